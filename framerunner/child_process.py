@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import resource
 import socket
 import sys
 import threading
@@ -255,3 +256,17 @@ def end_with_standard_input(clean_up: Callable[[], None]) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, name="lifeline", daemon=True).start()
+
+
+def limit_resources(memory_bytes: int, processor_s: int) -> None:
+    """Have this process fail with MemoryError, or be killed, above so much more memory or processor time."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        held_bytes = int(file.read().split()[5]) * resource.getpagesize()  # data and stacks
+    for what, limit in (
+        (resource.RLIMIT_DATA, held_bytes + memory_bytes),
+        (resource.RLIMIT_CPU, processor_s),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        hard = resource.getrlimit(what)[1]
+        wanted = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        resource.setrlimit(what, (wanted, wanted))

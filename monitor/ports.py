@@ -11,8 +11,9 @@ from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
 from wire.transports.vehicle_link import VehicleLink
 
-if TYPE_CHECKING:
-    from monitor.server import Monitor
+if TYPE_CHECKING:  # slow to import
+    from fastapi import APIRouter
+    from starlette.requests import HTTPConnection
 
 
 class Referee(Protocol):
@@ -73,6 +74,17 @@ class RunNotReadError(RunError):
     """A run that has to be read before its images can be had."""
 
 
+class Extension(Protocol):
+    """Addresses of the server that another room adds, such as the editor's flights."""
+
+    def router(self, may_act: Callable[[HTTPConnection], bool]) -> APIRouter:
+        """The addresses; `may_act` says whether a visitor may change something: fly, start, stop."""
+        ...
+
+    async def run(self) -> None:
+        """Serve until cancelled, then end all that was started."""
+
+
 @dataclass(frozen=True, slots=True)
 class Equipment:
     """What the monitor is given.
@@ -88,7 +100,7 @@ class Equipment:
             a drone without a referee of its own cannot be judged.
         camera_hosts: HOST or HOST:PORT from which video and referee may be fetched although a drone's packets
             come from elsewhere.
-        parts: further parts of the web application; each adds its pages and routes, and may add jobs.
+        extensions: more addresses.
     """
 
     open_link: Callable[[], VehicleLink]
@@ -99,4 +111,4 @@ class Equipment:
     runs: RunLibrary | None
     start_pose: Callable[[Scenario], tuple[float, float, float, float]] | None = None
     camera_hosts: tuple[str, ...] = ()
-    parts: tuple[Callable[[Monitor], None], ...] = ()
+    extensions: tuple[Extension, ...] = ()

@@ -34,6 +34,7 @@ MODULES = (
     "monitor.video_proxy",
     "monitor.pilot_channel",
     "monitor.replay_api",
+    "monitor.extensions",
     "monitor.competition.api",
     "monitor.competition.stage",
     "monitor.pages.shell",
@@ -43,7 +44,7 @@ MODULES = (
 )
 
 _END_S = 1
-_MAX_MESSAGE_BYTES = 1 << 17  # of a WebSocket; pages send some hundred bytes
+_MAX_MESSAGE_BYTES = 1 << 18  # of a WebSocket: a mission being edited; other pages send some hundred bytes
 
 
 @dataclass
@@ -119,8 +120,6 @@ def assemble(
     web.mount("/static", StaticBundles())
     for name in MODULES:
         import_module(name).register(monitor)
-    for part in equipment.parts:
-        part(monitor)
     return monitor
 
 

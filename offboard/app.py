@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
@@ -51,6 +51,9 @@ class Moment:
 
 
 Observer = Callable[[Moment], None]
+TickHook = Callable[[MissionEngine, DroneState], Awaitable[None]]
+"""Awaited before each tick with the drone's state at it. It may look at the engine, wait, and change its
+chart; `asyncio.CancelledError` ends the flight. Only for a vehicle whose time waits for the app."""
 logger = logging.getLogger(__name__)
 
 
@@ -82,6 +85,7 @@ async def fly_mission(
     box: Box | None = None,
     limits: CommandLimits = CONTEST,
     surroundings: Surroundings | None = None,
+    before_tick: TickHook | None = None,
 ) -> MissionEnd:
     """Connect, fly the mission, disconnect.
 
@@ -98,6 +102,7 @@ async def fly_mission(
         box: keeps the drone inside, whatever the mission commands; None: it may fly anywhere.
         limits: of the mission's commands.
         surroundings: what is known of the arena; a mission with `vision: frames` needs it.
+        before_tick: see `TickHook`; None costs nothing.
 
     Raises:
         DroneError: the drone cannot be reached or is not ready.
@@ -105,7 +110,7 @@ async def fly_mission(
     """
     keeper = None if box is None else KeepInBox(box)
     engine = MissionEngine(mission, surroundings=surroundings, limits=limits)
-    flight = _Flight(drone, perception, engine, limit_s, observer, keeper=keeper)
+    flight = _Flight(drone, perception, engine, limit_s, observer, keeper=keeper, before_tick=before_tick)
     try:
         await drone.connect()
         await perception.open()
@@ -128,6 +133,7 @@ class _Flight:
         observer: Observer | None,
         *,
         keeper: KeepInBox | None,
+        before_tick: TickHook | None,
     ) -> None:
         self._drone = drone
         self._perception = perception
@@ -135,6 +141,7 @@ class _Flight:
         self._limit_us = round(limit_s * MICROSECONDS)
         self._observer = observer
         self._keeper = keeper
+        self._before_tick = before_tick
         self._flying = False
         self._motors_requested = False
         self._landed = False
@@ -176,6 +183,8 @@ class _Flight:
         ticks = self._drone.ticks()
         try:
             async for state in ticks:
+                if self._before_tick is not None:
+                    await self._before_tick(self._engine, state)
                 if self._update_time(state.time_us):
                     return True
                 await self._tick(state)
@@ -325,6 +334,8 @@ class _Flight:
         end_us = None if self._landed else self._now_us + REST_US
         try:
             async for state in ticks:
+                if self._before_tick is not None:
+                    await self._before_tick(self._engine, state)
                 if end_us is None:
                     end_us = state.time_us + REST_US
                 if self._observer is not None:

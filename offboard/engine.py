@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Any
 from errors import UserError
 from offboard.chart.expressions import compile_value, names_in
 from offboard.chart.native import RESUME, TICK
-from offboard.chart.spec import Action, Leaf, Transition
+from offboard.chart.spec import Action, Leaf, enter_state, state_path
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
 from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.view import NavigationView
+from offboard.observation import ChartNow, check_change, guards_now, read_values, values_now
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
 from offboard.pilot_file import PilotFile, in_words, place_in
 from scenarios.models import COLOURS
@@ -49,6 +50,7 @@ class TransitionTaken:
             "resume" after a pause.
         values: each name of the guard that held with its value then, such as ("frame.d", 0.44), in the order
             of the guard; a name that could not be read is left out.
+        ids: the transition, and then each `then` that it led to; see `offboard.chart.spec.transition_id`.
     """
 
     source: str  # full id of the leaf that was left
@@ -57,6 +59,7 @@ class TransitionTaken:
     values: tuple[tuple[str, object], ...]
     time_us: int  # vehicle time
     seconds_in_source: float  # vehicle time without pauses
+    ids: tuple[str, ...] = ()
 
 
 class _FastState:
@@ -101,9 +104,7 @@ class MissionEngine:
         self.pilot = mission.new_pilot() if pilot is None else pilot
         self.pilot.limits = limits
         self._limits = limits
-        self._states = {
-            leaf_id: _FastState(leaf, leaf_id in mission.finishes) for leaf_id, leaf in mission.leaves.items()
-        }
+        self._states = _fast_states(mission)
         self._quiet_ticks = quiet_ticks
         self._navigator = _new_navigator(mission, surroundings, limits)
         self.pilot._navigator = self._navigator
@@ -196,6 +197,43 @@ class MissionEngine:
         if self._paused_us is None and self._present is not None:
             self._paused_us = time_us
 
+    def chart_now(self) -> ChartNow:
+        """The active states and what their guards read, computed at each call."""
+        present, pilot = self._present, self.pilot
+        active = state_path(self.state)
+        if present is None or present.finish:
+            return ChartNow(self.state, active, 0.0 if present is None else self._seconds_in_state())
+        return ChartNow(
+            self.state,
+            active,
+            self._seconds_in_state(),
+            guards_now(present.leaf, present.guards, pilot),
+            values_now(present.leaf.transitions, pilot),
+        )
+
+    def change(self, mission: Mission) -> None:
+        """Go on with a changed chart from the next tick on, in the same active state.
+
+        Nothing is entered or left. Times and the map are kept, and variables too, except one whose kind
+        changes; new variables have their first value.
+
+        Raises:
+            ChangeRefusedError: the active state is not in the changed chart, or it needs another vehicle,
+                pilot or perception; the mission in progress stays.
+        """
+        check_change(self.mission, mission, self.state)
+        states = _fast_states(mission)
+        if self._chart is not None:  # the library reads the active state from the pilot, and enters none
+            self._chart = mission.chart(model=self.pilot)
+            self._present = states[self.state]
+        self.mission, self._states = mission, states
+        memory, declared = vars(self.pilot.memory), mission.spec.variables
+        for name in set(memory) - set(declared):
+            del memory[name]
+        for name, first in declared.items():
+            if name not in memory or _kind(memory[name]) is not _kind(first):
+                memory[name] = first
+
     def _count_unseen(self, time_us: int) -> None:
         """Update the time since the pilot's frame was wholly in view."""
         pilot, seen_us = self.pilot, self._seen_us
@@ -217,7 +255,7 @@ class MissionEngine:
         pilot.seconds_in_mission = (time_us - self._started_us) / 1e6
         for number, guard in enumerate(present.guards):
             if guard(pilot):
-                self._take(present.leaf.transitions[number], time_us)
+                self._take(present.leaf, number, time_us)
                 return
         if self._quiet_ticks:
             for act in present.during:
@@ -230,26 +268,36 @@ class MissionEngine:
         self._paused_us = None
         self._started_us += time_us - paused_us
         self._entered_us += time_us - paused_us
-        if present.leaf.resume is None:
+        resume = present.leaf.resume
+        if resume is None:
             return False
+        ids = (present.leaf.resume_id, *enter_state(self.mission.states, resume.to)[1])
         source, seconds = self.state, (time_us - self._entered_us) / 1e6
         self.pilot.seconds_in_mission = (time_us - self._started_us) / 1e6
         cmd = self.pilot.cmd
         cmd.vel_x = cmd.vel_y = cmd.vel_z = cmd.rot_z = 0.0  # those of the state that is left
         self._chart.send(RESUME)
         self._settle(time_us)
-        self.transition = TransitionTaken(source, self.state, RESUME, (), time_us, seconds)
+        self.transition = TransitionTaken(source, self.state, RESUME, (), time_us, seconds, ids)
         return True
 
-    def _take(self, transition: Transition, time_us: int) -> None:
+    def _take(self, leaf: Leaf, number: int, time_us: int) -> None:
         """Let the chart take a transition whose guard holds, and record why."""
+        transition = leaf.transitions[number]
         source, seconds = self.state, self.pilot.seconds_in_state
-        values = _values(transition.when, self.pilot)  # now, because the actions on leaving may change them
+        values = read_values(
+            names_in(transition.when), self.pilot
+        )  # now, because the actions on leaving may change them
         self._chart.send(TICK)
         self._settle(time_us)
         arrived = self.state == transition.to or self.state.startswith(f"{transition.to}.")
         when = transition.when if arrived else DONE
-        self.transition = TransitionTaken(source, self.state, when, values, time_us, seconds)
+        ids = (leaf.transition_ids[number], *enter_state(self.mission.states, transition.to)[1])
+        self.transition = TransitionTaken(source, self.state, when, values, time_us, seconds, ids)
+
+    def _seconds_in_state(self) -> float:
+        until_us = self._last_us if self._paused_us is None else self._paused_us
+        return (until_us - self._entered_us) / 1e6
 
     def _settle(self, time_us: int) -> None:
         """Read the chart's present state."""
@@ -284,18 +332,17 @@ def _new_navigator(
     return Navigator(surroundings, limits)
 
 
-def _values(when: str, pilot: Pilot) -> tuple[tuple[str, object], ...]:
-    """The present values of the names of a guard."""
-    found = []
-    for name in names_in(when):
-        value: object = pilot
-        try:
-            for part in name.split("."):
-                value = getattr(value, part)
-        except (Exception, SystemExit):  # of a value that the guard itself did not read
-            continue
-        found.append((name, value))
-    return tuple(found)
+def _fast_states(mission: Mission) -> dict[str, _FastState]:
+    return {
+        leaf_id: _FastState(leaf, leaf_id in mission.finishes) for leaf_id, leaf in mission.leaves.items()
+    }
+
+
+def _kind(value: object) -> type:
+    """The kind of a variable's value; numbers are of one kind."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return float
+    return type(value)
 
 
 def _act(action: Action) -> Act:

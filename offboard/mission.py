@@ -13,7 +13,15 @@ from statemachine import StateChart
 from offboard.chart.check import check, is_finish
 from offboard.chart.messages import Message
 from offboard.chart.native import load_chart, native_document
-from offboard.chart.problems import MissionError, Place, Problem, ProblemList, did_you_mean, mission_error
+from offboard.chart.problems import (
+    MissionError,
+    Place,
+    Problem,
+    ProblemList,
+    cut,
+    did_you_mean,
+    mission_error,
+)
 from offboard.chart.read import read_mission_file
 from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
 from offboard.pilot import Pilot
@@ -21,7 +29,15 @@ from offboard.pilot_file import PilotFile
 from scenarios.models import MissionClass
 from vision.types import Vision
 
-__all__ = ["Mission", "MissionError", "list_missions", "load_mission", "mermaid", "new_mission"]
+__all__ = [
+    "Mission",
+    "MissionError",
+    "list_missions",
+    "load_mission",
+    "mermaid",
+    "mission_from_text",
+    "new_mission",
+]
 
 MAX_FILE_BYTES = 1_000_000
 MISSIONS = Path(__file__).parent / "missions"
@@ -69,6 +85,11 @@ class Mission:
         return f"class {self.mission_class}, vision {self.vision}"
 
     @cached_property
+    def states(self) -> dict[str, State]:
+        """All states, superstates too, by full id, in document order."""
+        return {state.id: state for state in all_states(self.spec.states)}
+
+    @cached_property
     def leaves(self) -> dict[str, Leaf]:
         """States without states of their own, by full id."""
         return {leaf.state.id: leaf for leaf in leaves(self.spec.states)}
@@ -76,8 +97,7 @@ class Mission:
     @cached_property
     def finishes(self) -> frozenset[str]:
         """States in which the mission is over."""
-        states = {state.id: state for state in all_states(self.spec.states)}
-        return frozenset(leaf_id for leaf_id in self.leaves if is_finish(states, leaf_id))
+        return frozenset(leaf_id for leaf_id in self.leaves if is_finish(self.states, leaf_id))
 
     def new_pilot(self) -> Pilot:
         """A pilot with the mission's own variables; `MissionError` if a contestant's class fails."""
@@ -102,11 +122,39 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
     Raises:
         MissionError: every problem, one a line, as `file:line: text`.
     """
-    pilot = Pilot if pilot is None else pilot
     path = _find(str(name_or_path), Path.cwd(), Place(str(name_or_path)))
+    return _checked(read_mission_file(_read_text(path), path), path, pilot)
+
+
+def mission_from_text(
+    text: str, pilot: PilotFile | type[Pilot] | None = None, *, file: str = "mission.yaml"
+) -> Mission:
+    """Load a mission that is not in a file, as `load_mission`; it may extend missions of the package only.
+
+    Args:
+        text: as a mission file has it.
+        pilot: see `load_mission`.
+        file: its name in messages; nothing is read there.
+
+    Raises:
+        MissionError: every problem, one a line, as `file:line: text`.
+    """
+    path = Path(file)
+    if len(text) > MAX_FILE_BYTES:
+        raise mission_error(Place(path.name), Message("file.too_large"))
+    written = read_mission_file(text.replace("\r\n", "\n").replace("\r", "\n"), path)
+    if written.extends and written.extends not in list_missions():
+        known = ", ".join(list_missions())
+        message = Message("extends.package_only", name=cut(written.extends), names=known)
+        raise mission_error(written.place, message)
+    return _checked(written, path, pilot)
+
+
+def _checked(written: MissionFile, path: Path, pilot: PilotFile | type[Pilot] | None) -> Mission:
+    pilot = Pilot if pilot is None else pilot
     problems = ProblemList()
     pilot_class = pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot
-    spec = expand_and_check(read_mission_file(_read_text(path), path), pilot_class, problems)
+    spec = expand_and_check(written, pilot_class, problems)
     problems.raise_if_any()
     mission = Mission(
         spec.name,

@@ -6,7 +6,6 @@ import asyncio
 import os
 import resource
 import sys
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,9 +14,7 @@ from cyclopts import Parameter
 from framerunner.commands import WholeNumber, check_range, say
 
 if TYPE_CHECKING:
-    from framerunner.editing.documents.desk import EditorDesk
     from monitor.ports import Equipment
-    from monitor.server import Monitor
     from scenarios.models import Scenario
 
 PASSWORD_VARIABLE = "FRAMERUNNER_JUDGE_PASSWORD"
@@ -102,6 +99,8 @@ def equipment(
 ) -> Equipment:
     """What the monitor, which may not import other rooms' functions, is given of them."""
     from framerunner.editing.documents.desk import EditorDesk
+    from framerunner.editing.documents.door import DocumentsDoor
+    from framerunner.editing.web import EditingDoor
     from framerunner.flying.plan import FlightPlan
     from framerunner.monitoring.run_library import RunFolders
     from monitor.ports import Equipment
@@ -117,15 +116,8 @@ def equipment(
         runs=RunFolders(runs),
         start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,
-        parts=(partial(_add_editor, desk=EditorDesk(missions)),),
+        extensions=(EditingDoor(), DocumentsDoor(EditorDesk(missions))),
     )
-
-
-def _add_editor(monitor: Monitor, desk: EditorDesk) -> None:
-    """Add the editor; its libraries are imported with the monitor's, in a thread."""
-    from framerunner.editing.documents.api import register
-
-    register(monitor, desk)
 
 
 def _allow_many_files() -> None:

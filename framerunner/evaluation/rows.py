@@ -33,10 +33,12 @@ class Row(FlightResult):
     Attributes:
         track: reduced to fewer samples; only of flights that failed, and not in the files of rows.
         traceback: of the fault that ended the flight; empty if there was none, not in the files of rows.
+        transitions: how often each was taken, by id; only if asked for, and not in the files of rows.
     """
 
     track: Track | None = Field(None, exclude=True, repr=False)
     traceback: str = Field("", exclude=True, repr=False)
+    transitions: Mapping[str, int] = Field({}, exclude=True, repr=False)
 
     @property
     def ended_in(self) -> str:

@@ -23,11 +23,13 @@ from framerunner.evaluation.backends import Pool, Workers, is_lost_worker, open_
 from framerunner.evaluation.rows import Row
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
+from framerunner.runs.chart_record import ChartRecord
 from framerunner.runs.track import Track
 from offboard.mission import Mission
 from scenarios.verdict import Verdict
 
 _PARENT_CHECK_S = 0.5
+_AGAIN_S = 2.0  # processor time after which a flight that goes on is ended once more
 TRACK_STEP_S = 0.2
 """Between two samples that are kept for a plot."""
 _ONE_AT_A_TIME = threading.Lock()
@@ -36,6 +38,27 @@ _ONE_AT_A_TIME = threading.Lock()
 
 class WorkerDiedError(Exception):
     """The process of a flight ended before the flight, by its own code or from outside."""
+
+
+class FlightTooLongError(Exception):
+    """A flight used too much processor time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What a flight may use, and what is kept of it.
+
+    Attributes:
+        processor_s: processor time; a flight that uses more ends, mostly in its mission, with the reason.
+            None: no limit. It holds in a process's main thread only.
+        whole: keep of every flight the track and the counts of transitions, not only tracks of failed ones.
+    """
+
+    processor_s: float | None = None
+    whole: bool = False
+
+
+NO_LIMITS = Terms()
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +71,10 @@ class _Task:
     plan: FlightPlan
     mission: bytes
     sender: int
+    terms: Terms
 
 
-def fly_all(tasks: Iterable[FlightPlan], pool: Pool) -> Generator[Row, None, None]:
+def fly_all(tasks: Iterable[FlightPlan], pool: Pool, terms: Terms = NO_LIMITS) -> Generator[Row, None, None]:
     """Fly all plans.
 
     Only a few are taken from `tasks` at a time, and nothing is kept of those that have ended. If a worker
@@ -60,6 +84,7 @@ def fly_all(tasks: Iterable[FlightPlan], pool: Pool) -> Generator[Row, None, Non
     Args:
         tasks: plans; their scenarios have different names.
         pool: where they are flown.
+        terms: of each flight.
 
     Yields:
         Rows as the flights end, in any order.
@@ -69,29 +94,30 @@ def fly_all(tasks: Iterable[FlightPlan], pool: Pool) -> Generator[Row, None, Non
     """
     if pool.backend == "loky" and pool.jobs == 1:  # no other process is needed
         _prepare_process()
-        yield from map(fly_task, tasks)
+        for task in tasks:
+            yield fly_task(task, terms)
         return
     waiting = iter(tasks)
     with open_pool(pool) as workers:
         while True:
             running: dict[str, FlightPlan] = {}
             try:
-                yield from _fly_in_pool(waiting, workers, running)
+                yield from _fly_in_pool(waiting, workers, running, terms)
             except Exception as error:
                 if not is_lost_worker(error):
                     raise
             else:
                 return
-            yield from (fly_alone(task) for task in list(running.values()))
+            yield from (fly_alone(task, terms) for task in list(running.values()))
 
 
 def _fly_in_pool(
-    waiting: Iterator[FlightPlan], workers: Workers, running: dict[str, FlightPlan]
+    waiting: Iterator[FlightPlan], workers: Workers, running: dict[str, FlightPlan], terms: Terms
 ) -> Iterator[Row]:
     """Fly in the pool; `running` gets the plans that were sent and whose rows have not been received."""
     from joblib import delayed
 
-    packer = _Packer()
+    packer = _Packer(terms)
 
     def calls() -> Iterator[Any]:
         for plan in waiting:
@@ -113,21 +139,22 @@ def _fly_in_pool(
 class _Packer:
     """Makes tasks of plans; pickles a mission once."""
 
-    def __init__(self) -> None:
+    def __init__(self, terms: Terms) -> None:
+        self._terms = terms
         self._mission: Mission | None = None
         self._packed = b""
 
     def task(self, plan: FlightPlan) -> _Task:
         if plan.mission is not self._mission:
             self._mission, self._packed = plan.mission, pickle.dumps(plan.mission)
-        return _Task(replace(plan, mission=None), self._packed, os.getpid())
+        return _Task(replace(plan, mission=None), self._packed, os.getpid(), self._terms)
 
 
-def fly_alone(plan: FlightPlan) -> Row:
+def fly_alone(plan: FlightPlan, terms: Terms = NO_LIMITS) -> Row:
     """Fly in a new process, which may die."""
     context = get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_send_flight, args=(_Packer().task(plan), sender), daemon=True)
+    process = context.Process(target=_send_flight, args=(_Packer(terms).task(plan), sender), daemon=True)
     with _sigint_blocked():
         process.start()
     sender.close()
@@ -160,7 +187,7 @@ def _fly_in_worker(task: _Task) -> Row:
     _prepare_process()
     if os.getppid() == task.sender:
         _end_with(task.sender)
-    return fly_task(replace(task.plan, mission=_unpack(task.mission)))
+    return fly_task(replace(task.plan, mission=_unpack(task.mission)), task.terms)
 
 
 @lru_cache(maxsize=1)
@@ -211,8 +238,34 @@ def _sigint_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def fly_task(plan: FlightPlan) -> Row:
+@contextmanager
+def processor_limit(limit_s: float | None) -> Iterator[None]:
+    """Raise `FlightTooLongError` within when this process has used so much processor time; None: never.
+
+    It is raised again and again, in case something catches it. Only a process's main thread has a limit.
+    """
+    if limit_s is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(_signal: int, _frame: object) -> None:
+        raise FlightTooLongError(f"more than {limit_s:g} s of processor time; its mission computes too much")
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, limit_s, _AGAIN_S)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def fly_task(plan: FlightPlan, terms: Terms = NO_LIMITS) -> Row:
     """Fly a plan with a mission.
+
+    Args:
+        plan: what is flown.
+        terms: what it may use, and what is kept.
 
     Returns:
         The flight's row; with the verdict "error" and a traceback if the program failed.
@@ -220,9 +273,10 @@ def fly_task(plan: FlightPlan) -> Row:
     Raises:
         KeyboardInterrupt: Ctrl-C was pressed.
     """
+    chart = ChartRecord() if terms.whole else None
     try:
-        with _ONE_AT_A_TIME:
-            flown = fly_lockstep(plan)
+        with _ONE_AT_A_TIME, processor_limit(terms.processor_s):
+            flown = fly_lockstep(plan, observers=() if chart is None else (chart.see,))
         if flown.outcome.interrupted:
             raise KeyboardInterrupt
     except KeyboardInterrupt:
@@ -230,8 +284,9 @@ def fly_task(plan: FlightPlan) -> Row:
     except BaseException as error:  # a contestant's code may raise anything, SystemExit too
         return _error_row(plan, error)
     _keep_imports()
-    track = None if flown.result.verdict is Verdict.CLEAN else thinned(flown.track)
-    return Row(**dict(flown.result), track=track)
+    has_track = terms.whole or flown.result.verdict is not Verdict.CLEAN
+    track = thinned(flown.track) if has_track else None
+    return Row(**dict(flown.result), track=track, transitions={} if chart is None else dict(chart.counts))
 
 
 def _error_row(plan: FlightPlan, error: BaseException) -> Row:

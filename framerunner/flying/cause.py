@@ -11,7 +11,7 @@ from offboard.app import MissionEnd, Moment
 from offboard.navigation.view import NavigationView
 from scenarios.crossing import Boundary
 from scenarios.models import COLOURS, Frame, Scenario
-from scenarios.result import RefereeReport
+from scenarios.result import FlightResult, RefereeReport
 from scenarios.verdict import Verdict
 
 SAME_FRAME_M = 1.0  # an estimate of a frame's colour that is farther away is of something else
@@ -115,6 +115,19 @@ class CauseWatch:
         return words
 
 
+def lost_in(result: FlightResult, track: Track) -> str:
+    """The mission's state in which a flight was lost or, if it was completed, in which it touched something.
+
+    Returns:
+        "" of a clean flight, and where it is not known.
+    """
+    if result.verdict is Verdict.CRASHED:
+        return _state_at(track, result.try_time_s)
+    if not result.completed:
+        return result.mission_state
+    return _state_at(track, result.contact_times_s[0]) if result.contact_times_s else ""
+
+
 def _outside(flown: Flown) -> str:
     """Where the drone first left the arena."""
     if not flown.report.outside_s:
@@ -163,7 +176,16 @@ def _at(track: Track, time_s: float) -> str:
     words = f"at {time_s:.1f} s"
     if not len(track):
         return words
-    index = min(max(bisect_right(track.time_s, time_s) - 1, 0), len(track) - 1)
+    index = _index_at(track, time_s)
     state = f" in {track.mission_state[index]}" if track.mission_state[index] else ""
     x, y, z = track.x[index], track.y[index], track.z[index]
     return f"{words}{state} at ({x:.2f}, {y:.2f}, {z:.2f})"
+
+
+def _state_at(track: Track, time_s: float) -> str:
+    return track.mission_state[_index_at(track, time_s)] if len(track) else ""
+
+
+def _index_at(track: Track, time_s: float) -> int:
+    """The last sample until a time, or the first one."""
+    return min(max(bisect_right(track.time_s, time_s) - 1, 0), len(track) - 1)

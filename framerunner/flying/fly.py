@@ -16,7 +16,7 @@ from framerunner.flying.envelopes import bound_s
 from framerunner.flying.judges import Judge
 from framerunner.flying.plan import FlightPlan
 from framerunner.runs.track import Track, TrackRecorder
-from offboard.app import MissionEnd, Moment, Observer, fly_mission
+from offboard.app import MissionEnd, Moment, Observer, TickHook, fly_mission
 from offboard.drone import Drone
 from offboard.perception import Perception
 from scenarios.faults.outcome import fault_fields
@@ -43,6 +43,7 @@ async def fly(
     *,
     run: Run | None = None,
     measured: Callable[[], Mapping[str, Any]] = dict,
+    before_tick: TickHook | None = None,
 ) -> FinishedFlight:
     """Fly a plan's mission from connecting to the verdict.
 
@@ -54,6 +55,7 @@ async def fly(
         observers: called at every tick, in this order; must be quick.
         run: awaits the flight itself, without the judgement; for what must be done around it.
         measured: called at the end; further fields of the result, such as `timing`.
+        before_tick: awaited before each tick of the mission; only in lockstep.
 
     Raises:
         DroneError: the drone cannot be reached or made ready.
@@ -77,6 +79,7 @@ async def fly(
         box=plan.box,
         limits=plan.command_limits,
         surroundings=plan.surroundings,
+        before_tick=before_tick,
     )
     outcome = await (flight if run is None else run(flight))
     report = await judge.report(

@@ -20,7 +20,7 @@ from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import LateResponse
-from offboard.app import Moment, Observer
+from offboard.app import Moment, Observer, TickHook
 from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraSilentError, ImageChoice
 from scenarios.models import Scenario, TrueState
 from scenarios.result import FaultFacts, RefereeReport, RefereeSnapshot
@@ -48,9 +48,19 @@ def fly_lockstep(
 
 
 async def lockstep_flight(
-    plan: FlightPlan, *, observers: Sequence[Observer] = (), on_image: ImageObserver | None = None
+    plan: FlightPlan,
+    *,
+    observers: Sequence[Observer] = (),
+    on_image: ImageObserver | None = None,
+    before_tick: TickHook | None = None,
 ) -> FinishedFlight:
     """Fly a plan as fast as the machine can; its seed is of wind and of what else is random.
+
+    Args:
+        plan: with a mission.
+        observers: called at every tick, in this order; must be quick.
+        on_image: called with each image.
+        before_tick: awaited before each tick, while simulated time stands still; see `RunControl`.
 
     Raises:
         DroneError: the drone does not get ready.
@@ -65,6 +75,7 @@ async def lockstep_flight(
         _SimulationJudge(vehicle),
         observers,
         measured=lambda: {"state_sha256": states.hexdigest()},
+        before_tick=before_tick,
     )
 
 

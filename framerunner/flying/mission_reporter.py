@@ -27,6 +27,7 @@ from wire.mission_tunnel import (
 STATE_TICKS = 2  # 10 Hz of vehicle time
 HISTORY = 10
 _TEXT_CHARACTERS = 80  # of a guard's value that is not a number
+_DIGITS = 6  # of a guard's value: more would take more pieces, and so longer to arrive
 _EXACT = 2**53  # larger integers lose digits in some JSON readers
 
 logger = logging.getLogger(__name__)
@@ -179,12 +180,13 @@ def _transition_json(taken: TransitionTaken) -> dict[str, object]:
         "to": taken.target,
         "time_us": taken.time_us,
         "when": taken.when,
-        "values": [[name, _plain(value)] for name, value in taken.values],
-        "seconds": taken.seconds_in_source,
+        "values": [[name, plain_value(value)] for name, value in taken.values],
+        "seconds": round(taken.seconds_in_source, 3),
+        "ids": list(taken.ids),
     }
 
 
-def _plain(value: object) -> object:
+def plain_value(value: object) -> object:
     """A value of a guard as JSON; a contestant's pilot may hold any type."""
     if value is None or isinstance(value, bool):
         return value
@@ -192,7 +194,7 @@ def _plain(value: object) -> object:
         return int(value)
     try:
         if not isinstance(value, str) and hasattr(value, "__float__"):
-            return float(value)
+            return float(f"{float(value):.{_DIGITS}g}")
         return str(value)[:_TEXT_CHARACTERS]
     except Exception:  # any that a contestant's conversion raises
         return type(value).__name__

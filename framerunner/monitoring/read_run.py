@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import resource
 import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -20,13 +19,14 @@ from typing import Any
 
 import cv2
 
-from framerunner.child_process import end_with_standard_input
+from framerunner.child_process import end_with_standard_input, limit_resources
 from framerunner.flying.navigation_reporter import navigation_json
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.events import RecordingError
 from framerunner.recording.open_recording import recorded_flight
 from offboard.app import Moment
-from offboard.engine import TransitionTaken
+from offboard.chart.spec import enter_state
+from offboard.engine import DONE, TransitionTaken
 from offboard.mission import Mission, MissionError, load_mission, mermaid
 from offboard.navigation.view import NavigationView
 from scenarios.loader import load_scenario
@@ -67,20 +67,6 @@ def main() -> int:
         print(" ".join(str(error).split()), file=sys.stderr)
         return 2
     return 0
-
-
-def limit_resources(memory_bytes: int, processor_s: int) -> None:
-    """Have this process fail with MemoryError, or be killed, above so much more memory or processor time."""
-    with open("/proc/self/statm", encoding="ascii") as file:
-        held_bytes = int(file.read().split()[5]) * resource.getpagesize()  # data and stacks
-    for what, limit in (
-        (resource.RLIMIT_DATA, held_bytes + memory_bytes),
-        (resource.RLIMIT_CPU, processor_s),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        hard = resource.getrlimit(what)[1]
-        wanted = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
-        resource.setrlimit(what, (wanted, wanted))
 
 
 def read_run(folder: Path, target: Path) -> None:
@@ -237,6 +223,7 @@ def _transitions(flight: CollectedFlight, clock: Clock, mission: Mission | None)
         if taken is None:
             when = _guard(mission, state, moment.mission_state)
             taken = TransitionTaken(state, moment.mission_state, when, (), now_us, (now_us - since_us) / 1e6)
+        ids = taken.ids or _ids(mission, taken)
         found.append(
             {
                 "time_s": clock(now_us),
@@ -245,6 +232,7 @@ def _transitions(flight: CollectedFlight, clock: Clock, mission: Mission | None)
                 "when": taken.when[:_MAX_TEXT],
                 "values": [[name[:_MAX_TEXT], _plain(value)] for name, value in taken.values],
                 "seconds": round(taken.seconds_in_source, 3),
+                "ids": [name[:_MAX_TEXT] for name in ids],
             }
         )
         state, since_us = moment.mission_state, now_us
@@ -258,6 +246,19 @@ def _guard(mission: Mission | None, source: str, target: str) -> str:
         return ""
     guards = {each.when for each in leaf.transitions if target == each.to or target.startswith(f"{each.to}.")}
     return guards.pop() if len(guards) == 1 else ""
+
+
+def _ids(mission: Mission | None, taken: TransitionTaken) -> tuple[str, ...]:
+    """Which transition it was, if only one can have been; recordings of older versions do not say."""
+    leaf = None if mission is None else mission.leaves.get(taken.source)
+    if mission is None or leaf is None:
+        return ()
+    found = []
+    for name, each in zip(leaf.transition_ids, leaf.transitions, strict=True):
+        arrived, followed = enter_state(mission.states, each.to)
+        if arrived == taken.target and taken.when in (each.when, DONE):
+            found.append((name, *followed))
+    return found[0] if len(found) == 1 else ()
 
 
 def _plain(value: object) -> object:

@@ -50,6 +50,7 @@ from vision.types import Detection, Detections, Image
 _MAX_TEXT_BYTES = 1_000_000  # of a message that is no image
 _MAX_FRAMES = 100  # of a map, and points of a path, that are kept
 _MAX_PATH = 1000
+_MAX_IDS = 100  # of the transitions of one tick
 _PNG_START = b"\x89PNG\r\n\x1a\n"
 Json = dict[str, Any]
 
@@ -241,6 +242,7 @@ def _transition(time_us: int, message: Json) -> TransitionTaken | None:
         values,
         time_us,
         float(message["previous_s"]),
+        tuple(map(str, message.get("transitions", ())[:_MAX_IDS])),
     )
 
 

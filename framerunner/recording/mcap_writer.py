@@ -84,7 +84,7 @@ class FlightRecording:
         self._now_us = time_us
         if self._first_us is None:
             self._first_us = time_us
-        if moment.mission_state != self._state:
+        if moment.mission_state != self._state or moment.transition is not None:
             self._enter_state(moment)
         if moment.detections != self._detections:
             self._detect(moment.detections, time_us)

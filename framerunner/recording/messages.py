@@ -201,7 +201,8 @@ def mission_state(moment: Moment, previous: str, previous_s: float) -> Message:
     taken = moment.transition
     guard: Message = {}
     if taken is not None:
-        guard = {"when": taken.when, "values": [_guard_value(*each) for each in taken.values]}
+        values = [_guard_value(*each) for each in taken.values]
+        guard = {"when": taken.when, "values": values, "transitions": list(taken.ids)}
     return {
         "timestamp": time_of(moment.state.time_us),
         "flight_time_s": moment.flight_time_s,

@@ -248,7 +248,7 @@ _OWN = (
     ),
     _object(
         "framerunner.MissionState",
-        optional=("when", "values"),
+        optional=("when", "values", "transitions"),
         timestamp=_TIME,
         flight_time_s=_FLIGHT_TIME,
         state=_field("string", "entered, such as red.turning"),
@@ -256,6 +256,7 @@ _OWN = (
         previous_s=_field("number", "time spent in it, seconds"),
         when=_field("string", "the guard that held"),
         values={"type": "array", "items": _VALUE},
+        transitions=_array(_field("string", "taken: a transition and each `then` it led to")),
     ),
     _object(
         "framerunner.Crossing",

@@ -54,6 +54,7 @@ class _Transition(_Lenient):
     when: str = Field("", max_length=2000)
     values: list[tuple[Name, float | bool | int | str | None]] = Field([], max_length=100)
     seconds: float | None = None
+    ids: list[Name] = Field([], max_length=100)  # of older apps: none
 
 
 class _History(_Lenient):
@@ -197,6 +198,7 @@ class MissionView:
                 "when": each.when,
                 "values": each.values,
                 "seconds": each.seconds,
+                "ids": each.ids,
             }
             for each in reversed(transitions)
         ]

@@ -11,7 +11,7 @@ it, then as a full id.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -26,6 +26,7 @@ MAX_PARTS = 20_000
 """Transitions and actions of all states, each with those of the superstates around it."""
 MAX_CHARACTERS = 100_000
 """Of the expressions of all states, counted likewise."""
+THEN, RESUME = "then", "resume"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +105,21 @@ class Leaf:
     transitions: tuple[Transition, ...]  # its own, then those of the superstates, in order of priority
     during: tuple[Action, ...]  # its own, then those of the superstates
     resume: Transition | None  # its own or, without one, that of the nearest superstate that has one
+    transition_ids: tuple[str, ...] = ()  # of each transition, see `transition_id`
+    resume_id: str = ""  # of `resume`; empty without one
+
+
+def transition_id(state: str, which: int | str) -> str:
+    """The id of a transition: full id of the state that declares it, and which of its transitions it is.
+
+    Args:
+        state: such as "red.turning"; a superstate's transition has the superstate's id wherever it is taken.
+        which: its number in the document, from 1, as diagrams show it; `THEN` or `RESUME`.
+
+    Returns:
+        Such as "red.turning/2", "red/then" or "red/resume".
+    """
+    return f"{state}/{which}"
 
 
 def leaves(states: tuple[State, ...], outer: tuple[State, ...] = ()) -> list[Leaf]:
@@ -116,9 +132,38 @@ def leaves(states: tuple[State, ...], outer: tuple[State, ...] = ()) -> list[Lea
         around = (state, *outer)
         transitions = () if state.final else tuple(t for s in around for t in s.transitions)
         during = () if state.final else tuple(a for s in around for a in s.during)
-        resume = None if state.final else next((s.resume for s in around if s.resume), None)
-        found.append(Leaf(state, transitions, during, resume))
+        numbered = () if state.final else around
+        ids = tuple(transition_id(s.id, n) for s in numbered for n, _ in enumerate(s.transitions, 1))
+        resumed = None if state.final else next((s for s in around if s.resume), None)
+        resume, resume_id = (
+            (None, "") if resumed is None else (resumed.resume, transition_id(resumed.id, RESUME))
+        )
+        found.append(Leaf(state, transitions, during, resume, ids, resume_id))
     return found
+
+
+def enter_state(states: Mapping[str, State], target: str) -> tuple[str, tuple[str, ...]]:
+    """Which leaf is active after a state is entered, and the ids of the `then`s that were followed at once.
+
+    Args:
+        states: all of the expanded chart, by full id.
+        target: full id of the state that is entered.
+    """
+    followed: list[str] = []
+    while True:
+        while states[target].states:
+            target = f"{target}.{states[target].initial}"
+        outer = states.get(target.rpartition(".")[0])
+        if not states[target].final or outer is None or not outer.then or len(followed) == len(states):
+            return target, tuple(followed)
+        followed.append(transition_id(outer.id, THEN))
+        target = outer.then
+
+
+def state_path(state: str) -> tuple[str, ...]:
+    """Full ids of the superstates around a state and of the state itself, outermost first; none of ""."""
+    parts = state.split(".") if state else []
+    return tuple(".".join(parts[:number]) for number in range(1, len(parts) + 1))
 
 
 def all_states(states: tuple[State, ...]) -> list[State]:

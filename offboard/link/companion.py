@@ -43,6 +43,10 @@ _TUNNEL_BYTES = 128
 _MAX_PACKETS_A_BEAT = 1000
 _MAVLINK_2 = 0xFD  # the first byte of a packet
 
+_URGENT = (DocumentKind.HISTORY,)
+# Pieces not sent yet: the mission's own document is the longest, and maps are many.
+_IN_ORDER = (*_URGENT, DocumentKind.RESULT, DocumentKind.MISSION, DocumentKind.MAP)
+
 logger = logging.getLogger(__name__)
 
 
@@ -66,6 +70,7 @@ class Companion:
         self._unsent: dict[DocumentKind, deque[bytes]] = {}
         self._next_repeated = 0
         self._beats = 0
+        self._early = 0  # pieces that were sent before their beat
         self._state = b""
         self._state_s = -inf
         self._text_id = 0
@@ -115,9 +120,15 @@ class Companion:
             logger.warning("not sent: %s", error)
 
     def send_document(self, kind: DocumentKind, pieces: list[bytes]) -> None:
-        """Send a document of `split_document` at the next beats, then repeat it in turn with the others."""
+        """Send a document of `split_document` at the next beats, then repeat it in turn with the others.
+
+        A history's first pieces are sent at once, so that a transition is known 0.1 s after it was taken; the
+        other documents wait for as many pieces longer.
+        """
         self._documents[kind] = pieces
         self._unsent[kind] = deque(pieces)
+        if kind is DocumentKind.HISTORY and not self._early:
+            self._early = self._send_new_pieces(_URGENT)
 
     def is_sending(self, kind: DocumentKind) -> bool:
         """Whether pieces of a new document of this kind still wait."""
@@ -144,14 +155,20 @@ class Companion:
             return
         if self._state and time.monotonic() - self._state_s > SILENT_S:
             self._send_state()
-        for _ in range(PIECES_A_BEAT):
-            piece = self._next_unsent()
-            if piece is None:
-                break
-            self._send_tunnel(DOCUMENT_TYPE, piece)
+        sent = self._send_new_pieces(_URGENT if self._early else _IN_ORDER)
+        self._early = max(0, self._early + sent - PIECES_A_BEAT)
         if self._beats % REPEAT_BEATS == 0:
             self._repeat_piece()
         self._beats += 1
+
+    def _send_new_pieces(self, kinds: tuple[DocumentKind, ...]) -> int:
+        """Send a beat's pieces of new documents of some kinds; returns how many there were."""
+        for number in range(PIECES_A_BEAT):
+            piece = None if self._peer is None else self._next_unsent(kinds)
+            if piece is None:
+                return number
+            self._send_tunnel(DOCUMENT_TYPE, piece)
+        return PIECES_A_BEAT
 
     async def send_finally(self, kind: DocumentKind) -> None:
         """Send all of a document twice, before the link is closed. Takes 0.3 s."""
@@ -187,9 +204,8 @@ class Companion:
         source, message_id = (data[5:7], data[7:10]) if data[0] == _MAVLINK_2 else (data[3:5], data[5:6])
         return source == self._autopilot and not any(message_id)
 
-    def _next_unsent(self) -> bytes | None:
-        """A piece not sent yet; the mission's own document is the longest, and maps are many."""
-        for kind in (DocumentKind.RESULT, DocumentKind.HISTORY, DocumentKind.MISSION, DocumentKind.MAP):
+    def _next_unsent(self, kinds: tuple[DocumentKind, ...]) -> bytes | None:
+        for kind in kinds:
             if self._unsent.get(kind):
                 return self._unsent[kind].popleft()
         return None

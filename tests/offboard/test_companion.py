@@ -134,9 +134,12 @@ async def test_a_document_is_sent_at_once_then_again_and_again_two_pieces_a_seco
     assert len(mission) > 5 and len(history) == 1
     companion.send_document(DocumentKind.MISSION, mission)
     companion.send_document(DocumentKind.HISTORY, history)
-    companion.beat()
     sent = payloads(forwarder.received(), 0x8F12)
-    assert sent == [*history, *mission[: module.PIECES_A_BEAT - 1]]  # the long one waits for the others
+    assert sent == history  # at once
+    companion.beat()
+    companion.beat()
+    sent += payloads(forwarder.received(), 0x8F12)
+    assert sent == [*history, *mission[: module.PIECES_A_BEAT]]
     for _ in range(len(mission) // module.PIECES_A_BEAT):
         companion.beat()
     sent += payloads(forwarder.received(), 0x8F12)
@@ -162,6 +165,25 @@ async def test_maps_wait_for_all_other_documents(pair):
     companion.beat()
     assert not companion.is_sending(DocumentKind.MAP)
     assert navigation[0] in payloads(forwarder.received(), 0x8F12)
+
+
+async def test_a_transition_is_sent_within_two_beats_of_being_taken(pair):
+    companion, forwarder = pair
+    noise = "".join(map(str, range(900)))
+    companion.send_document(DocumentKind.MAP, split_document(DocumentKind.MAP, {"goal": noise})[1])
+    texts = [f"state_{number} -> state_{number + 1}: frame.d < 0.{number}" for number in range(40)]
+    history = split_document(DocumentKind.HISTORY, {"transitions": texts})[1][:5]  # as long as ten of them
+    companion.beat()
+    companion.send_document(DocumentKind.HISTORY, history)
+    for _ in range(2):
+        companion.beat()
+    sent = payloads(forwarder.received(), 0x8F12)
+    assert set(history) < set(sent)
+    assert 2 * module.BEAT_S <= 0.1
+    for _ in range(40):  # the map is not sent faster for it
+        companion.send_document(DocumentKind.HISTORY, history)
+        companion.beat()
+    assert len(payloads(forwarder.received(), 0x8F12)) <= 40 * module.PIECES_A_BEAT + 2 + 4
 
 
 async def test_of_a_document_only_the_newest_version_is_sent(pair):

@@ -152,7 +152,13 @@ def test_a_transition_tells_its_guard_and_what_its_names_were():
     assert driver.engine.transition is None
     driver.tick(cam=see("red", NEAR))
     assert driver.engine.transition == TransitionTaken(
-        "red.frame_visible", "red.frame_close", "frame.d < 0.45", (("frame.d", 0.44),), driver.time_us, 0.1
+        "red.frame_visible",
+        "red.frame_close",
+        "frame.d < 0.45",
+        (("frame.d", 0.44),),
+        driver.time_us,
+        0.1,
+        ("red.frame_visible/1",),
     )
     driver.tick(cam=see("red", NEAR))
     taken = driver.engine.transition
@@ -165,7 +171,13 @@ def test_a_superstate_that_is_done_is_told_with_the_leaves_on_both_sides():
     driver = Driver().to("red.going_up")
     driver.tick(after_s=2.0)
     assert driver.engine.transition == TransitionTaken(
-        "red.going_up", "green.go_to_center", "done", (("seconds_in_state", 2.0),), driver.time_us, 2.0
+        "red.going_up",
+        "green.go_to_center",
+        "done",
+        (("seconds_in_state", 2.0),),
+        driver.time_us,
+        2.0,
+        ("red.going_up/1", "red/then"),
     )
 
 

@@ -73,7 +73,9 @@ def moment(tick, mission_state="red.turning", **changes):
 
 
 def taken(number, source="red.turning", target="red.frame_visible", values=()):
-    return TransitionTaken(source, target, "frame.d < 1", values, 50_000 * number, 0.05 * number)
+    return TransitionTaken(
+        source, target, "frame.d < 1", values, 50_000 * number, 0.05 * number, (f"{source}/1",)
+    )
 
 
 def test_the_mission_is_sent_before_it_begins():
@@ -178,6 +180,7 @@ def test_the_history_keeps_the_last_ten_with_the_values_of_their_guards():
             ["memory.none", None],
         ],
         "seconds": pytest.approx(0.55),
+        "ids": ["red.turning/1"],
     }
 
 

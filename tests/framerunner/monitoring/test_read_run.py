@@ -18,6 +18,7 @@ from framerunner.recording.mcap_writer import FlightRecording
 from monitor.ports import RunError
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
+from offboard.engine import TransitionTaken
 from offboard.mission import load_mission
 from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.view import NavigationView
@@ -25,7 +26,7 @@ from scenarios.loader import load_scenario
 from vision.types import Detections
 
 GREEDY = """
-from framerunner.monitoring.read_run import limit_resources
+from framerunner.child_process import limit_resources
 limit_resources({memory}, 100)
 try:
     held = bytearray(200_000_000)
@@ -159,3 +160,35 @@ def test_the_navigators_map_of_a_recording_is_listed_when_it_changes(tmp_path):
     assert [(each["t"], each["goal"]) for each in maps] == [(0.5, "explore"), (1.0, "cross red")]
     assert (maps[1]["frames"][0]["p"], maps[1]["frames"][0]["std"]) == ([3.0, 2.0, 2.0], None)
     assert maps[1]["path"] == [[0.0, 0.0, 1.0]]
+
+
+def test_the_transitions_of_a_recording_have_ids_that_are_found_by_the_chart_if_it_is_older(tmp_path):
+    folder, target = tmp_path / "flight", tmp_path / "target"
+    folder.mkdir()
+    target.mkdir()
+    scenario, mission = load_scenario("test-case-1"), load_mission("frame_challenge")
+    (folder / "mission.yaml").write_bytes(mission.path.read_bytes())
+    taken = [
+        ("red.turning", "red.frame_visible", "frame_seen", ("red.turning/1",)),
+        ("red.frame_visible", "red.frame_visible", "memory.x0 > 1", ("red.frame_visible/9",)),  # to itself
+        ("red.frame_visible", "red.frame_close", "frame.d < 0.45", ()),
+        ("red.frame_close", "red.going_up", "", ()),  # which the chart does not have
+        ("red.going_up", "green.go_to_center", "done", ()),
+        ("green.go_to_center", "red.frame_close", "", ()),  # which the chart does not have
+    ]
+    with FlightRecording(folder / "flight.mcap", scenario, mission, None) as recording:
+        for number, (source, arrived, when, ids) in enumerate(taken, 1):
+            state = DroneState(1_000_000 * number, 0.0, 0.0, 1.0, 0.0)
+            transition = TransitionTaken(source, arrived, when, (), state.time_us, 1.0, ids)
+            what = (state, VelocityCommand(), Detections(), arrived, float(number), transition)
+            recording.see(Moment(*what))
+    read_run(folder, target)
+    listed = json.loads((target / RECORDING).read_text())["transitions"]
+    assert [each["ids"] for each in listed] == [
+        ["red.turning/1"],
+        ["red.frame_visible/9"],
+        ["red.frame_visible/1"],
+        [],
+        ["red.going_up/1", "red/then"],
+        [],
+    ]

@@ -107,6 +107,7 @@ def test_transitions_are_listed_newest_first(view):
             "when": "frame.d < 1",
             "values": [["frame.d", 0.44], ["frame.seen", True], ["frame.a", None]],
             "seconds": 1.5,
+            "ids": [f"s{number}/2", f"s{number}/then"],
         }
         for number in range(3)
     ]
@@ -120,6 +121,7 @@ def test_transitions_are_listed_newest_first(view):
         "when": "frame.d < 1",
         "values": [["frame.d", 0.44], ["frame.seen", True], ["frame.a", None]],
         "seconds": 1.5,
+        "ids": ["s2/2", "s2/then"],
     }
     assert told["list"][0]["values"][1][1] is True
     assert [message["kind"] for message in view.standing()] == ["chart", "transitions"]

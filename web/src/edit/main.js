@@ -20,7 +20,7 @@ else chooseFile();
 
 /** The list of missions, and a form for a new one. */
 async function chooseFile() {
-  const { mayEdit, missions } = pageData();
+  const { mayEdit } = pageData();
   const problem = make("p", { class: "problem", role: "alert", hidden: true });
   const list = make("ul", { class: "e-files" });
   root.append(make("h1", {}, word("open")), problem, list);
@@ -36,7 +36,7 @@ async function chooseFile() {
   if (told.files.length === 0) list.append(make("li", { class: "hint" }, word("no_files")));
   if (!mayEdit) return;
   let name = "my_mission", source = "empty";
-  const sources = [["empty", word("empty")], ["example", word("example")], ...missions.map((each) => [each, word("a_copy", { name: each })])];
+  const sources = [["empty", word("empty")], ["example", word("example")], ...told.missions.map((/** @type {string} */ each) => [each, word("a_copy", { name: each })])];
   root.append(make("form", { class: "panel e-new" },
     textField(word("name"), name, (value) => { name = value; }),
     choice(word("from"), /** @type {[string, string][]} */ (sources), source, (value) => { source = value; }),

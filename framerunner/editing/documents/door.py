@@ -1,14 +1,15 @@
-"""The editor's routes in the monitor: its page, its files, and a WebSocket for each open document."""
+"""The editor's addresses for documents: the files of its folder, and a WebSocket for each open one."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import logging
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Callable, Sequence
+from typing import Annotated
 
-from fastapi import Body, HTTPException, Request
+from fastapi import APIRouter, Body, HTTPException, Request
+from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket
 
 from errors import UserError
@@ -29,15 +30,11 @@ from framerunner.editing.documents.messages import (
 )
 from framerunner.editing.documents.open_document import OpenDocument
 from monitor.access import refuse
-from monitor.pages.table import Page, add_page
 from offboard.authoring.edits import ReplaceText, parse_edit
 from offboard.authoring.text import Change
 from offboard.mission import list_missions
 
-if TYPE_CHECKING:
-    from monitor.server import Monitor
-
-PATH = "/edit"
+_Text = Annotated[str, Body(max_length=100)]
 _JOURNAL_PERIOD_S = 2.0
 _BAD_MESSAGE_CODE = 4400  # as HTTP's
 _MAX_QUEUE = 200
@@ -49,61 +46,60 @@ _CHANGED_ELSEWHERE = (
 logger = logging.getLogger(__name__)
 
 
-def register(monitor: Monitor, desk: EditorDesk) -> None:
-    """Add the editor to a monitor; whoever may fly may edit."""
-    add_page(
-        monitor,
-        Page(
-            PATH,
-            "Editor",
-            "edit",
-            lambda _monitor, _request, visitor: {"mayEdit": visitor.may_fly, "missions": list_missions()},
-        ),
-    )
+class DocumentsDoor:
+    """The editor's addresses for documents; implements `monitor.ports.Extension`.
 
-    def demand(request: Request) -> None:
-        if not monitor.access.visitor(request).may_fly:
-            raise HTTPException(403, "only those who logged in may edit")
+    Args:
+        desk: of the folder whose missions are edited.
+    """
 
-    @monitor.web.get("/api/edit/files")
-    async def files(request: Request) -> dict[str, object]:
-        demand(request)
-        return {"files": await asyncio.to_thread(desk.files), "folder": str(desk.folder)}
+    def __init__(self, desk: EditorDesk) -> None:
+        self._desk = desk
 
-    @monitor.web.post("/api/edit/files")
-    async def create(
-        request: Request,
-        name: Annotated[str, Body(max_length=100)],
-        source: Annotated[str, Body(max_length=100)],
-    ) -> dict[str, str]:
-        demand(request)
-        try:
-            return {"file": await asyncio.to_thread(desk.create, name, source)}
-        except UserError as error:
-            raise HTTPException(400, str(error)) from None
+    def router(self, may_act: Callable[[HTTPConnection], bool]) -> APIRouter:
+        """The addresses; `may_act` says who may edit."""
+        router, desk = APIRouter(), self._desk
 
-    @monitor.web.websocket("/ws/edit")
-    async def edit(websocket: WebSocket, file: str) -> None:
-        if not monitor.access.visitor(websocket).may_fly:
-            await refuse(websocket, "only those who logged in may edit")
-            return
-        try:
-            shared = desk.open(file)
-        except UserError as error:
-            await refuse(websocket, str(error).partition("\n")[0])
-            return
-        await websocket.accept()
-        await _Connection(websocket, desk, file, shared).serve()
+        def demand(request: Request) -> None:
+            if not may_act(request):
+                raise HTTPException(403, "only those who logged in may edit")
 
-    async def journal() -> None:
+        @router.get("/api/edit/files")
+        async def files(request: Request) -> dict[str, object]:
+            demand(request)
+            return {"files": await asyncio.to_thread(desk.files), "missions": list_missions()}
+
+        @router.post("/api/edit/files")
+        async def create(request: Request, name: _Text, source: _Text) -> dict[str, str]:
+            demand(request)
+            try:
+                return {"file": await asyncio.to_thread(desk.create, name, source)}
+            except UserError as error:
+                raise HTTPException(400, str(error)) from None
+
+        @router.websocket("/ws/edit")
+        async def edit(websocket: WebSocket, file: str) -> None:
+            if not may_act(websocket):
+                await refuse(websocket, "only those who logged in may edit")
+                return
+            try:
+                shared = desk.open(file)
+            except UserError as error:
+                await refuse(websocket, str(error).partition("\n")[0])
+                return
+            await websocket.accept()
+            await _Connection(websocket, desk, file, shared).serve()
+
+        return router
+
+    async def run(self) -> None:
+        """Write the journals of unsaved documents until cancelled, and then once more."""
         try:
             while True:
                 await asyncio.sleep(_JOURNAL_PERIOD_S)
-                desk.keep()
+                self._desk.keep()
         finally:
-            desk.keep()
-
-    monitor.jobs.append(journal)
+            self._desk.keep()
 
 
 class _Connection:

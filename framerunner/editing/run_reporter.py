@@ -1,0 +1,151 @@
+"""Makes the messages that say what the chart of a flight does, at most twenty a second."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+from framerunner.editing.messages import Ended, Guard, Now, Span, Taken, Value
+from framerunner.flying.cause import lost_in
+from framerunner.flying.fly import FinishedFlight
+from framerunner.flying.mission_reporter import plain_value
+from framerunner.flying.run_control import RunStanding
+from framerunner.runs.chart_record import ChartRecord, StateSpan
+from offboard.app import Moment
+from offboard.drone import DroneState
+from offboard.engine import MissionEngine, TransitionTaken
+from wire.finite_json import finite
+
+PERIOD_S = 0.04  # wall time between two messages of a flight that is not paused
+TRAIL_US = 100_000  # vehicle time between two places of the trail
+MAX_TAKEN = 100
+
+Point = tuple[float | None, ...]
+
+
+class RunReporter:
+    """Sees a flight as observer (`see`) and as a control's listener (`hear`).
+
+    Args:
+        run: id of the flight.
+        tell: takes the messages.
+        clock: seconds that never go back.
+    """
+
+    def __init__(
+        self, run: str, tell: Callable[[Now], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._run = run
+        self._tell = tell
+        self._clock = clock
+        self._record = ChartRecord()
+        self._trail: list[Point] = []
+        self._trail_us = -TRAIL_US
+        self._command: Point = (0.0, 0.0, 0.0, 0.0)
+        self._told_s = -PERIOD_S
+        self._standing: RunStanding | None = None
+        self._full = True
+        self._told = (0, 0, 0)  # transitions, spans and places
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        self._record.see(moment)
+        command = moment.command
+        self._command = (
+            command.forward_m_s,
+            command.left_m_s,
+            command.up_m_s,
+            command.yaw_rate_rad_s,
+        )
+        state = moment.state
+        if state.time_us - self._trail_us >= TRAIL_US:
+            self._trail_us = state.time_us
+            self._trail.append(_numbers(state.time_us / 1e6, state.x, state.y, state.z))
+
+    def rename(self, ids: Mapping[str, str]) -> None:
+        """Count on with a changed chart; the next message is a full one."""
+        self._record.rename(ids)
+        self._full = True
+
+    def tell_all(self) -> None:
+        """Make the next message a full one; may be called from another thread."""
+        self._full = True
+
+    def hear(self, engine: MissionEngine, state: DroneState, standing: RunStanding) -> None:
+        """Tell what is new, unless that was done just before."""
+        now_s = self._clock()
+        is_due = now_s - self._told_s >= PERIOD_S
+        if not (is_due or standing.paused or self._full or standing != self._standing):
+            return
+        self._told_s, self._standing = now_s, standing
+        self._tell(self._now(engine, state, standing))
+
+    def ended(self, flown: FinishedFlight) -> Ended:
+        """The last message of a flight."""
+        result = flown.result
+        return Ended(
+            run=self._run,
+            text=result.reason,
+            lost_in=lost_in(result, flown.track),
+            result=result.as_json(),
+            counts=dict(self._record.counts),
+            spans=_spans(self._record.spans()),
+        )
+
+    def failed(self, text: str) -> Ended:
+        """The last message of a flight that a fault of the program ended."""
+        spans, counts = self._record.spans(), dict(self._record.counts)
+        state = spans[-1].state if spans else ""
+        return Ended(run=self._run, text=text, lost_in=state, result=None, counts=counts, spans=_spans(spans))
+
+    def _now(self, engine: MissionEngine, state: DroneState, standing: RunStanding) -> Now:
+        full, self._full = self._full, False
+        chart, record = engine.chart_now(), self._record
+        taken_told, spans_told, trail_told = (0, 0, 0) if full else self._told
+        taken, spans = record.taken[taken_told:], record.ended(spans_told)
+        self._told = (len(record.taken), spans_told + len(spans), len(self._trail))
+        changed = record.counts if full else dict.fromkeys(name for each in taken for name in each.ids)
+        return Now(
+            run=self._run,
+            full=full,
+            time_s=state.time_us / 1e6,
+            state=chart.state,
+            active=chart.active,
+            seconds_in_state=chart.seconds_in_state,
+            paused=standing.paused,
+            stopped_in=standing.stopped_in,
+            speed=standing.speed,
+            guards=tuple(Guard(id=g.id, to=g.to, when=g.when, holds=g.holds) for g in chart.guards),
+            values=tuple(Value(name=v.name, value=_plain(v.value), unit=v.unit) for v in chart.values),
+            taken=tuple(map(_taken, taken[-MAX_TAKEN:])),
+            counts={name: record.counts[name] for name in changed},
+            spans=_spans(spans),
+            pose=_numbers(state.x, state.y, state.z, state.yaw),
+            command=_numbers(*self._command),
+            trail=tuple(self._trail[trail_told:]),
+        )
+
+
+def _spans(spans: Sequence[StateSpan]) -> tuple[Span, ...]:
+    return tuple(Span(state=each.state, from_s=each.from_us / 1e6, to_s=each.to_us / 1e6) for each in spans)
+
+
+def _taken(taken: TransitionTaken) -> Taken:
+    return Taken(
+        ids=taken.ids,
+        source=taken.source,
+        target=taken.target,
+        when=taken.when,
+        values=tuple((name, _plain(value)) for name, value in taken.values),
+        time_s=taken.time_us / 1e6,
+        seconds=taken.seconds_in_source,
+    )
+
+
+def _plain(value: object) -> float | bool | int | str | None:
+    plain: float | bool | int | str | None = finite(plain_value(value))
+    return plain
+
+
+def _numbers(*values: float | None) -> Point:
+    return tuple(finite(list(values)))

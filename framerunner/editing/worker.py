@@ -1,0 +1,182 @@
+"""One flight or one batch in a process of its own: `python -m framerunner.editing.worker`.
+
+The first line of standard input is a task, each further line of a single flight an order; standard output
+has a message a line. A mission that computes without end or takes all memory ends only this process, and when
+the server ends, standard input ends and this process with it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TextIO
+
+from pydantic import BaseModel, ValidationError
+
+from errors import UserError
+from framerunner.child_process import end_with_standard_input, limit_resources
+from framerunner.editing import messages
+from framerunner.editing.batch import fly_batch
+from framerunner.editing.run_reporter import RunReporter
+from framerunner.evaluation.runner import processor_limit
+from framerunner.flying.lockstep import lockstep_flight
+from framerunner.flying.plan import FlightPlan
+from framerunner.flying.run_control import RunControl
+from offboard.mission import Mission, MissionError, mission_from_text
+from offboard.pilot_file import PilotFile, read_pilot
+from scenarios.loader import load_scenario
+
+_SPARE_S = 120  # processor time for all but flying
+_NICENESS = 5
+Tell = Callable[[BaseModel], None]
+
+
+def main() -> int:
+    """Do the task that the first line of standard input names; returns 0, also if it is refused."""
+    import cv2
+
+    output = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a contestant's file prints is no message
+    os.nice(_NICENESS)
+    cv2.setNumThreads(1)
+    task = messages.TASK.validate_json(sys.stdin.readline())
+    tell = _teller(output)
+    flights = 1 if isinstance(task, messages.RunTask) else task.start.count + len(task.start.scenarios)
+    limit_resources(task.memory_bytes, round(task.processor_s) * flights + _SPARE_S)
+    tag = task.start.tag
+    try:
+        pilot = None if task.pilot is None else read_pilot(Path(task.pilot))
+        mission = mission_from_text(task.start.text, pilot)
+        if isinstance(task, messages.BatchTask):
+            end_with_standard_input(lambda: None)
+            fly_batch(task, mission, tell)
+        else:
+            _Run(task, mission, pilot, tell).fly(sys.stdin)
+    except MissionError as error:
+        tell(refusal(tag, error))
+    except UserError as error:
+        tell(messages.Refused(tag=tag, text=" ".join(str(error).split())))
+    return 0
+
+
+def refusal(tag: int, error: MissionError, run: str = "") -> messages.Refused:
+    """Why a mission is not flown: its first problem, and all of them."""
+    lines = tuple(str(error).splitlines())
+    more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
+    return messages.Refused(tag=tag, text=f"{lines[0]}{more}", lines=lines, run=run)
+
+
+class _Run:
+    """A flight that follows orders."""
+
+    def __init__(self, task: messages.RunTask, mission: Mission, pilot: PilotFile | None, tell: Tell) -> None:
+        start = task.start
+        _check_breaks(start.break_on, mission)
+        self._task, self._mission, self._pilot, self._tell = task, mission, pilot, tell
+        self._plan = FlightPlan(load_scenario(start.scenario), mission, start.seed)
+        self._reporter = RunReporter(task.run, tell)
+        self._control = RunControl(
+            speed=start.speed, paused=start.paused, break_on=start.break_on, listener=self._reporter.hear
+        )
+
+    def fly(self, orders: TextIO) -> None:
+        """Fly to the end; this process ends when there can be no more orders."""
+        self._tell(messages.Started(tag=self._task.start.tag, run=self._task.run))
+        threading.Thread(target=self._take_orders, args=(orders,), daemon=True).start()
+        flight = lockstep_flight(
+            self._plan, observers=(self._reporter.see,), before_tick=self._control.before_tick
+        )
+        try:
+            with processor_limit(self._task.processor_s):
+                flown = asyncio.run(flight)
+        except Exception as error:  # a fault of the program, or of a contestant's file
+            text = " ".join(str(error).split())
+            self._tell(self._reporter.failed(f"{type(error).__name__}: {text}"))
+        else:
+            self._tell(self._reporter.ended(flown))
+
+    def _take_orders(self, orders: Iterator[str]) -> None:
+        for line in orders:
+            try:
+                self._carry_out(messages.ORDER.validate_json(line))
+            except ValidationError:  # the server has checked it
+                continue
+        os._exit(1)
+
+    def _carry_out(self, order: messages.Order) -> None:
+        control = self._control
+        try:
+            match order:
+                case messages.Change():
+                    self._change(order)
+                    return
+                case messages.Watch():
+                    self._reporter.tell_all()
+                    control.tell()
+                case messages.Pause():
+                    control.pause()
+                case messages.GoOn():
+                    control.go_on()
+                case messages.Step():
+                    control.step(order.ticks)
+                case messages.Speed():
+                    control.set_speed(order.speed)
+                case messages.BreakOn():
+                    _check_breaks(order.states, self._mission)
+                    control.break_on(order.states)
+                case messages.Stop():
+                    control.stop()
+        except UserError as error:
+            self._tell(messages.Refused(tag=order.tag, text=str(error), run=self._task.run))
+        else:
+            self._tell(messages.Done(tag=order.tag))
+
+    def _change(self, order: messages.Change) -> None:
+        run = self._task.run
+        try:
+            mission = mission_from_text(order.text, self._pilot)
+        except MissionError as error:
+            self._tell(refusal(order.tag, error, run))
+            return
+
+        def changed(why_not: str, ids: Mapping[str, str]) -> None:
+            if why_not:
+                self._tell(messages.Refused(tag=order.tag, text=why_not, run=run))
+                return
+            renamed = dict(ids)
+            self._mission = mission
+            self._reporter.rename(renamed)
+            self._tell(messages.Changed(run=run, tag=order.tag, ids=renamed))
+
+        self._control.change(mission, changed)
+
+
+class _UnknownStateError(UserError):
+    """A state to stop at is not in the chart."""
+
+
+def _check_breaks(states: tuple[str, ...], mission: Mission) -> None:
+    unknown = next((each for each in states if each not in mission.states), None)
+    if unknown is not None:
+        raise _UnknownStateError(f"break_on '{unknown:.60}': is not a state of the mission; take its full id")
+
+
+def _teller(output: TextIO) -> Tell:
+    """Writes messages, a line each; may be called from several threads."""
+    lock = threading.Lock()
+
+    def tell(message: BaseModel) -> None:
+        line = message.model_dump_json() + "\n"
+        with lock:
+            output.write(line)
+            output.flush()
+
+    return tell
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,171 @@
+"""What a mission does now, as plain data: the active states and what their guards read. Made only on request.
+
+Reading changes nothing that flies. A contestant's properties are read as a guard reads them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from errors import UserError
+from offboard.chart.expressions import Evaluate, names_in
+from offboard.chart.spec import RESUME, THEN, Leaf, State, Transition, transition_id
+from offboard.chart.units import unit_of
+
+if TYPE_CHECKING:
+    from offboard.mission import Mission
+    from offboard.pilot import Pilot
+
+
+class ChangeRefusedError(UserError):
+    """A changed chart cannot take over; the message is one line that says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class GuardNow:
+    """A transition out of the active states, and whether its guard holds.
+
+    Attributes:
+        id: of the transition, see `offboard.chart.spec.transition_id`.
+        to: full id of its target.
+        when: its guard; "" for a transition without one.
+        holds: None if the guard cannot be evaluated now.
+    """
+
+    id: str
+    to: str
+    when: str
+    holds: bool | None
+
+
+@dataclass(frozen=True, slots=True)
+class ValueNow:
+    """A value that a guard reads.
+
+    Attributes:
+        name: as the guard has it, such as "frame.d".
+        value: of any type with a contestant's pilot.
+        unit: such as "m"; "" if it has none or none is known.
+    """
+
+    name: str
+    value: object
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class ChartNow:
+    """The chart after a tick.
+
+    Attributes:
+        state: full id of the active leaf; "" before the first tick.
+        active: full ids of all active states, outermost first.
+        seconds_in_state: vehicle time without pauses.
+        guards: of the transitions out of the active states, in order of priority.
+        values: all that these guards read, each once; one that cannot be read is left out.
+    """
+
+    state: str
+    active: tuple[str, ...]
+    seconds_in_state: float
+    guards: tuple[GuardNow, ...] = ()
+    values: tuple[ValueNow, ...] = ()
+
+
+def guards_now(leaf: Leaf, guards: Sequence[Evaluate], pilot: Pilot) -> tuple[GuardNow, ...]:
+    """The present truth of a leaf's guards, which are compiled in the order of its transitions."""
+    rows = zip(leaf.transition_ids, leaf.transitions, guards, strict=True)
+    return tuple(GuardNow(name, each.to, each.when, _truth(guard, pilot)) for name, each, guard in rows)
+
+
+def values_now(transitions: Sequence[Transition], pilot: Pilot) -> tuple[ValueNow, ...]:
+    """The present values of all names in the guards of transitions."""
+    names = dict.fromkeys(name for each in transitions for name in names_in(each.when))
+    return tuple(ValueNow(name, value, unit_of(name)) for name, value in read_values(names, pilot))
+
+
+def read_values(names: Sequence[str] | dict[str, None], pilot: Pilot) -> tuple[tuple[str, object], ...]:
+    """The present values of dotted names; one that cannot be read is left out."""
+    found = []
+    for name in names:
+        value: object = pilot
+        try:
+            for part in name.split("."):
+                value = getattr(value, part)
+        except (Exception, SystemExit):  # of a value that the guard itself did not read
+            continue
+        found.append((name, value))
+    return tuple(found)
+
+
+def check_change(old: Mission, new: Mission, state: str) -> None:
+    """Raise `ChangeRefusedError` unless a flight that is in a state of `old` can go on with `new`."""
+    for what, before, after in (
+        ("class", old.mission_class, new.mission_class),
+        ("vision", old.vision, new.vision),
+    ):
+        if before != after:
+            raise ChangeRefusedError(
+                f"{what}: {after} cannot replace {before} during a flight; stop it and start it again"
+            )
+    if new.pilot != old.pilot:
+        raise ChangeRefusedError("the changed chart is for another pilot; stop the flight and start it again")
+    if not state:
+        return
+    reason = ""
+    if state not in new.states:
+        reason = "is not in the changed chart"
+    elif state not in new.leaves:
+        reason = "has states of its own in the changed chart"
+    elif new.states[state].final and not old.states[state].final:
+        reason = "is final in the changed chart"
+    if reason:
+        raise ChangeRefusedError(
+            f"the active state '{state}' {reason}; leave it as it is, or go on until another state is active"
+        )
+
+
+def carried_ids(old: Mission, new: Mission) -> dict[str, str]:
+    """Which transitions of a chart are which of a changed one, by id.
+
+    A transition is the same as that of its state with the same target and guard, otherwise as the nearest
+    other one with the same target; so counts stay with their transitions when others are added or moved.
+    """
+    found: dict[str, str] = {}
+    for name, state in old.states.items():
+        if (after := new.states.get(name)) is not None:
+            found |= _carried(state, after)
+    return found
+
+
+def _carried(old: State, new: State) -> dict[str, str]:
+    free = dict(enumerate(new.transitions, 1))
+    numbers: dict[int, int] = {}
+    before = list(enumerate(old.transitions, 1))
+    for number, each in before:
+        same = (n for n, one in free.items() if (one.to, one.when) == (each.to, each.when))
+        if (match := next(same, None)) is not None:
+            numbers[number] = match
+            del free[match]
+    for number, each in before:
+        if number in numbers:
+            continue
+        near = sorted(free, key=lambda n: abs(n - number))
+        if (match := next((n for n in near if free[n].to == each.to), None)) is not None:
+            numbers[number] = match
+            del free[match]
+    found = {transition_id(old.id, number): transition_id(new.id, match) for number, match in numbers.items()}
+    if old.then and new.then:
+        found[transition_id(old.id, THEN)] = transition_id(new.id, THEN)
+    if old.resume and new.resume:
+        found[transition_id(old.id, RESUME)] = transition_id(new.id, RESUME)
+    return found
+
+
+def _truth(guard: Evaluate, pilot: Pilot) -> bool | None:
+    try:
+        return bool(guard(pilot))
+    except (Exception, SystemExit):  # such as of a contestant's property
+        return None

@@ -1,0 +1,324 @@
+"""The editor's door to flights, as a page uses it: over its WebSocket, with the real worker processes."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+from fastapi import FastAPI
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from framerunner.editing.service import EditingSettings
+from framerunner.editing.web import EditingDoor
+from framerunner.evaluation.runner import fly_task
+from framerunner.flying.plan import FlightPlan
+from offboard.mission import MISSIONS, load_mission
+from scenarios.loader import load_scenario
+
+PAPER = (MISSIONS / "frame_challenge.yaml").read_text(encoding="utf-8")
+HOVER = """
+name: hover
+initial: up
+states:
+  up:
+    enter:
+      - hover
+      - cmd.vel_z = 0.5
+    transitions:
+      - when: imu.z > 1
+        to: wait
+  wait:
+    enter:
+      - hover
+    transitions:
+      - when: seconds_in_state > 5
+        to: down
+  down:
+    enter:
+      - land
+    final: true
+"""
+BROKEN = """
+name: broken
+initial: up
+states:
+  up:
+    during:
+      - cmd.vel_z = 1 / (imu.z - imu.z)
+    transitions:
+      - when: imu.z > 1
+        to: down
+  down: {final: true}
+"""
+FOREVER = """
+import time
+from offboard.pilot import Pilot
+class Slow(Pilot):
+    @property
+    def answer(self) -> float:
+        print("this is no message")
+        while True:
+            pass
+"""
+
+
+class Page:
+    """The browser's end of a WebSocket."""
+
+    def __init__(self, socket):
+        self._socket = socket
+        self._tag = 0
+        self.seen = []
+
+    def ask(self, do, **fields):
+        self._tag += 1
+        self._socket.send_text(json.dumps({"do": do, "tag": self._tag, **fields}))
+        return self._tag
+
+    def until(self, *kinds, holds=lambda message: True):
+        """The next message of these kinds for which something holds."""
+        while True:
+            message = json.loads(self._socket.receive_text())
+            self.seen.append(message)
+            if message["kind"] in kinds and holds(message):
+                return message
+
+    def answer(self, do, **fields):
+        tag = self.ask(do, **fields)
+        kinds = ("done", "refused", "changed", "started", "batch_started")
+        return self.until(*kinds, holds=lambda message: message["tag"] == tag)
+
+
+@contextlib.contextmanager
+def page(*, may_act=True, **settings):
+    """A page that is connected to a server."""
+    door = EditingDoor(EditingSettings(**{"jobs": 2, **settings}))
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_):
+        running = asyncio.create_task(door.run())
+        yield
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+    web = FastAPI(lifespan=lifespan)
+    web.include_router(door.router(lambda _: may_act))
+    with TestClient(web) as client, client.websocket_connect("/ws/editing") as socket:
+        yield Page(socket)
+
+
+def workers():
+    """Processes of workers that exist."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        with contextlib.suppress(OSError):
+            words = (folder / "cmdline").read_bytes().split(b"\0") if folder.name.isdigit() else ()
+            stat = (folder / "stat").read_text().rpartition(")")[2].split() if words else ["Z"]
+            if b"framerunner.editing.worker" in words and stat[0] != "Z" and int(stat[1]) == os.getpid():
+                found.append(int(folder.name))
+    return found
+
+
+def test_a_flight_is_told_from_start_to_end_and_is_that_of_lockstep():
+    plan = FlightPlan(load_scenario("test-case-1"), load_mission("frame_challenge"), 0)
+    with page() as browser:
+        started = browser.answer("start", text=PAPER, speed=None)
+        assert started["kind"] == "started"
+        ended = browser.until("ended")
+    assert ended["result"]["state_sha256"] == fly_task(plan).state_sha256
+    assert (ended["lost_in"], ended["result"]["verdict"]) == ("", "clean")
+    told = [message for message in browser.seen if message["kind"] == "now"]
+    assert told[0]["full"] and not any(message["full"] for message in told[1:])
+    taken = [each for message in told for each in message["taken"]]
+    assert taken[0]["ids"] == ["take_off.start/1"]
+    assert ["red.going_up/1", "red/then"] in [each["ids"] for each in taken]
+    spans = [span for message in told for span in message["spans"]]
+    assert [span["state"] for span in ended["spans"]][: len(spans)] == [span["state"] for span in spans]
+    assert ended["spans"][-1]["state"] == "landing.stop"
+    assert ended["counts"]["red/then"] == 1
+    assert len([point for message in told for point in message["trail"]]) > 300
+
+
+def test_a_flight_stops_at_a_state_is_stepped_changed_and_goes_on():
+    with page() as browser:
+        run = browser.answer("start", text=HOVER, speed=None, break_on=["wait"])["run"]
+        stopped = browser.until("now", holds=lambda message: message["paused"])
+        assert (stopped["state"], stopped["active"], stopped["stopped_in"]) == ("wait", ["wait"], "wait")
+        assert stopped["guards"] == [
+            {"id": "wait/1", "to": "down", "when": "seconds_in_state > 5", "holds": False}
+        ]
+        assert [(value["name"], value["unit"]) for value in stopped["values"]] == [("seconds_in_state", "s")]
+        assert browser.answer("step", run=run, ticks=4)["kind"] == "done"
+        stepped = browser.until("now", holds=lambda message: message["paused"])
+        assert stepped["time_s"] - stopped["time_s"] == pytest.approx(0.2, abs=0.005)
+        refused = browser.answer("change", run=run, text=HOVER.replace("wait", "stay"))
+        assert refused["text"].startswith("the active state 'wait' is not in the changed chart")
+        refused = browser.answer("change", run=run, text=HOVER.replace("seconds_in_state", "secs"))
+        assert "unknown name 'secs'" in refused["text"]
+        changed = browser.answer("change", run=run, text=HOVER.replace("> 5", "> 1"))
+        assert changed["ids"] == {"up/1": "up/1", "wait/1": "wait/1"}
+        shown = browser.until("now")
+        assert shown["full"] and shown["counts"] == {"up/1": 1}
+        assert shown["guards"][0]["when"] == "seconds_in_state > 1"
+        assert shown["seconds_in_state"] == stepped["seconds_in_state"]
+        assert browser.answer("break_on", run=run, states=["nowhere"])["kind"] == "refused"
+        browser.ask("go_on", run=run)
+        ended = browser.until("ended")
+        assert ended["result"]["ended"] == "finished"
+        assert ended["counts"] == {"up/1": 1, "wait/1": 1}
+        wait = next(span for span in ended["spans"] if span["state"] == "wait")
+        assert wait["to_s"] - wait["from_s"] == pytest.approx(1.0, abs=0.11)
+        assert browser.answer("pause", run=run)["text"] == "the flight is over"
+
+
+def test_a_flight_that_is_stopped_ends_and_one_that_nobody_watches_too():
+    with page(unwatched_s=0.1) as browser:
+        run = browser.answer("start", text=HOVER, speed=0.1)["run"]
+        browser.until("now")
+        browser.ask("stop", run=run)
+        assert "interrupted" in browser.until("ended")["text"]
+        browser.answer("start", text=HOVER, paused=True)
+        browser.until("now", holds=lambda message: message["paused"])
+        (pid,) = workers()
+        with contextlib.suppress(WebSocketDisconnect):
+            browser._socket.close()
+        deadline = time.monotonic() + 20
+        while pid in workers():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+
+
+def test_another_page_can_watch_and_gets_all_so_far():
+    with page() as browser:
+        run = browser.answer("start", text=HOVER, speed=None, break_on=["wait"])["run"]
+        browser.until("now", holds=lambda message: message["paused"])
+        browser.ask("watch", run=run)
+        full = browser.until("now", holds=lambda message: message["full"])
+        assert (full["counts"], [span["state"] for span in full["spans"]]) == ({"up/1": 1}, ["up"])
+        browser.ask("go_on", run=run)
+        browser.until("ended")
+        browser.ask("watch", run=run)
+        assert browser.until("ended")["run"] == run
+
+
+def test_a_batch_of_layouts_is_told_flight_by_flight_failures_first():
+    with page() as browser:
+        started = browser.answer("start_batch", text=PAPER, level="calm", count=4, first_seed=1)
+        assert started["count"] == 4
+        ended = browser.until("batch_ended")
+        flights = {each["scenario"]: each for each in browser.seen if each["kind"] == "flight"}
+    assert set(flights) == {f"calm-{seed}" for seed in range(1, 5)}
+    assert (ended["flown"], ended["text"]) == (4, "")
+    ranked = [flights[name] for name in ended["order"]]
+    assert [each["rank"] for each in ranked] == sorted(each["rank"] for each in ranked)
+    assert [each["completed"] for each in ranked] == sorted(each["completed"] for each in ranked)
+    lost = ranked[0]
+    assert lost["scenario"] == "calm-2" and lost["lost_in"] == "blue.turning"
+    assert lost["counts"]["red/then"] == 1
+    track = lost["track"]
+    assert len(track["time_s"]) == len(track["x"]) == len(track["state"]) > 100
+    assert track["states"][track["state"][-1]] == "blue.turning"
+    assert lost["layout"]["name"] == "calm-2"
+
+
+def test_a_broken_mission_ends_in_words():
+    with page() as browser:
+        started = browser.answer("start_batch", text=BROKEN, scenarios=["test-case-1", "calm-3"])
+        assert started["count"] == 2
+        assert browser.until("batch_ended")["completed"] == 0
+        flights = [each for each in browser.seen if each["kind"] == "flight"]
+        assert {each["lost_in"] for each in flights} == {"up"}
+        assert all("mission 'broken', state 'up': ZeroDivisionError" in each["cause"] for each in flights)
+        refused = browser.answer("start_batch", text=BROKEN + "  other: {}\n")
+        assert refused["text"].startswith("mission.yaml:12:3: state 'other'")
+        text = HOVER.replace("name: hover", "name: hover\nextends: /etc/passwd")
+        refused = browser.answer("start", text=text)
+        assert "here a mission extends one of the package" in refused["text"]
+
+
+def test_a_batch_is_cancelled_with_all_its_processes_and_keeps_its_results():
+    with page() as browser:
+        batch = browser.answer("start_batch", text=PAPER, level="calm", count=40)["batch"]
+        browser.until("flight")
+        assert browser.answer("start_batch", text=PAPER)["text"].startswith("other flights are being flown")
+        browser.ask("cancel", batch=batch)
+        ended = browser.until("batch_ended")
+        flown = [each["scenario"] for each in browser.seen if each["kind"] == "flight"]
+        assert (ended["text"], ended["count"]) == ("cancelled", 40)
+        assert sorted(ended["order"]) == sorted(flown)
+        assert workers() == []
+        browser.ask("watch", run=batch)
+        assert browser.until("batch_ended") == ended
+
+
+@pytest.mark.parametrize("kind", ["start", "start_batch"])
+def test_a_mission_that_computes_without_end_is_ended(tmp_path, kind):
+    pilot = tmp_path / "slow.py"
+    pilot.write_text(FOREVER, encoding="utf-8")
+    text = HOVER.replace("imu.z > 1", "answer > 1")
+    with page(pilot=pilot, processor_s=2.0) as browser:
+        if kind == "start":
+            browser.answer(kind, text=text, speed=None)
+            text = browser.until("ended")["text"]
+        else:
+            browser.answer(kind, text=text, scenarios=["test-case-1"])
+            browser.until("batch_ended")
+            text = next(each["cause"] for each in browser.seen if each["kind"] == "flight")
+    assert "state 'up'" in text
+    assert "more than 2 s of processor time" in text
+
+
+def test_a_worker_that_dies_is_told():
+    with page() as browser:
+        browser.answer("start", text=HOVER, paused=True)
+        browser.until("now", holds=lambda message: message["paused"])
+        (pid,) = workers()
+        os.kill(pid, 9)
+        assert "the flight ended its process" in browser.until("ended")["text"]
+
+
+def test_only_so_many_flights_are_under_control():
+    with page(max_runs=1) as browser:
+        browser.answer("start", text=HOVER, paused=True)
+        assert browser.answer("start", text=HOVER)["text"].startswith("1 flights are under control")
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ("[", "Invalid JSON"),
+        ('{"do": "fly"}', "do"),
+        ('{"do": "start", "text": "x", "scenario": "../../etc/passwd", "tag": 7}', "scenario"),
+        ('{"do": "start", "text": "x", "pilot": "mine.py"}', "pilot"),
+        ('{"do": "start", "text": "x", "speed": 0}', "speed"),
+        ('{"do": "step", "run": "nothing", "ticks": 2}', "'nothing': there is no such flight"),
+        ('{"do": "start_batch", "text": "x", "count": 100000}', "count"),
+    ],
+)
+def test_a_message_that_cannot_be_understood_is_refused_in_one_line(message, words):
+    with page() as browser:
+        browser._socket.send_text(message)
+        refused = browser.until("refused")
+    assert words in refused["text"]
+    assert "\n" not in refused["text"]
+    assert refused["tag"] == (7 if '"tag": 7' in message else 0)
+
+
+def test_those_who_may_not_act_are_refused():
+    with pytest.raises(WebSocketDisconnect) as refusal, page(may_act=False) as browser:
+        browser.until("done")
+    assert refusal.value.code == 4403
+
+
+def test_the_choices_are_listed():
+    web = FastAPI()
+    web.include_router(EditingDoor().router(lambda _: True))
+    choices = TestClient(web).get("/api/editing/choices").json()
+    assert "test-case-1" in choices["scenarios"]
+    assert "calm" in choices["levels"]
