@@ -165,7 +165,7 @@ export class DiagramView {
       const group = svg("g", { class: `e-transition${kind}`, "data-transition": id, tabindex: 0, role: "button",
         "aria-label": `transition from ${state} to ${to}${when ? ` when ${when}` : ""}` }, hit, path);
       const words = event === "tick" ? `${order + 1}${when ? `: ${shorten(when)}` : ""}` : this.#words[event];
-      const label = svg("text", { class: "e-label", "data-transition": id }, words);
+      const label = svg("text", { class: "e-label", "data-transition": id, "data-words": words }, words);
       lines.push(group);
       labels.push(label);
       this.#transitionElements.set(id, { group, path, hit, label, lane });
@@ -219,9 +219,20 @@ export class DiagramView {
     }
   }
 
-  /** Light the active states. @param {Set<string>} paths */
-  light(paths) {
-    for (const [path, group] of this.#stateElements) group.classList.toggle("e-active", paths.has(path));
+  /**
+   * Show what flies.
+   * @param {Set<string>} active states
+   * @param {Map<string, number>} counts how often each transition was taken
+   * @param {Set<string>} taken transitions that were taken just now
+   */
+  light(active, counts, taken) {
+    for (const [path, group] of this.#stateElements) group.classList.toggle("e-active", active.has(path));
+    for (const [id, { group, label }] of this.#transitionElements) {
+      const count = counts.get(id) ?? 0;
+      const words = count > 0 ? `${label.dataset.words} (${count}×)` : label.dataset.words;
+      if (label.textContent !== words) label.textContent = words;
+      group.classList.toggle("e-taken", taken.has(id));
+    }
   }
 
   /** Show all of it. */

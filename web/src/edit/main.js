@@ -4,8 +4,11 @@ import { isTyping, make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 import { DiagramView } from "./diagram_view.js";
 import { button, choice, textField } from "./fields.js";
+import { flownId } from "./flights.js";
 import { Inspector } from "./inspector.js";
+import { RunPanel } from "./run_panel.js";
 import { EditSession } from "./session.js";
+import { Tabs } from "./tabs.js";
 import { TextView } from "./text_view.js";
 import { language, setLanguage, word } from "./words.js";
 
@@ -60,7 +63,9 @@ function edit(name) {
   const drawing = make("section", { class: "e-drawing", "aria-label": word("diagram") });
   const writing = make("section", { class: "e-writing", "aria-label": word("text") });
   const form = make("section", { class: "e-form panel", "aria-label": word("state") });
-  const findings = make("section", { class: "e-findings panel", "aria-label": word("findings") });
+  const findings = make("div");
+  const flying = make("div");
+  const tabs = new Tabs([["findings", word("checker"), findings], ["fly", word("fly"), flying]]);
   const undo = button(word("undo"), () => session.undo(), { "aria-keyshortcuts": "Control+Z" });
   const redo = button(word("redo"), () => session.redo(), { "aria-keyshortcuts": "Control+Y" });
   const save = button(word("save"), store, { class: "e-first", "aria-keyshortcuts": "Control+S" });
@@ -74,7 +79,7 @@ function edit(name) {
       setLanguage(language() === "en" ? "es" : "en");
       location.reload();
     }));
-  root.replaceChildren(tools, line, make("div", { class: "e-panes" }, drawing, form, writing, findings));
+  root.replaceChildren(tools, line, make("div", { class: "e-panes" }, drawing, form, writing, tabs.root));
 
   const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}`, {
     changed(changes, all) {
@@ -111,6 +116,22 @@ function edit(name) {
     },
   }, { done: word("done"), resume: word("resume") });
   const inspector = new Inspector(form, session, (chosen) => select(chosen, true));
+
+  new RunPanel(flying, {
+    async text() {
+      await session.flush();
+      return text.text;
+    },
+    lit(active, counts, taken) {
+      const ids = new Map(session.diagram.edges.map((edge) => [flownId(edge), edge.id]));
+      diagram.light(
+        new Set(active),
+        new Map(Object.entries(counts).map(([id, count]) => [ids.get(id) ?? "", count])),
+        new Set(taken.map((id) => ids.get(id) ?? "")));
+    },
+    lost: (id) => select({ kind: "state", id }, true),
+    selected: () => (selection.kind === "state" ? selection.id : ""),
+  });
 
   function innermost(nodes) {
     return nodes.reduce((best, each) => (each.span[0] >= best.span[0] && each.span[1] <= best.span[1] ? each : best));
@@ -154,7 +175,9 @@ function edit(name) {
         if (node) select(finding.event === null ? { kind: "state", id: node } : { kind: "transition", id: `${node}/${finding.event}/${finding.index}` }, false);
         if (finding.span) text.show(finding.span[0], finding.span[1]);
       }, { class: "e-link" })));
-    findings.replaceChildren(make("h2", {}, word("findings")),
+    const errors = session.findings.filter(({ severity }) => severity === "error").length;
+    tabs.mark("findings", errors > 0 ? `${errors} ✗` : rows.length > 0 ? `${rows.length} !` : "✓");
+    findings.replaceChildren(
       rows.length > 0 ? make("ul", {}, ...rows) : make("p", { class: "e-good" }, word("none")));
   }
 
