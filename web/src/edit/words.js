@@ -3,7 +3,7 @@
 const WORDS = {
   en: {
     undo: "Undo", redo: "Redo", save: "Save", saved: "saved", unsaved: "not saved", fit: "Show all", arrange: "Arrange",
-    new_state: "New state", new_superstate: "New superstate", language: "Español", files: "Missions",
+    new_state: "New state", new_superstate: "New superstate", new_template: "New template", language: "Español", files: "Missions",
     state: "State", transition: "Transition", mission: "Mission", name: "Name", description: "Description",
     class: "Class", vision: "Vision", initial: "Starts in", final: "final: the end", starts_here: "starts here", uses: "Uses the states of",
     enter: "On entry", during: "During", exit: "On exit", add_action: "Add an action", remove: "Remove", up: "Up", down: "Down",
@@ -17,6 +17,7 @@ const WORDS = {
     foreign_note: "Written in the mission that this one extends; it can be changed there.", create: "Create", from: "Start from",
     empty: "an empty chart", example: "an example with comments", a_copy: "a copy of {name}", open: "Open a mission", no_files: "There are no missions in this folder yet.",
     overwrite: "Another program has changed the file. Save anyway?", text: "Text", diagram: "Diagram", add_transition: "Add a transition", new_name: "name",
+    templates: "Templates", template_name: "Name of the template", use_template: "New state that uses {name}",
     fly: "Fly", fly_once: "Fly", fly_paused: "Fly step by step", fly_many: "Fly {count} layouts", pause: "Pause", go_on: "Go on", step: "Step", stop: "Stop",
     break_here: "Stop at the selected state", take_changes: "Take changes", not_flying: "nothing is flying", time_line: "time line of states",
     scenario: "Scenario", or_layout: "or a random layout", speed: "Speed", level: "Level", starting: "starting …", select_state: "select a state first",
@@ -25,7 +26,7 @@ const WORDS = {
   },
   es: {
     undo: "Deshacer", redo: "Rehacer", save: "Guardar", saved: "guardado", unsaved: "sin guardar", fit: "Ver todo", arrange: "Ordenar",
-    new_state: "Estado nuevo", new_superstate: "Superestado nuevo", language: "English", files: "Misiones",
+    new_state: "Estado nuevo", new_superstate: "Superestado nuevo", new_template: "Plantilla nueva", language: "English", files: "Misiones",
     state: "Estado", transition: "Transición", mission: "Misión", name: "Nombre", description: "Descripción",
     class: "Clase", vision: "Visión", initial: "Empieza en", final: "final: el fin", starts_here: "empieza aquí", uses: "Usa los estados de",
     enter: "Al entrar", during: "Durante", exit: "Al salir", add_action: "Añadir una acción", remove: "Quitar", up: "Subir", down: "Bajar",
@@ -39,6 +40,7 @@ const WORDS = {
     foreign_note: "Escrito en la misión que esta amplía; se puede cambiar allí.", create: "Crear", from: "Empezar con",
     empty: "un diagrama vacío", example: "un ejemplo con comentarios", a_copy: "una copia de {name}", open: "Abrir una misión", no_files: "Aún no hay misiones en esta carpeta.",
     overwrite: "Otro programa ha cambiado el archivo. ¿Guardar de todos modos?", text: "Texto", diagram: "Diagrama", add_transition: "Añadir una transición", new_name: "nombre",
+    templates: "Plantillas", template_name: "Nombre de la plantilla", use_template: "Estado nuevo que usa {name}",
     fly: "Volar", fly_once: "Volar", fly_paused: "Volar paso a paso", fly_many: "Volar {count} disposiciones", pause: "Pausa", go_on: "Seguir", step: "Un paso", stop: "Parar",
     break_here: "Parar en el estado elegido", take_changes: "Usar los cambios", not_flying: "no vuela nada", time_line: "línea de tiempo de los estados",
     scenario: "Escenario", or_layout: "o una disposición al azar", speed: "Velocidad", level: "Nivel", starting: "empezando …", select_state: "elige antes un estado",
