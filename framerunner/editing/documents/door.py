@@ -21,6 +21,7 @@ from framerunner.editing.documents.messages import (
     PageMessageError,
     SaveMessage,
     StepMessage,
+    TypedChange,
     TypeMessage,
     catalogue_message,
     changed_message,
@@ -32,7 +33,7 @@ from framerunner.editing.documents.open_document import OpenDocument
 from monitor.access import refuse
 from offboard.authoring.edits import ReplaceText, parse_edit
 from offboard.authoring.text import Change
-from offboard.mission import list_missions
+from offboard.mission import MAX_FILE_BYTES, list_missions
 
 _Text = Annotated[str, Body(max_length=100)]
 _JOURNAL_PERIOD_S = 2.0
@@ -208,9 +209,24 @@ def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[Change]:
     if message.revision != opened.revision:
         raise PageMessageError(_CHANGED_ELSEWHERE)
     changes: list[Change] = []
-    for typed in message.changes:
-        positions = opened.document.positions
-        start = positions.from_utf16(typed.start)
-        end = positions.from_utf16(typed.start + typed.removed)
-        changes += opened.apply(ReplaceText(start=start, end=end, text=typed.inserted))
+    before = opened.document
+    try:
+        for typed in message.changes:
+            changes += opened.apply(_replacement(opened, typed))
+    except UserError:
+        while opened.document.text != before.text:
+            opened.undo()
+        raise
     return changes
+
+
+def _replacement(opened: OpenDocument, typed: TypedChange) -> ReplaceText:
+    text, positions = opened.document.text, opened.document.positions
+    last = typed.start + typed.removed
+    if len(typed.inserted) > MAX_FILE_BYTES:
+        raise PageMessageError("the mission would be larger than 1 MB; a mission is a page or two")
+    if last > positions.to_utf16(len(text)):
+        raise PageMessageError(f"typed text: {last} is after the end of the text; load the page again")
+    return ReplaceText(
+        start=positions.from_utf16(typed.start), end=positions.from_utf16(last), text=typed.inserted
+    )
