@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,6 +42,7 @@ class OpenDocument:
     problem: str = ""
     _saved: bytes = b""
     _is_kept: bool = True  # the journal has the present text
+    _typed_to: int = -1  # where the last edit ended, if it was typed letters
 
     @classmethod
     def open(cls, path: Path) -> OpenDocument:
@@ -80,12 +82,30 @@ class OpenDocument:
         return self.path.with_name(f".{self.path.name}{_JOURNAL_SUFFIX}")
 
     def apply(self, edit: Edit) -> tuple[Change, ...]:
-        """Apply an edit; see `EditSession.apply`."""
+        """Apply an edit; see `EditSession.apply`.
+
+        Letters typed one after the other are undone together, a line at most.
+        """
         before = self.document
-        changes = self.session.apply(edit)
+        typed = edit if isinstance(edit, ReplaceText) and _is_typed(edit) else None
+        goes_on = typed is not None and typed.start == self._typed_to
+        changes = self.session.apply(edit, goes_on=goes_on)
         if changes:
             self.layout = follow(self.layout, before, edit, self.document)
-        return self._changed(changes)
+        self._changed(changes)
+        if typed is not None:
+            self._typed_to = typed.start + len(typed.text)
+        return changes
+
+    def take_back(self, changes: Sequence[Change]) -> None:
+        """Make the text as it was before its last changes."""
+        for change in reversed(changes):
+            inverse = change.inverse
+            self.apply(
+                ReplaceText(
+                    start=inverse.start, end=inverse.start + len(inverse.removed), text=inverse.inserted
+                )
+            )
 
     def undo(self) -> tuple[Change, ...]:
         """Take the last edit back; see `EditSession.undo`."""
@@ -98,6 +118,7 @@ class OpenDocument:
     def _changed(self, changes: tuple[Change, ...]) -> tuple[Change, ...]:
         if changes:
             self.revision += 1
+            self._typed_to = -1
             self._is_kept = False
         return changes
 
@@ -152,3 +173,7 @@ class OpenDocument:
         self._saved = self.document.data
         self._is_kept = True
         self.journal.unlink(missing_ok=True)
+
+
+def _is_typed(edit: ReplaceText) -> bool:
+    return edit.start == edit.end and "\n" not in edit.text

@@ -1,4 +1,4 @@
-"""The acceptance test of the editor: the paper's navigator is built by mouse and keyboard, checked and flown."""
+"""The paper's navigator is built in the editor by mouse and keyboard, checked, saved and flown."""
 
 from __future__ import annotations
 
@@ -76,10 +76,9 @@ async def fill(user: EditorUser, parent: str, states: dict) -> None:
     first, *others = states
     await user.select(f"{parent}.first")
     await user.rename(f"{parent}.first", first)
-    for name in states:
+    for name, (enter, during, leads) in states.items():
         if name in others:
             await user.add_inner(parent, name)
-        enter, during, leads = states[name]
         await user.do("On entry", *enter)
         await user.do("During", *during)
         if not leads:

@@ -222,9 +222,9 @@ def test_a_message_that_no_page_sends_closes_with_one_line(path, message):
         with server.http.websocket_connect("/ws/edit?file=hover.yaml") as socket:
             socket.receive_json()
             socket.send_text(message)
+            socket.receive_json()  # that no other window is there
             with pytest.raises(WebSocketDisconnect) as closed:
-                while True:
-                    socket.receive_json()
+                socket.receive_json()
         assert closed.value.code == 4400
         assert closed.value.reason
         assert "\n" not in closed.value.reason
@@ -291,6 +291,20 @@ def test_two_windows_share_a_document(path):
             pass
 
 
+def test_typed_letters_are_undone_together_a_line_at_most(path):
+    opened = OpenDocument.open(path)
+    end = len(HOVER)
+    for letter in "# ab\n# c":
+        opened.apply(ReplaceText(start=end, end=end, text=letter))
+        end += 1
+    opened.apply(ReplaceText(start=0, end=0, text="#"))
+    texts = []
+    while opened.session.can_undo:
+        opened.undo()
+        texts.append(opened.document.text)
+    assert texts == [HOVER + "# ab\n# c", HOVER + "# ab\n", HOVER + "# ab", HOVER]
+
+
 def test_a_page_that_left_finds_its_text_again(path):
     with served(path.parent) as server:
         with server.window("hover.yaml") as window:
@@ -311,7 +325,8 @@ def test_typed_changes_of_which_one_is_impossible_are_refused_together(path):
 
 
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
-    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n" for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"
+    for before, name in zip("abcdefgh", "bcdefghi", strict=True)
 )
 HOSTILE = {
     "alias bomb": BOMB + "name: x\nstates: *i\n",

@@ -1,7 +1,7 @@
 /** The connection to the document that is edited; the server applies all edits, this page shows what comes back. */
 import { ReconnectingSocket } from "../lib/reconnecting_socket.js";
 
-const TYPING_PAUSE_MS = 150; // after which typed text is sent
+const TYPING_PAUSE_MS = 80; // after which typed text is sent
 
 /**
  * @typedef {{start: number, removed: number, inserted: string}} TextChange offsets in UTF-16 code units
