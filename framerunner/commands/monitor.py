@@ -98,6 +98,7 @@ def equipment(
     camera_hosts: tuple[str, ...] = (),
 ) -> Equipment:
     """What the monitor, which may not import other rooms' functions, is given of them."""
+    from framerunner.course.door import CourseDoor
     from framerunner.editing.documents.desk import EditorDesk
     from framerunner.editing.documents.door import DocumentsDoor
     from framerunner.editing.web import EditingDoor
@@ -116,7 +117,7 @@ def equipment(
         runs=RunFolders(runs),
         start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,
-        extensions=(EditingDoor(), DocumentsDoor(EditorDesk(missions))),
+        extensions=(EditingDoor(), DocumentsDoor(EditorDesk(missions)), CourseDoor(missions)),
     )
 
 

@@ -10,7 +10,9 @@ import { RunPanel } from "./run_panel.js";
 import { EditSession } from "./session.js";
 import { Tabs } from "./tabs.js";
 import { TextView } from "./text_view.js";
-import { language, setLanguage, word } from "./words.js";
+import { changeLanguage, language } from "../lib/language.js";
+import { LessonPanel } from "./lesson_panel.js";
+import { word } from "./words.js";
 
 /** @typedef {import("./diagram_view.js").Selection} Selection */
 
@@ -65,7 +67,12 @@ function edit(name) {
   const form = make("section", { class: "e-form panel", "aria-label": word("state") });
   const findings = make("div");
   const flying = make("div");
-  const tabs = new Tabs([["findings", word("checker"), findings], ["fly", word("fly"), flying]]);
+  const lesson = new URLSearchParams(location.search).get("lesson");
+  const teaching = make("div");
+  const tabs = new Tabs([
+    ...(lesson ? [/** @type {[string, string, HTMLElement]} */ (["lesson", word("lesson"), teaching])] : []),
+    ["findings", word("checker"), findings], ["fly", word("fly"), flying],
+  ]);
   const undo = button(word("undo"), () => session.undo(), { "aria-keyshortcuts": "Control+Z" });
   const redo = button(word("redo"), () => session.redo(), { "aria-keyshortcuts": "Control+Y" });
   const save = button(word("save"), store, { class: "e-first", "aria-keyshortcuts": "Control+S" });
@@ -75,10 +82,7 @@ function edit(name) {
     button(word("new_superstate"), () => inspector.add(true)),
     button(word("fit"), () => diagram.fit()),
     button(word("arrange"), arrange),
-    button(word("language"), () => {
-      setLanguage(language() === "en" ? "es" : "en");
-      location.reload();
-    }));
+    button(word("language"), changeLanguage));
   root.replaceChildren(tools, line, make("div", { class: "e-panes" }, drawing, form, writing, tabs.root));
 
   const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}`, {
@@ -117,7 +121,7 @@ function edit(name) {
   }, { done: word("done"), resume: word("resume") });
   const inspector = new Inspector(form, session, (chosen) => select(chosen, true));
 
-  new RunPanel(flying, {
+  const runs = new RunPanel(flying, {
     async text() {
       await session.flush();
       return text.text;
@@ -132,6 +136,20 @@ function edit(name) {
     lost: (id) => select({ kind: "state", id }, true),
     selected: () => (selection.kind === "state" ? selection.id : ""),
   });
+
+  if (lesson) {
+    new LessonPanel(teaching, lesson, {
+      async text() {
+        await session.flush();
+        return text.text;
+      },
+      scenario: (name) => runs.choose(name),
+      flown(flight) {
+        runs.showFlight(flight);
+        if (flight.lost_in) select({ kind: "state", id: flight.lost_in }, true);
+      },
+    });
+  }
 
   function innermost(nodes) {
     return nodes.reduce((best, each) => (each.span[0] >= best.span[0] && each.span[1] <= best.span[1] ? each : best));

@@ -83,6 +83,19 @@ export class RunPanel {
       choice(word("level"), words(levels), this.#level, (value) => { this.#level = value; }));
   }
 
+  /** Fly in a scenario from now on. @param {string} scenario */
+  choose(scenario) {
+    this.#scenario = scenario;
+    this.#loadChoices();
+  }
+
+  /** Show a flight that is over. @param {Flight} flight */
+  showFlight(flight) {
+    this.#view.show(flight.layout, flight.track);
+    this.#listener.lit([], flight.counts, []);
+    setText(this.#line, flight.reason);
+  }
+
   async #start(paused) {
     const text = await this.#listener.text();
     if (this.#run) await this.#flights.ask({ do: "stop", run: this.#run });
@@ -193,10 +206,8 @@ export class RunPanel {
     const head = make("tr", {}, ...["scenario", "verdict", "lost_in", "seconds"].map((key) => make("th", {}, word(/** @type {any} */ (key)))));
     this.#table.replaceChildren(head, ...this.#rows.map((each) => {
       const show = button(each.scenario, () => {
-        this.#view.show(each.layout, each.track);
-        this.#listener.lit([], each.counts, []);
+        this.showFlight(each);
         if (each.lost_in) this.#listener.lost(each.lost_in);
-        setText(this.#line, each.reason);
       }, { class: "e-link" });
       return make("tr", { "data-completed": String(each.completed) },
         make("td", {}, show), make("td", {}, each.verdict), make("td", {}, each.lost_in), make("td", {}, number(each.total_time_s, 1)));
