@@ -1,6 +1,6 @@
 """How long the editor's core takes for a large mission: text to diagram, the checker, an edit.
 
-    python -m benchmarks.authoring [--states 200] [--transitions 2] [--repeats 20]
+python -m benchmarks.authoring [--states 200] [--transitions 2] [--repeats 20]
 """
 
 from __future__ import annotations

@@ -77,9 +77,9 @@ from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import Edit, TransitionPath, edit_schema, parse_edit
 from offboard.authoring.findings import Finding, check_document, problems_of
 from offboard.authoring.layout import (
-    Box,
     Layout,
     LayoutError,
+    StateBox,
     follow,
     layout_path,
     parse_layout,
@@ -97,7 +97,6 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 __all__ = [
-    "Box",
     "Catalogue",
     "Change",
     "Diagram",
@@ -114,6 +113,7 @@ __all__ = [
     "Positions",
     "PrimitiveEntry",
     "Span",
+    "StateBox",
     "TransitionPath",
     "ValueEntry",
     "XmlError",

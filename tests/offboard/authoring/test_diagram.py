@@ -11,11 +11,11 @@ import pytest
 from pydantic import Field
 
 from offboard.authoring import (
-    Box,
     Document,
     EditSession,
     Layout,
     LayoutError,
+    StateBox,
     apply,
     as_json,
     catalogue,
@@ -89,7 +89,7 @@ def test_positions_are_beside_the_mission_and_follow_it(tmp_path):
     document = opened("frame_challenge")
     path.write_bytes(document.data)
     assert read_layout(path) == Layout()
-    boxes = {node.id: Box(x=10.0 * number, y=5.5) for number, node in enumerate(diagram(document).nodes)}
+    boxes = {node.id: StateBox(x=10.0 * number, y=5.5) for number, node in enumerate(diagram(document).nodes)}
     layout = Layout(states=boxes, corners={"red.turning/tick/0": ((1, 2), (3, 4))})
     assert write_layout(path, layout) == layout_path(path) == tmp_path / "mission.layout.json"
     assert read_layout(path) == layout
@@ -113,8 +113,16 @@ def test_positions_are_beside_the_mission_and_follow_it(tmp_path):
 
 @pytest.mark.parametrize(
     "text",
-    ["", "[]", "{", '{"states": {"a": {"x": 1}}}', '{"states": {"a": {"x": 1, "y": NaN}}}', '{"version": 2}', '{"more": 1}'],
-)  # fmt: skip
+    [
+        "",
+        "[]",
+        "{",
+        '{"states": {"a": {"x": 1}}}',
+        '{"states": {"a": {"x": 1, "y": NaN}}}',
+        '{"version": 2}',
+        '{"more": 1}',
+    ],
+)
 def test_a_bad_layout_is_refused_in_one_line(text):
     with pytest.raises(LayoutError, match=r"^m\.layout\.json: ") as caught:
         parse_layout(text, "m.layout.json")

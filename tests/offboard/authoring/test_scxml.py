@@ -35,10 +35,13 @@ def test_a_shipped_mission_means_the_same_after_export_and_import(tmp_path, name
 @given(SEEDS)
 def test_a_generated_mission_means_the_same_after_export_and_import(seed):
     chart = Document.from_text(random_mission(Random(seed))).chart
+    refused = ""
     try:
         again = Document.from_text(import_scxml(export_scxml(chart).encode())).chart
     except XmlError as error:  # a superstate's target whose name is one of a state within it, too
-        assert all("cannot be named" in line for line in str(error).split("\n"))
+        refused = str(error)
+    if refused:
+        assert all("cannot be named" in line for line in refused.split("\n"))
         return
     states = tuple(replace(state, exit=() if state.final else state.exit) for state in chart.states)
     assert native_document(again) == native_document(replace(chart, states=states))
@@ -60,7 +63,8 @@ def test_a_chart_of_another_editor_is_imported():
       <datamodel><data id="count" expr="1"/></datamodel>
       <state id="Up" qt:place="9">
         <onentry><script>hover(); cmd.vel_z = 0.5</script></onentry>
-        <transition event="tick" cond="imu.z &gt; 1 &amp;&amp; !frame_seen || colour != 'a &amp;&amp; b'" target="Go-On">
+        <transition event="tick" target="Go-On"
+                    cond="imu.z &gt; 1 &amp;&amp; !frame_seen || colour != 'a &amp;&amp; b'">
           <assign location="memory.count" expr="memory.count + 1"/>
         </transition>
         <transition event="tick"><script>fly_to_goal()</script></transition>
@@ -132,9 +136,13 @@ REFUSED = [
     ("<datamodel><data id='x' src='file:///etc/passwd'/></datamodel><state id='a'/>", "'src' of <data>"),
     ("<datamodel><data id='x' expr='open()'/></datamodel><state id='a'/>", "is no number"),
     ("<xi:include xmlns:xi='http://www.w3.org/2001/XInclude' href='/etc/passwd'/>", "<include> in <scxml>"),
-    ("<state id='a'><transition event='tick' target='a'/><state id='b'><transition event='tick'/></state></state>", "hides those of <state> 'a'"),
+    (
+        "<state id='a'><transition event='tick' target='a'/>"
+        "<state id='b'><transition event='tick'/></state></state>",
+        "hides those of <state> 'a'",
+    ),
     ("", "there is no <state>"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("inside", "reason"), REFUSED)
