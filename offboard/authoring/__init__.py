@@ -35,9 +35,9 @@ holds, `edit_schema()` is their JSON Schema. `kind` is one of
     set_variable {name, value | null}                           set_mission {key, value}
     replace_text {start, end, text}
 
-with `transition` = {state, event?: tick | done | resume, index?} and `section` = enter | during | exit, `references` = keep | delete.
-The event `tick` is an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a path or
-a full id.
+with `transition` = {state, event?: tick | done | resume, index?}, `section` = enter | during | exit and
+`references` = keep | delete. The event `tick` is
+an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a path or a full id.
 
 `apply(document, edit)` returns `Edited(document, changes)`; `EditSession` does so with `undo()` and
 `redo()`. A `Change` is {start, removed, inserted}; the changes of one edit follow each other, each made
@@ -77,9 +77,9 @@ from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import Edit, TransitionPath, edit_schema, parse_edit
 from offboard.authoring.findings import Finding, check_document, problems_of
 from offboard.authoring.layout import (
-    Box,
     Layout,
     LayoutError,
+    StateBox,
     follow,
     layout_path,
     parse_layout,
@@ -97,7 +97,6 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 __all__ = [
-    "Box",
     "Catalogue",
     "Change",
     "Diagram",
@@ -114,6 +113,7 @@ __all__ = [
     "Positions",
     "PrimitiveEntry",
     "Span",
+    "StateBox",
     "TransitionPath",
     "ValueEntry",
     "XmlError",

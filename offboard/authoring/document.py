@@ -86,6 +86,17 @@ class Document:
         """The nodes of its YAML; None if it is empty or cannot be read."""
         return self._nodes[0]
 
+    def read(self) -> MissionFile:
+        """What the file says, without what it extends. Raises `MissionError` with all faults of its form."""
+        if self._nodes[1] is not None:
+            raise self._nodes[1]
+        if self.nodes is None:
+            raise mission_error(Place(self.label, 1), Message("yaml.empty"))
+        problems = ProblemList()
+        written = read_nodes(self.nodes, self.path, problems)
+        problems.raise_if_any()
+        return written
+
     @property
     def unreadable(self) -> MissionError | None:
         """Why it is not YAML; None if it is, or is empty. Only its text can be edited then."""

@@ -14,8 +14,7 @@ from offboard.authoring.outline import SECTIONS, Event, Section, Span, StateOutl
 from offboard.authoring.references import instances
 from offboard.chart.messages import ENGLISH, Message
 from offboard.chart.problems import MissionError, Problem, ProblemList, Severity
-from offboard.chart.read import read_mission_file
-from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
+from offboard.chart.yaml_nodes import ListNode, Node, Scalar
 from offboard.mission import expand_and_check
 from offboard.pilot import Pilot
 
@@ -72,10 +71,7 @@ def problems_of(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[P
     """What the checker notes of a document."""
     problems = ProblemList()
     try:
-        if document.unreadable is not None:
-            raise document.unreadable
-        written = read_mission_file(document.text, document.path)
-        expand_and_check(written, pilot_class, problems)
+        expand_and_check(document.read(), pilot_class, problems)
     except MissionError as error:
         return (*problems.all, *error.problems)
     return problems.all
@@ -145,12 +141,12 @@ def _scalar_at(node: Node, offset: int) -> Scalar | None:
     pending: list[Node] = [node]
     while pending:
         present = pending.pop()
-        if isinstance(present, Scalar):
-            if present.start <= offset < present.end:
-                return present
+        if not present.start <= offset < present.end:
             continue
+        if isinstance(present, Scalar):
+            return present
         if isinstance(present, ListNode):
             pending.extend(present.items)
-        elif isinstance(present, MapNode):
+        else:
             pending.extend((*present.key_nodes.values(), *present.items.values()))
     return None

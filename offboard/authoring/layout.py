@@ -25,7 +25,7 @@ class LayoutError(UserError):
     """A layout file cannot be used; the message is one line."""
 
 
-class Box(BaseModel):
+class StateBox(BaseModel):
     """Where a state is drawn, in pixels of the page; with a width and height of its own if they were set."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -42,7 +42,7 @@ class Layout(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     version: Literal[1] = 1
-    states: dict[str, Box] = Field(default_factory=dict, max_length=5000)
+    states: dict[str, StateBox] = Field(default_factory=dict, max_length=5000)
     corners: dict[str, tuple[tuple[Coordinate, Coordinate], ...]] = Field(
         default_factory=dict, max_length=20_000
     )

@@ -11,11 +11,10 @@ import ast
 import re
 from dataclasses import dataclass, field
 
-from offboard.authoring.blocks import Blocks, Value
-from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
 from offboard.authoring.scxml_export import NAMESPACE, SCXML
 from offboard.authoring.xml_tree import Element, XmlError, parse_xml
+from offboard.authoring.yaml_writer import Style, Value
 from offboard.chart.native import RESUME, TICK
 from offboard.chart.problems import MAX_REPORTED, cut
 from offboard.chart.spec import look_up
@@ -113,12 +112,12 @@ class _Importer:
             raise XmlError("\n".join(lines))
 
     def _text(self, value: dict[str, Value], states: dict[str, Value]) -> str:
-        blocks = Blocks(Document.from_text(""))
+        style = Style()
         try:
-            lines = [line for key, each in value.items() for line in blocks.entry_lines(key, each, 0)]
+            lines = [line for key, each in value.items() for line in style.entry(key, each, 0)]
             lines += ["", "states:"]
             for number, (name, state) in enumerate(states.items()):
-                lines += ([""] if number else []) + blocks.entry_lines(name, state, 2)
+                lines += ([""] if number else []) + style.entry(name, state, 2)
         except EditError as error:
             raise XmlError(str(error)) from None
         return "\n".join(lines) + "\n"

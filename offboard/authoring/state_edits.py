@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from offboard.authoring.blocks import Owner, Value
+from offboard.authoring.blocks import Owner
 from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import (
     AddState,
@@ -20,6 +20,7 @@ from offboard.authoring.edits import (
 from offboard.authoring.outline import TEMPLATE, StateOutline
 from offboard.authoring.references import instances, prefix_change, references, relative
 from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, Work, keys_before
+from offboard.authoring.yaml_writer import Value, style_of
 from offboard.chart.problems import cut
 from offboard.chart.spec import all_states
 from offboard.chart.yaml_nodes import MapNode, Scalar
@@ -63,7 +64,7 @@ def _insert_state(work: Work, parent: str, name: str, value: Value, index: int |
             )
         else:
             blocks = work.blocks
-            lines = blocks.entry_lines(name, value, _column(work, container))
+            lines = style_of(work.document.nodes).entry(name, value, _column(work, container))
             work.patch(blocks.insert_entry_text(container, index, lines, apart=_are_apart(work, container)))
     if parent != TEMPLATE:
         _set_first_initial(work, parent, name)

@@ -39,7 +39,7 @@ def parse_xml(data: bytes) -> Element:
     """The outermost element of an XML document. Raises `XmlError`."""
     if len(data) > MAX_XML_BYTES:
         raise XmlError("the file is larger than 1 MB; a chart is a few pages")
-    reader = _Reader()
+    reader = _XmlReader()
     try:
         reader.parser.Parse(data, True)
     except expat.ExpatError as error:
@@ -51,7 +51,7 @@ def parse_xml(data: bytes) -> Element:
     return reader.root
 
 
-class _Reader:
+class _XmlReader:
     def __init__(self) -> None:
         self.root: Element | None = None
         self._open: list[Element] = []
