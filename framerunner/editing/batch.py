@@ -93,12 +93,12 @@ def _flight(batch: str, row: Row, scenario: Scenario) -> messages.Flight:
     )
 
 
-def _track(track: Track) -> messages.Track:
+def _track(track: Track) -> messages.FlownTrack:
     states = tuple(dict.fromkeys(track.mission_state))
     numbers = {state: number for number, state in enumerate(states)}
     columns: list[Any] = [tuple(finite(list(each))) for each in (track.time_s, track.x, track.y, track.z)]
     time_s, x, y, z = columns
-    return messages.Track(
+    return messages.FlownTrack(
         time_s=time_s,
         x=x,
         y=y,

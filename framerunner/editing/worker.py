@@ -55,7 +55,7 @@ def main() -> int:
             end_with_standard_input(lambda: None)
             fly_batch(task, mission, tell)
         else:
-            _Run(task, mission, pilot, tell).fly(sys.stdin)
+            _ControlledRun(task, mission, pilot, tell).fly(sys.stdin)
     except MissionError as error:
         tell(refusal(tag, error))
     except UserError as error:
@@ -70,7 +70,7 @@ def refusal(tag: int, error: MissionError, run: str = "") -> messages.Refused:
     return messages.Refused(tag=tag, text=f"{lines[0]}{more}", lines=lines, run=run)
 
 
-class _Run:
+class _ControlledRun:
     """A flight that follows orders."""
 
     def __init__(self, task: messages.RunTask, mission: Mission, pilot: PilotFile | None, tell: Tell) -> None:
