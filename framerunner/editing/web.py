@@ -1,8 +1,8 @@
 """The editor's door to flights: `GET /api/editing/choices` and the WebSocket `/ws/editing`.
 
 `/api/editing/choices` is `{"scenarios": [names], "lessons": [names], "levels": [names], "max_text":
-characters, "max_count": flights of a batch}`. A `scenario` below is the name of one or of a lesson, whose goals
-then count; random ones are named as level and seed, such as `calm-17`.
+characters, "max_count": flights of a batch}`. A `scenario` below is the name of one or of a lesson, whose
+goals then count; random ones are named as level and seed, such as `calm-17`.
 
 The WebSocket is closed with code 4403 if the visitor may not start flights. Each message is a JSON object. A
 request has `do` and may have `tag`, a whole number that comes back with its answer:
