@@ -26,6 +26,7 @@ from wire.mission_tunnel import (
 
 STATE_TICKS = 2  # 10 Hz of vehicle time
 HISTORY = 10
+MAX_HISTORY_PIECES = 4  # two are sent at once, two with the companion's next beat
 _TEXT_CHARACTERS = 80  # of a guard's value that is not a number
 _DIGITS = 6  # of a guard's value: more would take more pieces, and so longer to arrive
 _EXACT = 2**53  # larger integers lose digits in some JSON readers
@@ -94,7 +95,7 @@ class MissionReporter:
         if moment.transition is not None:
             self._transitions += 1
             self._history.append(_transition_json(moment.transition))
-            self._send_document(DocumentKind.HISTORY, {"transitions": list(self._history)})
+            self._send_history()
         if moment.mission_state != self._mission_state or moment.transition is not None:
             self._entered_us = time_us
         flying = moment.state.armed and moment.state.offboard and not moment.paused
@@ -109,6 +110,15 @@ class MissionReporter:
             self._companion.send_text(f"{TEXT_PREFIX}{moment.mission_state}")
         self._send_detections(moment)
         self._send_map(moment)
+
+    def _send_history(self) -> None:
+        """Send the last transitions, as many as arrive within 0.1 s of the newest."""
+        while True:
+            _, pieces = split_document(DocumentKind.HISTORY, {"transitions": list(self._history)})
+            if len(pieces) <= MAX_HISTORY_PIECES or len(self._history) == 1:
+                break
+            self._history.popleft()
+        self._companion.send_document(DocumentKind.HISTORY, pieces)
 
     def _send_state(self, moment: Moment, flying: bool) -> None:
         state, command = moment.state, moment.command

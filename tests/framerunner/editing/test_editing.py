@@ -229,7 +229,7 @@ def test_a_batch_of_layouts_is_told_flight_by_flight_failures_first():
 
 def test_a_broken_mission_ends_in_words():
     with page() as browser:
-        started = browser.answer("start_batch", text=BROKEN, scenarios=["test-case-1", "calm-3"])
+        started = browser.answer("start_batch", text=BROKEN, scenarios=["1_take_off", "calm-3"])
         assert started["count"] == 2
         assert browser.until("batch_ended")["completed"] == 0
         flights = [each for each in browser.seen if each["kind"] == "flight"]
@@ -322,3 +322,4 @@ def test_the_choices_are_listed():
     choices = TestClient(web).get("/api/editing/choices").json()
     assert "test-case-1" in choices["scenarios"]
     assert "calm" in choices["levels"]
+    assert "1_take_off" in choices["lessons"]

@@ -9,7 +9,7 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from framerunner.flying.mission_reporter import HISTORY, MissionReporter
+from framerunner.flying.mission_reporter import HISTORY, MAX_HISTORY_PIECES, MissionReporter
 from framerunner.flying.navigation_reporter import MAX_FRAMES, MAX_POINTS, navigation_json
 from offboard.app import Moment, fly_mission
 from offboard.drone import DroneState, VelocityCommand
@@ -319,3 +319,15 @@ async def test_a_whole_flight_is_reported_in_order():
     assert gaps.max() <= 100_000
     assert listener.states[-1].finished and not listener.states[-1].flying
     assert len(seen) / 2 <= len(listener.states) <= len(seen) / 2 + 2 * len(changes) + 10
+
+
+def test_a_history_of_long_guards_has_fewer_transitions_so_that_the_newest_arrives_at_once():
+    listener, reporter = make_reporter()
+    noise = np.random.default_rng(1).integers(33, 127, (12, 80))
+    for number, letters in enumerate(noise):
+        values = (("memory.text", "".join(map(chr, letters))),)
+        reporter.see(moment(number, transition=taken(number, values=values)))
+    last = listener.contents(DocumentKind.HISTORY)[-1]
+    assert last["transitions"][-1]["time_us"] == 550_000
+    assert 1 < len(last["transitions"]) < HISTORY
+    assert len(split_document(DocumentKind.HISTORY, last)[1]) <= MAX_HISTORY_PIECES
