@@ -6,10 +6,12 @@ import asyncio
 import json
 import logging
 from collections.abc import Callable, Sequence
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Body, HTTPException, Request
 from starlette.requests import HTTPConnection
+from starlette.responses import PlainTextResponse, Response
 from starlette.websockets import WebSocket
 
 from errors import UserError
@@ -30,11 +32,11 @@ from framerunner.editing.documents.messages import (
 )
 from framerunner.editing.documents.open_document import OpenDocument
 from monitor.access import refuse
-from offboard.authoring.edits import ReplaceText, parse_edit
-from offboard.authoring.text import Change
+from offboard.authoring import Change, export_scxml, import_scxml, mermaid_of, parse_edit
 from offboard.mission import list_missions
 
 _Text = Annotated[str, Body(max_length=100)]
+_Scxml = Annotated[str, Body(max_length=1_000_000)]
 _JOURNAL_PERIOD_S = 2.0
 _BAD_MESSAGE_CODE = 4400  # as HTTP's
 _MAX_QUEUE = 200
@@ -76,6 +78,33 @@ class DocumentsDoor:
                 return {"file": await asyncio.to_thread(desk.create, name, source)}
             except UserError as error:
                 raise HTTPException(400, str(error)) from None
+
+        @router.post("/api/edit/import")
+        async def import_(request: Request, name: _Text, scxml: _Scxml) -> dict[str, str]:
+            demand(request)
+
+            def write() -> str:
+                return desk.write(name, import_scxml(scxml.encode(), name))
+
+            try:
+                return {"file": await asyncio.to_thread(write)}
+            except UserError as error:
+                raise HTTPException(400, str(error)) from None
+
+        @router.get("/api/edit/export")
+        async def export(request: Request, file: str, kind: Literal["scxml", "mermaid"]) -> Response:
+            demand(request)
+            try:
+                chart = desk.open(file).opened.document.chart
+                desk.close(file)
+            except UserError as error:
+                raise HTTPException(400, str(error)) from None
+            if chart is None:
+                raise HTTPException(400, "the mission has mistakes; mend them, then export it")
+            text = export_scxml(chart) if kind == "scxml" else mermaid_of(chart)
+            kept_as = f"{Path(file).stem}.{'scxml' if kind == 'scxml' else 'mmd'}"
+            headers = {"Content-Disposition": f'attachment; filename="{kept_as}"'}
+            return PlainTextResponse(text, headers=headers)
 
         @router.websocket("/ws/edit")
         async def edit(websocket: WebSocket, file: str) -> None:
@@ -212,5 +241,6 @@ def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[Change]:
         positions = opened.document.positions
         start = positions.from_utf16(typed.start)
         end = positions.from_utf16(typed.start + typed.removed)
-        changes += opened.apply(ReplaceText(start=start, end=end, text=typed.inserted))
+        edit = {"kind": "replace_text", "start": start, "end": end, "text": typed.inserted}
+        changes += opened.apply(parse_edit(edit))
     return changes

@@ -14,19 +14,13 @@ those before it, `status`, and `{"refused": reason}` in an answer.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from errors import UserError
 from framerunner.editing.documents.open_document import OpenDocument
-from offboard.authoring.catalogue import catalogue
-from offboard.authoring.diagram import diagram
-from offboard.authoring.findings import check_document
-from offboard.authoring.layout import Box
-from offboard.authoring.outline import Span
-from offboard.authoring.text import Change, Positions
+from offboard.authoring import Change, Positions, Span, StateBox, as_json, catalogue, check_document, diagram
 
 _Number = Annotated[int, Field(ge=0, le=2**53)]
 
@@ -83,7 +77,7 @@ class LayoutMessage(_FromPage):
     """Where states are drawn."""
 
     type: Literal["layout"]
-    places: Annotated[dict[str, Box | None], Field(max_length=5000)]
+    places: Annotated[dict[str, StateBox | None], Field(max_length=5000)]
 
 
 PageMessage = EditMessage | TypeMessage | StepMessage | SaveMessage | LayoutMessage
@@ -139,10 +133,12 @@ def _state(opened: OpenDocument) -> dict[str, object]:
     drawn = diagram(document)
     found = []
     for each in check_document(document):
-        found.append({**asdict(each), "span": at(Span(each.start, each.end))})
-    nodes = [{**asdict(node), "span": at(node.span), "name_span": at(node.name_span)} for node in drawn.nodes]
+        found.append({**as_json(each), "span": at(Span(each.start, each.end))})
+    nodes = [
+        {**as_json(node), "span": at(node.span), "name_span": at(node.name_span)} for node in drawn.nodes
+    ]
     edges = [
-        {**asdict(edge), "span": at(edge.span), "when_span": at(edge.when_span), "to_span": at(edge.to_span)}
+        {**as_json(edge), "span": at(edge.span), "when_span": at(edge.when_span), "to_span": at(edge.to_span)}
         for edge in drawn.edges
     ]
     outline = document.outline
@@ -167,4 +163,4 @@ def catalogue_message(opened: OpenDocument) -> dict[str, object]:
     """The names that the mission can use."""
     outline = opened.document.outline
     variables = dict.fromkeys(outline.variables, 0.0)
-    return asdict(catalogue(variables=variables, contest=outline.text("class") != "open"))
+    return as_json(catalogue(variables=variables, contest=outline.text("class") != "open"))

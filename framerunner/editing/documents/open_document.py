@@ -7,11 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from errors import UserError
-from offboard.authoring.apply import EditSession
-from offboard.authoring.document import Document
-from offboard.authoring.edits import Edit, ReplaceText
-from offboard.authoring.layout import Box, Layout, LayoutError, follow, layout_path, read_layout, write_layout
-from offboard.authoring.text import Change
+from offboard.authoring import (
+    Change,
+    Document,
+    Edit,
+    EditSession,
+    Layout,
+    LayoutError,
+    StateBox,
+    follow,
+    layout_path,
+    parse_edit,
+    read_layout,
+    write_layout,
+)
 
 _JOURNAL_SUFFIX = ".unsaved"
 
@@ -61,7 +70,8 @@ class OpenDocument:
         except (OSError, UserError):
             return
         if kept != self._saved:
-            self.session.apply(ReplaceText(start=0, end=len(self.session.document.text), text=text))
+            end = len(self.session.document.text)
+            self.session.apply(parse_edit({"kind": "replace_text", "start": 0, "end": end, "text": text}))
             self.restored = True
 
     @property
@@ -101,7 +111,7 @@ class OpenDocument:
             self._is_kept = False
         return changes
 
-    def place(self, places: dict[str, Box | None]) -> None:
+    def place(self, places: dict[str, StateBox | None]) -> None:
         """Keep where states are drawn, by their full ids; None forgets one. Raises `LayoutError`."""
         states = {**self.layout.states, **{name: box for name, box in places.items() if box is not None}}
         for name, box in places.items():
