@@ -31,11 +31,11 @@ export class LessonPanel {
     this.#root.append(
       make("h2", {}, `${lesson.number}. ${inLanguage(title)}`),
       make("p", { class: "e-goal" }, inLanguage(goal)),
-      make("ol", {}, ...items(steps)),
-      make("details", {}, make("summary", {}, word("hints")), make("ul", {}, ...items(hints))),
       make("div", { class: "e-row" }, button(word("check_lesson"), () => this.#check(), { class: "e-first" }),
         make("a", { href: "/course" }, word("next_lesson"))),
-      this.#line);
+      this.#line,
+      make("ol", {}, ...items(steps)),
+      make("details", {}, make("summary", {}, word("hints")), make("ul", {}, ...items(hints))));
   }
 
   async #check() {

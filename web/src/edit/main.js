@@ -11,6 +11,8 @@ import { EditSession } from "./session.js";
 import { Tabs } from "./tabs.js";
 import { TextView } from "./text_view.js";
 import { changeLanguage, language } from "../lib/language.js";
+import { savePicture } from "./picture.js";
+import { showNames } from "./names.js";
 import { LessonPanel } from "./lesson_panel.js";
 import { word } from "./words.js";
 
@@ -53,13 +55,34 @@ async function chooseFile() {
       if (made.ok) location.href = `/edit?file=${encodeURIComponent(created)}`;
       problem.hidden = made.ok;
       problem.textContent = typeof detail === "string" ? detail : made.statusText;
+    }),
+    importField(async (text, wanted) => {
+      const made = await fetch("/api/edit/import", {
+        method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ name: wanted, scxml: text }),
+      });
+      const { file: created, detail } = await made.json();
+      if (made.ok) location.href = `/edit?file=${encodeURIComponent(created)}`;
+      problem.hidden = made.ok;
+      problem.textContent = typeof detail === "string" ? detail : made.statusText;
     })));
+}
+
+/** A field for an SCXML file. @param {(text: string, name: string) => void} chosen */
+function importField(chosen) {
+  const input = /** @type {HTMLInputElement} */ (make("input", { type: "file", accept: ".scxml,.xml" }));
+  input.addEventListener("change", async () => {
+    const [picked] = input.files ?? [];
+    const name = picked?.name.replace(/\.[^.]*$/, "").toLowerCase().replace(/[^a-z0-9]+/g, "_").replace(/^[^a-z]+/, "");
+    if (picked) chosen(await picked.text(), name || "imported");
+  });
+  return make("label", { class: "e-field" }, make("span", {}, word("import_scxml")), input);
 }
 
 /** @param {string} name of the file */
 function edit(name) {
   /** @type {Selection} */
   let selection = { kind: "mission", id: "" };
+  const stem = name.replace(/\.ya?ml$/, "");
   const line = make("p", { class: "e-message", role: "status", hidden: true });
   const state = make("span", { class: "e-saved", role: "status" });
   const drawing = make("section", { class: "e-drawing", "aria-label": word("diagram") });
@@ -69,9 +92,10 @@ function edit(name) {
   const flying = make("div");
   const lesson = new URLSearchParams(location.search).get("lesson");
   const teaching = make("div");
+  const names = make("div", { class: "e-names" });
   const tabs = new Tabs([
     ...(lesson ? [/** @type {[string, string, HTMLElement]} */ (["lesson", word("lesson"), teaching])] : []),
-    ["findings", word("checker"), findings], ["fly", word("fly"), flying],
+    ["findings", word("checker"), findings], ["fly", word("fly"), flying], ["names", word("names"), names],
   ]);
   const undo = button(word("undo"), () => session.undo(), { "aria-keyshortcuts": "Control+Z" });
   const redo = button(word("redo"), () => session.redo(), { "aria-keyshortcuts": "Control+Y" });
@@ -82,6 +106,9 @@ function edit(name) {
     button(word("new_superstate"), () => inspector.add(true)),
     button(word("fit"), () => diagram.fit()),
     button(word("arrange"), arrange),
+    make("details", { class: "e-export" }, make("summary", {}, word("export")),
+      button("PNG", () => savePicture(drawing, stem, "png")), button("SVG", () => savePicture(drawing, stem, "svg")),
+      ...["mermaid", "scxml"].map((kind) => make("a", { href: `/api/edit/export?kind=${kind}&file=${encodeURIComponent(name)}`, download: true }, kind === "scxml" ? "SCXML" : "Mermaid"))),
     button(word("language"), changeLanguage));
   root.replaceChildren(tools, line, make("div", { class: "e-panes" }, drawing, form, writing, tabs.root));
 
@@ -181,6 +208,7 @@ function edit(name) {
     text.setFindings(session.findings);
     inspector.show(selection);
     showFindings();
+    showNames(names, session.catalogue);
     root.classList.toggle("e-unreadable", !session.isReadable);
     if (!session.isReadable) tell(word("unreadable"));
     else if (line.textContent === word("unreadable")) tell("");
