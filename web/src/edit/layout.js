@@ -5,13 +5,18 @@ import dagre from "@dagrejs/dagre";
  * @typedef {import("./session.js").Diagram} Diagram
  * @typedef {import("./session.js").Point} Point
  * @typedef {{x: number, y: number, width: number, height: number}} Box in the drawing's units, from its upper left
+ * @typedef {{from: string, to: string, width: number}} Join a transition between two states of a level, with its label's width
  */
 
 const LETTER = 7.2; // mean width of a letter
 const LEAF = { width: 110, height: 44 };
 const HEADER = 30; // of a superstate, with its name
 const PADDING = 18;
-const GAP = { nodesep: 36, ranksep: 56, edgesep: 16 };
+const LABEL = { letter: 6, height: 16, longest: 34, words: 84 };
+const GAP = { nodesep: 36, ranksep: 34, edgesep: 16 };
+
+/** The room for a transition's label. @param {string} event @param {string} when */
+const labelWidth = (event, when) => (event === "tick" ? (Math.min(when.length, LABEL.longest) + 3) * LABEL.letter : LABEL.words);
 
 /** The width of a state's name. @param {string} text */
 const textWidth = (text) => Math.max(LEAF.width, Math.ceil(text.length * LETTER) + 34);
@@ -39,18 +44,19 @@ export function layOut(diagram, kept) {
     for (let at = path; at; at = parents.get(at)) found.unshift(at);
     return found;
   };
-  /** @type {Map<string, [string, string][]>} the transitions of each level, between its states */
+  /** @type {Map<string, Join[]>} the transitions of each level, between its states */
   const levels = new Map();
-  for (const { source, target } of diagram.edges) {
+  for (const { source, target, event, when } of diagram.edges) {
     if (source === target) continue;
     const from = chain(source), into = chain(target);
     let depth = 0;
     while (depth < from.length - 1 && depth < into.length - 1 && from[depth] === into[depth]) depth += 1;
     if (from[depth] === into[depth]) continue;
     const level = depth === 0 ? "" : from[depth - 1];
-    const pairs = levels.get(level);
-    if (pairs) pairs.push([from[depth], into[depth]]);
-    else levels.set(level, [[from[depth], into[depth]]]);
+    const join = { from: from[depth], to: into[depth], width: labelWidth(event, when) };
+    const joins = levels.get(level);
+    if (joins) joins.push(join);
+    else levels.set(level, [join]);
   }
   /** @type {Map<string, Box>} */
   const boxes = new Map();
@@ -81,12 +87,12 @@ export function layOut(diagram, kept) {
 /**
  * Place the states of one level.
  * @param {string[]} paths
- * @param {[string, string][]} pairs transitions
+ * @param {Join[]} joins
  * @param {Map<string, Box>} boxes with the states' sizes; their places are set
  * @param {Object<string, Point>} kept
  * @returns {{width: number, height: number}} what they need
  */
-function arrange(paths, pairs, boxes, kept) {
+function arrange(paths, joins, boxes, kept) {
   const isPlaced = (path) => kept[path] !== undefined;
   if (!paths.every(isPlaced)) {
     const graph = new dagre.graphlib.Graph();
@@ -95,7 +101,7 @@ function arrange(paths, pairs, boxes, kept) {
     graph.setGraph({ rankdir: hasSuper ? "LR" : "TB", ranker: paths.length > 60 ? "longest-path" : "network-simplex", ...GAP });
     graph.setDefaultEdgeLabel(() => ({}));
     for (const path of paths) graph.setNode(path, { ...boxes.get(path) });
-    for (const [from, to] of pairs) graph.setEdge(from, to);
+    for (const { from, to, width } of joins) graph.setEdge(from, to, { width, height: LABEL.height, labelpos: "c" });
     dagre.layout(graph);
     for (const path of paths) {
       const { x, y, width, height } = graph.node(path);

@@ -53,7 +53,8 @@ export class RunPanel {
     this.#pause = button(word("pause"), () => this.#togglePause());
     const drawing = make("div", { class: "e-top-view" });
     this.#view = new TopView(drawing);
-    root.append(
+    root.classList.add("e-fly");
+    root.append(drawing, make("div", {},
       this.#choices,
       make("div", { class: "e-row" },
         button(word("fly_once"), () => this.#start(false), { class: "e-first" }),
@@ -63,7 +64,7 @@ export class RunPanel {
         button(word("take_changes"), () => this.#change()),
         button(word("stop"), () => this.#order({ do: "stop" })),
         button(word("fly_many", { count: String(BATCH) }), () => this.#startBatch())),
-      this.#line, this.#strip, make("div", { class: "e-run-columns" }, drawing, make("div", {}, this.#guards, this.#values)), this.#table);
+      this.#line, this.#strip, make("div", { class: "e-run-columns" }, this.#guards, this.#values), this.#table));
     this.#flights = new Flights({ heard: (message) => this.#hear(message), lost: () => this.#forget() });
     this.#loadChoices();
   }
