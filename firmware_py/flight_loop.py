@@ -216,6 +216,7 @@ class FlightLoop:
 
     def _observe(self, sensors: Sensors | Readings, usable: bool) -> Observation:
         state, detector, now_us = self.state, self._land_detector, self._now_us
+        has_position = self.estimator.has_position
         if not usable:
             self._now_us = now_us = now_us + self._period_us
         else:
@@ -230,7 +231,7 @@ class FlightLoop:
                 lifting=self._lift_off.ticks > 0,
                 command_down_m_s=self._guidance.command_down_m_s,
                 throttle=self.output.throttle,
-                has_position=self.estimator.has_position,
+                has_position=has_position,
             )
             if landed is not before:
                 self._change_ground_contact(landed)
@@ -242,7 +243,7 @@ class FlightLoop:
         return Observation(
             now_us,
             usable,
-            self.estimator.has_position,
+            has_position,
             1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
             detector.landed,
             self._guidance.mode.target_reached,

@@ -28,6 +28,7 @@ def build_app() -> App:
     from framerunner.commands import (
         bound,
         camera,
+        course,
         doctor,
         evaluate,
         film,
@@ -61,6 +62,7 @@ def build_app() -> App:
     app.command(replay.replay)
     app.command(film.film)
     app.command(mission.app)
+    app.command(course.app)
     app.command(scenario.app)
     app.command(vision.app)
     return app

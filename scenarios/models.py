@@ -15,6 +15,7 @@ from geometry.solids import Solid
 from geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.air import Wind
 from scenarios.faults.declaration import Fault
+from scenarios.goals import Goal
 from scenarios.imaging.clutter import Hall, Patch
 from scenarios.imaging.effects import CameraEffects
 from scenarios.part import Part, refusal
@@ -26,7 +27,7 @@ MissionClass = Literal["contest", "open"]
 DecoyColour = Literal["cyan", "magenta"]
 DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
-_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors", "wind", "faults", "hall", "patches")
+_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors", "wind", "faults", "hall", "patches", "goals")
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
@@ -302,6 +303,19 @@ class Scenario(Part):
     sensors: str = Field("ideal", description="name of the drone's sensor suite, or a file of one")
     wind: Wind = Field(Wind(), description="how the air moves; by default it is still")
     faults: tuple[Fault, ...] = Field((), max_length=20, description="what fails, and when")
+
+    goals: tuple[Goal, ...] = Field(
+        (), max_length=20, description="what is to be done, in this order, instead of crossing all frames"
+    )
+
+    @model_validator(mode="after")
+    def _goals_have_frames(self) -> Self:
+        colours = {frame.colour for frame in self.frames}
+        for index, goal in enumerate(self.goals):
+            if goal.face is not None and goal.face not in colours:
+                message = "is the colour of no frame; add it to frames or face another"
+                raise refusal(goal.face, message, "goals", index, "face")
+        return self
 
     @model_validator(mode="after")
     def _one_frame_a_colour(self) -> Self:

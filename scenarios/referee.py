@@ -7,6 +7,7 @@ from math import isfinite
 
 from geometry.vectors import Vec3
 from scenarios.crossing import Boundary, Passage, PathWatch
+from scenarios.goals import GoalWatch
 from scenarios.models import COLOURS, Scenario, TrueState, ground_height
 from scenarios.result import RefereeReport, RefereeSnapshot
 from scenarios.touchdown import (
@@ -45,6 +46,7 @@ class Referee:
 
     Crossings count while the motors are on. Only the first crossing of each frame counts; one crossed too
     early makes the order wrong, whatever follows. The order is red, green, blue, those that the scenario has.
+    In a scenario with goals no frame has to be crossed, and crossings are not noted: its goals count instead.
 
     Args:
         scenario: what is flown.
@@ -58,7 +60,8 @@ class Referee:
         self._floor_m = floor_m
         self._limit_us = round(scenario.try_limit_s * 1e6)
         self._boundary = Boundary(scenario.arena)
-        self._frames = sorted(scenario.frames, key=lambda frame: COLOURS.index(frame.colour))
+        crossable = () if scenario.goals else scenario.frames
+        self._frames = sorted(crossable, key=lambda frame: COLOURS.index(frame.colour))
         self._expected = tuple(frame.colour for frame in self._frames)
         self._solids = {
             *(each.colour for each in scenario.all_frames),
@@ -75,6 +78,9 @@ class Referee:
         """Forget the try, if there was one."""
         self._path = PathWatch(self._scenario.arena, self._frames)
         self._crash_watch = CrashWatch(self._scenario, self._envelope_m, self._floor_m)
+        self._goals = GoalWatch(
+            self._scenario.goals, {frame.colour: frame.position_arena_m for frame in self._scenario.frames}
+        )
         self._start_us = 0
         self._start_height_m = 0.0
         self._stop_us: int | None = None
@@ -126,6 +132,8 @@ class Referee:
             self._cross(colour, passage, step_us)
         if position_m[2] - self._start_height_m > TAKEN_OFF_M:
             self._taken_off = True
+        if self._scenario.goals:
+            self._goals.follow(state.time_us, position_m, state.attitude_arena)
         self._watch(state)
         if self._over:
             return
@@ -251,6 +259,7 @@ class Referee:
             contact_frames=tuple(self._contacts),
             outside_s=self._path.outside_us * 1e-6,
             try_time_s=self.try_time_s,
+            missed_goal=str(self._goals.next_goal or ""),
             began=self._phase is not _Phase.WAITING,
             taken_off=self._taken_off,
             motors_on=self._phase is _Phase.FLYING,
@@ -270,6 +279,7 @@ class Referee:
             crossing_times_s=tuple(time_s for time_s, _ in crossings),
             crossing_offsets_m=tuple(passage.offset_m for _, passage in crossings),
             crossing_sides=tuple(passage.side for _, passage in crossings),
+            goal_times_s=tuple([(time_us - self._start_us) * 1e-6 for time_us in self._goals.times_us]),
             contacts=len(self._contacts),
             contact_frames=facts.contact_frames,
             contact_times_s=tuple(self._contacts_s),

@@ -79,6 +79,11 @@ class RefereeReport(_Record):
     crossing_sides: tuple[Side, ...] = Field(
         (), max_length=10, description="the side the drone came from, one for each"
     )
+    goal_times_s: tuple[Seconds, ...] = Field(
+        (),
+        max_length=20,
+        description="when the scenario's goals were reached, since motors on, in their order",
+    )
     contacts: Count = Field(0, description="number of contacts with frames and obstacles")
     contact_frames: tuple[Text, ...] = Field(
         (), max_length=10_000, description="what was touched, in order: a frame's colour, `pole` or `wall`"

@@ -28,6 +28,7 @@ class TryFacts:
     expected: tuple[str, ...]  # colours to cross, in order
     crossed: tuple[str, ...]  # colours crossed, each once, in order of its first crossing
     contact_frames: tuple[str, ...]  # what was touched at each contact
+    missed_goal: str  # the first of the scenario's goals that is not reached, in words, or ""
     outside_s: float
     try_time_s: float  # motors on to motors off, or to now
     began: bool  # the motors were on
@@ -47,7 +48,8 @@ def judge(facts: TryFacts, mission_state: str = "", ended: str | None = None) ->
     1. `wrong order`: a frame was crossed too early, whatever followed.
     2. `crashed`: see `CrashWatch`; coming to rest on its side or back is a crash too.
     3. `timed out`: the try exceeded its limit.
-    4. `clean` or `completed`: all frames crossed in order, and standing on the base with the motors off.
+    4. `clean` or `completed`: all frames crossed in order, or all goals of the scenario reached, and standing
+       on the base with the motors off.
        Clean has neither contacts nor time outside.
     5. `aborted`: all else. Examples are a mission that was broken off, motors cut in the air without a crash,
        landing beside the base, and landing with a frame not crossed.
@@ -84,7 +86,7 @@ def _verdict(facts: TryFacts) -> Verdict:
     if facts.timed_out:
         return Verdict.TIMED_OUT
     landed_on_base = facts.landing is not None and facts.landing.surface == "base"
-    if facts.crossed != facts.expected or not landed_on_base:
+    if facts.crossed != facts.expected or facts.missed_goal or not landed_on_base:
         return Verdict.ABORTED
     return Verdict.COMPLETED if _flaws(facts) else Verdict.CLEAN
 
@@ -113,6 +115,8 @@ def _shortfall(facts: TryFacts) -> str:
             return words
     if facts.landing is not None and facts.landing.surface != "base":
         return f"landed {facts.landing.error_m:.2f} m from the base's centre, not on the base"
+    if facts.missed_goal:
+        return f"landed on the base without being {facts.missed_goal}"
     missing = ", ".join(colour for colour in facts.expected if colour not in facts.crossed)
     return f"landed on the base without crossing {missing}"
 

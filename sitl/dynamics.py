@@ -220,7 +220,7 @@ class Dynamics:
 
     def motor_speeds_rad_s(self) -> tuple[float, ...]:
         """True speeds of the rotors."""
-        return tuple(speed() for speed in self._speeds)
+        return tuple([speed() for speed in self._speeds])
 
 
 def _ignore(_speed_rad_s: float) -> bool:

@@ -3,7 +3,7 @@
 The error of attitude is a rotation vector about the axes of NED (R = exp(d) R_estimated), so that the error
 of the heading is one of its components. Prediction and correction follow J. Solà, "Quaternion kinematics for
 the error-state Kalman filter", 2017 (arXiv 1711.02508), section 7, with global angular errors. numpy does the
-algebra; measurements are fused one number after the other, which needs no inverse.
+algebra; measurements are fused one number after the other (see `joint_update`), which needs no inverse.
 """
 
 from __future__ import annotations
@@ -57,6 +57,7 @@ class ErrorCovariance:
     Attributes:
         p: the covariance, updated in place.
         error: the errors found by the corrections since `take_error`, shape (n,).
+        has_error: whether it has been corrected since.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class ErrorCovariance:
         self.size = size = INERTIAL_STATES + len(drifts)
         self.p: Matrix = np.zeros((size, size))
         self.error: Matrix = np.zeros(size)
+        self.has_error = False
         self._drifting = [
             (index, drift)
             for index, drift in enumerate(drifts, start=INERTIAL_STATES)
@@ -80,7 +82,7 @@ class ErrorCovariance:
         self._g: Matrix = np.zeros((GYRO_BIAS, size))  # F less the identity: only the first states change
         self._rows: Matrix = np.zeros((GYRO_BIAS, size))
         self._work: Matrix = np.zeros((size, size))
-        self._diagonal = np.arange(size)
+        self._diagonal = self.p.reshape(-1)[:: size + 1]
         self._noise: Matrix = np.zeros(size)
 
     def set_variance(self, index: int, *variances: float) -> None:
@@ -148,54 +150,50 @@ class ErrorCovariance:
         np.dot(g, p, out=self._rows)
         p[:GYRO_BIAS] += self._rows
         p[:, :GYRO_BIAS] += np.dot(p, g.T)
-        p[self._diagonal, self._diagonal] += noise
-
-    def related(self, row: Matrix) -> tuple[Matrix, float]:
-        """P H', shape (n,), and H P H' of a measured number with the derivatives H, shape (n,)."""
-        related: Matrix = self.p @ row
-        return related, float(related @ row)
-
-    def fuse(
-        self, row: Matrix, innovation: float, variance: float, related: tuple[Matrix, float] | None = None
-    ) -> float:
-        """Correct by one measured number.
-
-        Args:
-            row: derivatives of the measured number by the error state, shape (n,).
-            innovation: measured minus predicted by the nominal state.
-            variance: of the measurement.
-            related: what `related` has given for the row, if nothing has been fused since.
-
-        Returns:
-            The normalised innovation squared; over the numbers of one measurement, these add up to its NIS.
-        """
-        gain, own = related or self.related(row)
-        return self._correct(gain, own, float(row @ self.error), innovation, variance)
+        self._diagonal += noise
 
     def fuse_state(self, index: int, innovation: float, variance: float) -> float:
-        """Correct by a measurement of one state; see `fuse`."""
-        gain: Matrix = self.p[index].copy()
-        return self._correct(gain, float(gain[index]), float(self.error[index]), innovation, variance)
+        """Correct by a measurement of one state.
 
-    def _correct(self, gain: Matrix, own: float, known: float, innovation: float, variance: float) -> float:
-        total = own + variance
-        left = innovation - known  # what earlier numbers have not explained yet
-        scaled = gain / total
+        Args:
+            index: of the state.
+            innovation: measured minus predicted by the nominal state.
+            variance: of the measurement.
+
+        Returns:
+            The normalised innovation squared.
+        """
+        related: Matrix = self.p[index]
+        total = float(related[index]) + variance
+        left = innovation - float(self.error[index])  # what earlier numbers have not explained yet
+        scale = total**-0.5
+        self.correct((scale * related)[:, None], np.array([scale * left]))
+        return left * left / total
+
+    def correct(self, gains: Matrix, weights: Matrix) -> None:
+        """Correct by measured numbers.
+
+        Args:
+            gains: of each number in a column, divided by the root of its innovation's variance, shape (n, k).
+            weights: innovations divided by these roots, shape (k,).
+        """
         p, considered = self.p, self._considered
         if considered is None:
-            p -= scaled[:, None] * gain
+            p -= np.dot(gains, gains.T)
+            self.error += np.dot(gains, weights)
         else:
             kept = p[considered, considered].copy()
-            p -= scaled[:, None] * gain
+            p -= np.dot(gains, gains.T)
             p[considered, considered] = kept
-            scaled[considered] = 0.0
-        self.error += scaled * left
-        return left * left / total
+            self.error += np.dot(gains, weights)
+            self.error[considered] = 0.0
+        self.has_error = True
 
     def take_error(self) -> list[float]:
         """The errors found since the last call; they are then zero, as the nominal state has them."""
         found: list[float] = self.error.tolist()
         self.error[:] = 0.0
+        self.has_error = False
         return found
 
     def symmetrise(self) -> None:

@@ -339,3 +339,44 @@ def test_the_report_on_any_states_is_consistent(rows):
     if report.verdict in {"clean", "completed"}:
         assert report.landed_on_base
         assert report.frames_crossed == ("red", "green", "blue")
+
+
+GOALS = Scenario.model_validate(
+    {
+        "name": "goals",
+        "frames": [{"colour": "red", "x_m": 3.0, "y_m": 0.0, "z_m": 1.0}],
+        "goals": [{"hold_m": (0.0, 0.0, 1.0), "seconds": 1.0}, {"face": "red", "distance_m": (1.0, 2.5)}],
+    }
+)
+FACING = LEVEL
+AWAY = (0.0, 0.0, 0.0, 1.0)
+
+
+def test_goals_are_reached_in_order_and_instead_of_crossing():
+    flight = Flight(GOALS).motors(True).fly(UP).wait(0.5)
+    assert "without being" not in flight.referee.report().reason
+    flight.wait(0.6).fly((1.0, 0.0, 1.0)).wait(1.1, attitude=FACING).fly(UP, HOME).motors(False).wait(1.0)
+    report = flight.referee.report()
+    assert report.verdict is Verdict.CLEAN
+    assert report.frames_crossed == ()
+    first, second = report.goal_times_s
+    assert 1.0 < first < 2.2
+    assert second > first + 1.0
+
+
+def test_a_goal_that_is_interrupted_begins_again():
+    flight = Flight(GOALS).motors(True).fly(UP).wait(0.4).fly((0.6, 0.0, 1.0), UP).wait(0.4)
+    assert flight.referee.report().goal_times_s == ()
+    flight.wait(0.6)
+    assert len(flight.referee.report().goal_times_s) == 1
+
+
+def test_looking_elsewhere_or_from_too_far_is_not_facing():
+    flight = Flight(GOALS).motors(True).fly(UP).wait(1.1).wait(2.0)  # faces it from 3 m
+    assert len(flight.referee.report().goal_times_s) == 1
+    flight.fly((1.0, 0.0, 1.0)).wait(0.3, attitude=FACING).wait(2.0, attitude=AWAY)
+    assert len(flight.referee.report().goal_times_s) == 1
+    flight.fly(UP, HOME).motors(False).wait(1.0)
+    report = flight.referee.report()
+    assert report.verdict is Verdict.ABORTED
+    assert "landed on the base without being facing red from 1 to 2.5 m away for 1 s" in report.reason

@@ -30,6 +30,7 @@ LOCKSTEP = {
     "crossing_times_s": [20.5, 40.25, 60.125],
     "crossing_offsets_m": [0.01, 0.02, 0.03],
     "crossing_sides": ["front", "back", "front"],
+    "goal_times_s": [],
     "contacts": 1,
     "contact_frames": ["red"],
     "contact_times_s": [35.5],

@@ -7,6 +7,7 @@ from scenarios.verdict import TryFacts, Verdict, judge
 
 ALL = ("red", "green", "blue")
 GOOD = TryFacts(
+    missed_goal="",
     expected=ALL,
     crossed=ALL,
     contact_frames=(),

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from math import inf, isfinite
+
 from firmware_py.estimation.error_state import Matrix
+from firmware_py.estimation.joint_update import JointUpdate
 from firmware_py.estimation.navigation_filter import NavigationFilter
 
 NEVER_US = -(10**15)
@@ -87,11 +90,11 @@ class Aid:
             Whether they passed the gate; if not, nothing is fused.
         """
         covariance = into.covariance
-        worst = 0.0
-        for at, (innovation, variance) in enumerate(zip(innovations, variances, strict=True), start=index):
-            total = float(covariance.p[at, at]) + variance
-            worst = max(worst, innovation * innovation / total)
-        if not self._passes(worst, into.time_us):
+        squares = [
+            innovation * innovation / (float(covariance.p[at, at]) + variance)
+            for at, (innovation, variance) in enumerate(zip(innovations, variances, strict=True), start=index)
+        ]
+        if not self._passes(squares, into.time_us):
             return False
         nis = 0.0
         for at, (innovation, variance) in enumerate(zip(innovations, variances, strict=True), start=index):
@@ -102,24 +105,26 @@ class Aid:
     def fuse_rows(
         self,
         into: NavigationFilter,
-        rows: tuple[Matrix, ...],
-        innovations: tuple[float, ...],
+        rows: Matrix,
+        innovations: tuple[float, ...] | list[float],
         variances: tuple[float, ...],
     ) -> bool:
-        """Fuse measured numbers by their derivatives, each of shape (n,); see `fuse_states`."""
-        covariance = into.covariance
-        related = [covariance.related(row) for row in rows]
-        worst = max(
-            [
-                innovation * innovation / (own + variance)
-                for (_, own), innovation, variance in zip(related, innovations, variances, strict=True)
-            ]
-        )
-        if not self._passes(worst, into.time_us):
+        """Fuse measured numbers by their derivatives, shape (k, n); see `fuse_states`."""
+        update = JointUpdate(into.covariance, rows, innovations)
+        passed = self.fuse_part(into, update, 0, variances)
+        update.apply()
+        return passed
+
+    def fuse_part(
+        self, into: NavigationFilter, update: JointUpdate, first: int, variances: tuple[float, ...]
+    ) -> bool:
+        """Fuse numbers of an update from an index on; see `fuse_states`."""
+        squares = [update.square(at, variance) for at, variance in enumerate(variances, start=first)]
+        if not self._passes(squares, into.time_us):
             return False
-        nis = covariance.fuse(rows[0], innovations[0], variances[0], related[0])
-        for row, innovation, variance in zip(rows[1:], innovations[1:], variances[1:], strict=True):
-            nis += covariance.fuse(row, innovation, variance)
+        nis = 0.0
+        for at, variance in enumerate(variances, start=first):
+            nis += update.fuse(at, variance)
         self._fused(nis, into)
         return True
 
@@ -164,14 +169,15 @@ class Aid:
         self._open = True
         self._last_us = NEVER_US  # innovations before and after are not compared
 
-    def _passes(self, square: float, now_us: int) -> bool:
+    def _passes(self, squares: list[float], now_us: int) -> bool:
         self.arrived_us = now_us
-        self.ratio = (square**0.5) / self._gate
+        worst = max(squares) if isfinite(sum(squares)) else inf
+        self.ratio = worst**0.5 / self._gate
         is_open, self._open = self._open, False
         if is_open and self.fused_us != NEVER_US:
             self._resets += 1
             self._last_reset_us = now_us
-        return self.ratio <= 1.0 or is_open  # false for NaN too
+        return self.ratio <= 1.0 or is_open
 
     def _fused(self, nis: float, into: NavigationFilter) -> None:
         self.nis = nis

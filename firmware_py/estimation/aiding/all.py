@@ -75,7 +75,8 @@ class Aiding:
     def position_us(self) -> int:
         """When the horizontal position was measured last; without such a sensor, its velocity."""
         if self._has_position_sensor:
-            return max(self._pose.horizontal.fused_us, self._gps.horizontal.fused_us)
+            pose_us, gps_us = self._pose.horizontal.fused_us, self._gps.horizontal.fused_us
+            return pose_us if pose_us > gps_us else gps_us
         return max(self.ground.flow.fused_us, self._stood_us)
 
     @property

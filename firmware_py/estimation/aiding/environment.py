@@ -45,11 +45,11 @@ class BarometerAiding:
             self._zero_m = altitude_m - height_m
             target.set_drift(index, 0.0, UNKNOWN_M2)  # fusing relates it to the height
             aid.accept_any()
-        row = target.row()
-        row[POSITION + 2], row[index] = -1.0, 1.0
+        row = target.rows(1)
+        row[0, POSITION + 2], row[0, index] = -1.0, 1.0
         predicted_m = height_m + target.drift(index) + self._zero_m
         variance_m2 = self._variance_pa2 * metres_per_pascal(sample.pressure_pa) ** 2
-        aid.fuse_rows(into, (row,), (altitude_m - predicted_m,), (variance_m2,))
+        aid.fuse_rows(into, row, (altitude_m - predicted_m,), (variance_m2,))
 
 
 class MagnetometerAiding:
@@ -77,14 +77,12 @@ class MagnetometerAiding:
         m = rotation(into.state.attitude)
         n, e, d = self._earth
         predicted = to_body(m, n, e, d)
-        rows, innovations = [], []
-        for axis in range(3):
-            row = target.row()
+        rows, innovations = target.rows(3), []
+        for axis, row in enumerate(rows):
             x, y, z = m[axis], m[axis + 3], m[axis + 6]  # the body's axis in the world
             row[ATTITUDE : ATTITUDE + 3] = (y * d - z * e, z * n - x * d, x * e - y * n)
             row[index + axis] = 1.0
             if scale >= 0:
                 row[scale + axis] = predicted[axis]
             innovations.append(sample.field_frd_gauss[axis] - predicted[axis] - target.drift(index + axis))
-            rows.append(row)
-        self.field.fuse_rows(into, tuple(rows), tuple(innovations), (self._variance,) * 3)
+        self.field.fuse_rows(into, rows, innovations, (self._variance,) * 3)

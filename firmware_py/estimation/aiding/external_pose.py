@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from math import cos, pi, remainder, sin, tan
+from math import cos, isfinite, nan, pi, remainder, sin, tan
+
+import numpy as np
 
 from firmware_py.estimation.aiding.aid import Aid
 from firmware_py.estimation.aiding.target import MAX_RESETS, Target
-from firmware_py.estimation.error_state import ATTITUDE, POSITION
+from firmware_py.estimation.error_state import ATTITUDE, POSITION, Matrix
+from firmware_py.estimation.joint_update import JointUpdate
 from firmware_py.estimation.settings import EstimatorSettings
 from firmware_py.measurements import ExternalPose
-from geometry.rotations import Rotation, euler_from_quaternion, rotation, yaw_of
+from geometry.rotations import euler_from_quaternion, rotation, yaw_of
 from geometry.vectors import Vec3
 
 _MAX_PITCH_RAD = 1.3  # beyond, there is no heading
+_HEADING = 3  # index of its row, behind those of the position
 
 
 class PoseAiding:
@@ -35,6 +39,12 @@ class PoseAiding:
         self.vertical = Aid("external height", 1, gate, reset_us, MAX_RESETS)
         self.heading = Aid("external heading", 1, gate, reset_us, MAX_RESETS)
         self._resets: int | None = None
+        self._rows = rows = target.rows(_HEADING + 1)
+        rows[:_HEADING, POSITION : POSITION + 3] = np.eye(3)
+        offset, turn = target.layout.offset, target.layout.turn
+        self._offset_rows: Matrix | None = rows[:_HEADING, offset : offset + 3] if offset >= 0 else None
+        if turn >= 0:
+            rows[_HEADING, turn] = 1.0
 
     def fuse(self, pose: ExternalPose) -> None:
         """Correct by a pose; a source that says that its frame has jumped is followed."""
@@ -45,53 +55,75 @@ class PoseAiding:
         vn, ve, vd = into.state.velocity_ned_m_s
         n, e, d = pose.position_ned_m
         position = (n - vn * late_s, e - ve * late_s, d - vd * late_s)
-        m = rotation(into.state.attitude)
+        if self._offset_rows is not None:  # the place of the markers on the vehicle is not known exactly
+            self._offset_rows[:] = np.array(rotation(into.state.attitude)).reshape(3, 3)
+        turned_rad = self._prepare_heading(pose)
+        aids = (self.horizontal, self.vertical, self.heading)
+        if jumped or any(aid.is_needed(into.time_us) for aid in aids):
+            self._fuse_singly(pose, position, turned_rad, jumped=jumped)
+            return
+        innovations = self._innovations(position)
+        level = self._variances(self.horizontal, innovations[:2], pose.position_variance_m2[:2])
+        upright = self._variances(self.vertical, innovations[2:], pose.position_variance_m2[2:])
+        update = JointUpdate(into.covariance, self._rows, (*innovations, turned_rad))
+        # What else a pose says is not believed either if one part does not fit.
+        if (
+            self.horizontal.fuse_part(into, update, 0, level)
+            and self.vertical.fuse_part(into, update, 2, upright)
+            and isfinite(turned_rad)
+        ):
+            self.heading.fuse_part(into, update, _HEADING, (pose.attitude_variance_rad2[2],))
+        update.apply()
+
+    def _fuse_singly(self, pose: ExternalPose, position: Vec3, turned_rad: float, *, jumped: bool) -> None:
+        """Correct by one part after the other, some of which set the state to what is measured."""
+        target = self._target
+        into = target.filter
+        reported: tuple[float, ...] = pose.position_variance_m2
         for aid, axes in ((self.horizontal, (0, 1)), (self.vertical, (2,))):
             overdue = aid.is_overdue(into.time_us)
             if overdue and not jumped:
-                self._target.doubt()
+                target.doubt()
             if jumped or overdue or aid.is_needed(into.time_us):
-                self._target.move(axes, position)
+                target.move(axes, position)
                 aid.accept_any()
-            if not self._fuse_position(aid, axes, position, pose.position_variance_m2, m):
-                return  # what else the pose says is not believed either
-        if pose.attitude is not None:
-            self._fuse_heading(yaw_of(pose.attitude), pose.attitude_variance_rad2[2], jumped=jumped)
-
-    def _fuse_position(
-        self, aid: Aid, axes: tuple[int, ...], position: Vec3, variance: Vec3, m: Rotation
-    ) -> bool:
-        """Correct by coordinates of the markers, whose place on the vehicle is not known exactly."""
-        target, index = self._target, self._target.layout.offset
-        own = target.filter.state.position_ned_m
-        innovations = tuple([position[axis] - own[axis] for axis in axes])
-        least = aid.variance(innovations, max([variance[axis] for axis in axes]), target.filter.time_us)
-        variances = tuple([max(variance[axis], least) for axis in axes])
-        if index < 0:
-            return aid.fuse_states(target.filter, POSITION + axes[0], innovations, variances)
-        rows = []
-        for axis in axes:
-            row = target.row()
-            row[POSITION + axis] = 1.0
-            row[index : index + 3] = m[3 * axis : 3 * axis + 3]
-            rows.append(row)
-        return aid.fuse_rows(target.filter, tuple(rows), innovations, variances)
-
-    def _fuse_heading(self, yaw_rad: float, variance: float, *, jumped: bool) -> None:
-        """Correct by a heading y: its change by the error of attitude is (cos y tan p, sin y tan p, 1)."""
-        target, aid = self._target, self.heading
-        into = target.filter
-        _, pitch_rad, estimated_rad = euler_from_quaternion(into.state.attitude)
-        if abs(pitch_rad) > _MAX_PITCH_RAD:
+            part = slice(axes[0], axes[-1] + 1)
+            innovations = self._innovations(position)[part]
+            variances = self._variances(aid, innovations, reported[part])
+            if not aid.fuse_rows(into, self._rows[part], innovations, variances):
+                return
+        if not isfinite(turned_rad):
             return
+        if jumped or self.heading.is_overdue(into.time_us):
+            target.turn(turned_rad)
+            turned_rad = 0.0
+            self.heading.accept_any()
+        row = self._rows[_HEADING:]
+        self.heading.fuse_rows(into, row, (turned_rad,), (pose.attitude_variance_rad2[2],))
+
+    def _innovations(self, position: Vec3) -> tuple[float, ...]:
+        n, e, d = self._target.filter.state.position_ned_m
+        return (position[0] - n, position[1] - e, position[2] - d)
+
+    def _variances(
+        self, aid: Aid, innovations: tuple[float, ...], reported: tuple[float, ...]
+    ) -> tuple[float, ...]:
+        """Of each coordinate, as reported or as measured."""
+        least = aid.variance(innovations, max(reported), self._target.filter.time_us)
+        return tuple([max(variance, least) for variance in reported])
+
+    def _prepare_heading(self, pose: ExternalPose) -> float:
+        """Write the heading's row and return its innovation, rad; NaN: there is no heading.
+
+        The change of a heading y by the error of attitude is (cos y tan p, sin y tan p, 1).
+        """
+        _, pitch_rad, estimated_rad = euler_from_quaternion(self._target.filter.state.attitude)
+        if pose.attitude is None or abs(pitch_rad) > _MAX_PITCH_RAD:
+            return nan
         slope = tan(pitch_rad)
-        row = target.row()
-        row[ATTITUDE : ATTITUDE + 3] = (cos(estimated_rad) * slope, sin(estimated_rad) * slope, 1.0)
-        if target.layout.turn >= 0:
-            row[target.layout.turn] = 1.0
-        innovation = remainder(yaw_rad - estimated_rad, 2.0 * pi)
-        if jumped or aid.is_overdue(into.time_us):
-            target.turn(innovation)
-            innovation = 0.0
-            aid.accept_any()
-        aid.fuse_rows(into, (row,), (innovation,), (variance,))
+        self._rows[_HEADING, ATTITUDE : ATTITUDE + 3] = (
+            cos(estimated_rad) * slope,
+            sin(estimated_rad) * slope,
+            1.0,
+        )
+        return remainder(yaw_of(pose.attitude) - estimated_rad, 2.0 * pi)

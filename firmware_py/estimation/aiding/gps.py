@@ -101,15 +101,13 @@ class GpsAiding:
                 target.doubt()
                 target.move(axes, position)
                 aid.accept_any()
-            rows, innovations = [], []
-            for axis in axes:
-                row = target.row()
+            rows, innovations = target.rows(len(axes)), []
+            for row, axis in zip(rows, axes, strict=True):
                 row[POSITION + axis] = row[index + axis] = 1.0
-                rows.append(row)
                 known_m = into.state.position_ned_m[axis] + target.drift(index + axis)
                 innovations.append(position[axis] - known_m)
             variance_m2 = aid.variance(tuple(innovations), sigma_m * sigma_m, into.time_us)
-            aid.fuse_rows(into, tuple(rows), tuple(innovations), (variance_m2,) * len(axes))
+            aid.fuse_rows(into, rows, innovations, (variance_m2,) * len(axes))
 
 
 def _is_good(sample: GpsSample) -> bool:

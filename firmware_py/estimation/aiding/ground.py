@@ -64,13 +64,13 @@ class GroundAiding:
         if aid.is_needed(into.time_us):
             target.set_drift(index, height_m - measured_m, UNKNOWN_M2)
             aid.accept_any()
-        row = target.row()
-        row[POSITION + 2] = row[index] = -1.0
+        row = target.rows(1)
+        row[0, POSITION + 2] = row[0, index] = -1.0
         # A tilt by t about north and east changes the vertical part of the measured line.
-        row[ATTITUDE] = -m[5] * sample.distance_m
-        row[ATTITUDE + 1] = m[2] * sample.distance_m
+        row[0, ATTITUDE] = -m[5] * sample.distance_m
+        row[0, ATTITUDE + 1] = m[2] * sample.distance_m
         innovation = measured_m - (height_m - target.drift(index))
-        aid.fuse_rows(into, (row,), (innovation,), (self._range_variance_m2,))
+        aid.fuse_rows(into, row, (innovation,), (self._range_variance_m2,))
 
     def fuse_flow(self, sample: FlowSample) -> None:
         """Correct by the velocity in body axes that optical flow and height above ground give."""
@@ -86,21 +86,19 @@ class GroundAiding:
         about_right = (sample.flow_rad[1] - sample.gyro_rad[1]) / period_s
         measured = (about_right * along_m, -about_forward * along_m)  # forward and right, m/s
         known = to_body(m, *into.state.velocity_ned_m_s)
-        rows, innovations = [], []
+        rows, innovations = target.rows(2), []
         scale, bias = target.layout.flow_scale, target.layout.flow_gyro
-        for axis in (0, 1):
-            row = target.row()
+        for axis, row in enumerate(rows):
             row[VELOCITY : VELOCITY + 3] = (m[axis], m[axis + 3], m[axis + 6])
             lever_m = along_m if axis == 0 else -along_m
             if scale >= 0:  # of the whole flow, which the turn is part of
                 row[scale] = known[axis] + lever_m * sample.gyro_rad[1 - axis] / period_s
             if bias >= 0:  # a turn about right measured too large: forward too slow
                 row[bias + 1 - axis] = -lever_m
-            rows.append(row)
             innovations.append(measured[axis] - known[axis])
         sigma_m_s = self._flow_sigma_rad_s * along_m
         variance = sigma_m_s * sigma_m_s
-        self.flow.fuse_rows(into, tuple(rows), tuple(innovations), (variance, variance))
+        self.flow.fuse_rows(into, rows, innovations, (variance, variance))
 
     def move(self) -> None:
         """Let the ground's variance grow with the way flown over it since the last call."""

@@ -112,9 +112,9 @@ class Target:
         self.resets = 0
         self.height_resets = 0
 
-    def row(self) -> Matrix:
-        """Derivatives of a measured number by the error state, all zero, shape (n,)."""
-        return np.zeros(self.filter.covariance.size)
+    def rows(self, count: int) -> Matrix:
+        """Derivatives of measured numbers by the error state, all zero, shape (count, n)."""
+        return np.zeros((count, self.filter.covariance.size))
 
     def drift(self, index: int) -> float:
         """The estimated slow error at an index of the error state."""

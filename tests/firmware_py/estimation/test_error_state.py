@@ -14,12 +14,21 @@ from firmware_py.estimation.error_state import (
     Drift,
     ErrorCovariance,
 )
+from firmware_py.estimation.joint_update import JointUpdate
 from geometry.rotations import quaternion_from_euler, rotation
 
 DRIFTS = (Drift(), Drift(0.3), Drift(0.2, 5.0))
 SIZE = INERTIAL_STATES + len(DRIFTS)
 PERIOD_S = 0.02
 TURN, PUSH, GYRO, ACCEL = 4e-8, 6e-5, 1e-9, 3e-8
+
+
+def fuse(covariance, rows, innovations, variances):
+    """Fuse measured numbers; return their normalised innovation squared."""
+    update = JointUpdate(covariance, rows, innovations)
+    nis = sum(update.fuse(index, variance) for index, variance in enumerate(variances))
+    update.apply()
+    return nis
 
 
 def reference_matrices(attitude, push):
@@ -83,7 +92,7 @@ def test_each_prediction_and_correction_equals_filterpys():
             row[0, index] = 1.0
             if index == SIZE - 1:
                 row[0] = numbers.normal(size=SIZE)
-                nis += ours.fuse(row[0], innovation, 0.04)
+                nis += fuse(ours, row, [innovation], [0.04])
             else:
                 nis += ours.fuse_state(index, innovation, 0.04)
             theirs.update(np.array([[innovation]]), R=np.array([[0.04]]), H=row)
@@ -95,6 +104,35 @@ def test_each_prediction_and_correction_equals_filterpys():
     assert not any(ours.take_error())
 
 
+def test_numbers_fused_at_once_correct_as_a_kalman_filter_does():
+    numbers = np.random.default_rng(7)
+    start = numbers.normal(size=(SIZE, SIZE))
+    for count in (1, 2, 4):
+        ours, theirs = ErrorCovariance(DRIFTS), KalmanFilter(SIZE, count)
+        ours.p[:] = theirs.P = start @ start.T
+        theirs.x = np.zeros((SIZE, 1))
+        rows, innovations = numbers.normal(size=(count, SIZE)), numbers.normal(size=count)
+        variances = numbers.uniform(0.1, 1.0, count)
+        fuse(ours, rows, innovations.tolist(), variances.tolist())
+        theirs.update(innovations[:, None], R=np.diag(variances), H=rows)
+        np.testing.assert_allclose(ours.p, theirs.P, rtol=1e-8, atol=1e-9)
+        np.testing.assert_allclose(ours.take_error(), theirs.x[:, 0], rtol=1e-8, atol=1e-9)
+
+
+def test_a_number_that_is_not_fused_changes_nothing():
+    numbers = np.random.default_rng(8)
+    start, rows = numbers.normal(size=(15, 15)), numbers.normal(size=(3, 15))
+    some, only = ErrorCovariance(), ErrorCovariance()
+    some.p[:] = only.p[:] = start @ start.T
+    update = JointUpdate(some, rows, [0.3, float("nan"), -0.2])
+    update.fuse(0, 0.5)
+    update.fuse(2, 0.5)
+    update.apply()
+    fuse(only, rows[[0, 2]], [0.3, -0.2], [0.5, 0.5])
+    np.testing.assert_allclose(some.p, only.p, rtol=1e-12)
+    np.testing.assert_allclose(some.take_error(), only.take_error(), rtol=1e-12)
+
+
 def test_the_nis_of_sequential_numbers_is_that_of_the_whole_measurement():
     numbers = np.random.default_rng(5)
     covariance = ErrorCovariance()
@@ -103,7 +141,7 @@ def test_the_nis_of_sequential_numbers_is_that_of_the_whole_measurement():
     rows, innovation = numbers.normal(size=(3, 15)), numbers.normal(size=3)
     whole = rows @ covariance.p @ rows.T + np.eye(3) * 0.5
     expected = innovation @ np.linalg.solve(whole, innovation)
-    nis = sum(covariance.fuse(row, value, 0.5) for row, value in zip(rows, innovation, strict=True))
+    nis = fuse(covariance, rows, innovation.tolist(), [0.5] * 3)
     assert nis == pytest.approx(expected)
 
 
@@ -115,7 +153,7 @@ def test_a_considered_state_keeps_its_variance_and_value_but_counts():
         covariance.set_variance(POSITION, 1.0)
         covariance.set_variance(15, 0.25)
         for _ in range(50):
-            covariance.fuse(row, 0.1, 0.01)
+            fuse(covariance, row[None, :], [0.1], [0.01])
     assert considering.p[15, 15] == 0.25
     assert considering.take_error()[15] == 0.0
     # The position cannot become better known than the place at which it is measured.

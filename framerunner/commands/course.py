@@ -1,0 +1,105 @@
+"""`framerunner course`: lessons from take-off to the whole challenge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import App, Parameter
+
+from errors import SettingError
+from framerunner.commands import load_mission_with, say
+
+app = App(
+    name="course", help="Five short lessons: take off, fly to points, look, cross, the whole challenge."
+)
+
+LessonName = Annotated[str, Parameter(help="number or name")]
+LanguageOption = Annotated[Literal["en", "es"], Parameter(help="English or Spanish")]
+_FAILED = 1
+
+
+@app.command(name="list")
+def list_(*, language: LanguageOption = "en") -> int:
+    """List the lessons, with what the drone has to do in each.
+
+    **Examples**
+
+        framerunner course list
+
+        framerunner course list --language es
+    """
+    from framerunner.course.lessons import load_lessons
+
+    for lesson in load_lessons():
+        text = lesson.text
+        print(f"{lesson.number}  {text.title.in_language(language)} ({text.minutes} min)")
+        print(f"   {text.goal.in_language(language)}")
+    return 0
+
+
+@app.command
+def start(
+    lesson: LessonName,
+    *,
+    out: Annotated[Path, Parameter(help="folder to write the mission to")] = Path("."),
+    language: LanguageOption = "en",
+) -> int:
+    """Begin a lesson: print what to do, and write the mission to start from. Nothing is overwritten.
+
+    **Examples**
+
+        framerunner course start 1
+
+        framerunner course start 3 --out missions --language es
+    """
+    from framerunner.course.lessons import find_lesson
+
+    found = find_lesson(lesson)
+    text, path = found.text, out / f"lesson_{found.number}.yaml"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with path.open("x", encoding="utf-8") as file:
+            file.write(found.start)
+    except FileExistsError:
+        raise SettingError(f"{path} is there already and is left as it is; choose another --out") from None
+    except OSError as error:
+        raise SettingError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
+    print(f"{text.title.in_language(language)}\n\n{text.goal.in_language(language)}\n")
+    for number, step in enumerate(text.steps, start=1):
+        print(f"{number}. {step.in_language(language)}")
+    for hint in text.hints:
+        print(f"*  {hint.in_language(language)}")
+    print(f"\nwritten: {path}\n\n  framerunner course check {found.number} {path}")
+    return 0
+
+
+@app.command
+def check(
+    lesson: LessonName,
+    mission: Annotated[str, Parameter(help="name or file")],
+    *,
+    pilot: Annotated[
+        Path | None,
+        Parameter(help="Python file with a subclass of Pilot that the mission uses; it is executed"),
+    ] = None,
+) -> int:
+    """Fly a mission in a lesson's scenario, as fast as the machine can, and say whether it passes.
+
+    Exit code 1: it does not.
+
+    **Examples**
+
+        framerunner course check 1 lesson_1.yaml
+
+        framerunner course check 5 frame_challenge
+    """
+    from framerunner.course.lessons import find_lesson
+    from framerunner.flying.lockstep import fly_lockstep
+    from framerunner.flying.plan import FlightPlan
+
+    found = find_lesson(lesson)
+    say(f"flying lesson {found.number} …")
+    result = fly_lockstep(FlightPlan(found.scenario, load_mission_with(mission, pilot))).result
+    print(f"{'passed' if result.completed else 'not yet'}: {result.reason}")
+    return 0 if result.completed else _FAILED
