@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from framerunner.editing.messages import Ended, Guard, Now, StateTime, Taken, Value
 from framerunner.flying.cause import lost_in
 from framerunner.flying.fly import FinishedFlight
-from framerunner.flying.mission_reporter import plain_value
+from framerunner.flying.guard_reporter import plain_value
 from framerunner.flying.run_control import RunStanding
 from framerunner.runs.chart_record import ChartRecord, StateSpan
 from offboard.app import Moment

@@ -172,7 +172,7 @@ class EditingService:
         if is_batch and len(running) >= self._settings.max_batches:
             return "other flights are being flown; wait until they are over, or cancel them"
         if not is_batch and len(running) >= self._settings.max_runs:
-            return f"{len(running)} flights are under control already; stop one first"
+            return f"no more than {len(running)} can be under control at the same time; stop one first"
         return ""
 
     def _watch(self, job: _Job, request: messages.Watch, watcher: Watcher) -> None:

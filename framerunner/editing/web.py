@@ -115,10 +115,14 @@ class _Connection:
         self._outbox: deque[str] = deque()
         self._arrived = asyncio.Event()
         self._allowance = Allowance(time.monotonic)
+        self._too_slow = False
 
     def put(self, line: str) -> None:
-        """Queue a message."""
-        self._outbox.append(line)
+        """Queue a message; a page that does not keep up is disconnected."""
+        if len(self._outbox) < _MAX_QUEUE:
+            self._outbox.append(line)
+        else:
+            self._too_slow = True
         self._arrived.set()
 
     async def serve(self) -> None:
@@ -135,7 +139,10 @@ class _Connection:
     async def _receive(self) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while True:
-                text = await self._websocket.receive_text()
+                message = await self._websocket.receive()
+                if message["type"] == "websocket.disconnect":
+                    return
+                text = message.get("text") or ""
                 if not self._allowance.spend():
                     await self._websocket.close(TOO_MANY_CODE, "too many messages a second")
                     return
@@ -157,7 +164,7 @@ class _Connection:
             while True:
                 await self._arrived.wait()
                 self._arrived.clear()
-                if len(self._outbox) > _MAX_QUEUE:
+                if self._too_slow:
                     await self._websocket.close(TOO_SLOW_CODE, "this page does not keep up")
                     return
                 while self._outbox:

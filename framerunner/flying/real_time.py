@@ -111,7 +111,9 @@ async def fly_in_real_time(
             return {"timing": flight_timing(drone, perception, clock, factor, settings.speed, fused=fused)}
 
         observers = (records.see, reporter.see)
-        flown = await fly(plan, drone, perception, judge, observers, run=run, measured=timing)
+        flown = await fly(
+            plan, drone, perception, judge, observers, run=run, measured=timing, before_tick=reporter.look
+        )
         await reporter.send_result(records.complete(flown.result))
     return flown
 

@@ -286,7 +286,7 @@ def test_a_worker_that_dies_is_told():
 def test_only_so_many_flights_are_under_control():
     with page(max_runs=1) as browser:
         browser.answer("start", text=HOVER, paused=True)
-        assert browser.answer("start", text=HOVER)["text"].startswith("1 flights are under control")
+        assert browser.answer("start", text=HOVER)["text"].startswith("no more than 1 can be under")
 
 
 @pytest.mark.parametrize(
