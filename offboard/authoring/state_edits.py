@@ -48,8 +48,8 @@ def add_template(work: Work, edit: AddTemplate) -> None:
 
 
 def _insert_state(work: Work, parent: str, name: str, value: Value, index: int | None) -> None:
-    """Insert a new state or, with the parent "@", a template."""
-    _refuse_taken(work, parent, name)
+    """Insert a new state or, with the parent "@", a template; it may replace one of the extended mission."""
+    _refuse_taken(work, parent, name, replacing=True)
     before = references(work.document).values()
     container, owner = _container(work, parent)
     if container is None or not container.items:
@@ -111,13 +111,13 @@ def _container(work: Work, parent: str) -> tuple[MapNode | None, Owner]:
     return (node if isinstance(node, MapNode) else None), owner
 
 
-def _refuse_taken(work: Work, parent: str, name: str) -> None:
+def _refuse_taken(work: Work, parent: str, name: str, *, replacing: bool = False) -> None:
     outline = work.document.outline
     siblings = outline.templates if parent == TEMPLATE else outline.states_in(parent)
     if name in [state.name for state in siblings]:
         what = "template" if parent == TEMPLATE else "state"
         raise EditError(f"there is a {what} '{name}' already; choose another name")
-    if parent == "" and name in _base_names(work):
+    if parent == "" and not replacing and name in _base_names(work):
         raise EditError(f"'{outline.text('extends')}' has a state '{name}'; choose another name")
 
 
