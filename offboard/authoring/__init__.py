@@ -39,10 +39,10 @@ with `transition` = {state, event?: tick | done | resume, index?}, `section` = e
 `references` = keep | delete. The event `tick` is
 an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a path or a full id.
 
-`apply(document, edit)` returns `Edited(document, changes)`; `EditSession` does so with `undo()` and
-`redo()`. A `Change` is {start, removed, inserted}; the changes of one edit follow each other, each made
-for the text after those before it. What cannot be applied raises `EditError` with one line, and nothing
-is changed.
+`apply(document, edit)` returns `Edited(document, changes)`; `EditSession(document, layout)` does so with
+`undo()`, `redo()` and a `layout` that follows. A `Change` is {start, removed, inserted}; the changes of one
+edit follow each other, each made for the text after those before it. What cannot be applied raises
+`EditError` with one line, and nothing is changed.
 
 **Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
 advice), code, message, file, line, column, start, end, state, event, index, section, nodes.

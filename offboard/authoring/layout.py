@@ -124,6 +124,19 @@ def follow(layout: Layout, before: Document, edit: Edit, after: Document) -> Lay
     )
 
 
+def completed(layout: Layout, earlier: Layout, document: Document) -> Layout:
+    """The layout of a document's states; those that have no place have the one of an earlier layout."""
+    if document.chart is None:
+        return layout
+    known = chart_ids(document)
+    states = {name: box for name, box in (earlier.states | layout.states).items() if name in known}
+    edges = earlier.corners | layout.corners
+    return Layout(
+        states=states,
+        corners={name: points for name, points in edges.items() if name.partition("/")[0] in known},
+    )
+
+
 def _edge_id(name: str, change: object) -> str:
     assert callable(change)
     state, _, rest = name.partition("/")

@@ -111,6 +111,23 @@ def test_positions_are_beside_the_mission_and_follow_it(tmp_path):
     assert set(boxes) - set(followed.states) == {"landing", "landing.go_to_base", "landing.stop"}
 
 
+def test_places_come_back_with_what_is_undone():
+    document = opened("frame_challenge")
+    boxes = {node.id: StateBox(x=10.0 * number, y=0) for number, node in enumerate(diagram(document).nodes)}
+    session = EditSession(document, Layout(states=boxes))
+    session.apply(parse_edit({"kind": "rename_state", "state": "landing", "name": "home"}))
+    session.apply(parse_edit({"kind": "delete_state", "state": "home"}))
+    assert "home" not in session.layout.states
+    dragged = {**session.layout.states, "red": StateBox(x=1, y=2)}
+    session.layout = Layout(states=dragged)
+    session.undo()
+    assert session.layout.states["home.stop"] == boxes["landing.stop"]
+    session.undo()
+    assert session.layout.states == {**boxes, "red": StateBox(x=1, y=2)}
+    session.redo()
+    assert session.layout.states["home.stop"] == boxes["landing.stop"]
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -81,7 +81,7 @@ def test_an_edit_changes_what_it_says_and_no_line_outside(seed):
     assert applied
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_500_edits_and_500_undos_give_the_first_bytes(seed):
     random = Random(seed)
     data = random_mission(random).encode()

@@ -6,9 +6,17 @@ from textwrap import dedent
 
 import pytest
 
-from offboard.authoring import Document, EditError, EditSession, apply, edit_schema, parse_edit
+from offboard.authoring import (
+    Document,
+    EditError,
+    EditSession,
+    apply,
+    check_document,
+    edit_schema,
+    parse_edit,
+)
 from offboard.authoring.references import instances
-from offboard.mission import MISSIONS, load_mission
+from offboard.mission import MISSIONS, list_missions, load_mission
 
 TEXT = dedent("""\
     # A mission.
@@ -375,3 +383,52 @@ def test_a_mission_is_built_from_nothing():
 
 def test_the_schema_of_edits_names_all_kinds():
     assert len(edit_schema()["oneOf"]) == 21
+
+
+def building(shipped: Document) -> list[dict[str, object]]:
+    """Edits that make a mission from nothing: first all states, then what they do and lead to."""
+    outline = shipped.outline
+    edits: list[dict[str, object]] = []
+    for key in ("name", "description", "class", "vision", "extends"):
+        if outline.text(key):
+            edits.append({"kind": "set_mission", "key": key, "value": outline.text(key)})
+    edits += [{"kind": "set_variable", "name": n, "value": v.text} for n, v in outline.variables.items()]
+    for template in outline.templates:
+        names = [state.name for state in template.states]
+        edits.append({"kind": "add_template", "name": template.name, "states": names})
+    for state in outline:
+        if state.is_template or state.parent.startswith("@"):
+            continue
+        edit = {"kind": "add_state", "name": state.name, "parent": state.parent}
+        edits.append({**edit, "use": state.text("use")} if state.text("use") else edit)
+    for state in outline:
+        for section in ("enter", "during", "exit"):
+            actions = [action.text for action in state.actions(section)]
+            edits.append({"kind": "set_actions", "state": state.path, "section": section, "actions": actions})
+        if state.text("final"):
+            edits.append({"kind": "set_final", "state": state.path, "final": True})
+        for each in state.transitions:
+            to = each.to.text
+            beside = f"{state.parent}.{to}".lstrip(".")
+            inside = f"{state.path}.{to}"
+            known = [path for path in (inside, beside, to) if outline.get(path) is not None]
+            edit = {
+                "kind": "add_transition",
+                "state": state.path,
+                "event": each.event,
+                "to": (known or [to])[0],
+            }
+            edits.append({**edit, "when": each.when.text if each.when else ""})
+    return edits
+
+
+@pytest.mark.parametrize("name", list_missions())
+def test_a_shipped_mission_is_built_by_edits_from_an_empty_text(tmp_path, name):
+    shipped = Document.open(MISSIONS / f"{name}.yaml")
+    path = tmp_path / f"{name}.yaml"
+    session = EditSession(Document.from_text("", path))
+    for edit in building(shipped):
+        session.apply(parse_edit(edit))
+    path.write_bytes(session.document.data)
+    assert load_mission(path).native == load_mission(name).native
+    assert not [each for each in check_document(session.document) if each.severity != "advice"]
