@@ -13,6 +13,7 @@ import { TextView } from "./text_view.js";
 import { changeLanguage, language } from "../lib/language.js";
 import { savePicture } from "./picture.js";
 import { showNames } from "./names.js";
+import { watchFlights } from "./live_light.js";
 import { LessonPanel } from "./lesson_panel.js";
 import { word } from "./words.js";
 
@@ -164,6 +165,7 @@ function edit(name) {
     selected: () => (selection.kind === "state" ? selection.id : ""),
   });
 
+  watchFlights(() => session.mission.name ?? "", (active) => diagram.light(new Set(active), new Map(), new Set()));
   if (lesson) {
     new LessonPanel(teaching, lesson, {
       async text() {
