@@ -364,11 +364,12 @@ export class DiagramView {
     const lines = new Set(family.flatMap((each) => this.#touching.get(each) ?? []));
     const moveBy = (dx, dy) => {
       for (const each of family) {
-        const box = before.get(each);
-        Object.assign(this.#boxes.get(each), { x: box.x + dx, y: box.y + dy });
+        const box = before.get(each), now = this.#boxes.get(each);
+        if (!now) continue; // it was deleted in another window meanwhile
+        Object.assign(now, { x: box.x + dx, y: box.y + dy });
         this.#place(each);
       }
-      for (const id of lines) this.#drawLine(id);
+      for (const id of lines) if (this.#transitionElements.has(id)) this.#drawLine(id);
     };
     return {
       move: (event) => {
@@ -376,7 +377,7 @@ export class DiagramView {
         moveBy(x - start.x, y - start.y);
       },
       end: (event, wasMoved) => {
-        if (!wasMoved) return;
+        if (!wasMoved || !this.#boxes.has(path)) return;
         const parent = this.#parents.get(path);
         const over = this.#stateAt(this.#point(event), new Set(family)) ?? "";
         const around = over === "" || this.#children.has(over) ? over : this.#parents.get(over);

@@ -17,6 +17,9 @@ export class Inspector {
   #root;
   #session;
   #select;
+  /** @type {Selection} */
+  #shown = { kind: "mission", id: "" };
+  #isStale = false; // the form shows what was there before the last change
 
   /**
    * @param {HTMLElement} root
@@ -27,10 +30,17 @@ export class Inspector {
     this.#root = root;
     this.#session = session;
     this.#select = select;
+    root.addEventListener("focusout", () => {
+      if (this.#isStale) setTimeout(() => this.show(this.#shown)); // after the change that this may be
+    });
   }
 
-  /** Show what is selected; the field that has the focus keeps it. @param {Selection} selection */
+  /** Show what is selected; the field that has the focus keeps it, and nothing is shown while one is being filled in. @param {Selection} selection */
   show(selection) {
+    const isSame = selection.kind === this.#shown.kind && selection.id === this.#shown.id;
+    this.#isStale = isSame && this.#isFillingIn();
+    this.#shown = selection;
+    if (this.#isStale) return;
     const focused = this.#root.contains(document.activeElement) ? document.activeElement?.getAttribute("data-key") : null;
     const { nodes, edges } = this.#session.diagram;
     const state = selection.kind === "state" ? nodes.find(({ id }) => id === selection.id) : undefined;
@@ -39,6 +49,11 @@ export class Inspector {
     this.#root.replaceChildren(...form, this.#suggestions());
     this.#root.querySelectorAll("input, select, button").forEach((each, index) => each.setAttribute("data-key", `${selection.kind}${index}`));
     if (focused) /** @type {HTMLElement|null} */ (this.#root.querySelector(`[data-key="${focused}"]`))?.focus();
+  }
+
+  #isFillingIn() {
+    const field = document.activeElement;
+    return field instanceof HTMLInputElement && this.#root.contains(field) && field.type === "text" && field.value !== field.defaultValue;
   }
 
   /** Put the cursor into the first field. */
@@ -65,7 +80,9 @@ export class Inspector {
     const { mission, variables, templates, diagram } = this.#session;
     const set = (key) => (value) => this.#edit({ kind: "set_mission", key, value });
     const top = diagram.nodes.filter(({ parent }) => parent === "").map(({ name }) => name);
-    const names = templates.length > 0 ? make("p", { class: "hint" }, `templates: ${templates.join(", ")}`) : null;
+    const uses = templates.map((name) => make("li", {}, make("span", {}, name),
+      button("+", () => this.#addUser(name), { class: "e-small", "aria-label": word("use_template", { name }), title: word("use_template", { name }) }),
+      button("×", () => this.#edit({ kind: "delete_state", state: `@${name}` }), { class: "e-small", "aria-label": `${word("remove")}: ${name}` })));
     const rows = Object.entries(variables).map(([name, value]) => make("li", {},
       textField(name, value, (next) => this.#edit({ kind: "set_variable", name, value: next || null })),
       button("×", () => this.#edit({ kind: "set_variable", name, value: null }), { class: "e-small", "aria-label": `${word("remove")}: ${name}` })));
@@ -78,7 +95,7 @@ export class Inspector {
       choice(word("initial"), top.map((name) => [name, name]), mission.initial, (name) => this.#edit({ kind: "set_initial", state: "", name })),
       make("fieldset", { class: "e-lines" }, make("legend", {}, word("variables")), make("ul", {}, ...rows),
         textField(word("add_variable"), "", (name) => name && this.#edit({ kind: "set_variable", name, value: "0" }), { placeholder: word("new_name") })),
-      ...(names ? [names] : []),
+      ...(uses.length > 0 ? [make("fieldset", { class: "e-lines" }, make("legend", {}, word("templates")), make("ul", {}, ...uses))] : []),
     ];
   }
 
@@ -104,11 +121,13 @@ export class Inspector {
       ...(isTop && !path.startsWith("@") && (inner.length === 0 || state.template) && templates.length > 0
         ? [choice(word("uses"), [["", "–"], ...templates.map((name) => /** @type {[string, string]} */ ([name, name]))], state.template,
           (template) => this.#edit({ kind: "set_use", state: path, template }))] : []),
+      ...(templates.includes(state.template)
+        ? [textField(word("template_name"), state.template, (name) => name !== state.template && this.#edit({ kind: "rename_state", state: `@${state.template}`, name }))] : []),
       ...(state.template ? this.#parameters(state) : []),
       actions("enter"), actions("during"), actions("exit"),
       this.#transitions(state, own),
       make("div", { class: "e-row" },
-        state.template ? null : button(word("inner"), () => this.#addInner(state)),
+        state.template && !templates.includes(state.template) ? null : button(word("inner"), () => this.#addInner(state)),
         button(word("duplicate"), () => this.#duplicate(state)),
         button(word("delete"), () => this.delete({ kind: "state", id: state.id }), { class: "e-danger" })),
     ];
@@ -129,7 +148,7 @@ export class Inspector {
         () => this.#select({ kind: "transition", id: edge.id }), { class: "e-link" })));
     const targets = this.#targets(state.id);
     const add = choice(word("add_transition"), [["", "…"], ...targets], "",
-      (to) => to && this.#edit({ kind: "add_transition", state: state.source, to }));
+      (to) => to && this.#edit({ kind: "add_transition", state: state.source, to: this.#session.target(state.id, to) }));
     return make("fieldset", { class: "e-lines" }, make("legend", {}, word("transitions")), make("ul", {}, ...rows), add);
   }
 
@@ -152,7 +171,7 @@ export class Inspector {
       title,
       ...(edge.source_state.startsWith("@") ? [make("p", { class: "hint" }, word("template_note", { name: edge.source_state.slice(1).split(".")[0] }))] : []),
       ...(isTick ? [textField(word("guard"), edge.when, (when) => this.#edit({ kind: "set_guard", transition, when }), { list: VALUES })] : []),
-      choice(word("to"), this.#targets(edge.source), edge.target, (to) => this.#edit({ kind: "redirect_transition", transition, to })),
+      choice(word("to"), this.#targets(edge.source), edge.target, (to) => this.#edit({ kind: "redirect_transition", transition, to: this.#session.target(edge.source, to) })),
       choice(word("event"), events, edge.event, async (event) => {
         if (await this.#edit({ kind: "set_event", transition, event })) follow(event, event === "tick" ? siblings : 0);
       }),
@@ -194,10 +213,27 @@ export class Inspector {
     }
   }
 
+  /** A new template with one state, and a state that uses it: a template alone is not part of the chart. */
+  async addTemplate() {
+    const { templates } = this.#session;
+    let name = "template";
+    for (let number = 2; templates.includes(name); number += 1) name = `template_${number}`;
+    if (await this.#edit({ kind: "add_template", name, states: ["first"] })) await this.#addUser(name);
+  }
+
+  /** A new state that uses a template. @param {string} template */
+  async #addUser(template) {
+    const name = this.#freeName("group", "");
+    if (await this.#edit({ kind: "add_state", name, use: template })) {
+      this.#select({ kind: "state", id: name });
+      this.focus();
+    }
+  }
+
   /** @param {StateNode} state */
   async #addInner(state) {
     const name = this.#freeName("state", state.id);
-    if (await this.#edit({ kind: "add_state", name, parent: state.source })) {
+    if (await this.#edit({ kind: "add_state", name, parent: state.template ? `@${state.template}` : state.source })) {
       this.#select({ kind: "state", id: `${state.id}.${name}` });
       this.focus();
     }

@@ -105,6 +105,7 @@ function edit(name) {
     make("a", { href: "/edit" }, word("files")), make("strong", {}, name), state, save, undo, redo,
     button(word("new_state"), () => inspector.add(false)),
     button(word("new_superstate"), () => inspector.add(true)),
+    button(word("new_template"), () => inspector.addTemplate()),
     button(word("fit"), () => diagram.fit()),
     button(word("arrange"), arrange),
     make("details", { class: "e-export" }, make("summary", {}, word("export")),
@@ -120,6 +121,7 @@ function edit(name) {
       refresh();
     },
     connected(connection, reason) {
+      text.setReadOnly(connection !== "open"); // what is typed without a connection would be lost
       if (connection === "open") tell("");
       else tell(connection === "refused" ? reason : word("away"));
     },
@@ -129,6 +131,8 @@ function edit(name) {
   });
   const text = new TextView(writing, {
     typed: (take) => session.type(take),
+    undo: () => session.undo(),
+    redo: () => session.redo(),
     moved: (offset) => {
       const around = session.diagram.nodes.filter(({ span }) => span && span[0] <= offset && offset <= span[1]);
       const at = session.diagram.edges.find(({ span }) => span && span[0] <= offset && offset <= span[1]);
@@ -234,7 +238,7 @@ function edit(name) {
     const node = session.diagram.nodes.find(({ id }) => id === from);
     if (!node?.source) return tell(word("foreign_note"));
     const count = session.diagram.edges.filter(({ source, event }) => source === from && event === "tick").length;
-    if (await session.edit({ kind: "add_transition", state: node.source, to })) {
+    if (await session.edit({ kind: "add_transition", state: node.source, to: session.target(from, to) })) {
       select({ kind: "transition", id: `${from}/tick/${count}` }, true);
       inspector.focus();
     }
@@ -265,6 +269,7 @@ function edit(name) {
     if (!session.isSaved) event.preventDefault();
   });
   addEventListener("keydown", (event) => {
+    if (event.defaultPrevented) return; // the text has taken it
     const isCommand = event.ctrlKey || event.metaKey;
     const key = event.key.toLowerCase();
     if (isCommand && key === "s") {

@@ -29,6 +29,7 @@ export class EditSession {
   #typed = null;
   #timer = 0;
   #sending = Promise.resolve();
+  #isTypedUnderWay = false;
 
   revision = 0;
   /** @type {Diagram} */
@@ -105,6 +106,18 @@ export class EditSession {
     return this.#ask({ type: "layout", places });
   }
 
+  /**
+   * How an edit names the target of a transition: states of one template by where they are written.
+   * @param {string} from id of the state that has the transition
+   * @param {string} to id
+   */
+  target(from, to) {
+    const written = (id) => this.diagram.nodes.find((node) => node.id === id)?.source ?? "";
+    const template = (path) => (path.startsWith("@") ? path.split(".")[0] : "");
+    const path = written(to);
+    return template(path) && template(path) === template(written(from)) ? path : to;
+  }
+
   /** Text is being typed. @param {() => TextChange[]} take the changes since the last call */
   type(take) {
     this.#typed = take;
@@ -121,7 +134,10 @@ export class EditSession {
       await before; // its answer has the revision for which the next changes are made
       const changes = this.#typed?.() ?? [];
       this.#typed = null;
-      if (changes.length > 0) await this.#ask({ type: "type", revision: this.revision, changes });
+      if (changes.length === 0) return;
+      this.#isTypedUnderWay = true;
+      await this.#ask({ type: "type", revision: this.revision, changes });
+      this.#isTypedUnderWay = false;
     })();
     return this.#sending;
   }
@@ -152,7 +168,9 @@ export class EditSession {
       if (message.diagram.readable) this.diagram = message.diagram;
       this.isReadable = message.diagram.readable;
       this.#setStatus(message);
-      this.#listener.changed(message.changes ?? [], message.text ?? null);
+      // A change that overtakes typed text makes the server refuse that and send the whole text.
+      const isOvertaken = this.#isTypedUnderWay && message.answers === undefined;
+      this.#listener.changed(isOvertaken ? [] : message.changes ?? [], message.text ?? null);
       if (message.text !== undefined && message.restored) this.#listener.note("restored");
       if (message.text !== undefined && message.problem) this.#listener.refused(message.problem);
     } else {

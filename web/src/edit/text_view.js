@@ -2,8 +2,8 @@
 import { basicSetup } from "codemirror";
 import { yaml } from "@codemirror/lang-yaml";
 import { setDiagnostics } from "@codemirror/lint";
-import { Annotation, EditorSelection } from "@codemirror/state";
-import { EditorView } from "@codemirror/view";
+import { Annotation, ChangeSet, Compartment, EditorSelection, EditorState, Prec } from "@codemirror/state";
+import { EditorView, keymap } from "@codemirror/view";
 
 /** @typedef {import("./session.js").TextChange} TextChange */
 
@@ -16,17 +16,30 @@ export class TextView {
   /** @type {import("@codemirror/state").ChangeSet|null} what was typed since it was last taken */
   #typed = null;
   #isMoving = false;
+  #writable = new Compartment();
 
   /**
    * @param {HTMLElement} parent
-   * @param {{typed: (take: () => TextChange[]) => void, moved: (offset: number) => void}} listener
+   * @param {{typed: (take: () => TextChange[]) => void, undo: () => void, redo: () => void,
+   *   moved: (offset: number) => void}} listener
    */
   constructor(parent, listener) {
+    const step = (take) => () => {
+      take();
+      return true;
+    };
     this.#shadow = parent.attachShadow({ mode: "open" });
     this.#view = new EditorView({
       parent: this.#shadow,
       root: this.#shadow,
       extensions: [
+        // Diagram and text have one history, which the server keeps.
+        Prec.highest(keymap.of([
+          { key: "Mod-z", run: step(listener.undo), preventDefault: true },
+          { key: "Mod-y", run: step(listener.redo), preventDefault: true },
+          { key: "Mod-Shift-z", run: step(listener.redo), preventDefault: true },
+        ])),
+        this.#writable.of([]),
         basicSetup,
         yaml(),
         EditorView.theme({ "&": { height: "100%", fontSize: "13px" }, ".cm-scroller": { overflow: "auto" } }),
@@ -59,20 +72,31 @@ export class TextView {
 
   /** Show a text. @param {string} text */
   setText(text) {
-    if (text === this.text) return;
     this.#typed = null;
+    if (text === this.text) return;
     this.#view.dispatch({
       changes: { from: 0, to: this.#view.state.doc.length, insert: text }, annotations: remote.of(true),
     });
   }
 
-  /** Make changes that the server has made. @param {TextChange[]} changes */
+  /** Make changes that the server has made to the text without what is typed here and not sent. @param {TextChange[]} changes */
   change(changes) {
     for (const { start, removed, inserted } of changes) {
-      this.#view.dispatch({
-        changes: { from: start, to: start + removed, insert: inserted }, annotations: remote.of(true),
-      });
+      const typed = this.#typed;
+      const length = typed ? typed.length : this.#view.state.doc.length;
+      let change = ChangeSet.of({ from: start, to: start + removed, insert: inserted }, length);
+      if (typed) {
+        this.#typed = typed.map(change);
+        change = change.map(typed, true);
+      }
+      this.#view.dispatch({ changes: change, annotations: remote.of(true) });
     }
+  }
+
+  /** Whether nothing can be typed. @param {boolean} isReadOnly */
+  setReadOnly(isReadOnly) {
+    const extensions = isReadOnly ? [EditorState.readOnly.of(true), EditorView.editable.of(false)] : [];
+    this.#view.dispatch({ effects: this.#writable.reconfigure(extensions) });
   }
 
   /** Mark findings. @param {import("./session.js").Finding[]} findings */

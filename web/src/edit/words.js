@@ -4,7 +4,7 @@ import { translator } from "../lib/language.js";
 const WORDS = {
   en: {
     undo: "Undo", redo: "Redo", save: "Save", saved: "saved", unsaved: "not saved", fit: "Show all", arrange: "Arrange",
-    new_state: "New state", new_superstate: "New superstate", language: "Español", files: "Missions",
+    new_state: "New state", new_superstate: "New superstate", new_template: "New template", language: "Español", files: "Missions",
     state: "State", transition: "Transition", mission: "Mission", name: "Name", description: "Description",
     class: "Class", vision: "Vision", initial: "Starts in", final: "final: the end", starts_here: "starts here", uses: "Uses the states of",
     enter: "On entry", during: "During", exit: "On exit", add_action: "Add an action", remove: "Remove", up: "Up", down: "Down",
@@ -20,6 +20,7 @@ const WORDS = {
     overwrite: "Another program has changed the file. Save anyway?", text: "Text", diagram: "Diagram", add_transition: "Add a transition", new_name: "name",
     export: "Export", import_scxml: "or import an SCXML file", search: "Search",
     lesson: "Lesson", check_lesson: "Check the lesson", checking: "flying …", passed: "Passed!", not_yet: "Not yet", next_lesson: "To the lessons", hints: "Hints",
+    templates: "Templates", template_name: "Name of the template", use_template: "New state that uses {name}",
     fly: "Fly", fly_once: "Fly", fly_paused: "Fly step by step", fly_many: "Fly {count} layouts", pause: "Pause", go_on: "Go on", step: "Step", stop: "Stop",
     break_here: "Stop at the selected state", take_changes: "Take changes", not_flying: "nothing is flying", time_line: "time line of states",
     scenario: "Scenario", or_layout: "or a random layout", speed: "Speed", level: "Level", starting: "starting …", select_state: "select a state first",
@@ -28,7 +29,7 @@ const WORDS = {
   },
   es: {
     undo: "Deshacer", redo: "Rehacer", save: "Guardar", saved: "guardado", unsaved: "sin guardar", fit: "Ver todo", arrange: "Ordenar",
-    new_state: "Estado nuevo", new_superstate: "Superestado nuevo", language: "English", files: "Misiones",
+    new_state: "Estado nuevo", new_superstate: "Superestado nuevo", new_template: "Plantilla nueva", language: "English", files: "Misiones",
     state: "Estado", transition: "Transición", mission: "Misión", name: "Nombre", description: "Descripción",
     class: "Clase", vision: "Visión", initial: "Empieza en", final: "final: el fin", starts_here: "empieza aquí", uses: "Usa los estados de",
     enter: "Al entrar", during: "Durante", exit: "Al salir", add_action: "Añadir una acción", remove: "Quitar", up: "Subir", down: "Bajar",
@@ -44,6 +45,7 @@ const WORDS = {
     overwrite: "Otro programa ha cambiado el archivo. ¿Guardar de todos modos?", text: "Texto", diagram: "Diagrama", add_transition: "Añadir una transición", new_name: "nombre",
     export: "Exportar", import_scxml: "o importar un archivo SCXML", search: "Buscar",
     lesson: "Lección", check_lesson: "Comprobar la lección", checking: "volando …", passed: "¡Conseguido!", not_yet: "Aún no", next_lesson: "A las lecciones", hints: "Pistas",
+    templates: "Plantillas", template_name: "Nombre de la plantilla", use_template: "Estado nuevo que usa {name}",
     fly: "Volar", fly_once: "Volar", fly_paused: "Volar paso a paso", fly_many: "Volar {count} disposiciones", pause: "Pausa", go_on: "Seguir", step: "Un paso", stop: "Parar",
     break_here: "Parar en el estado elegido", take_changes: "Usar los cambios", not_flying: "no vuela nada", time_line: "línea de tiempo de los estados",
     scenario: "Escenario", or_layout: "o una disposición al azar", speed: "Velocidad", level: "Nivel", starting: "empezando …", select_state: "elige antes un estado",
