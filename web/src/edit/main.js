@@ -153,23 +153,26 @@ function edit(name) {
   }, { done: word("done"), resume: word("resume") });
   const inspector = new Inspector(form, session, (chosen) => select(chosen, true));
 
+  /** @param {string[]} active @param {Object<string, number>} counts @param {string[]} taken ids as flights have them */
+  function light(active, counts, taken) {
+    const ids = new Map(session.diagram.edges.map((edge) => [flownId(edge), edge.id]));
+    diagram.light(
+      new Set(active),
+      new Map(Object.entries(counts).map(([id, count]) => [ids.get(id) ?? "", count])),
+      new Set(taken.map((id) => ids.get(id) ?? "")));
+  }
+
   const runs = new RunPanel(flying, {
     async text() {
       await session.flush();
       return text.text;
     },
-    lit(active, counts, taken) {
-      const ids = new Map(session.diagram.edges.map((edge) => [flownId(edge), edge.id]));
-      diagram.light(
-        new Set(active),
-        new Map(Object.entries(counts).map(([id, count]) => [ids.get(id) ?? "", count])),
-        new Set(taken.map((id) => ids.get(id) ?? "")));
-    },
+    lit: light,
     lost: (id) => select({ kind: "state", id }, true),
     selected: () => (selection.kind === "state" ? selection.id : ""),
   });
 
-  watchFlights(() => session.mission.name ?? "", (active) => diagram.light(new Set(active), new Map(), new Set()));
+  watchFlights(() => session.mission.name ?? "", (active, counts) => light(active, counts, []));
   if (lesson) {
     new LessonPanel(teaching, lesson, {
       async text() {
