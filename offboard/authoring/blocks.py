@@ -49,6 +49,7 @@ class Blocks:
         self._text = document.text
         self._lines = document.positions
         self._style = style_of(document.nodes)
+        self._known_dashes: dict[int, list[int]] = {}  # by where the list begins
 
     def add_entry(self, owner: Owner, key: str, value: Value, before: Sequence[str] = ()) -> Patch:
         """Add an entry to a mapping: after the last of the keys that go `before` it, or at its start."""
@@ -230,12 +231,16 @@ class Blocks:
 
     def _dashes(self, node: ListNode) -> list[int]:
         """Where the dash of each item is."""
+        known = self._known_dashes.get(node.start)
+        if known is not None:
+            return known
         found = [node.start]
         for previous in node.items[:-1]:
             after = _DASH.search(self._text, self._lines.line_end(max(previous.end, found[-1] + 1)))
             if after is None:
                 raise EditError("the list has several dashes in a line; edit the text")
             found.append(after.end() - 1)
+        self._known_dashes[node.start] = found
         return found
 
     def _block(self, start: int, end: int, indent: int) -> Span:

@@ -23,7 +23,7 @@ class Element:
     Attributes:
         namespace: its address; empty if it has none.
         attributes: those with a namespace as "address name".
-        text: all characters directly in it.
+        chunks: the characters directly in it.
         line: where it begins, counted from 1.
     """
 
@@ -32,7 +32,12 @@ class Element:
     attributes: dict[str, str]
     line: int
     children: list[Element] = field(default_factory=list)
-    text: str = ""
+    chunks: list[str] = field(default_factory=list)
+
+    @property
+    def text(self) -> str:
+        """All characters directly in it."""
+        return "".join(self.chunks)
 
 
 def parse_xml(data: bytes) -> Element:
@@ -83,7 +88,7 @@ class _XmlReader:
 
     def _characters(self, text: str) -> None:
         if self._open:
-            self._open[-1].text += text
+            self._open[-1].chunks.append(text)
 
     def _refuse_document_type(self, *_: object) -> None:
         line = self.parser.CurrentLineNumber

@@ -291,6 +291,12 @@ HOSTILE = {
         + "\n        to: a\n"
         for k in range(250)
     ),
+    "spaces in an action": 'initial: a\nstates:\n  a:\n    final: true\n    enter: ["hover('
+    + " " * 900_000
+    + '\\n\\nx"]\n',
+    "large numbers": "initial: a\nvariables: {x: " + "9" * 490 + "}\nstates:\n  a:\n    transitions:\n"
+    "      - when: memory.x > " + "9" * 480 + "\n        to: b\n  b:\n    final: true\n"
+    "    enter: [cmd.vel_x = " + "9" * 480 + "]\n",
     "open quotation mark": "a: '" + "x" * 900_000,
     "tabs": "a:\tb\n" * 150_000,
     "control characters": "\0" * 1_000_000,
