@@ -66,45 +66,12 @@ class DocumentsDoor:
             if not may_act(request):
                 raise HTTPException(403, "only those who logged in may edit")
 
-        @router.get("/api/edit/files")
-        async def files(request: Request) -> dict[str, object]:
-            demand(request)
-            return {"files": await asyncio.to_thread(desk.files), "missions": list_missions()}
-
-        @router.post("/api/edit/files")
-        async def create(request: Request, name: _Text, source: _Text) -> dict[str, str]:
-            demand(request)
-            try:
-                return {"file": await asyncio.to_thread(desk.create, name, source)}
-            except UserError as error:
-                raise HTTPException(400, str(error)) from None
-
-        @router.post("/api/edit/import")
-        async def import_(request: Request, name: _Text, scxml: _Scxml) -> dict[str, str]:
-            demand(request)
-
-            def write() -> str:
-                return desk.write(name, import_scxml(scxml.encode(), name))
-
-            try:
-                return {"file": await asyncio.to_thread(write)}
-            except UserError as error:
-                raise HTTPException(400, str(error)) from None
+        _add_files(router, desk, demand)
 
         @router.get("/api/edit/export")
         async def export(request: Request, file: str, kind: Literal["scxml", "mermaid"]) -> Response:
             demand(request)
-            try:
-                chart = desk.open(file).opened.document.chart
-                desk.close(file)
-            except UserError as error:
-                raise HTTPException(400, str(error)) from None
-            if chart is None:
-                raise HTTPException(400, "the mission has mistakes; mend them, then export it")
-            text = export_scxml(chart) if kind == "scxml" else mermaid_of(chart)
-            kept_as = f"{Path(file).stem}.{'scxml' if kind == 'scxml' else 'mmd'}"
-            headers = {"Content-Disposition": f'attachment; filename="{kept_as}"'}
-            return PlainTextResponse(text, headers=headers)
+            return _export(desk, file, kind)
 
         @router.websocket("/ws/edit")
         async def edit(websocket: WebSocket, file: str) -> None:
@@ -117,7 +84,7 @@ class DocumentsDoor:
                 await refuse(websocket, str(error).partition("\n")[0])
                 return
             await websocket.accept()
-            await _Connection(websocket, desk, file, shared).serve()
+            await _Window(websocket, desk, file, shared).serve()
 
         return router
 
@@ -131,8 +98,47 @@ class DocumentsDoor:
             self._desk.keep()
 
 
-class _Connection:
-    """One page's WebSocket."""
+def _add_files(router: APIRouter, desk: EditorDesk, demand: Callable[[Request], None]) -> None:
+    """Add the addresses of the folder's files; `demand` refuses those who may not edit."""
+
+    @router.get("/api/edit/files")
+    async def files(request: Request) -> dict[str, object]:
+        demand(request)
+        return {"files": await asyncio.to_thread(desk.files), "missions": list_missions()}
+
+    @router.post("/api/edit/files")
+    async def create(request: Request, name: _Text, source: _Text) -> dict[str, str]:
+        demand(request)
+        return {"file": await _made(lambda: desk.create(name, source))}
+
+    @router.post("/api/edit/import")
+    async def import_(request: Request, name: _Text, scxml: _Scxml) -> dict[str, str]:
+        demand(request)
+        return {"file": await _made(lambda: desk.write(name, import_scxml(scxml.encode(), name)))}
+
+
+async def _made(make: Callable[[], str]) -> str:
+    try:
+        return await asyncio.to_thread(make)
+    except UserError as error:
+        raise HTTPException(400, str(error)) from None
+
+
+def _export(desk: EditorDesk, file: str, kind: Literal["scxml", "mermaid"]) -> Response:
+    try:
+        chart = desk.open(file).opened.document.chart
+        desk.close(file)
+    except UserError as error:
+        raise HTTPException(400, str(error)) from None
+    if chart is None:
+        raise HTTPException(400, "the mission has mistakes; mend them, then export it")
+    text = export_scxml(chart) if kind == "scxml" else mermaid_of(chart)
+    name = f"{Path(file).stem}.{'scxml' if kind == 'scxml' else 'mmd'}"
+    return PlainTextResponse(text, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+
+
+class _Window:
+    """A page's WebSocket."""
 
     def __init__(self, websocket: WebSocket, desk: EditorDesk, file: str, shared: SharedDocument) -> None:
         self._websocket = websocket
