@@ -46,8 +46,8 @@ edit follow each other, each made for the text after those before it. What canno
 
 **Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
 advice), code, message, file, line, column, start, end, state, event, index, section, nodes.
-`problems_of` has them before they are put into words; other languages are tables of
-`offboard.chart.messages`.
+`problems_of` has them before they are put into words. `check_document(document, texts=SPANISH)` says them in
+Spanish.
 
 **Catalogue**: `catalogue(pilot_class, variables, contest=...)`: `values` (name, type, text, unit, low,
 high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
@@ -91,12 +91,16 @@ from offboard.authoring.scxml_export import export_scxml
 from offboard.authoring.scxml_import import import_scxml
 from offboard.authoring.text import Change, Positions
 from offboard.authoring.xml_tree import XmlError
+from offboard.chart.messages import ENGLISH
+from offboard.chart.spanish import SPANISH
 from offboard.mission import mermaid_of
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 __all__ = [
+    "ENGLISH",
+    "SPANISH",
     "Catalogue",
     "Change",
     "Diagram",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from random import Random
+from string import Formatter
 from textwrap import dedent
 from time import perf_counter
 
@@ -11,6 +12,7 @@ import pytest
 from offboard.authoring import Document, as_json, check_document, diagram
 from offboard.chart.conditions import Conditions
 from offboard.chart.messages import ENGLISH
+from offboard.chart.spanish import SPANISH
 from offboard.chart.vocabulary import Vocabulary
 from offboard.engine import MissionEngine
 from offboard.mission import MISSIONS, list_missions, load_mission
@@ -167,12 +169,21 @@ def test_a_text_that_is_no_yaml_is_a_finding_with_its_line():
     assert diagram(Document.from_text("a: [")).readable is False
 
 
-def test_messages_can_be_in_another_language():
-    table = {"state.no_timeout": "el estado «{state}» espera sin límite de tiempo"}
-    text = GOOD.replace("seconds_in_state > 30", "imu.z > 3")
-    (finding,) = check_document(Document.from_text(text), texts=table)
-    assert finding.message == "el estado «rise» espera sin límite de tiempo"
-    assert all(isinstance(text, str) for text in ENGLISH.values())
+def test_findings_can_be_in_spanish():
+    text = GOOD.replace("frame_seen", "goal_m < 1").replace("to: red", "to: rde", 1)
+    said = [each.message for each in check_document(Document.from_text(text), texts=SPANISH)]
+    assert said == [
+        "when 'goal_m < 1': goal_m es un lugar (x, y, z), no un número; lee distance_to_goal_m, o imu.x",
+        "el destino 'rde' del estado 'rise' no es un estado; ¿quizá 'red'?",
+    ]
+
+
+def test_all_texts_are_there_in_both_languages():
+    def names(text: str) -> set[str]:
+        return {name for _, name, _, _ in Formatter().parse(text) if name}
+
+    assert set(SPANISH) == set(ENGLISH)
+    assert {code for code in ENGLISH if names(ENGLISH[code]) != names(SPANISH[code])} == set()
 
 
 @pytest.mark.parametrize("name", list_missions())
