@@ -52,7 +52,8 @@ Spanish.
 **Catalogue**: `catalogue(pilot_class, variables, contest=...)`: `values` (name, type, text, unit, low,
 high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
 
-**Diagram**: `diagram(document)`: `nodes` and `edges` with ids, places in the text and what edits need.
+**Diagram**: `diagram(document)`: `nodes` and `edges` with ids, places in the text and what edits need,
+`settings`, `variables`, `templates`; `edge_taken` finds the edge of an engine's `TransitionTaken`.
 
 **Layout**: `read_layout`, `write_layout`, `parse_layout`, `follow` after an edit; the side file
 `NAME.layout.json` is {version: 1, states: {id: {x, y, width?, height?}}, corners: {edge id: [[x, y],

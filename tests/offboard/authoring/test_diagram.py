@@ -69,6 +69,18 @@ def test_nodes_and_edges_know_where_they_are_written():
     assert edges["red/resume/0"].target == "red.go_to_center"
 
 
+def test_the_edges_that_the_engine_takes_are_found():
+    drawn = diagram(opened("frame_challenge"))
+    found = drawn.edge_taken
+    assert found("red.turning", "red.frame_visible", "frame_seen") == "red.turning/tick/0"
+    assert found("red.going_up", "green.go_to_center", "done") == "red/done/0"
+    assert found("blue.turning", "blue.go_to_center", "resume") == "blue/resume/0"
+    assert found("blue.turning", "blue.go_to_center", "frame_seen") == ""
+    assert drawn.settings["name"] == "frame_challenge"
+    assert drawn.variables == {"x0": "0", "y0": "0", "alpha0": "0"}
+    assert drawn.templates["cross_frame"][:2] == ("@cross_frame", "@cross_frame.go_to_center")
+
+
 def test_states_of_another_file_cannot_be_edited_here():
     nodes = {node.id: node for node in diagram(opened("soft_landing")).nodes}
     assert (nodes["red.turning"].source, nodes["red.turning"].span) == ("", None)
