@@ -49,7 +49,7 @@ advice), code, message, file, line, column, start, end, state, event, index, sec
 `problems_of` has them before they are put into words. `check_document(document, texts=SPANISH)` says them in
 Spanish.
 
-**Catalogue**: `catalogue(pilot_class, variables, contest=...)`: `values` (name, type, text, unit, low,
+**Catalogue**: `catalogue_of(document, pilot_class)`: `values` (name, type, text, unit, low,
 high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
 
 **Diagram**: `diagram(document)`: `nodes` and `edges` with ids, places in the text and what edits need,
@@ -71,7 +71,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from offboard.authoring.apply import Edited, EditSession, apply
-from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue
+from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue, catalogue_of
 from offboard.authoring.diagram import Diagram, Edge, Node, diagram
 from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
@@ -125,6 +125,7 @@ __all__ = [
     "apply",
     "as_json",
     "catalogue",
+    "catalogue_of",
     "check_document",
     "diagram",
     "edit_schema",

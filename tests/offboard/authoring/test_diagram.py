@@ -19,6 +19,7 @@ from offboard.authoring import (
     apply,
     as_json,
     catalogue,
+    catalogue_of,
     diagram,
     follow,
     layout_path,
@@ -218,4 +219,7 @@ def test_the_catalogue_has_what_a_contestant_adds():
     assert primitives["creep"].help.endswith("For as long as it is called.")
     assert not primitives["hover"].own
     assert all(value.text for value in made.values if not value.own and not value.name.startswith("memory."))
+    names = {value.name for value in catalogue_of(opened("careful_crossing")).values}
+    assert {"memory.x0", "memory.alpha0"} <= names
+    assert {value.name: value for value in catalogue_of(opened("racer")).values}["cmd.vel_x"].high is None
     assert {value.name: value for value in catalogue(contest=False).values}["cmd.vel_x"].high is None

@@ -163,6 +163,17 @@ def test_each_finding_is_at_its_place(old, new, severity, code, marked, where):
     as_json(finding)
 
 
+def test_a_variable_that_nothing_sets_is_a_constant_unless_a_contestant_s_pilot_may_set_it():
+    class Mine(Pilot):
+        def count(self) -> None:
+            self.memory.n += 1
+
+    text = GOOD.replace("templates:", "variables: {n: 0}\ntemplates:").replace("frame_seen", "memory.n > 3")
+    (finding,) = found(text)
+    assert (finding.severity, finding.code) == ("warning", "guard.never")
+    assert check_document(Document.from_text(text.replace("hover", "count")), Mine) == ()
+
+
 def test_a_text_that_is_no_yaml_is_a_finding_with_its_line():
     (finding,) = found(GOOD.replace("    use: leg", "   use: leg", 1))
     assert (finding.severity, finding.code, finding.line) == ("error", "yaml.indentation", 26)
