@@ -104,7 +104,7 @@ def catalogue(
 
 
 def catalogue_of(document: Document, pilot_class: type[Pilot] = Pilot) -> Catalogue:
-    """The names that the mission of a document can use, with its own variables and the limits of its class."""
+    """The names that a document's mission can use, with its own variables and the limits of its class."""
     chart = document.chart
     if chart is None:
         return catalogue(pilot_class)
