@@ -46,13 +46,14 @@ edit follow each other, each made for the text after those before it. What canno
 
 **Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
 advice), code, message, file, line, column, start, end, state, event, index, section, nodes.
-`problems_of` has them before they are put into words; other languages are tables of
-`offboard.chart.messages`.
+`problems_of` has them before they are put into words. `check_document(document, texts=SPANISH)` says them in
+Spanish.
 
-**Catalogue**: `catalogue(pilot_class, variables, contest=...)`: `values` (name, type, text, unit, low,
+**Catalogue**: `catalogue_of(document, pilot_class)`: `values` (name, type, text, unit, low,
 high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
 
-**Diagram**: `diagram(document)`: `nodes` and `edges` with ids, places in the text and what edits need.
+**Diagram**: `diagram(document)`: `nodes` and `edges` with ids, places in the text and what edits need,
+`settings`, `variables`, `templates`; `edge_taken` finds the edge of an engine's `TransitionTaken`.
 
 **Layout**: `read_layout`, `write_layout`, `parse_layout`, `follow` after an edit; the side file
 `NAME.layout.json` is {version: 1, states: {id: {x, y, width?, height?}}, corners: {edge id: [[x, y],
@@ -70,7 +71,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from offboard.authoring.apply import Edited, EditSession, apply
-from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue
+from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue, catalogue_of
 from offboard.authoring.diagram import Diagram, Edge, Node, diagram
 from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
@@ -91,12 +92,16 @@ from offboard.authoring.scxml_export import export_scxml
 from offboard.authoring.scxml_import import import_scxml
 from offboard.authoring.text import Change, Positions
 from offboard.authoring.xml_tree import XmlError
+from offboard.chart.messages import ENGLISH
+from offboard.chart.spanish import SPANISH
 from offboard.mission import mermaid_of
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 __all__ = [
+    "ENGLISH",
+    "SPANISH",
     "Catalogue",
     "Change",
     "Diagram",
@@ -120,6 +125,7 @@ __all__ = [
     "apply",
     "as_json",
     "catalogue",
+    "catalogue_of",
     "check_document",
     "diagram",
     "edit_schema",

@@ -280,6 +280,6 @@ def _reason(tests: frozenset[_Test]) -> Message:
     term = _impossible_term(tests)
     assert term is not None
     own = " and ".join(sorted(str(test) for test in tests if test.term == term))
-    ends = f"at least {term.low:g}" if term.high == inf else f"from {term.low:g} to {term.high:g}"
-    ends = f"at most {term.high:g}" if term.low == -inf else ends
+    code = "guard.at_least" if term.high == inf else "guard.from_to"
+    ends = Message("guard.at_most" if term.low == -inf else code, low=term.low, high=term.high)
     return Message("guard.range", name=term.shown, meant=own, range=ends)

@@ -1,7 +1,7 @@
 """All texts about mission files, in one table: the words of each finding, by its code.
 
 A finding is made of a code and values; `ENGLISH` has the words. Another language is another table with the
-same codes: `Message.text(table)`.
+same codes, such as `spanish.SPANISH`: `Message.text(table)`.
 """
 
 from __future__ import annotations
@@ -170,6 +170,9 @@ ENGLISH: Mapping[str, str] = {
     "guard.constant": "it is always false",
     "guard.contradiction": "no value of {names} fulfils all of it; is an 'and' meant as 'or'?",
     "guard.range": "{name} is never {meant}; it is {range}",
+    "guard.at_least": "at least {low:g}",
+    "guard.at_most": "at most {high:g}",
+    "guard.from_to": "from {low:g} to {high:g}",
     "guard.always": "when '{when}' always holds: {reason}; leave 'when' out, or correct it",
     "guard.always_true": "it is true for every value",
     "vision.needed": "'{name}' needs the map of frames; add the line 'vision: frames' at the top of {file}",

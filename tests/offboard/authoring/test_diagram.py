@@ -19,6 +19,7 @@ from offboard.authoring import (
     apply,
     as_json,
     catalogue,
+    catalogue_of,
     diagram,
     follow,
     layout_path,
@@ -67,6 +68,18 @@ def test_nodes_and_edges_know_where_they_are_written():
     assert document.text[edge.to_span.start : edge.to_span.end] == "shift_right"
     assert edges["red/done/0"].target == "green"
     assert edges["red/resume/0"].target == "red.go_to_center"
+
+
+def test_the_edges_that_the_engine_takes_are_found():
+    drawn = diagram(opened("frame_challenge"))
+    found = drawn.edge_taken
+    assert found("red.turning", "red.frame_visible", "frame_seen") == "red.turning/tick/0"
+    assert found("red.going_up", "green.go_to_center", "done") == "red/done/0"
+    assert found("blue.turning", "blue.go_to_center", "resume") == "blue/resume/0"
+    assert found("blue.turning", "blue.go_to_center", "frame_seen") == ""
+    assert drawn.settings["name"] == "frame_challenge"
+    assert drawn.variables == {"x0": "0", "y0": "0", "alpha0": "0"}
+    assert drawn.templates["cross_frame"][:2] == ("@cross_frame", "@cross_frame.go_to_center")
 
 
 def test_states_of_another_file_cannot_be_edited_here():
@@ -206,4 +219,7 @@ def test_the_catalogue_has_what_a_contestant_adds():
     assert primitives["creep"].help.endswith("For as long as it is called.")
     assert not primitives["hover"].own
     assert all(value.text for value in made.values if not value.own and not value.name.startswith("memory."))
+    names = {value.name for value in catalogue_of(opened("careful_crossing")).values}
+    assert {"memory.x0", "memory.alpha0"} <= names
+    assert {value.name: value for value in catalogue_of(opened("racer")).values}["cmd.vel_x"].high is None
     assert {value.name: value for value in catalogue(contest=False).values}["cmd.vel_x"].high is None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from textwrap import dedent
 
 import pytest
@@ -432,3 +434,12 @@ def test_a_shipped_mission_is_built_by_edits_from_an_empty_text(tmp_path, name):
     path.write_bytes(session.document.data)
     assert load_mission(path).native == load_mission(name).native
     assert not [each for each in check_document(session.document) if each.severity != "advice"]
+
+
+def test_the_example_of_the_documents_works(capsys):
+    text = (Path(__file__).parents[3] / "docs" / "missions.md").read_text(encoding="utf-8")
+    (example,) = [each for each in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if "authoring" in each]
+    exec(compile(example, "missions.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert "error state.no_way_out state 'up' has no way out" in printed
+    assert printed.endswith("  down:\n    final: true\n\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from random import Random
+from string import Formatter
 from textwrap import dedent
 from time import process_time
 
@@ -11,6 +12,7 @@ import pytest
 from offboard.authoring import Document, as_json, check_document, diagram
 from offboard.chart.conditions import Conditions
 from offboard.chart.messages import ENGLISH
+from offboard.chart.spanish import SPANISH
 from offboard.chart.vocabulary import Vocabulary
 from offboard.engine import MissionEngine
 from offboard.mission import MISSIONS, list_missions, load_mission
@@ -161,18 +163,38 @@ def test_each_finding_is_at_its_place(old, new, severity, code, marked, where):
     as_json(finding)
 
 
+def test_a_variable_that_nothing_sets_is_a_constant_unless_a_contestant_s_pilot_may_set_it():
+    class Mine(Pilot):
+        def count(self) -> None:
+            self.memory.n += 1
+
+    text = GOOD.replace("templates:", "variables: {n: 0}\ntemplates:").replace("frame_seen", "memory.n > 3")
+    (finding,) = found(text)
+    assert (finding.severity, finding.code) == ("warning", "guard.never")
+    assert check_document(Document.from_text(text.replace("hover", "count")), Mine) == ()
+
+
 def test_a_text_that_is_no_yaml_is_a_finding_with_its_line():
     (finding,) = found(GOOD.replace("    use: leg", "   use: leg", 1))
     assert (finding.severity, finding.code, finding.line) == ("error", "yaml.indentation", 26)
     assert diagram(Document.from_text("a: [")).readable is False
 
 
-def test_messages_can_be_in_another_language():
-    table = {"state.no_timeout": "el estado «{state}» espera sin límite de tiempo"}
-    text = GOOD.replace("seconds_in_state > 30", "imu.z > 3")
-    (finding,) = check_document(Document.from_text(text), texts=table)
-    assert finding.message == "el estado «rise» espera sin límite de tiempo"
-    assert all(isinstance(text, str) for text in ENGLISH.values())
+def test_findings_can_be_in_spanish():
+    text = GOOD.replace("frame_seen", "goal_m < 1").replace("to: red", "to: rde", 1)
+    said = [each.message for each in check_document(Document.from_text(text), texts=SPANISH)]
+    assert said == [
+        "when 'goal_m < 1': goal_m es un lugar (x, y, z), no un número; lee distance_to_goal_m, o imu.x",
+        "el destino 'rde' del estado 'rise' no es un estado; ¿quizá 'red'?",
+    ]
+
+
+def test_all_texts_are_there_in_both_languages():
+    def names(text: str) -> set[str]:
+        return {name for _, name, _, _ in Formatter().parse(text) if name}
+
+    assert set(SPANISH) == set(ENGLISH)
+    assert {code for code in ENGLISH if names(ENGLISH[code]) != names(SPANISH[code])} == set()
 
 
 @pytest.mark.parametrize("name", list_missions())
