@@ -134,8 +134,8 @@ def mission_from_text(
     written = read_mission_file(text.replace("\r\n", "\n").replace("\r", "\n"), path)
     if written.extends and written.extends not in list_missions():
         known = ", ".join(list_missions())
-        text = f"extends '{cut(written.extends)}': here a mission extends one of the package; known: {known}"
-        raise mission_error(written.place, text)
+        what = f"extends '{cut(written.extends)}': here a mission extends one of the package; known: {known}"
+        raise mission_error(written.place, what)
     return _checked(written, path, pilot)
 
 
