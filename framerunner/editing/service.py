@@ -138,7 +138,7 @@ class EditingService:
         """Forget a watcher that disconnected; what nobody watches any more is ended after a while."""
         self._pages.discard(watcher)
         if not self._pages and self._spare is not None:
-            self._spare.kill()
+            self._keep(self._spare.end())
             self._spare = None
         for job in self._jobs.values():
             if watcher in job.watchers:
@@ -149,7 +149,7 @@ class EditingService:
         """End everything."""
         self._closed = True
         if self._spare is not None:
-            self._spare.kill()
+            self._keep(self._spare.end())
             self._spare = None
         for job in self._jobs.values():
             job.cancelled = True
@@ -196,8 +196,9 @@ class EditingService:
             await spare.start()
         except OSError as error:
             logger.warning("a worker of the editor cannot be started: %s", error)
+            return
         if spare is not self._spare and not any(spare is job.worker for job in self._jobs.values()):
-            spare.kill()  # all pages have gone meanwhile
+            await spare.end()  # all pages have gone meanwhile
 
     def _keep(self, work: Coroutine[None, None, None]) -> None:
         task = asyncio.create_task(work)

@@ -82,6 +82,12 @@ class WorkerProcess:
         how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         return f"{how}: {lines[-1][:300]}" if lines else how
 
+    async def end(self) -> None:
+        """Kill it and wait for its end, if it was started."""
+        if self._process is not None:
+            self.kill()
+            await self.ended()
+
     def kill(self) -> None:
         """End it and all that it started at once."""
         if self._process is not None:
