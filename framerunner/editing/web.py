@@ -127,6 +127,7 @@ class _Connection:
 
     async def serve(self) -> None:
         """Receive and send until the browser disconnects or is disconnected."""
+        self._service.enter(self)
         sending = asyncio.create_task(self._send())
         receiving = asyncio.create_task(self._receive())
         try:
