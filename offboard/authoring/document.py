@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,9 +11,9 @@ from offboard.authoring.outline import Outline
 from offboard.authoring.text import MissionText, Positions
 from offboard.chart.messages import Message
 from offboard.chart.problems import MissionError, Place, ProblemList, mission_error
-from offboard.chart.read import parse_mission_yaml, read_nodes
+from offboard.chart.read import parse_mission_yaml, read_mission_file, read_nodes
 from offboard.chart.spec import MissionFile, expand, merge_extended
-from offboard.chart.yaml_nodes import MapNode
+from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
 from offboard.mission import MAX_FILE_BYTES, read_base
 
 
@@ -86,16 +87,27 @@ class Document:
         """The nodes of its YAML; None if it is empty or cannot be read."""
         return self._nodes[0]
 
-    def read(self) -> MissionFile:
-        """What the file says, without what it extends. Raises `MissionError` with all faults of its form."""
-        if self._nodes[1] is not None:
-            raise self._nodes[1]
-        if self.nodes is None:
-            raise mission_error(Place(self.label, 1), Message("yaml.empty"))
-        problems = ProblemList()
-        written = read_nodes(self.nodes, self.path, problems)
-        problems.raise_if_any()
-        return written
+    @cached_property
+    def _scalars(self) -> tuple[list[int], list[Scalar]]:
+        """All texts of its YAML in their order, with where they start."""
+        found: list[Scalar] = []
+        pending: list[Node] = [] if self.nodes is None else [self.nodes]
+        while pending:
+            node = pending.pop()
+            if isinstance(node, Scalar):
+                found.append(node)
+            elif isinstance(node, ListNode):
+                pending.extend(node.items)
+            elif isinstance(node, MapNode):
+                pending.extend((*node.key_nodes.values(), *node.items.values()))
+        found.sort(key=lambda scalar: (scalar.start, scalar.end))
+        return [scalar.start for scalar in found], found
+
+    def scalar_at(self, offset: int) -> Scalar | None:
+        """The text of its YAML around an offset."""
+        starts, scalars = self._scalars
+        number = bisect_right(starts, offset) - 1
+        return scalars[number] if number >= 0 and offset < scalars[number].end else None
 
     @property
     def unreadable(self) -> MissionError | None:
@@ -133,6 +145,19 @@ class Document:
         except MissionError:
             return None
 
-    def _written(self) -> MissionFile:
+    @cached_property
+    def _read(self) -> tuple[MissionFile, ProblemList]:
         assert self.nodes is not None
-        return read_nodes(self.nodes, self.path, ProblemList())
+        problems = ProblemList()
+        return read_nodes(self.nodes, self.path, problems), problems
+
+    def _written(self) -> MissionFile:
+        return self._read[0]
+
+    def read(self) -> MissionFile:
+        """What is written in it, without what it extends. Raises `MissionError` with all faults of its form."""
+        if self.nodes is None:
+            return read_mission_file(self.text, self.path)  # says why
+        written, problems = self._read
+        problems.raise_if_any()
+        return written

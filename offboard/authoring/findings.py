@@ -14,12 +14,12 @@ from offboard.authoring.outline import SECTIONS, Event, Section, Span, StateOutl
 from offboard.authoring.references import instances
 from offboard.chart.messages import ENGLISH, Message
 from offboard.chart.problems import MissionError, Problem, ProblemList, Severity
-from offboard.chart.yaml_nodes import ListNode, Node, Scalar
 from offboard.mission import expand_and_check
 from offboard.pilot import Pilot
 
 _WORD = re.compile(r"[\w.]+|\S")
 _WITH_REASON = ("when", "action")
+_MAX_FINDINGS = 300  # each is looked up in text and diagram
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +57,17 @@ class Finding:
 def check_document(
     document: Document, pilot_class: type[Pilot] = Pilot, texts: Mapping[str, str] = ENGLISH
 ) -> tuple[Finding, ...]:
-    """All findings of a document, in the order of the text.
+    """The findings of a document, in the order of the text: all, or as many as a person reads, errors first.
 
     Args:
         document: any; also one that is no mission.
         pilot_class: whose names the mission uses.
         texts: in which language; see `offboard.chart.messages`.
     """
-    return tuple(_finding(document, each, texts) for each in problems_of(document, pilot_class))
+    problems = problems_of(document, pilot_class)
+    if len(problems) > _MAX_FINDINGS:
+        problems = tuple(sorted(problems, key=lambda each: each.severity != "error"))[:_MAX_FINDINGS]
+    return tuple(_finding(document, each, texts) for each in problems)
 
 
 def problems_of(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[Problem, ...]:
@@ -125,7 +128,7 @@ def _part(state: StateOutline, offset: int) -> tuple[Event | None, int | None, s
 def _span(document: Document, offset: int, *, whole_line: bool) -> Span:
     """The text that a fault at an offset concerns: a whole value, a word in it, or the line."""
     positions, text = document.positions, document.text
-    node = None if document.nodes is None else _scalar_at(document.nodes, offset)
+    node = document.scalar_at(offset)
     if node is not None and offset - node.start <= int(node.quoted):
         return Span(node.start, node.end)
     start, end = positions.line_start(offset), positions.line_end(offset)
@@ -134,19 +137,3 @@ def _span(document: Document, offset: int, *, whole_line: bool) -> Span:
         return Span(offset, word.end() if word else min(offset + 1, end))
     line = text[start:end]
     return Span(start + len(line) - len(line.lstrip()), start + len(line.rstrip()))
-
-
-def _scalar_at(node: Node, offset: int) -> Scalar | None:
-    """The innermost text around an offset."""
-    pending: list[Node] = [node]
-    while pending:
-        present = pending.pop()
-        if not present.start <= offset < present.end:
-            continue
-        if isinstance(present, Scalar):
-            return present
-        if isinstance(present, ListNode):
-            pending.extend(present.items)
-        else:
-            pending.extend((*present.key_nodes.values(), *present.items.values()))
-    return None

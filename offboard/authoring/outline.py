@@ -6,8 +6,10 @@ first: `@cross_frame.turning`; the template itself is `@cross_frame`.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from offboard.chart.problems import NOWHERE
@@ -138,11 +140,18 @@ class Outline:
 
     def at(self, offset: int) -> StateOutline | None:
         """The innermost state around an offset."""
-        found = None
-        for state in self._by_path.values():
-            if state.span.start <= offset <= state.span.end:
-                found = state  # inner ones come after those around them
-        return found
+        starts, states = self._by_start
+        number = bisect_right(starts, offset) - 1
+        state = states[number] if number >= 0 else None
+        while state is not None and state.span.end < offset:
+            state = self._by_path.get(state.parent)
+        return state
+
+    @cached_property
+    def _by_start(self) -> tuple[list[int], list[StateOutline]]:
+        """All states in the order of the text, with where they start; inner ones after those around them."""
+        states = sorted(self._by_path.values(), key=lambda state: state.key.start)
+        return [state.key.start for state in states], states
 
     def text(self, key: str) -> str:
         """The text of a key of the mission; empty if it has none."""

@@ -23,6 +23,7 @@ from framerunner.editing.documents.messages import (
     PageMessageError,
     SaveMessage,
     StepMessage,
+    TypedChange,
     TypeMessage,
     catalogue_message,
     changed_message,
@@ -32,8 +33,8 @@ from framerunner.editing.documents.messages import (
 )
 from framerunner.editing.documents.open_document import OpenDocument
 from monitor.access import refuse
-from offboard.authoring import Change, export_scxml, import_scxml, mermaid_of, parse_edit
-from offboard.mission import list_missions
+from offboard.authoring import Change, Edit, export_scxml, import_scxml, mermaid_of, parse_edit
+from offboard.mission import MAX_FILE_BYTES, list_missions
 
 _Text = Annotated[str, Body(max_length=100)]
 _Scxml = Annotated[str, Body(max_length=1_000_000)]
@@ -243,10 +244,23 @@ def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[Change]:
     if message.revision != opened.revision:
         raise PageMessageError(_CHANGED_ELSEWHERE)
     changes: list[Change] = []
-    for typed in message.changes:
-        positions = opened.document.positions
-        start = positions.from_utf16(typed.start)
-        end = positions.from_utf16(typed.start + typed.removed)
-        edit = {"kind": "replace_text", "start": start, "end": end, "text": typed.inserted}
-        changes += opened.apply(parse_edit(edit))
+    before = opened.document
+    try:
+        for typed in message.changes:
+            changes += opened.apply(_replacement(opened, typed))
+    except UserError:
+        while opened.document.text != before.text:
+            opened.undo()
+        raise
     return changes
+
+
+def _replacement(opened: OpenDocument, typed: TypedChange) -> Edit:
+    text, positions = opened.document.text, opened.document.positions
+    last = typed.start + typed.removed
+    if len(typed.inserted) > MAX_FILE_BYTES:
+        raise PageMessageError("the mission would be larger than 1 MB; a mission is a page or two")
+    if last > positions.to_utf16(len(text)):
+        raise PageMessageError(f"typed text: {last} is after the end of the text; load the page again")
+    start, end = positions.from_utf16(typed.start), positions.from_utf16(last)
+    return parse_edit({"kind": "replace_text", "start": start, "end": end, "text": typed.inserted})

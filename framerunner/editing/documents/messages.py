@@ -42,7 +42,7 @@ class TypedChange(BaseModel):
 
     start: _Number
     removed: _Number
-    inserted: Annotated[str, Field(max_length=1_000_000)]
+    inserted: Annotated[str, Field(max_length=20_000_000)]  # more than a mission may have is refused later
 
 
 class EditMessage(_FromPage):

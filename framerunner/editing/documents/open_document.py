@@ -145,14 +145,15 @@ class OpenDocument:
             SaveRefusedError: it cannot be written, or another program has changed it.
         """
         name = self.path.name
-        part = self.path.with_name(f".{name}.part")
+        file = Path(os.path.realpath(self.path))  # a link stays one
+        part = file.with_name(f".{file.name}.part")
         try:
-            if not force and self.path.exists() and self.path.read_bytes() != self._saved:
+            if not force and file.exists() and file.read_bytes() != self._saved:
                 raise SaveRefusedError(f"{name} was changed by another program since it was opened")
             part.write_bytes(self.document.data)
-            if self.path.exists():
-                part.chmod(self.path.stat().st_mode & 0o777)
-            os.replace(part, self.path)
+            if file.exists():
+                part.chmod(file.stat().st_mode & 0o777)
+            os.replace(part, file)
             if layout_path(self.path).exists() or self.layout.states:
                 write_layout(self.path, self.layout)
         except OSError as error:

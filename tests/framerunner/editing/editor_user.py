@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from playwright.async_api import Locator, Page, expect
 
 from tests.chromium import Complaints, until
@@ -51,12 +53,17 @@ class EditorUser:
         await self.page.keyboard.type(value)
         await self.page.keyboard.press("Enter")
 
+    def choice(self, label: str) -> Locator:
+        """A list of the form."""
+        return self.form.get_by_role("combobox", name=label, exact=True)
+
     async def choose(self, label: str, value: str) -> None:
         """Choose from a list of the form."""
-        await self.form.get_by_label(label, exact=True).select_option(value)
+        await self.choice(label).select_option(value)
 
     async def select(self, name: str) -> None:
-        """Click a state's name."""
+        """Show all of the diagram and click a state."""
+        await self.press("Show all")
         await self.state(name).locator("> rect").first.click(position=_TOP_LEFT_PX)
         await expect(self.form.locator("h2")).to_have_text(f"State {name.rpartition('.')[2]}")
 
@@ -98,7 +105,7 @@ class EditorUser:
         await self.page.mouse.move(handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2)
         await self.page.mouse.down()
         box = await self.state(target).locator("> rect").first.bounding_box()
-        await self.page.mouse.move(box["x"] + 6, box["y"] + 6, steps=3)
+        await self.page.mouse.move(box["x"] + 3, box["y"] + 3, steps=3)
         await self.page.mouse.up()
         await expect(self.form.locator("h2")).to_have_text(f"Transition {source} → {target}")
         if when:
@@ -110,7 +117,7 @@ class EditorUser:
     async def event(self, event: str) -> None:
         """Choose the event of the selected transition."""
         await self.choose("Event", event)
-        await expect(self.form.get_by_label("Event", exact=True)).to_have_value(event)
+        await expect(self.choice("Event")).to_have_value(event)
 
     async def tick(self, label: str) -> None:
         """Tick a box of the form."""
@@ -119,21 +126,27 @@ class EditorUser:
         await expect(box).to_be_checked()
 
     async def text(self) -> str:
-        """The YAML that is shown."""
-        return await self.page.locator(".e-writing").evaluate(
-            "(host) => host.shadowRoot.querySelector('.cm-content').cmTile.view.state.doc.toString()"
-        )
+        """The YAML that is shown, of a mission that is not longer than the window."""
+        return "\n".join(await self.page.locator(".cm-line").all_text_contents())
 
     async def type_at(self, line: int, text: str) -> None:
         """Put the cursor at the end of a line of the YAML, from 1, and type."""
         await self.page.locator(".cm-line").nth(line - 1).click()
         await self.page.keyboard.press("End")
-        await self.page.keyboard.type(text)
+        await self.write(text)
+
+    async def write(self, text: str) -> None:
+        """Type at the cursor; the text's own indentation is kept, whatever Enter adds."""
+        for number, line in enumerate(text.split("\n")):
+            if number:
+                await self.page.keyboard.press("Enter")
+                await self.page.keyboard.press("Shift+Home")
+            await self.page.keyboard.type(line)
 
     async def saves(self) -> None:
         """Press Control and S, and wait until the file has it."""
         await self.page.keyboard.press("ControlOrMeta+s")
-        await expect(self.page.locator(".e-saved")).to_have_text("saved")
+        await expect(self.page.locator(".e-saved")).to_have_text(re.compile("^saved"))
 
     async def until(self, expression: str, timeout_s: float = 30.0) -> None:
         """Wait until an expression is true in the page."""

@@ -1,6 +1,8 @@
-"""The acceptance test of the editor: the paper's navigator is built by mouse and keyboard, checked and flown."""
+"""The editor as a whole: the paper's navigator is built by mouse and keyboard, checked and flown."""
 
 from __future__ import annotations
+
+import re
 
 import pytest
 import yaml
@@ -11,6 +13,7 @@ from tests.chromium import chromium
 from tests.framerunner.editing.editor_program import editor
 from tests.framerunner.editing.editor_user import SIZE, EditorUser
 
+LANDED = re.compile("(completed|clean) after .* crossed: red, green, blue")
 RATE = ("look_to_frame", "cmd.vel_x = (frame.d - 0.3) / 8")
 # State, what it does on entry and during, and its transitions: guard and target.
 CROSS_FRAME = {
@@ -73,10 +76,9 @@ async def fill(user: EditorUser, parent: str, states: dict) -> None:
     first, *others = states
     await user.select(f"{parent}.first")
     await user.rename(f"{parent}.first", first)
-    for name in states:
+    for name, (enter, during, leads) in states.items():
         if name in others:
             await user.add_inner(parent, name)
-        enter, during, leads = states[name]
         await user.do("On entry", *enter)
         await user.do("During", *during)
         if not leads:
@@ -141,10 +143,10 @@ async def test_the_papers_navigator_is_built_by_hand_checked_saved_and_flown(tmp
         await user.saves()
         assert meaning("frame_challenge") == meaning(mission)
         await user.page.get_by_role("tab", name="Fly").click()
-        await user.page.get_by_label("Speed").select_option(label="max")
+        await user.page.get_by_role("combobox", name="Speed").select_option(label="max")
         await user.press("Fly", user.page.locator(".e-tabs .e-tab:not([hidden])"))
         line = user.page.locator(".e-run-line")
-        await expect(line).to_contain_text("completed", timeout=60_000)
+        await expect(line).to_have_text(LANDED, timeout=60_000)
         assert not user.complaints
 
 

@@ -1,0 +1,349 @@
+"""Open documents: the journal, saving, the folder's files, and the door to them, without a browser."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from types import SimpleNamespace
+
+import pytest
+from fastapi import FastAPI
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from framerunner.editing.documents.desk import DeskError, EditorDesk
+from framerunner.editing.documents.door import DocumentsDoor
+from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
+from offboard.authoring.edits import AddState
+from offboard.mission import MISSIONS, list_missions
+
+HOVER = "name: hover\ninitial: up\nstates:\n  up:\n    enter: [hover]\n    final: true  # ü 😀\n"
+CRLF = HOVER.replace("\n", "\r\n").encode()
+
+
+@pytest.fixture
+def path(tmp_path):
+    made = tmp_path / "hover.yaml"
+    made.write_text(HOVER, encoding="utf-8")
+    return made
+
+
+class Socket:
+    """A page's end of a document's WebSocket."""
+
+    def __init__(self, socket):
+        self._socket = socket
+        self._number = 0
+        self.document = self.receive("document")
+
+    def receive(self, kind):
+        """The next message of a type."""
+        while (message := self._socket.receive_json())["type"] != kind:
+            pass
+        return message
+
+    def ask(self, kind, **fields):
+        """Ask for something; the answer."""
+        self._number += 1
+        self._socket.send_json({"type": kind, "number": self._number, **fields})
+        while (message := self._socket.receive_json()).get("answers") != self._number:
+            pass
+        return message
+
+    def edit(self, kind, **fields):
+        return self.ask("edit", edit={"kind": kind, **fields})
+
+    def type(self, start, inserted, *, revision, removed=0):
+        change = {"start": start, "removed": removed, "inserted": inserted}
+        return self.ask("type", revision=revision, changes=[change])
+
+
+@contextmanager
+def served(folder, *, may_act=True):
+    """A client of a server with the documents' door."""
+    web = FastAPI()
+    web.include_router(DocumentsDoor(EditorDesk(folder)).router(lambda _: may_act))
+    with TestClient(web) as client:
+
+        @contextmanager
+        def window(name):
+            # The test client cancels what the server still does when a page has left.
+            with suppress(CancelledError), client.websocket_connect(f"/ws/edit?file={name}") as socket:
+                yield Socket(socket)
+
+        yield SimpleNamespace(http=client, window=window)
+
+
+def test_what_is_not_saved_is_found_again_after_a_kill(path):
+    opened = OpenDocument.open(path)
+    opened.apply(AddState(name="down"))
+    opened.keep()
+    again = OpenDocument.open(path)  # of another process: the first one was killed
+    assert again.restored
+    assert not again.is_saved
+    assert again.document.text == opened.document.text
+    assert path.read_text() == HOVER
+    again.undo()
+    assert again.is_saved
+    again.keep()
+    assert not OpenDocument.open(path).restored
+    assert [each.name for each in path.parent.iterdir()] == ["hover.yaml"]
+
+
+def test_saving_ends_the_journal_and_keeps_the_files_mode(path):
+    path.chmod(0o640)
+    opened = OpenDocument.open(path)
+    opened.apply(AddState(name="down"))
+    opened.keep()
+    opened.save()
+    assert opened.is_saved
+    assert path.read_bytes() == opened.document.data
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert not OpenDocument.open(path).restored
+    assert [each.name for each in path.parent.iterdir()] == ["hover.yaml"]
+
+
+@pytest.mark.parametrize("rest", [b"\xff\xfe not text", b"", HOVER.encode()])
+def test_a_journal_that_says_nothing_is_no_obstacle(path, rest):
+    opened = OpenDocument.open(path)
+    opened.journal.write_bytes(rest)
+    assert OpenDocument.open(path).document.text in (HOVER, rest.decode(errors="ignore"))
+
+
+def test_a_file_that_another_program_changed_is_not_overwritten_unless_wanted(path):
+    opened = OpenDocument.open(path)
+    opened.apply(AddState(name="down"))
+    path.write_text("name: other\n")
+    with pytest.raises(SaveRefusedError, match=r"hover\.yaml was changed by another program"):
+        opened.save()
+    assert path.read_text() == "name: other\n"
+    opened.save(force=True)
+    assert path.read_bytes() == opened.document.data
+
+
+def test_a_deleted_file_is_written_again_and_a_lost_folder_is_told(path):
+    opened = OpenDocument.open(path)
+    opened.apply(AddState(name="down"))
+    path.unlink()
+    opened.save()
+    assert path.read_bytes() == opened.document.data
+    path.unlink()
+    path.parent.rmdir()
+    opened.apply(AddState(name="other"))
+    opened.keep()
+    with pytest.raises(SaveRefusedError, match="cannot be written"):
+        opened.save()
+
+
+@pytest.mark.parametrize(
+    "name", ["../x.yaml", "/etc/x.yaml", "a/b.yaml", ".hidden.yaml", "x.txt", "x.yaml\n", "", "\0.yaml"]
+)
+def test_pages_name_files_of_the_folder_and_no_others(tmp_path, name):
+    folder = tmp_path / "missions"
+    folder.mkdir()
+    (tmp_path / "x.yaml").write_text(HOVER)
+    with pytest.raises(DeskError, match="is no mission file of this folder"):
+        EditorDesk(folder).open(name)
+
+
+@pytest.mark.parametrize("name", ["../x", "X", "", "a b", "a" * 61, "x.yaml", "ü"])
+def test_a_new_missions_name_is_one_word(tmp_path, name):
+    with pytest.raises(DeskError, match="use small letters"):
+        EditorDesk(tmp_path).create(name, "empty")
+    assert not list(tmp_path.iterdir())
+
+
+def test_new_missions_are_made_from_an_empty_chart_an_example_or_a_copy(tmp_path):
+    desk = EditorDesk(tmp_path / "new")
+    assert desk.files() == []
+    assert [desk.create(name, name) for name in ("empty", "example")] == ["empty.yaml", "example.yaml"]
+    desk.create("mine", "frame_challenge")
+    shipped = (MISSIONS / "frame_challenge.yaml").read_text()
+    copied = (desk.folder / "mine.yaml").read_text()
+    assert copied == shipped.replace("name: frame_challenge\n", "name: mine\n")
+    for file in desk.files():
+        assert desk.open(file).opened.document.text
+    with pytest.raises(DeskError, match="is there already"):
+        desk.create("mine", "empty")
+    with pytest.raises(DeskError, match="unknown source"):
+        desk.create("other", "../x")
+
+
+def test_a_link_to_a_mission_stays_a_link(path):
+    link = path.with_name("link.yaml")
+    link.symlink_to(path)
+    opened = OpenDocument.open(link)
+    opened.apply(AddState(name="down"))
+    opened.save()
+    assert link.is_symlink()
+    assert path.read_bytes() == opened.document.data
+
+
+def test_only_those_who_may_act_reach_the_documents(path):
+    with served(path.parent, may_act=False) as server:
+        for answer in (
+            server.http.get("/api/edit/files"),
+            server.http.post("/api/edit/files", json={"name": "x", "source": "empty"}),
+        ):
+            assert answer.status_code == 403
+        with pytest.raises(WebSocketDisconnect) as closed, server.window("hover.yaml"):
+            pass
+        assert closed.value.code == 4403
+    assert [each.name for each in path.parent.iterdir()] == ["hover.yaml"]
+
+
+@pytest.mark.parametrize("name", ["../x.yaml", "none.yaml", ".hover.yaml.unsaved"])
+def test_a_file_that_is_not_there_closes_with_one_line(path, name):
+    with served(path.parent) as server:
+        with pytest.raises(WebSocketDisconnect) as closed, server.window(name):
+            pass
+        assert closed.value.code == 4403
+        assert closed.value.reason
+        assert "\n" not in closed.value.reason
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "no JSON",
+        "[]",
+        '{"type": "run", "number": 1}',
+        '{"type": "edit", "number": -1, "edit": {}}',
+        '{"type": "save", "number": 1, "path": "/etc/passwd"}',
+        '{"type": "layout", "number": 1, "places": {"up": {"x": "left", "y": 0}}}',
+        "[" * 100_000,
+        '{"type": "edit", "number": 1, "edit": ' + '{"a": ' * 100_000,
+    ],
+    ids=lambda message: message[:40],
+)
+def test_a_message_that_no_page_sends_closes_with_one_line(path, message):
+    with served(path.parent) as server:
+        with server.http.websocket_connect("/ws/edit?file=hover.yaml") as socket:
+            socket.receive_json()
+            socket.send_text(message)
+            with pytest.raises(WebSocketDisconnect) as closed:
+                while True:
+                    socket.receive_json()
+        assert closed.value.code == 4400
+        assert closed.value.reason
+        assert "\n" not in closed.value.reason
+        with server.window("hover.yaml") as window:
+            assert window.document["text"] == HOVER
+
+
+def test_a_refused_edit_changes_nothing_and_says_why_in_one_line(path):
+    with served(path.parent) as server, server.window("hover.yaml") as window:
+        for edit in (
+            {"kind": "rename_state", "state": "up", "name": "Ü"},
+            {"kind": "delete_state", "state": "nowhere"},
+            {"kind": "replace_text", "start": 5, "end": 10_000, "text": ""},
+            {"kind": "save"},
+            {},
+        ):
+            refused = window.ask("edit", edit=edit)["refused"]
+            assert refused
+            assert "\n" not in refused
+        assert window.ask("save")["saved"]
+    assert path.read_text() == HOVER
+
+
+@pytest.mark.parametrize("name", list_missions())
+def test_opening_and_saving_changes_no_byte(tmp_path, name):
+    shipped = (MISSIONS / f"{name}.yaml").read_bytes()
+    (tmp_path / "copy.yaml").write_bytes(shipped)
+    with served(tmp_path) as server, server.window("copy.yaml") as window:
+        assert "refused" not in window.ask("save")
+    assert (tmp_path / "copy.yaml").read_bytes() == shipped
+
+
+def test_line_ends_and_wide_characters_survive_typing(path):
+    path.write_bytes(CRLF)
+    with served(path.parent) as server, server.window("hover.yaml") as window:
+        text = window.document["text"]
+        assert "\r" not in text
+        at = len(text[: text.index("😀") + 1].encode("utf-16-le")) // 2
+        answer = window.type(at, "😀\n    # more", revision=0)
+        assert "refused" not in answer
+        assert window.ask("save")["saved"]
+        assert path.read_bytes() == CRLF.replace("😀".encode(), "😀😀\r\n    # more".encode())
+        assert window.ask("undo")["changes"] == [
+            {"start": at, "removed": len("😀\n    # more") + 1, "inserted": ""}
+        ]
+        window.ask("save")
+    assert path.read_bytes() == CRLF
+
+
+def test_two_windows_share_a_document(path):
+    with served(path.parent) as server, server.window("hover.yaml") as one:
+        with server.window("hover.yaml") as two:
+            assert two.receive("status")["others"] == 1
+            one.edit("add_state", name="down")
+            changed = two.receive("changed")
+            assert "down" in [node["id"] for node in changed["diagram"]["nodes"]]
+            late = two.type(0, "# late\n", revision=0)
+            assert "another window" in late["refused"]
+            assert "down:" in late["text"]
+            assert "late" not in late["text"]
+            assert "refused" not in two.type(0, "# now\n", revision=late["revision"])
+            assert one.receive("changed")["changes"][0]["inserted"] == "# now\n"
+        while one.receive("status").get("others") != 0:
+            pass
+
+
+def test_a_page_that_left_finds_its_text_again(path):
+    with served(path.parent) as server:
+        with server.window("hover.yaml") as window:
+            window.edit("add_state", name="down")
+        with server.window("hover.yaml") as window:
+            assert "down:" in window.document["text"]
+            assert window.document["restored"]
+            assert not window.document["saved"]
+
+
+def test_typed_changes_of_which_one_is_impossible_are_refused_together(path):
+    with served(path.parent) as server, server.window("hover.yaml") as window:
+        changes = [{"start": at, "removed": 0, "inserted": "#"} for at in (0, 10**6)]
+        answer = window.ask("type", revision=0, changes=changes)
+        assert answer["refused"]
+        assert answer["text"] == HOVER
+        assert answer["saved"]
+
+
+BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"
+    for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+)
+HOSTILE = {
+    "alias bomb": BOMB + "name: x\nstates: *i\n",
+    "merge bomb": BOMB + "name: x\n<<: *i\n",
+    "deep brackets": "name: x\nstates: " + "[" * 100_000,
+    "deep braces": "name: x\nstates: " + "{a: " * 100_000 + "}" * 100_000,
+    "deep lines": "\n".join(" " * depth + "a:" for depth in range(1200)),
+    "many states": "name: x\nstates:\n" + "".join(f"  s{i}: {{to: s{i}}}\n" for i in range(1_500)),
+    "python object": "name: !!python/object/apply:os.system ['touch hacked']\nstates: {}\n",
+    "huge": "#" * 1_100_000,
+    "one long line": "name: " + "x " * 400_000,
+    "long expression": HOVER + "    during: [" + "cmd.vel_z = 1" + " + 1" * 200_000 + "]\n",
+    "deep expression": HOVER + "    during: ['cmd.vel_z = " + "(" * 100_000 + "1" + ")" * 100_000 + "']\n",
+    "unsafe call": HOVER + "    during: [\"cmd.vel_z = __import__('os').system('touch hacked')\"]\n",
+    "unsafe attribute": HOVER + "    during: ['cmd.vel_z = imu.__class__.__mro__[1].__subclasses__()']\n",
+    "power": HOVER + "    during: ['cmd.vel_z = 9**9**9**9']\n",
+    "colours": HOVER + "    during: ['cmd.vel_z = \"a\" * 10**10']\n",
+}
+
+
+@pytest.mark.parametrize("hostile", HOSTILE)
+def test_hostile_text_is_answered_within_a_second_and_does_nothing(path, hostile, monkeypatch):
+    monkeypatch.chdir(path.parent)
+    with served(path.parent) as server, server.window("hover.yaml") as window:
+        began_s = time.process_time()
+        answer = window.type(0, HOSTILE[hostile], revision=0, removed=len(HOVER) + 1)
+        took_s = time.process_time() - began_s
+        problems = [each for each in answer.get("findings", []) if each["severity"] == "error"]
+        assert answer.get("refused") or problems, answer
+        assert took_s < 1.0
+        assert len(str(problems)) < 100_000
+        with server.window("hover.yaml") as other:  # the server lives
+            assert "refused" not in other.ask("undo") or answer.get("refused")
+    assert not list(path.parent.glob("hacked*"))

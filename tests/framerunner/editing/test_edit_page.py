@@ -1,0 +1,238 @@
+"""The editor's page in a real browser: diagram and text follow each other, and no work is lost."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import expect
+
+from tests.chromium import chromium
+from tests.framerunner.editing.editor_program import editor, free_port
+from tests.framerunner.editing.editor_user import SIZE, EditorUser
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+HOVER = """\
+name: hover   # ü 😀: a comment
+initial: up
+
+states:
+  up:
+    enter:
+      - hover
+      - cmd.vel_z = 0.5   # upwards
+    transitions:
+      - when: imu.z > 1
+        to: wait
+
+  wait:
+    enter: [hover]
+    transitions:
+      - {when: seconds_in_state > 5, to: down}
+  down:
+    enter:
+    - land
+    final: true
+# the end
+"""
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser():
+    async with chromium() as opened:
+        yield opened
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def program(tmp_path_factory):
+    async with editor(tmp_path_factory.mktemp("missions") / "first.yaml") as running:
+        running.folder = tmp_path_factory.getbasetemp() / "missions0"
+        yield running
+
+
+class Windows:
+    """Windows at one mission's page."""
+
+    def __init__(self, program, context, path):
+        self.program = program
+        self.context = context
+        self.path = path
+
+    async def open(self):
+        user = EditorUser(await self.context.new_page())
+        user.page.set_default_timeout(10_000)
+        await user.open(self.program.page(self.path.name))
+        return user
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def windows(program, browser, request):
+    path = program.folder / f"{request.node.name[:70]}.yaml"
+    path.write_bytes(HOVER.encode())
+    context = await browser.new_context(viewport=SIZE)
+    yield Windows(program, context, path)
+    await context.close()
+
+
+async def test_what_is_typed_changes_the_diagram_and_what_is_drawn_the_text(windows):
+    user = await windows.open()
+    await user.type_at(11, "\n      - when: imu.z > 3\n        to: down")
+    await expect(user.transition("up/tick/1")).to_have_text("2: imu.z > 3")
+    await user.select("wait")
+    await user.rename("wait", "stay")
+    await user.join("stay", "up", "seconds_unseen > 9")
+    drawn = HOVER.replace(
+        "        to: wait\n", "        to: stay\n      - when: imu.z > 3\n        to: down\n"
+    ).replace("  wait:\n", "  stay:\n")
+    transition = "      - {when: seconds_in_state > 5, to: down}\n"
+    added = "      - when: seconds_unseen > 9\n        to: up\n"
+    await user.saves()
+    assert windows.path.read_text() == drawn.replace(transition, transition + added)
+    assert await user.text() == windows.path.read_text()
+    assert not user.complaints
+
+
+async def test_undoing_all_edits_gives_the_first_bytes_back(windows):
+    user = await windows.open()
+    await user.add("New state", "other")
+    await user.join("other", "down", "imu.x > 1")
+    await user.select("up")
+    await user.press("Duplicate", user.form)
+    await expect(user.state("up_2")).to_be_attached()
+    await user.select("wait")
+    await user.page.keyboard.press("Delete")
+    await expect(user.state("wait")).to_have_count(0)
+    await user.type_at(1, " and more")
+    await user.until("document.querySelector('.e-saved').textContent === 'not saved'")
+    await user.saves()
+    assert windows.path.read_bytes() != HOVER.encode()
+    undo = user.page.get_by_role("button", name="Undo")
+    while await undo.is_enabled():
+        await undo.click()
+        await user.page.wait_for_timeout(100)
+    await user.saves()
+    assert windows.path.read_bytes() == HOVER.encode()
+    redo = user.page.get_by_role("button", name="Redo")
+    await redo.click()
+    await expect(user.state("state")).to_be_attached()
+
+
+async def test_control_z_in_the_text_takes_one_edit_back(windows):
+    user = await windows.open()
+    await user.select("wait")
+    await user.rename("wait", "stay")
+    await user.type_at(1, "!")
+    await user.page.wait_for_timeout(400)  # longer than the pause after which typed text is sent
+    await user.page.keyboard.press("ControlOrMeta+z")
+    await expect(user.page.locator(".cm-line").first).to_have_text(HOVER.splitlines()[0])
+    await expect(user.state("stay")).to_be_attached()
+    await user.page.keyboard.press("ControlOrMeta+z")
+    await expect(user.state("wait")).to_be_attached()
+    assert await user.text() == HOVER
+
+
+async def test_a_finding_is_shown_in_the_diagram_the_text_and_the_list(windows):
+    user = await windows.open()
+    await expect(user.page.locator("#e-panel-findings")).not_to_contain_text("nowhere")
+    await user.type_at(16, " # a comment\n      - when: imu.w > 1\n        to: up")
+    await expect(user.page.locator('[data-transition="wait/tick/1"].e-transition')).to_have_attribute(
+        "data-finding", "error"
+    )
+    await expect(user.page.locator(".cm-lintRange-error")).to_have_text("imu.w > 1")
+    row = user.page.locator("#e-panel-findings li[data-severity=error] button")
+    await expect(row).to_contain_text("17: ")
+    await row.click()
+    await expect(user.form.locator("h2")).to_have_text("Transition wait → up")
+
+
+async def test_an_unsafe_expression_is_an_error_at_once(windows):
+    user = await windows.open()
+    await user.select("wait")
+    await user.do("On entry", "cmd.vel_z = __import__('os').system('touch hacked')")
+    await expect(user.state("wait")).to_have_attribute("data-finding", "error", timeout=1000)
+    assert not list(windows.path.parent.glob("hacked*"))
+
+
+async def test_closing_with_unsaved_work_asks(windows):
+    user = await windows.open()
+    asked = []
+
+    async def stay(dialog):
+        asked.append(dialog.type)
+        await dialog.dismiss()
+
+    user.page.on("dialog", stay)
+    await user.add("New state", "other")
+    await user.page.close(run_before_unload=True)
+    await asyncio.sleep(0.5)
+    assert asked == ["beforeunload"]
+    assert not user.page.is_closed()
+    await user.saves()
+    async with user.page.expect_event("close"):
+        await user.page.close(run_before_unload=True)
+    assert asked == ["beforeunload"]
+
+
+async def test_two_windows_know_of_each_other_and_show_the_same(windows):
+    one, two = await windows.open(), await windows.open()
+    for user in (one, two):
+        await expect(user.page.locator(".e-saved")).to_contain_text("also open in another window")
+    await one.add("New state", "other")
+    await expect(two.state("other")).to_be_attached()
+    await two.type_at(7, " # typed")
+    await expect(one.page.locator(".cm-line").nth(6)).to_have_text("      - hover # typed")
+    await two.page.close()
+    await expect(one.page.locator(".e-saved")).not_to_contain_text("another window")
+    assert not one.complaints
+
+
+async def test_typing_in_two_windows_at_once_ends_in_the_same_text(windows):
+    one, two = await windows.open(), await windows.open()
+    await one.page.locator(".cm-line").nth(0).click()
+    await one.page.keyboard.press("End")
+    await two.page.locator(".cm-line").nth(6).click()
+    await two.page.keyboard.press("End")
+    for number in range(30):
+        await one.page.keyboard.type(f"a{number}")
+        await two.page.keyboard.type(f"b{number}")
+    await asyncio.sleep(1.0)
+    assert await one.text() == await two.text()
+    await one.saves()
+    assert windows.path.read_text() == await one.text()
+    assert not [*one.complaints, *two.complaints]
+
+
+async def test_a_field_that_is_being_filled_in_is_kept_when_another_window_edits(windows):
+    one, two = await windows.open(), await windows.open()
+    await one.select("wait")
+    await one.form.get_by_label("On exit: Add an action", exact=True).click()
+    await one.page.keyboard.type("land")
+    await two.type_at(8, " # typed")
+    await expect(one.page.locator(".cm-line").nth(7)).to_contain_text("# typed")
+    await one.page.keyboard.press("Enter")
+    await expect(one.form.get_by_label("Remove: land")).to_have_count(1)
+
+
+async def test_a_killed_program_loses_at_most_five_seconds(browser, tmp_path):
+    path, port = tmp_path / "hover.yaml", free_port()
+    path.write_text(HOVER)
+    context = await browser.new_context(viewport=SIZE)
+    async with editor(path, port=port) as program:
+        user = EditorUser(await context.new_page())
+        await user.open(program.page(path.name))
+        await user.add("New state", "kept")
+        await asyncio.sleep(5.0)
+        await program.kill()
+        await expect(user.page.locator(".e-message")).to_contain_text("no connection")
+        await user.type_at(1, "typed in vain")
+        assert "in vain" not in await user.text()
+    assert "kept" not in path.read_text()
+    async with editor(path, port=port) as program:
+        await expect(user.page.locator(".e-message")).to_contain_text("is here again", timeout=15_000)
+        await expect(user.state("kept")).to_be_attached()
+        await expect(user.page.locator(".e-saved")).to_contain_text("not saved")
+        await user.saves()
+        assert "  kept:\n" in path.read_text()
+        assert path.read_text().replace("\n  kept:\n", "", 1) == HOVER
+    await context.close()
