@@ -75,7 +75,7 @@ class DocumentsDoor:
             return _export(desk, file, kind)
 
         @router.websocket("/ws/edit")
-        async def edit(websocket: WebSocket, file: str) -> None:
+        async def edit(websocket: WebSocket, file: str, language: str = "en") -> None:
             if not may_act(websocket):
                 await refuse(websocket, "only those who logged in may edit")
                 return
@@ -84,6 +84,7 @@ class DocumentsDoor:
             except UserError as error:
                 await refuse(websocket, str(error).partition("\n")[0])
                 return
+            shared.opened.speaks_spanish |= language == "es"
             await websocket.accept()
             await _Window(websocket, desk, file, shared).serve()
 
@@ -208,7 +209,6 @@ class _Window:
             return
         if changes:
             told = changed_message(opened, before, changes)
-            told["type"] = "changed"
             for viewer in self._shared.viewers:
                 if viewer != self._queue:
                     viewer(told)

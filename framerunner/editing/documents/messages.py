@@ -20,7 +20,17 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from errors import UserError
 from framerunner.editing.documents.open_document import OpenDocument
-from offboard.authoring import Change, Positions, Span, StateBox, as_json, catalogue, check_document, diagram
+from offboard.authoring import (
+    SPANISH,
+    Change,
+    Positions,
+    Span,
+    StateBox,
+    as_json,
+    catalogue,
+    check_document,
+    diagram,
+)
 
 _Number = Annotated[int, Field(ge=0, le=2**53)]
 
@@ -96,7 +106,7 @@ def read_message(text: str | bytes) -> PageMessage:
 
 def document_message(opened: OpenDocument) -> dict[str, object]:
     """The whole document."""
-    return {"type": "document", "text": opened.document.text, **_state(opened)}
+    return {**_state(opened), "type": "document", "text": opened.document.text}
 
 
 def changed_message(opened: OpenDocument, before: str, changes: Sequence[Change]) -> dict[str, object]:
@@ -107,7 +117,7 @@ def changed_message(opened: OpenDocument, before: str, changes: Sequence[Change]
         removed = len(change.removed.encode("utf-16-le")) // 2
         written.append({"start": start, "removed": removed, "inserted": change.inserted})
         before = before[: change.start] + change.inserted + before[change.start + len(change.removed) :]
-    return {"type": "changed", "changes": written, **_state(opened)}
+    return {**_state(opened), "type": "changed", "changes": written}
 
 
 def status_message(opened: OpenDocument) -> dict[str, object]:
@@ -131,9 +141,10 @@ def _state(opened: OpenDocument) -> dict[str, object]:
         return [positions.to_utf16(each) if wide else each for each in (span.start, span.end)]
 
     drawn = diagram(document)
-    found = []
-    for each in check_document(document):
-        found.append({**as_json(each), "span": at(Span(each.start, each.end))})
+    found = [{**as_json(each), "span": at(Span(each.start, each.end))} for each in check_document(document)]
+    if opened.speaks_spanish:
+        for each, spanish in zip(found, check_document(document, texts=SPANISH), strict=True):
+            each["spanish"] = spanish.message
     nodes = [
         {**as_json(node), "span": at(node.span), "name_span": at(node.name_span)} for node in drawn.nodes
     ]
@@ -145,7 +156,6 @@ def _state(opened: OpenDocument) -> dict[str, object]:
     keys = ("name", "description", "class", "vision", "extends", "initial")
     return {
         **status_message(opened),
-        "type": "document",
         "name": opened.path.name,
         "revision": opened.revision,
         "restored": opened.restored,

@@ -39,6 +39,7 @@ class OpenDocument:
         layout: where its states are drawn.
         revision: counts the document's changes.
         restored: what a killed program had not saved was found and is shown.
+        speaks_spanish: a page wants findings in Spanish, too.
         problem: what else went wrong at opening, in one line; empty: nothing.
     """
 
@@ -48,6 +49,7 @@ class OpenDocument:
     revision: int = 0
     restored: bool = False
     problem: str = ""
+    speaks_spanish: bool = False
     _saved: bytes = b""
     _is_kept: bool = True  # the journal has the present text
 

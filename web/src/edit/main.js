@@ -114,7 +114,7 @@ function edit(name) {
     button(word("language"), changeLanguage));
   root.replaceChildren(tools, line, make("div", { class: "e-panes" }, drawing, form, writing, tabs.root));
 
-  const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}`, {
+  const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}&language=${language()}`, {
     changed(changes, all) {
       if (all !== null) text.setText(all);
       else text.change(changes);
