@@ -122,7 +122,9 @@ export class DiagramView {
     this.#edges = new Map(this.#diagram.edges.map((edge) => [edge.id, edge]));
     for (const { id: path, parent } of this.#diagram.nodes) {
       this.#parents.set(path, parent);
-      this.#children.set(parent, [...(this.#children.get(parent) ?? []), path]);
+      const siblings = this.#children.get(parent);
+      if (siblings) siblings.push(path);
+      else this.#children.set(parent, [path]);
     }
   }
 

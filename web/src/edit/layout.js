@@ -14,6 +14,11 @@ const HEADER = 30; // of a superstate, with its name
 const PADDING = 18;
 const LABEL = { letter: 6, height: 16, longest: 34, words: 84 };
 const GAP = { nodesep: 36, ranksep: 34, edgesep: 16 };
+const ROW_GAP = 56;
+const MOST_FOR_DAGRE = 80; // states and transitions of a level: it takes long if there are many
+const MOST_KEPT = 100;
+/** @type {Map<string, Map<string, Point>>} automatic places that were found before: most edits leave them as they are */
+const arranged = new Map();
 
 /** The room for a transition's label. @param {string} event @param {string} when */
 const labelWidth = (event, when) => (event === "tick" ? (Math.min(when.length, LABEL.longest) + 3) * LABEL.letter : LABEL.words);
@@ -95,18 +100,12 @@ export function layOut(diagram, kept) {
 function arrange(paths, joins, boxes, kept) {
   const isPlaced = (path) => kept[path] !== undefined;
   if (!paths.every(isPlaced)) {
-    const graph = new dagre.graphlib.Graph();
-    // Superstates follow each other to the right, so that a wide page is used.
-    const hasSuper = paths.some((path) => boxes.get(path).height > LEAF.height);
-    graph.setGraph({ rankdir: hasSuper ? "LR" : "TB", ranker: paths.length > 60 ? "longest-path" : "network-simplex", ...GAP });
-    graph.setDefaultEdgeLabel(() => ({}));
-    for (const path of paths) graph.setNode(path, { ...boxes.get(path) });
-    for (const { from, to, width } of joins) graph.setEdge(from, to, { width, height: LABEL.height, labelpos: "c" });
-    dagre.layout(graph);
-    for (const path of paths) {
-      const { x, y, width, height } = graph.node(path);
-      Object.assign(boxes.get(path), { x: x - width / 2, y: y - height / 2 });
-    }
+    const key = JSON.stringify([paths.map((path) => [path, boxes.get(path).width, boxes.get(path).height]), joins]);
+    const found = arranged.get(key) ?? (paths.length + joins.length > MOST_FOR_DAGRE ? inRows : byDagre)(paths, joins, boxes);
+    arranged.delete(key); // what is used last is kept longest
+    arranged.set(key, found);
+    if (arranged.size > MOST_KEPT) arranged.delete(arranged.keys().next().value ?? "");
+    for (const [path, point] of found) Object.assign(boxes.get(path), point);
   }
   let width = 0, height = 0;
   for (const path of paths) {
@@ -116,6 +115,66 @@ function arrange(paths, joins, boxes, kept) {
     height = Math.max(height, box.y + box.height);
   }
   return { width, height };
+}
+
+/**
+ * Automatic places of the states of one level, by dagre.
+ * @param {string[]} paths
+ * @param {Join[]} joins
+ * @param {Map<string, Box>} boxes
+ * @returns {Map<string, Point>}
+ */
+function byDagre(paths, joins, boxes) {
+  const graph = new dagre.graphlib.Graph();
+  // Superstates follow each other to the right, so that a wide page is used.
+  const hasSuper = paths.some((path) => boxes.get(path).height > LEAF.height);
+  graph.setGraph({ rankdir: hasSuper ? "LR" : "TB", ranker: "network-simplex", ...GAP });
+  graph.setDefaultEdgeLabel(() => ({}));
+  for (const path of paths) graph.setNode(path, { ...boxes.get(path) });
+  for (const { from, to, width } of joins) graph.setEdge(from, to, { width, height: LABEL.height, labelpos: "c" });
+  dagre.layout(graph);
+  return new Map(paths.map((path) => {
+    const { x, y, width, height } = graph.node(path);
+    return [path, { x: x - width / 2, y: y - height / 2 }];
+  }));
+}
+
+/**
+ * Automatic places of many states, in linear time: rows by distance from the first state, from above.
+ * @param {string[]} paths
+ * @param {Join[]} joins
+ * @param {Map<string, Box>} boxes
+ * @returns {Map<string, Point>}
+ */
+function inRows(paths, joins, boxes) {
+  /** @type {Map<string, string[]>} */
+  const next = new Map(paths.map((path) => [path, []]));
+  for (const { from, to } of joins) next.get(from)?.push(to);
+  const order = [], seen = new Set();
+  for (const start of paths) { // those that the first one does not reach follow
+    const queue = seen.has(start) ? [] : [start];
+    seen.add(start);
+    for (let head = 0; head < queue.length; head += 1) {
+      order.push(queue[head]);
+      for (const to of next.get(queue[head]) ?? []) {
+        if (!seen.has(to)) queue.push(to);
+        seen.add(to);
+      }
+    }
+  }
+  const columns = Math.ceil(Math.sqrt(paths.length));
+  const places = new Map();
+  for (let row = 0, y = 0; row < order.length; row += columns) {
+    let x = 0, height = 0;
+    for (const path of order.slice(row, row + columns)) {
+      const box = boxes.get(path);
+      places.set(path, { x, y });
+      x += box.width + GAP.nodesep;
+      height = Math.max(height, box.height);
+    }
+    y += height + ROW_GAP;
+  }
+  return places;
 }
 
 /** The place of a state within its parent, as it is kept. @param {Box} box @param {Box|null} parent @returns {Point} */
