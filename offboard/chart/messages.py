@@ -116,6 +116,7 @@ ENGLISH: Mapping[str, str] = {
     "variable.text": "write a text in quotes: '{text}'",
     # The chart.
     "extends.package_only": "extends '{name}': here a mission extends one of the package; known: {names}",
+    "extends.elsewhere": "extends '{name}': is in another folder; copy that file beside this one",
     "extends.circle": "extends '{name}': runs in a circle or too deep",
     "template.unused": "template '{name}' is not used; remove it or 'use' it",
     "template.unknown": "state '{state}' uses the unknown template '{name}'; known: {known}",

@@ -73,6 +73,8 @@ SPANISH: Mapping[str, str] = {
     "variable.word": "escribe {word}",
     "variable.text": "escribe un texto entre comillas: '{text}'",
     # The chart.
+    "extends.package_only": "extends '{name}': aquí una misión amplía una del paquete; hay: {names}",
+    "extends.elsewhere": "extends '{name}': está en otra carpeta; copia ese archivo junto a este",
     "extends.circle": "extends '{name}': da vueltas en círculo o es demasiado profundo",
     "template.unused": "la plantilla '{name}' no se usa; quítala o úsala con 'use'",
     "template.unknown": "el estado '{state}' usa la plantilla desconocida '{name}'; hay: {known}",
