@@ -7,7 +7,7 @@ Printed are medians of several tries:
 
 - first page: from the request until the diagram stands, with an empty cache, and the bytes over the wire, as
   compressed; of the page of an empty mission, too;
-- text to diagram: from the last key pressed in the text, from the message that this sends 150 ms later, and
+- text to diagram: from the last key pressed in the text, from the message that this sends 80 ms later, and
   from the answer's arrival, until the frame in which the new diagram is drawn;
 - dragging: frames a second (`requestAnimationFrame`) while the mouse moves a state, and its longest frame.
 """
@@ -52,7 +52,11 @@ COUNT_FRAMES = """
 () => {
   window.frames_ms = [];
   let last = performance.now();
-  const next = (now) => { window.frames_ms.push(now - last); last = now; window.counting = requestAnimationFrame(next); };
+  const next = (now) => {
+    window.frames_ms.push(now - last);
+    last = now;
+    window.counting = requestAnimationFrame(next);
+  };
   window.counting = requestAnimationFrame(next);
 }
 """
@@ -115,7 +119,10 @@ async def measure(browser: Browser, states: int) -> None:
                 loads = [await load(browser, url, ".e-state") for _ in range(TRIES)]
                 content_s = statistics.median(each.content_s for each in loads)
                 received = statistics.median(each.received_bytes for each in loads)
-                print(f"first page, {name}: {content_s:.2f} s, {received / 1e6:.2f} MB over the wire", flush=True)
+                print(
+                    f"first page, {name}: {content_s:.2f} s, {received / 1e6:.2f} MB over the wire",
+                    flush=True,
+                )
             page = await browser.new_page(viewport=SIZE)
             await page.add_init_script(WATCH)
             await page.goto(program.page("large.yaml"))
@@ -125,7 +132,9 @@ async def measure(browser: Browser, states: int) -> None:
             await page.keyboard.press("End")
             tries = [await type_to_diagram(page) for _ in range(TRIES)]
             for name in ("key", "sent", "arrived"):
-                print(f"text to diagram, from {name}: {statistics.median(each[name] for each in tries):.0f} ms")
+                print(
+                    f"text to diagram, from {name}: {statistics.median(each[name] for each in tries):.0f} ms"
+                )
             for state in ("s0", f"s{states // 2}"):
                 frames, longest = await drag(page, state)
                 print(f"dragging {state}: {frames:.0f} frames a second, longest {longest:.0f} ms", flush=True)
@@ -133,12 +142,16 @@ async def measure(browser: Browser, states: int) -> None:
 
 async def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--states", type=int, default=200)
     states = parser.parse_args().states
     async with async_playwright() as playwright:
         path = os.environ.get("FRAMERUNNER_CHROMIUM") or shutil.which("chromium")
-        browser = await playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        browser = await playwright.chromium.launch(
+            executable_path=path, args=["--no-sandbox", "--disable-gpu"]
+        )
         await measure(browser, states)
         await browser.close()
 

@@ -186,7 +186,7 @@ def read_base(mission: MissionFile) -> MissionFile:
     """Read the mission that one extends: of the package, or a file in its own folder or below.
 
     Raises:
-        MissionError: there is none, or it is elsewhere: a mission of unknown origin shall not read other files.
+        MissionError: there is none, or it is elsewhere: a mission shall not read any file that it names.
     """
     folder = mission.path.parent
     path = _find(mission.extends, folder, mission.place)

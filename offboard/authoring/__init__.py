@@ -75,7 +75,7 @@ from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, 
 from offboard.authoring.diagram import Diagram, Edge, Node, diagram
 from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
-from offboard.authoring.edits import Edit, TransitionPath, edit_schema, parse_edit
+from offboard.authoring.edits import Edit, ReplaceText, TransitionPath, edit_schema, parse_edit
 from offboard.authoring.findings import Finding, check_document, problems_of
 from offboard.authoring.layout import (
     Layout,
@@ -117,6 +117,7 @@ __all__ = [
     "Node",
     "Positions",
     "PrimitiveEntry",
+    "ReplaceText",
     "Span",
     "StateBox",
     "TransitionPath",

@@ -118,11 +118,17 @@ class EditSession:
         """Whether there is an edit that was taken back."""
         return bool(self._undone)
 
-    def apply(self, edit: edits.Edit) -> tuple[Change, ...]:
-        """Apply an edit and return the changes of the text. Raises `EditError`; nothing is changed then."""
+    def apply(self, edit: edits.Edit, *, goes_on: bool = False) -> tuple[Change, ...]:
+        """Apply an edit and return the changes of the text. Raises `EditError`; nothing is changed then.
+
+        Args:
+            edit: what to do.
+            goes_on: it is undone together with the edit before, as one letter of a typed word is.
+        """
         edited = apply(self.document, edit)
         if edited.changes:
-            self._done.append(_Step(edited.changes, self.layout))
+            before = self._done.pop() if goes_on and self._done else _Step((), self.layout)
+            self._done.append(_Step((*before.changes, *edited.changes), before.layout))
             self._undone.clear()
             self.layout = follow(self.layout, self.document, edit, edited.document)
             self.document = edited.document

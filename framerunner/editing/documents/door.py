@@ -244,13 +244,11 @@ def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[Change]:
     if message.revision != opened.revision:
         raise PageMessageError(_CHANGED_ELSEWHERE)
     changes: list[Change] = []
-    before = opened.document
     try:
         for typed in message.changes:
             changes += opened.apply(_replacement(opened, typed))
     except UserError:
-        while opened.document.text != before.text:
-            opened.undo()
+        opened.take_back(changes)
         raise
     return changes
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,10 +15,9 @@ from offboard.authoring import (
     EditSession,
     Layout,
     LayoutError,
+    ReplaceText,
     StateBox,
-    follow,
     layout_path,
-    parse_edit,
     read_layout,
     write_layout,
 )
@@ -36,7 +36,6 @@ class OpenDocument:
     Attributes:
         path: of the file.
         session: the document with its edits.
-        layout: where its states are drawn.
         revision: counts the document's changes.
         restored: what a killed program had not saved was found and is shown.
         speaks_spanish: a page wants findings in Spanish, too.
@@ -45,13 +44,13 @@ class OpenDocument:
 
     path: Path
     session: EditSession
-    layout: Layout
     revision: int = 0
     restored: bool = False
     problem: str = ""
     speaks_spanish: bool = False
     _saved: bytes = b""
     _is_kept: bool = True  # the journal has the present text
+    _typed_to: int = -1  # where the last edit ended, if it was typed letters
 
     @classmethod
     def open(cls, path: Path) -> OpenDocument:
@@ -61,7 +60,7 @@ class OpenDocument:
             layout, problem = read_layout(path), ""
         except LayoutError as error:
             layout, problem = Layout(), str(error)
-        opened = cls(path, EditSession(document), layout, problem=problem, _saved=document.data)
+        opened = cls(path, EditSession(document, layout), problem=problem, _saved=document.data)
         opened._restore()
         return opened
 
@@ -73,13 +72,18 @@ class OpenDocument:
             return
         if kept != self._saved:
             end = len(self.session.document.text)
-            self.session.apply(parse_edit({"kind": "replace_text", "start": 0, "end": end, "text": text}))
+            self.session.apply(ReplaceText(start=0, end=end, text=text))
             self.restored = True
 
     @property
     def document(self) -> Document:
         """As it is now."""
         return self.session.document
+
+    @property
+    def layout(self) -> Layout:
+        """Where its states are drawn."""
+        return self.session.layout
 
     @property
     def is_saved(self) -> bool:
@@ -92,12 +96,26 @@ class OpenDocument:
         return self.path.with_name(f".{self.path.name}{_JOURNAL_SUFFIX}")
 
     def apply(self, edit: Edit) -> tuple[Change, ...]:
-        """Apply an edit; see `EditSession.apply`."""
-        before = self.document
-        changes = self.session.apply(edit)
-        if changes:
-            self.layout = follow(self.layout, before, edit, self.document)
-        return self._changed(changes)
+        """Apply an edit; see `EditSession.apply`.
+
+        Letters typed one after the other are undone together, a line at most.
+        """
+        typed = edit if isinstance(edit, ReplaceText) and _is_typed(edit) else None
+        goes_on = typed is not None and typed.start == self._typed_to
+        changes = self._changed(self.session.apply(edit, goes_on=goes_on))
+        if typed is not None:
+            self._typed_to = typed.start + len(typed.text)
+        return changes
+
+    def take_back(self, changes: Sequence[Change]) -> None:
+        """Make the text as it was before its last changes."""
+        for change in reversed(changes):
+            inverse = change.inverse
+            self.apply(
+                ReplaceText(
+                    start=inverse.start, end=inverse.start + len(inverse.removed), text=inverse.inserted
+                )
+            )
 
     def undo(self) -> tuple[Change, ...]:
         """Take the last edit back; see `EditSession.undo`."""
@@ -110,6 +128,7 @@ class OpenDocument:
     def _changed(self, changes: tuple[Change, ...]) -> tuple[Change, ...]:
         if changes:
             self.revision += 1
+            self._typed_to = -1
             self._is_kept = False
         return changes
 
@@ -119,7 +138,7 @@ class OpenDocument:
         for name, box in places.items():
             if box is None:
                 states.pop(name, None)
-        self.layout = Layout(states=states, corners=self.layout.corners)
+        self.session.layout = Layout(states=states, corners=self.layout.corners)
         write_layout(self.path, self.layout)
 
     def keep(self) -> None:
@@ -164,3 +183,7 @@ class OpenDocument:
         self._saved = self.document.data
         self._is_kept = True
         self.journal.unlink(missing_ok=True)
+
+
+def _is_typed(edit: ReplaceText) -> bool:
+    return edit.start == edit.end and "\n" not in edit.text

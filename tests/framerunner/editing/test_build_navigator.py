@@ -1,4 +1,4 @@
-"""The editor as a whole: the paper's navigator is built by mouse and keyboard, checked and flown."""
+"""The paper's navigator is built in the editor by mouse and keyboard, checked, saved and flown."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from starlette.websockets import WebSocketDisconnect
 from framerunner.editing.documents.desk import DeskError, EditorDesk
 from framerunner.editing.documents.door import DocumentsDoor
 from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
-from offboard.authoring.edits import AddState
+from offboard.authoring.edits import AddState, ReplaceText
 from offboard.mission import MISSIONS, list_missions
 
 HOVER = "name: hover\ninitial: up\nstates:\n  up:\n    enter: [hover]\n    final: true  # ü 😀\n"
@@ -222,9 +222,9 @@ def test_a_message_that_no_page_sends_closes_with_one_line(path, message):
         with server.http.websocket_connect("/ws/edit?file=hover.yaml") as socket:
             socket.receive_json()
             socket.send_text(message)
+            socket.receive_json()  # that no other window is there
             with pytest.raises(WebSocketDisconnect) as closed:
-                while True:
-                    socket.receive_json()
+                socket.receive_json()
         assert closed.value.code == 4400
         assert closed.value.reason
         assert "\n" not in closed.value.reason
@@ -289,6 +289,20 @@ def test_two_windows_share_a_document(path):
             assert one.receive("changed")["changes"][0]["inserted"] == "# now\n"
         while one.receive("status").get("others") != 0:
             pass
+
+
+def test_typed_letters_are_undone_together_a_line_at_most(path):
+    opened = OpenDocument.open(path)
+    end = len(HOVER)
+    for letter in "# ab\n# c":
+        opened.apply(ReplaceText(start=end, end=end, text=letter))
+        end += 1
+    opened.apply(ReplaceText(start=0, end=0, text="#"))
+    texts = []
+    while opened.session.can_undo:
+        opened.undo()
+        texts.append(opened.document.text)
+    assert texts == [HOVER + "# ab\n# c", HOVER + "# ab\n", HOVER + "# ab", HOVER]
 
 
 def test_a_page_that_left_finds_its_text_again(path):

@@ -8,6 +8,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
+from benchmarks.editor import drag, large_mission
 from tests.chromium import chromium
 from tests.framerunner.editing.editor_program import editor, free_port
 from tests.framerunner.editing.editor_user import SIZE, EditorUser
@@ -212,6 +213,20 @@ async def test_a_field_that_is_being_filled_in_is_kept_when_another_window_edits
     await expect(one.page.locator(".cm-line").nth(7)).to_contain_text("# typed")
     await one.page.keyboard.press("Enter")
     await expect(one.form.get_by_label("Remove: land")).to_have_count(1)
+
+
+async def test_a_large_mission_is_drawn_typed_in_and_dragged(windows):
+    windows.path.write_text(large_mission(200))
+    user = await windows.open()
+    await expect(user.page.locator(".e-state")).to_have_count(200)
+    await expect(user.page.locator(".e-transition")).to_have_count(398)
+    await user.type_at(6, " and frame.a < 5")
+    await expect(user.transition("s0/tick/0")).to_have_text("1: frame_seen and frame.d < 1 and fr…")
+    place = await user.state("s7").get_attribute("transform")
+    frames, _ = await drag(user.page, "s7")
+    assert frames > 1
+    await expect(user.state("s7")).not_to_have_attribute("transform", place)
+    assert not user.complaints  # also no request to another host
 
 
 async def test_a_killed_program_loses_at_most_five_seconds(browser, tmp_path):

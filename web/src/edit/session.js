@@ -2,7 +2,7 @@
 import { language } from "../lib/language.js";
 import { ReconnectingSocket } from "../lib/reconnecting_socket.js";
 
-const TYPING_PAUSE_MS = 150; // after which typed text is sent
+const TYPING_PAUSE_MS = 80; // after which typed text is sent
 
 /**
  * @typedef {{start: number, removed: number, inserted: string}} TextChange offsets in UTF-16 code units
