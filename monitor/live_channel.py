@@ -26,7 +26,7 @@ MAX_VIEWERS_PER_ADDRESS = 60  # a page has two; a class may share one address
 MAX_PENDING = 200
 TOO_SLOW_CODE = 1013  # "try again later"
 # Kinds of which only the newest counts: one that was not sent yet is replaced.
-_REPLACED = ("pose", "status", "detections", "map")
+_REPLACED = ("pose", "status", "detections", "map", "guards")
 _POSE_DECIMALS = 4  # a tenth of a millimetre; in a quaternion 0.2 mrad
 _log = logging.getLogger(__name__)
 

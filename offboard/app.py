@@ -53,7 +53,7 @@ class Moment:
 Observer = Callable[[Moment], None]
 TickHook = Callable[[MissionEngine, DroneState], Awaitable[None]]
 """Awaited before each tick with the drone's state at it. It may look at the engine, wait, and change its
-chart; `asyncio.CancelledError` ends the flight. Only for a vehicle whose time waits for the app."""
+chart; `asyncio.CancelledError` ends the flight. It may wait only if the vehicle's time waits for the app."""
 logger = logging.getLogger(__name__)
 
 

@@ -285,9 +285,8 @@ class MissionEngine:
         """Let the chart take a transition whose guard holds, and record why."""
         transition = leaf.transitions[number]
         source, seconds = self.state, self.pilot.seconds_in_state
-        values = read_values(
-            names_in(transition.when), self.pilot
-        )  # now, because the actions on leaving may change them
+        # Now, because the actions on leaving may change them.
+        values = read_values(names_in(transition.when), self.pilot)
         self._chart.send(TICK)
         self._settle(time_us)
         arrived = self.state == transition.to or self.state.startswith(f"{transition.to}.")

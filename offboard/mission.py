@@ -183,8 +183,15 @@ def expand_and_check(written: MissionFile, pilot_class: type[Pilot], problems: P
 
 
 def read_base(mission: MissionFile) -> MissionFile:
-    """Read the mission that one extends. Raises `MissionError`."""
-    path = _find(mission.extends, mission.path.parent, mission.place)
+    """Read the mission that one extends: of the package, or a file in its own folder or below.
+
+    Raises:
+        MissionError: there is none, or it is elsewhere: a mission shall not read any file that it names.
+    """
+    folder = mission.path.parent
+    path = _find(mission.extends, folder, mission.place)
+    if path.parent != MISSIONS and not path.is_relative_to(folder.resolve()):
+        raise mission_error(mission.place, Message("extends.elsewhere", name=mission.extends))
     label = path.name if path.name != mission.path.name else str(path)
     return read_mission_file(_read_text(path), path, label)
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from errors import UserError
+from offboard.chart.described import unit_of
 from offboard.chart.expressions import Evaluate, names_in
 from offboard.chart.spec import RESUME, THEN, Leaf, State, Transition, transition_id
-from offboard.chart.units import unit_of
 
 if TYPE_CHECKING:
     from offboard.mission import Mission
@@ -83,7 +83,9 @@ def guards_now(leaf: Leaf, guards: Sequence[Evaluate], pilot: Pilot) -> tuple[Gu
 def values_now(transitions: Sequence[Transition], pilot: Pilot) -> tuple[ValueNow, ...]:
     """The present values of all names in the guards of transitions."""
     names = dict.fromkeys(name for each in transitions for name in names_in(each.when))
-    return tuple(ValueNow(name, value, unit_of(name)) for name, value in read_values(names, pilot))
+    return tuple(
+        ValueNow(name, value, unit_of(type(pilot), name)) for name, value in read_values(names, pilot)
+    )
 
 
 def read_values(names: Sequence[str] | dict[str, None], pilot: Pilot) -> tuple[tuple[str, object], ...]:

@@ -9,7 +9,7 @@ import { existsSync } from "node:fs";
 import path from "node:path";
 import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
-import { strictMermaid } from "./strict_mermaid.mjs";
+import { adaptedPackages } from "./adapted_packages.mjs";
 
 const HERE = path.dirname(fileURLToPath(import.meta.url));
 const SOURCE = path.join(HERE, "src");
@@ -63,7 +63,7 @@ const result = await build({
   legalComments: "none", // they are in the file of licences
   metafile: true,
   logLevel: "warning",
-  plugins: [strictMermaid()],
+  plugins: [adaptedPackages()],
 });
 await writeFile(path.join(OUTPUT, "third-party-licences.txt"), await licences(result.metafile.outputs));
 await copyFile(path.join(SOURCE, "shell", "icon.svg"), path.join(OUTPUT, "icon.svg"));

@@ -78,6 +78,7 @@ class DocumentKind(IntEnum):
     HISTORY = 2
     RESULT = 3
     MAP = 4
+    GUARDS = 5
 
 
 @dataclass(frozen=True, slots=True)

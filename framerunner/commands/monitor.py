@@ -40,9 +40,7 @@ def monitor(
     port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8080,
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
-    missions: Annotated[Path, Parameter(help="folder of the missions that the editor shows")] = Path(
-        "missions"
-    ),
+    missions: Annotated[Path, Parameter(help="folder that the editor shows")] = Path("missions"),
     camera_host: Annotated[
         tuple[str, ...],
         Parameter(
@@ -77,9 +75,8 @@ def monitor(
     from wire.transports.urls import parse_url
 
     parse_url(drone)
-    given = equipment(
-        drone, None if scenario is None else load_scenario(scenario), runs, missions, camera_host
-    )
+    flown = None if scenario is None else load_scenario(scenario)
+    given = equipment(drone, flown, runs, missions, camera_host)
     password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()
     settings = MonitorSettings(bind, port, database, password, trusted_proxy, qr_codes=qr_codes)
     _allow_many_files()
@@ -98,6 +95,7 @@ def equipment(
     camera_hosts: tuple[str, ...] = (),
 ) -> Equipment:
     """What the monitor, which may not import other rooms' functions, is given of them."""
+    from framerunner.course.door import CourseDoor
     from framerunner.editing.documents.desk import EditorDesk
     from framerunner.editing.documents.door import DocumentsDoor
     from framerunner.editing.web import EditingDoor
@@ -116,7 +114,7 @@ def equipment(
         runs=RunFolders(runs),
         start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,
-        extensions=(EditingDoor(), DocumentsDoor(EditorDesk(missions))),
+        extensions=(EditingDoor(), DocumentsDoor(EditorDesk(missions)), CourseDoor(missions)),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from framerunner.editing import messages
+from framerunner.editing.places import find_scenario, level_names
 from framerunner.evaluation.backends import Pool
 from framerunner.evaluation.plan import Plan, plan_level
 from framerunner.evaluation.rows import Row
@@ -15,10 +16,8 @@ from framerunner.evaluation.runner import Terms, fly_all
 from framerunner.flying.cause import lost_in
 from framerunner.runs.track import Track
 from offboard.mission import Mission
-from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 from scenarios.random_numbers import LevelError
-from scenarios.random_scenarios import LEVEL_FILES
 from scenarios.verdict import Verdict
 from wire.finite_json import finite
 
@@ -58,10 +57,10 @@ def fly_batch(task: messages.BatchTask, mission: Mission, tell: Callable[[BaseMo
 def _plan(start: messages.StartBatch, mission: Mission) -> Plan:
     """Only names of the package are looked up, and no files."""
     if start.scenarios:
-        scenarios = [load_scenario(name) for name in dict.fromkeys(start.scenarios)]
+        scenarios = [find_scenario(name) for name in dict.fromkeys(start.scenarios)]
         return Plan("scenarios", "scenarios", scenarios, mission, [0] * len(scenarios))
-    if start.level not in LEVEL_FILES.names():
-        known = ", ".join(LEVEL_FILES.names())
+    if start.level not in level_names():
+        known = ", ".join(level_names())
         raise LevelError(f"level '{start.level}': is not known; there are {known}")
     return plan_level(start.level, start.first_seed, start.count, mission)
 
@@ -93,12 +92,12 @@ def _flight(batch: str, row: Row, scenario: Scenario) -> messages.Flight:
     )
 
 
-def _track(track: Track) -> messages.Track:
+def _track(track: Track) -> messages.FlownTrack:
     states = tuple(dict.fromkeys(track.mission_state))
     numbers = {state: number for number, state in enumerate(states)}
     columns: list[Any] = [tuple(finite(list(each))) for each in (track.time_s, track.x, track.y, track.z)]
     time_s, x, y, z = columns
-    return messages.Track(
+    return messages.FlownTrack(
         time_s=time_s,
         x=x,
         y=y,

@@ -162,7 +162,7 @@ class Taken(_Message):
     seconds: float  # in `source`
 
 
-class Span(_Message):
+class StateTime(_Message):
     """A time in which a state was active."""
 
     state: str
@@ -207,7 +207,7 @@ class Now(_Message):
     values: tuple[Value, ...]
     taken: tuple[Taken, ...]
     counts: dict[str, int]
-    spans: tuple[Span, ...]
+    spans: tuple[StateTime, ...]
     pose: tuple[float | None, ...]
     command: tuple[float | None, ...]
     trail: tuple[tuple[float | None, ...], ...]
@@ -248,10 +248,10 @@ class Ended(_Message):
     lost_in: str  # the state in which it was lost; "" if it was not
     result: Json | None
     counts: dict[str, int]
-    spans: tuple[Span, ...]
+    spans: tuple[StateTime, ...]
 
 
-class Track(_Message):
+class FlownTrack(_Message):
     """Where a drone was: times since motors on, places, and the index in `states` of each sample's state."""
 
     time_s: tuple[float | None, ...] = ()
@@ -295,7 +295,7 @@ class Flight(_Message):
     total_time_s: float | None
     frames_crossed: tuple[str, ...]
     counts: dict[str, int]
-    track: Track
+    track: FlownTrack
     layout: Json
 
 
@@ -318,7 +318,7 @@ FromWorker = Annotated[
 FROM_WORKER: TypeAdapter[FromWorker] = TypeAdapter(FromWorker)
 
 
-class _Task(_Message):
+class _WorkerTask(_Message):
     """What a worker process is given first.
 
     Attributes:
@@ -332,7 +332,7 @@ class _Task(_Message):
     memory_bytes: int
 
 
-class RunTask(_Task):
+class RunTask(_WorkerTask):
     """Fly once, controlled by orders, one a line."""
 
     kind: Literal["run"] = "run"
@@ -340,7 +340,7 @@ class RunTask(_Task):
     start: Start
 
 
-class BatchTask(_Task):
+class BatchTask(_WorkerTask):
     """Fly many times, `jobs` at once."""
 
     kind: Literal["batch"] = "batch"

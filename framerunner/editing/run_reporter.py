@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 
-from framerunner.editing.messages import Ended, Guard, Now, Span, Taken, Value
+from framerunner.editing.messages import Ended, Guard, Now, StateTime, Taken, Value
 from framerunner.flying.cause import lost_in
 from framerunner.flying.fly import FinishedFlight
-from framerunner.flying.mission_reporter import plain_value
+from framerunner.flying.guard_reporter import plain_value
 from framerunner.flying.run_control import RunStanding
 from framerunner.runs.chart_record import ChartRecord, StateSpan
 from offboard.app import Moment
@@ -126,8 +126,10 @@ class RunReporter:
         )
 
 
-def _spans(spans: Sequence[StateSpan]) -> tuple[Span, ...]:
-    return tuple(Span(state=each.state, from_s=each.from_us / 1e6, to_s=each.to_us / 1e6) for each in spans)
+def _spans(spans: Sequence[StateSpan]) -> tuple[StateTime, ...]:
+    return tuple(
+        StateTime(state=each.state, from_s=each.from_us / 1e6, to_s=each.to_us / 1e6) for each in spans
+    )
 
 
 def _taken(taken: TransitionTaken) -> Taken:

@@ -7,6 +7,7 @@ import logging
 import os
 import secrets
 from collections import OrderedDict
+from collections.abc import Coroutine
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -16,6 +17,7 @@ from pydantic import BaseModel, ValidationError
 from framerunner.editing import messages
 from framerunner.editing.worker_process import WorkerProcess
 
+_SPARE_S = 2.0  # after a start, until a worker is made ready for the next one
 _KEPT_JOBS = 8  # that are over, for pages that are opened again
 _MAX_KEPT_LINES = messages.MAX_COUNT + 10
 logger = logging.getLogger(__name__)
@@ -101,6 +103,14 @@ class EditingService:
         self._settings = settings
         self._jobs: OrderedDict[str, _Job] = OrderedDict()
         self._tasks: set[asyncio.Task[None]] = set()
+        self._pages: set[Watcher] = set()
+        self._spare: WorkerProcess | None = None
+        self._closed = False
+
+    def enter(self, watcher: Watcher) -> None:
+        """Note a watcher that connected; a worker is made ready for it, as that takes a second."""
+        self._pages.add(watcher)
+        self._prepare()
 
     async def do(self, request: messages.Request, watcher: Watcher) -> None:
         """Carry out a request; its answer is put to the watcher."""
@@ -126,6 +136,10 @@ class EditingService:
 
     def leave(self, watcher: Watcher) -> None:
         """Forget a watcher that disconnected; what nobody watches any more is ended after a while."""
+        self._pages.discard(watcher)
+        if not self._pages and self._spare is not None:
+            self._keep(self._spare.end())
+            self._spare = None
         for job in self._jobs.values():
             if watcher in job.watchers:
                 job.watchers.discard(watcher)
@@ -133,6 +147,10 @@ class EditingService:
 
     async def close(self) -> None:
         """End everything."""
+        self._closed = True
+        if self._spare is not None:
+            self._keep(self._spare.end())
+            self._spare = None
         for job in self._jobs.values():
             job.cancelled = True
             job.worker.kill()
@@ -159,12 +177,33 @@ class EditingService:
             )
         else:
             task = messages.RunTask.model_validate({**common, "run": name, "start": start})
-        job = self._jobs[name] = _Job(name, WorkerProcess(task), is_batch=is_batch)
+        spare, self._spare = self._spare, None
+        worker = spare if spare is not None and spare.usable else WorkerProcess()
+        job = self._jobs[name] = _Job(name, worker, is_batch=is_batch)
         job.watchers.add(watcher)
         job.ask(watcher, request.tag)
-        follow = asyncio.create_task(self._follow(job), name=f"editing {name}")
-        self._tasks.add(follow)
-        follow.add_done_callback(self._tasks.discard)
+        self._keep(self._follow(job, task))
+        asyncio.get_running_loop().call_later(_SPARE_S, self._prepare)
+
+    def _prepare(self) -> None:
+        """Start a worker for the next task, unless there is one or nobody is connected."""
+        if self._spare is None and self._pages and not self._closed:
+            self._spare = WorkerProcess()
+            self._keep(self._start_spare(self._spare))
+
+    async def _start_spare(self, spare: WorkerProcess) -> None:
+        try:
+            await spare.start()
+        except OSError as error:
+            logger.warning("a worker of the editor cannot be started: %s", error)
+            return
+        if spare is not self._spare and not any(spare is job.worker for job in self._jobs.values()):
+            await spare.end()  # all pages have gone meanwhile
+
+    def _keep(self, work: Coroutine[None, None, None]) -> None:
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     def _no_room(self, *, is_batch: bool) -> str:
         """Why no more can be started; "" if it can."""
@@ -172,7 +211,7 @@ class EditingService:
         if is_batch and len(running) >= self._settings.max_batches:
             return "other flights are being flown; wait until they are over, or cancel them"
         if not is_batch and len(running) >= self._settings.max_runs:
-            return f"{len(running)} flights are under control already; stop one first"
+            return f"no more than {len(running)} can be under control at the same time; stop one first"
         return ""
 
     def _watch(self, job: _Job, request: messages.Watch, watcher: Watcher) -> None:
@@ -184,7 +223,7 @@ class EditingService:
         else:
             job.worker.send(request.model_copy(update={"tag": job.ask(watcher, request.tag)}))
 
-    async def _follow(self, job: _Job) -> None:
+    async def _follow(self, job: _Job, task: BaseModel) -> None:
         """Pass on what a worker tells until it ends, and say how it ended if it did not."""
         how = ""
         try:
@@ -193,6 +232,7 @@ class EditingService:
             except OSError as error:
                 how = f"it cannot be started ({error.strerror or error})"
                 return
+            job.worker.send(task)
             try:
                 if not job.cancelled:
                     await self._pass_on(job)

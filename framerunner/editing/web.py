@@ -1,7 +1,8 @@
 """The editor's door to flights: `GET /api/editing/choices` and the WebSocket `/ws/editing`.
 
-`/api/editing/choices` is `{"scenarios": [names], "levels": [names], "max_text": characters, "max_count":
-flights of a batch}`; random scenarios are named as level and seed, such as `calm-17`.
+`/api/editing/choices` is `{"scenarios": [names], "lessons": [names], "levels": [names], "max_text":
+characters, "max_count": flights of a batch}`. A `scenario` below is the name of one or of a lesson, whose
+goals then count; random ones are named as level and seed, such as `calm-17`.
 
 The WebSocket is closed with code 4403 if the visitor may not start flights. Each message is a JSON object. A
 request has `do` and may have `tag`, a whole number that comes back with its answer:
@@ -52,11 +53,10 @@ from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from framerunner.editing import messages
+from framerunner.editing.places import lesson_names, level_names, scenario_names
 from framerunner.editing.service import EditingService, EditingSettings
 from monitor.access import refuse
 from monitor.pilot_channel import Allowance
-from scenarios.loader import list_scenarios
-from scenarios.random_scenarios import LEVEL_FILES
 from scenarios.result import first_error
 
 TOO_SLOW_CODE, TOO_MANY_CODE = 1013, 4429
@@ -81,8 +81,9 @@ class EditingDoor:
         @router.get("/api/editing/choices")
         def choices() -> dict[str, list[str] | int]:
             return {
-                "scenarios": list_scenarios(),
-                "levels": LEVEL_FILES.names(),
+                "scenarios": scenario_names(),
+                "lessons": lesson_names(),
+                "levels": level_names(),
                 "max_text": messages.MAX_TEXT,
                 "max_count": messages.MAX_COUNT,
             }
@@ -114,14 +115,19 @@ class _Connection:
         self._outbox: deque[str] = deque()
         self._arrived = asyncio.Event()
         self._allowance = Allowance(time.monotonic)
+        self._too_slow = False
 
     def put(self, line: str) -> None:
-        """Queue a message."""
-        self._outbox.append(line)
+        """Queue a message; a page that does not keep up is disconnected."""
+        if len(self._outbox) < _MAX_QUEUE:
+            self._outbox.append(line)
+        else:
+            self._too_slow = True
         self._arrived.set()
 
     async def serve(self) -> None:
         """Receive and send until the browser disconnects or is disconnected."""
+        self._service.enter(self)
         sending = asyncio.create_task(self._send())
         receiving = asyncio.create_task(self._receive())
         try:
@@ -134,7 +140,10 @@ class _Connection:
     async def _receive(self) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while True:
-                text = await self._websocket.receive_text()
+                message = await self._websocket.receive()
+                if message["type"] == "websocket.disconnect":
+                    return
+                text = message.get("text") or ""
                 if not self._allowance.spend():
                     await self._websocket.close(TOO_MANY_CODE, "too many messages a second")
                     return
@@ -156,7 +165,7 @@ class _Connection:
             while True:
                 await self._arrived.wait()
                 self._arrived.clear()
-                if len(self._outbox) > _MAX_QUEUE:
+                if self._too_slow:
                     await self._websocket.close(TOO_SLOW_CODE, "this page does not keep up")
                     return
                 while self._outbox:

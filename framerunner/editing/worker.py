@@ -21,6 +21,7 @@ from errors import UserError
 from framerunner.child_process import end_with_standard_input, limit_resources
 from framerunner.editing import messages
 from framerunner.editing.batch import fly_batch
+from framerunner.editing.places import find_scenario
 from framerunner.editing.run_reporter import RunReporter
 from framerunner.evaluation.runner import processor_limit
 from framerunner.flying.lockstep import lockstep_flight
@@ -28,7 +29,6 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.flying.run_control import RunControl
 from offboard.mission import Mission, MissionError, mission_from_text
 from offboard.pilot_file import PilotFile, read_pilot
-from scenarios.loader import load_scenario
 
 _SPARE_S = 120  # processor time for all but flying
 _NICENESS = 5
@@ -43,7 +43,10 @@ def main() -> int:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a contestant's file prints is no message
     os.nice(_NICENESS)
     cv2.setNumThreads(1)
-    task = messages.TASK.validate_json(sys.stdin.readline())
+    line = sys.stdin.readline()
+    if not line:  # it was not needed
+        return 0
+    task = messages.TASK.validate_json(line)
     tell = _teller(output)
     flights = 1 if isinstance(task, messages.RunTask) else task.start.count + len(task.start.scenarios)
     limit_resources(task.memory_bytes, round(task.processor_s) * flights + _SPARE_S)
@@ -55,7 +58,7 @@ def main() -> int:
             end_with_standard_input(lambda: None)
             fly_batch(task, mission, tell)
         else:
-            _Run(task, mission, pilot, tell).fly(sys.stdin)
+            _ControlledRun(task, mission, pilot, tell).fly(sys.stdin)
     except MissionError as error:
         tell(refusal(tag, error))
     except UserError as error:
@@ -70,14 +73,14 @@ def refusal(tag: int, error: MissionError, run: str = "") -> messages.Refused:
     return messages.Refused(tag=tag, text=f"{lines[0]}{more}", lines=lines, run=run)
 
 
-class _Run:
+class _ControlledRun:
     """A flight that follows orders."""
 
     def __init__(self, task: messages.RunTask, mission: Mission, pilot: PilotFile | None, tell: Tell) -> None:
         start = task.start
         _check_breaks(start.break_on, mission)
         self._task, self._mission, self._pilot, self._tell = task, mission, pilot, tell
-        self._plan = FlightPlan(load_scenario(start.scenario), mission, start.seed)
+        self._plan = FlightPlan(find_scenario(start.scenario), mission, start.seed)
         self._reporter = RunReporter(task.run, tell)
         self._control = RunControl(
             speed=start.speed, paused=start.paused, break_on=start.break_on, listener=self._reporter.hear

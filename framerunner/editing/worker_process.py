@@ -18,19 +18,20 @@ _GRACE_S = 2.0  # from the end of its output to its own
 
 
 class WorkerProcess:
-    """`framerunner.editing.worker` with a task; its processes are killed by `kill`.
+    """`framerunner.editing.worker`; what is sent first is its task; `kill` ends all its processes."""
 
-    Args:
-        task: its first line.
-    """
-
-    def __init__(self, task: BaseModel) -> None:
-        self._task = task
+    def __init__(self) -> None:
         self._process: Process | None = None
         self._errors: asyncio.Task[bytes] | None = None
+        self._starting = asyncio.Lock()
 
     async def start(self) -> None:
-        """Start it. Raises OSError if that is not possible."""
+        """Start it, once; others that call this wait for it. Raises OSError if that is not possible."""
+        async with self._starting:
+            if self._process is None:
+                await self._start()
+
+    async def _start(self) -> None:
         process = self._process = await asyncio.create_subprocess_exec(
             sys.executable,
             "-m",
@@ -43,7 +44,11 @@ class WorkerProcess:
         )
         assert process.stderr is not None
         self._errors = asyncio.create_task(_last_bytes(process.stderr))
-        self.send(self._task)
+
+    @property
+    def usable(self) -> bool:
+        """Whether it has not ended."""
+        return self._process is None or self._process.returncode is None
 
     def send(self, message: BaseModel) -> None:
         """Send a line; nothing if it has ended."""
@@ -76,6 +81,12 @@ class WorkerProcess:
             return "it was ended, or used too much processor time or memory"
         how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         return f"{how}: {lines[-1][:300]}" if lines else how
+
+    async def end(self) -> None:
+        """Kill it and wait for its end, if it was started."""
+        if self._process is not None:
+            self.kill()
+            await self.ended()
 
     def kill(self) -> None:
         """End it and all that it started at once."""

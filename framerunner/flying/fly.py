@@ -55,7 +55,7 @@ async def fly(
         observers: called at every tick, in this order; must be quick.
         run: awaits the flight itself, without the judgement; for what must be done around it.
         measured: called at the end; further fields of the result, such as `timing`.
-        before_tick: awaited before each tick of the mission; only in lockstep.
+        before_tick: awaited before each tick of the mission; it may wait only in lockstep.
 
     Raises:
         DroneError: the drone cannot be reached or made ready.

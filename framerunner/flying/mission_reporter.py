@@ -7,9 +7,11 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
+from framerunner.flying.guard_reporter import GuardReporter, plain_value
 from framerunner.flying.navigation_reporter import NavigationReporter
 from offboard.app import Moment
-from offboard.engine import TransitionTaken
+from offboard.drone import DroneState
+from offboard.engine import MissionEngine, TransitionTaken
 from offboard.link.companion import Companion
 from offboard.mission import Mission, mermaid
 from scenarios.result import FlightResult
@@ -26,9 +28,7 @@ from wire.mission_tunnel import (
 
 STATE_TICKS = 2  # 10 Hz of vehicle time
 HISTORY = 10
-_TEXT_CHARACTERS = 80  # of a guard's value that is not a number
-_DIGITS = 6  # of a guard's value: more would take more pieces, and so longer to arrive
-_EXACT = 2**53  # larger integers lose digits in some JSON readers
+MAX_HISTORY_PIECES = 4  # two are sent at once, two with the companion's next beat
 
 logger = logging.getLogger(__name__)
 
@@ -65,6 +65,7 @@ class MissionReporter:
         self._image_size_px = (0, 0)
         self._detections: Detections | None = None
         self._navigation = NavigationReporter()
+        self._guards = GuardReporter()
         self._broken = False
         still = (0.0, 0.0, 0.0, 0.0)
         companion.send_state(MissionState(self._crc, -1, 0, 0, 0, False, False, False, still, start_arena))
@@ -84,6 +85,18 @@ class MissionReporter:
             self._broken = True
             logger.warning("the mission is no longer reported: %r", error)
 
+    async def look(self, engine: MissionEngine, state: DroneState) -> None:
+        """Report what the guards read, twice a second: a `TickHook` that never waits."""
+        if self._broken or self._companion.is_sending(DocumentKind.GUARDS):
+            return
+        try:
+            document = self._guards.document(engine, state.time_us)
+            if document is not None:
+                self._send_document(DocumentKind.GUARDS, {"mission_crc": self._crc, **document})
+        except Exception as error:  # must not end the flight
+            self._broken = True
+            logger.warning("the mission is no longer reported: %r", error)
+
     async def send_result(self, result: FlightResult) -> None:
         """Send how the flight was judged, at once and twice, and wait 0.3 s until that has been sent."""
         if self._send_document(DocumentKind.RESULT, result.as_json()) is not None:
@@ -93,8 +106,9 @@ class MissionReporter:
         time_us = moment.state.time_us
         if moment.transition is not None:
             self._transitions += 1
+            self._guards.count(moment.transition)
             self._history.append(_transition_json(moment.transition))
-            self._send_document(DocumentKind.HISTORY, {"transitions": list(self._history)})
+            self._send_history()
         if moment.mission_state != self._mission_state or moment.transition is not None:
             self._entered_us = time_us
         flying = moment.state.armed and moment.state.offboard and not moment.paused
@@ -109,6 +123,15 @@ class MissionReporter:
             self._companion.send_text(f"{TEXT_PREFIX}{moment.mission_state}")
         self._send_detections(moment)
         self._send_map(moment)
+
+    def _send_history(self) -> None:
+        """Send the last transitions, as many as arrive within 0.1 s of the newest."""
+        while True:
+            _, pieces = split_document(DocumentKind.HISTORY, {"transitions": list(self._history)})
+            if len(pieces) <= MAX_HISTORY_PIECES or len(self._history) == 1:
+                break
+            self._history.popleft()
+        self._companion.send_document(DocumentKind.HISTORY, pieces)
 
     def _send_state(self, moment: Moment, flying: bool) -> None:
         state, command = moment.state, moment.command
@@ -184,20 +207,6 @@ def _transition_json(taken: TransitionTaken) -> dict[str, object]:
         "seconds": round(taken.seconds_in_source, 3),
         "ids": list(taken.ids),
     }
-
-
-def plain_value(value: object) -> object:
-    """A value of a guard as JSON; a contestant's pilot may hold any type."""
-    if value is None or isinstance(value, bool):
-        return value
-    if isinstance(value, int) and abs(value) < _EXACT:
-        return int(value)
-    try:
-        if not isinstance(value, str) and hasattr(value, "__float__"):
-            return float(f"{float(value):.{_DIGITS}g}")
-        return str(value)[:_TEXT_CHARACTERS]
-    except Exception:  # any that a contestant's conversion raises
-        return type(value).__name__
 
 
 def _box(detection: Detection) -> Box:

@@ -110,8 +110,8 @@ async def fly_in_real_time(
             factor, fused = records.recorder.real_time_factor, plan.chart.vision == "frames"
             return {"timing": flight_timing(drone, perception, clock, factor, settings.speed, fused=fused)}
 
-        observers = (records.see, reporter.see)
-        flown = await fly(plan, drone, perception, judge, observers, run=run, measured=timing)
+        what = (plan, drone, perception, judge, (records.see, reporter.see))
+        flown = await fly(*what, run=run, measured=timing, before_tick=reporter.look)
         await reporter.send_result(records.complete(flown.result))
     return flown
 

@@ -21,24 +21,8 @@ def register(monitor: Monitor) -> None:
     access = monitor.access
 
     def page(request: Request, token: str, name: str = "", problem: str = "", status: int = 200) -> Response:
-        values = {
-            "needs_password": access.needs_password,
-            "token": token,
-            "name": name,
-            "problem": problem,
-            "max_name_length": MAX_NAME_LENGTH,
-        }
-        visitor = access.visitor(request)
-        return render(
-            "login.html.j2",
-            visitor,
-            monitor.instance,
-            title="Log in",
-            here="/login",
-            classes="narrow",
-            status=status,
-            values=values,
-        )
+        values = {"token": token, "name": name, "problem": problem}
+        return _page(monitor, request, values, status)
 
     @monitor.web.get("/login")
     async def show(request: Request, token: str = "") -> Response:
@@ -82,3 +66,17 @@ def register(monitor: Monitor) -> None:
 def _is_encrypted(request: Request) -> bool:
     """Whether the request came by TLS, as a trusted proxy reports."""
     return request.url.scheme == "https"
+
+
+def _page(monitor: Monitor, request: Request, values: dict[str, str], status: int) -> Response:
+    form = {"needs_password": monitor.access.needs_password, "max_name_length": MAX_NAME_LENGTH}
+    return render(
+        "login.html.j2",
+        monitor.access.visitor(request),
+        monitor.instance,
+        title="Log in",
+        here="/login",
+        classes="narrow",
+        status=status,
+        values={**form, **values},
+    )

@@ -16,6 +16,7 @@ _NAVIGATION = (
     ("Live", "/"),
     ("Statechart", "/chart"),
     ("Editor", "/edit"),
+    ("Course", "/course"),
     ("Pilot", "/pilot"),
     ("Competition", "/competition"),
     ("Ranking", "/ranking"),

@@ -39,8 +39,9 @@ class StaticBundles(StaticFiles):
         if key not in self._compressed:
             # In a thread: a large file takes some 30 ms, and poses are sent meanwhile.
             self._compressed[key] = await asyncio.to_thread(_gzip, Path(file.path))
-        kept = ("ETag", "Last-Modified", "Cache-Control", "Vary", "Content-Type")
-        headers = {name: file.headers[name] for name in kept} | {"Content-Encoding": "gzip"}
+        kept = ("Last-Modified", "Cache-Control", "Vary", "Content-Type")
+        headers = {name: file.headers[name] for name in kept}
+        headers |= {"Content-Encoding": "gzip", "ETag": f"W/{file.headers['ETag']}"}
         return Response(self._compressed[key], headers=headers)
 
 

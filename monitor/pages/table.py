@@ -46,6 +46,7 @@ class Page:
 PAGES = (
     Page("/", "Live", "live"),
     Page("/chart", "Statechart", "chart"),
+    Page("/course", "Course", "course", lambda _monitor, _request, visitor: {"mayAct": visitor.may_fly}),
     Page("/edit", "Editor", "edit", lambda _monitor, _request, visitor: {"mayEdit": visitor.may_fly}),
     Page(
         "/pilot",

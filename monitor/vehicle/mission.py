@@ -63,6 +63,16 @@ class _History(_Lenient):
     transitions: list[_Transition] = Field([], max_length=100)
 
 
+class _Guards(_Lenient):
+    """The GUARDS document."""
+
+    mission_crc: int = Field(0, ge=0, lt=2**32)
+    time_us: int = Field(0, ge=0, le=2**53)
+    counts: dict[Name, Annotated[int, Field(ge=0, le=2**53)]] = Field({}, max_length=1000)
+    guards: list[tuple[Name, bool | None]] = Field([], max_length=100)
+    values: list[tuple[Name, float | bool | int | str | None, Name]] = Field([], max_length=100)
+
+
 class MissionView:
     """The mission state of one app.
 
@@ -82,20 +92,21 @@ class MissionView:
         self._history: JsonMessage | None = None
         self._detected: JsonMessage | None = None
         self._map: JsonMessage | None = None
-        self._map_crc = 0  # of its mission
+        self._guards: JsonMessage | None = None
+        self._flight_crc = 0  # of the mission of map and guards
         self.state: MissionState | None = None
         self.result: tuple[int, FlightResult] | None = None
         self.problem = ""
         self.problem_told = False
 
     def take(self, message: Message, now_s: float) -> list[JsonMessage]:
-        """Take a TUNNEL message. Returns messages "detections", "chart", "transitions" or "map" for pages."""
+        """Take a TUNNEL message. Returns messages for pages: "detections", "chart", "map" and so on."""
         payload = bytes(message.payload[: message.payload_length])
         try:
             if message.payload_type == STATE_TYPE:
                 self.state = decode_state(payload)
                 self._heard_s = now_s
-                return [] if self.state.mission_crc == self._map_crc else self.forget_map()
+                return [] if self.state.mission_crc == self._flight_crc else self.forget_flight()
             if message.payload_type == DETECTIONS_TYPE:
                 self._detected = self._detections(payload)
                 return [self._detected]
@@ -141,16 +152,19 @@ class MissionView:
         }
 
     def standing(self) -> list[JsonMessage]:
-        """What a new watcher is sent: the chart, and the last transitions, detections and map."""
-        messages = (self._chart(), self._history, self._detected, self._map)
+        """What a new watcher is sent: the chart, and the last transitions, guards, detections and map."""
+        messages = (self._chart(), self._history, self._guards, self._detected, self._map)
         return [message for message in messages if message is not None]
 
-    def forget_map(self) -> list[JsonMessage]:
-        """Forget the navigator's map, which belongs to another flight; returns a message "map" without it."""
-        if self._map is None:
-            return []
-        self._map = None
-        return [map_message(self._id, NavigationDocument())]
+    def forget_flight(self) -> list[JsonMessage]:
+        """Forget map and guards, which belong to another flight; returns messages without their content."""
+        told = []
+        if self._map is not None:
+            told.append(map_message(self._id, NavigationDocument()))
+        if self._guards is not None:
+            told.append(self._guards_message(_Guards()))
+        self._map = self._guards = None
+        return told
 
     def _state_name(self, state: MissionState) -> str:
         document = self._document
@@ -173,8 +187,12 @@ class MissionView:
                 return [self._history]
             if document.kind is DocumentKind.MAP:
                 navigation = NavigationDocument.model_validate(document.content)
-                self._map, self._map_crc = map_message(self._id, navigation), navigation.mission_crc
+                self._map, self._flight_crc = map_message(self._id, navigation), navigation.mission_crc
                 return [self._map]
+            if document.kind is DocumentKind.GUARDS:
+                guards = _Guards.model_validate(document.content)
+                self._guards, self._flight_crc = self._guards_message(guards), guards.mission_crc
+                return [self._guards]
         except ValidationError as error:
             self.problem = f"{document.kind.name.lower()} document: {first_error(error)}"
             return []
@@ -188,6 +206,15 @@ class MissionView:
     def _chart(self) -> JsonMessage | None:
         document = self._document
         return None if document is None else {"kind": "chart", "id": self._id, **document.model_dump()}
+
+    def _guards_message(self, document: _Guards) -> JsonMessage:
+        content = {
+            "time_s": round(document.time_us * 1e-6, 3),
+            "counts": document.counts,
+            "guards": [{"id": name, "holds": holds} for name, holds in document.guards],
+            "values": [{"name": name, "value": value, "unit": unit} for name, value, unit in document.values],
+        }
+        return {"kind": "guards", "id": self._id, **finite(content)}
 
     def _transitions(self, transitions: list[_Transition]) -> JsonMessage:
         listed = [

@@ -211,7 +211,7 @@ class Vehicle:
         if self._telemetry.restarts != self._restarts:
             self._judging.close()
             self.link.forget_sequence()
-            for forgotten in self._mission.forget_map():
+            for forgotten in self._mission.forget_flight():
                 self._callbacks.publish(forgotten)
             self._reset(now_s)
             self._callbacks.notice("warning", f"drone {self.id} has restarted")

@@ -35,24 +35,25 @@ holds, `edit_schema()` is their JSON Schema. `kind` is one of
     set_variable {name, value | null}                           set_mission {key, value}
     replace_text {start, end, text}
 
-with `transition` = {state, event?: tick | done | resume, index?} and `section` = enter | during | exit, `references` = keep | delete.
-The event `tick` is an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a path or
-a full id.
+with `transition` = {state, event?: tick | done | resume, index?}, `section` = enter | during | exit and
+`references` = keep | delete. The event `tick` is
+an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a path or a full id.
 
-`apply(document, edit)` returns `Edited(document, changes)`; `EditSession` does so with `undo()` and
-`redo()`. A `Change` is {start, removed, inserted}; the changes of one edit follow each other, each made
-for the text after those before it. What cannot be applied raises `EditError` with one line, and nothing
-is changed.
+`apply(document, edit)` returns `Edited(document, changes)`; `EditSession(document, layout)` does so with
+`undo()`, `redo()` and a `layout` that follows. A `Change` is {start, removed, inserted}; the changes of one
+edit follow each other, each made for the text after those before it. What cannot be applied raises
+`EditError` with one line, and nothing is changed.
 
 **Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
 advice), code, message, file, line, column, start, end, state, event, index, section, nodes.
-`problems_of` has them before they are put into words; other languages are tables of
-`offboard.chart.messages`.
+`problems_of` has them before they are put into words. `check_document(document, texts=SPANISH)` says them in
+Spanish.
 
-**Catalogue**: `catalogue(pilot_class, variables, contest=...)`: `values` (name, type, text, unit, low,
+**Catalogue**: `catalogue_of(document, pilot_class)`: `values` (name, type, text, unit, low,
 high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
 
-**Diagram**: `diagram(document)`: `nodes` and `edges` with ids, places in the text and what edits need.
+**Diagram**: `diagram(document)`: `nodes` and `edges` with ids, places in the text and what edits need,
+`settings`, `variables`, `templates`; `edge_taken` finds the edge of an engine's `TransitionTaken`.
 
 **Layout**: `read_layout`, `write_layout`, `parse_layout`, `follow` after an edit; the side file
 `NAME.layout.json` is {version: 1, states: {id: {x, y, width?, height?}}, corners: {edge id: [[x, y],
@@ -70,16 +71,16 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from offboard.authoring.apply import Edited, EditSession, apply
-from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue
+from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue, catalogue_of
 from offboard.authoring.diagram import Diagram, Edge, Node, diagram
 from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
-from offboard.authoring.edits import Edit, TransitionPath, edit_schema, parse_edit
+from offboard.authoring.edits import Edit, ReplaceText, TransitionPath, edit_schema, parse_edit
 from offboard.authoring.findings import Finding, check_document, problems_of
 from offboard.authoring.layout import (
-    Box,
     Layout,
     LayoutError,
+    StateBox,
     follow,
     layout_path,
     parse_layout,
@@ -91,13 +92,16 @@ from offboard.authoring.scxml_export import export_scxml
 from offboard.authoring.scxml_import import import_scxml
 from offboard.authoring.text import Change, Positions
 from offboard.authoring.xml_tree import XmlError
+from offboard.chart.messages import ENGLISH
+from offboard.chart.spanish import SPANISH
 from offboard.mission import mermaid_of
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 __all__ = [
-    "Box",
+    "ENGLISH",
+    "SPANISH",
     "Catalogue",
     "Change",
     "Diagram",
@@ -113,13 +117,16 @@ __all__ = [
     "Node",
     "Positions",
     "PrimitiveEntry",
+    "ReplaceText",
     "Span",
+    "StateBox",
     "TransitionPath",
     "ValueEntry",
     "XmlError",
     "apply",
     "as_json",
     "catalogue",
+    "catalogue_of",
     "check_document",
     "diagram",
     "edit_schema",

@@ -9,6 +9,7 @@ from typing import Any
 from offboard.authoring import edits, state_edits, transition_edits
 from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
+from offboard.authoring.layout import Layout, completed, follow
 from offboard.authoring.text import Change
 from offboard.authoring.work import Work
 from offboard.mission import MAX_FILE_BYTES
@@ -80,20 +81,32 @@ def _refuse_too_long(document: Document) -> None:
         raise EditError("the mission would be larger than 1 MB; a mission is a page or two")
 
 
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """An edit that was done or undone, with the layout before that."""
+
+    changes: tuple[Change, ...]
+    layout: Layout
+
+
 class EditSession:
-    """A document with its edits, which can be undone and done again.
+    """A document and the places of its states, with edits that can be undone and done again.
 
     Args:
         document: as opened.
+        layout: where its states are drawn.
 
     Attributes:
         document: as it is now.
+        layout: likewise; a page sets it when states were dragged, which is no edit. Renamed and moved states
+            keep their places, and states that an undone edit brings back have the places that they had.
     """
 
-    def __init__(self, document: Document) -> None:
+    def __init__(self, document: Document, layout: Layout | None = None) -> None:
         self.document = document
-        self._done: list[tuple[Change, ...]] = []
-        self._undone: list[tuple[Change, ...]] = []
+        self.layout = Layout() if layout is None else layout
+        self._done: list[_Step] = []
+        self._undone: list[_Step] = []
 
     @property
     def can_undo(self) -> bool:
@@ -113,32 +126,34 @@ class EditSession:
             goes_on: it is undone together with the edit before, as one letter of a typed word is.
         """
         edited = apply(self.document, edit)
-        self.document = edited.document
         if edited.changes:
-            before = self._done.pop() if goes_on and self._done else ()
-            self._done.append((*before, *edited.changes))
+            before = self._done.pop() if goes_on and self._done else _Step((), self.layout)
+            self._done.append(_Step((*before.changes, *edited.changes), before.layout))
             self._undone.clear()
+            self.layout = follow(self.layout, self.document, edit, edited.document)
+            self.document = edited.document
         return edited.changes
 
     def undo(self) -> tuple[Change, ...]:
         """Take the last edit back and return the changes of the text. Raises `EditError` if there is none."""
         if not self._done:
             raise EditError("there is nothing to undo")
-        changes = self._done.pop()
-        self._undone.append(changes)
-        return self._change(tuple(change.inverse for change in reversed(changes)))
+        step = self._done.pop()
+        self._undone.append(_Step(step.changes, self.layout))
+        return self._change(tuple(change.inverse for change in reversed(step.changes)), step.layout)
 
     def redo(self) -> tuple[Change, ...]:
         """Do again what was undone last. Raises `EditError` if nothing was."""
         if not self._undone:
             raise EditError("there is nothing to do again")
-        changes = self._undone.pop()
-        self._done.append(changes)
-        return self._change(changes)
+        step = self._undone.pop()
+        self._done.append(_Step(step.changes, self.layout))
+        return self._change(step.changes, step.layout)
 
-    def _change(self, changes: tuple[Change, ...]) -> tuple[Change, ...]:
+    def _change(self, changes: tuple[Change, ...], layout: Layout) -> tuple[Change, ...]:
         content = self.document.content
         for change in changes:
             content = content.changed(change)
         self.document = Document(content, self.document.path)
+        self.layout = completed(self.layout, layout, self.document)
         return changes

@@ -7,19 +7,16 @@ indentation or to what they stand under; and braces and brackets. Nothing else o
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
-
-import yaml
 
 from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
 from offboard.authoring.outline import Span
+from offboard.authoring.yaml_writer import Value, flow, style_of, written
 from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
 
-Value = str | Sequence["Value"] | Mapping[str, "Value"]
-"""What is written: a text, a list, or a mapping."""
 Patch = tuple[int, int, str]
 """Characters from an offset to another are replaced by a text."""
 _COMMENT = re.compile(r"([ \t]*)#")
@@ -51,7 +48,8 @@ class Blocks:
     def __init__(self, document: Document) -> None:
         self._text = document.text
         self._lines = document.positions
-        self._step, self._dash = _style(document.nodes)
+        self._style = style_of(document.nodes)
+        self._known_dashes: dict[int, list[int]] = {}  # by where the list begins
 
     def add_entry(self, owner: Owner, key: str, value: Value, before: Sequence[str] = ()) -> Patch:
         """Add an entry to a mapping: after the last of the keys that go `before` it, or at its start."""
@@ -60,7 +58,7 @@ class Blocks:
             previous = next((name for name in reversed(node.items) if name in before), "")
             if not node.flow:
                 return self._add_line(node, previous, key, value)
-            entry = f"{key}: {_flow(value)}"
+            entry = f"{key}: {flow(value)}"
             if not previous:
                 start = next(iter(node.key_nodes.values())).start
                 return start, start, f"{entry}, "
@@ -69,19 +67,19 @@ class Blocks:
         if isinstance(node, ListNode) or (isinstance(node, Scalar) and node.text):
             raise EditError("what stands there is no mapping; correct the text first")
         if isinstance(node, MapNode) and node.flow:
-            return node.start, node.end, f"{{{key}: {_flow(value)}}}"
+            return node.start, node.end, f"{{{key}: {flow(value)}}}"
         if owner.in_braces:
-            return node.start, node.start, f" {{{key}: {_flow(value)}}}"
-        lines = self._entry(key, value, self.child_indent(owner))
+            return node.start, node.start, f" {{{key}: {flow(value)}}}"
+        lines = self._style.entry(key, value, self.child_indent(owner))
         return self._insert(self._lines.line_end(owner.key.end) if owner.key else len(self._text), lines)
 
     def _add_line(self, node: MapNode, previous: str, key: str, value: Value) -> Patch:
         first = next(iter(node.key_nodes.values()))
-        indent = self._column(first.start)
+        indent = self._lines.column(first.start)
         if previous:
-            return self._insert(self.entry(node, previous).end, self._entry(key, value, indent))
-        lines = self._entry(key, value, indent)
-        if not self._is_first_in_line(first.start):  # after the dash of a list
+            return self._insert(self.entry(node, previous).end, self._style.entry(key, value, indent))
+        lines = self._style.entry(key, value, indent)
+        if not self._lines.is_first_in_line(first.start):  # after the dash of a list
             return first.start, first.start, "\n".join(lines).lstrip() + "\n" + " " * indent
         return self._insert(self._lines.line_start(first.start), lines)
 
@@ -93,7 +91,7 @@ class Blocks:
             ends = [max(node.key_nodes[name].end, node.items[name].end) for name in names]
             starts = [node.key_nodes[name].start for name in names]
             return _without_item(starts, ends, index)
-        if not self._is_first_in_line(own.start):
+        if not self._lines.is_first_in_line(own.start):
             if index + 1 == len(names):
                 raise EditError(f"'{key}' is all there is here; remove what it belongs to")
             return own.start, node.key_nodes[names[index + 1]].start, ""
@@ -103,17 +101,17 @@ class Blocks:
     def entry(self, node: MapNode, key: str) -> Span:
         """The lines of an entry of a mapping that is not in braces, with the comments that belong to it."""
         own = node.key_nodes[key]
-        return self._block(own.start, max(own.end, node.items[key].end), self._column(own.start))
+        return self._block(own.start, max(own.end, node.items[key].end), self._lines.column(own.start))
 
     def add_item(self, node: ListNode, index: int, value: Value) -> Patch:
         """Add an item to a list that has some, before the item with an index or at its end."""
         if node.flow:
             if index < len(node.items):
                 start = node.items[index].start
-                return start, start, f"{_flow(value)}, "
+                return start, start, f"{flow(value)}, "
             end = node.items[-1].end if node.items else node.start + 1
-            return end, end, f", {_flow(value)}" if node.items else _flow(value)
-        lines = self._item(value, self._column(self._dashes(node)[0]))
+            return end, end, f", {flow(value)}" if node.items else flow(value)
+        lines = self._style.item(value, self._lines.column(self._dashes(node)[0]))
         if index < len(node.items):
             return self._insert(self.item(node, index).start, lines)
         return self._insert(self.item(node, len(node.items) - 1).end, lines)
@@ -141,9 +139,9 @@ class Blocks:
     def item(self, node: ListNode, index: int) -> Span:
         """The lines of an item of a list that is not in brackets, with the comments that belong to it."""
         dash = self._dashes(node)[index]
-        if not self._is_first_in_line(dash):
+        if not self._lines.is_first_in_line(dash):
             raise EditError("the list begins within a line; edit the text")
-        return self._block(dash, max(dash + 1, node.items[index].end), self._column(dash))
+        return self._block(dash, max(dash + 1, node.items[index].end), self._lines.column(dash))
 
     def set_list(self, owner: Owner, key: str, values: Sequence[Value], before: Sequence[str]) -> list[Patch]:
         """Make a list of texts have some values; only what differs is changed."""
@@ -159,11 +157,11 @@ class Blocks:
         if isinstance(node, ListNode) and node.flow:
             if "#" in self._text[node.start : node.end]:
                 raise EditError(f"'{key}' is in brackets with comments; edit the text")
-            return [(node.start, node.end, _flow(values))]
+            return [(node.start, node.end, flow(values))]
         if isinstance(node, Scalar) and not node.text:
             if mapping.flow:
-                return [(node.start, node.start, f" {_flow(values)}")]
-            lines = self._entry(key, values, self._column(mapping.key_nodes[key].start))[1:]
+                return [(node.start, node.start, f" {flow(values)}")]
+            lines = self._style.entry(key, values, self._lines.column(mapping.key_nodes[key].start))[1:]
             return [self._insert(self._lines.line_end(mapping.key_nodes[key].end), lines)]
         raise EditError(f"'{key}' is no list; correct the text first")
 
@@ -181,8 +179,8 @@ class Blocks:
                 else:
                     patches.append(self.remove_item(node, index))
             if new:
-                indent = self._column(self._dashes(node)[0])
-                lines = [line for value in new for line in self._item(value, indent)]
+                indent = self._lines.column(self._dashes(node)[0])
+                lines = [line for value in new for line in self._style.item(value, indent)]
                 at = self.item(node, last).start if last < len(old) else self.item(node, last - 1).end
                 patches.append(self._insert(at, lines))
         return patches
@@ -218,13 +216,9 @@ class Blocks:
                 start -= len(before) - len(before.rstrip("\n")) - 1 if before.endswith("\n") else 0
         return start, end, ""
 
-    def entry_lines(self, key: str, value: Value, indent: int) -> list[str]:
-        """The lines of a new entry."""
-        return self._entry(key, value, indent)
-
     def child_indent(self, owner: Owner) -> int:
         """Indentation of the entries of a mapping that has none yet."""
-        return 0 if owner.key is None else self._column(owner.key.start) + self._step
+        return 0 if owner.key is None else self._lines.column(owner.key.start) + self._style.step
 
     def shifted(self, span: Span, indent: int) -> list[str]:
         """The lines of an entry, moved so that its key has an indentation."""
@@ -235,20 +229,18 @@ class Blocks:
             return [" " * by + line if line.strip() else line for line in lines]
         return [line[min(-by, len(line) - len(line.lstrip(" "))) :] for line in lines]
 
-    def _column(self, offset: int) -> int:
-        return offset - self._lines.line_start(offset)
-
-    def _is_first_in_line(self, offset: int) -> bool:
-        return not self._text[self._lines.line_start(offset) : offset].strip()
-
     def _dashes(self, node: ListNode) -> list[int]:
         """Where the dash of each item is."""
+        known = self._known_dashes.get(node.start)
+        if known is not None:
+            return known
         found = [node.start]
         for previous in node.items[:-1]:
             after = _DASH.search(self._text, self._lines.line_end(max(previous.end, found[-1] + 1)))
             if after is None:
                 raise EditError("the list has several dashes in a line; edit the text")
             found.append(after.end() - 1)
+        self._known_dashes[node.start] = found
         return found
 
     def _block(self, start: int, end: int, indent: int) -> Span:
@@ -279,74 +271,9 @@ class Blocks:
             return at, at, f"\n{block}"
         return at, at, f"{block}\n"
 
-    def _entry(self, key: str, value: Value, indent: int) -> list[str]:
-        space = " " * indent
-        if isinstance(value, str):
-            return [f"{space}{key}: {written(value)}" if value else f"{space}{key}:"]
-        lines = [f"{space}{key}:"]
-        if isinstance(value, Mapping):
-            for name, inner in value.items():
-                lines += self._entry(name, inner, indent + self._step)
-        else:
-            for inner in value:
-                lines += self._item(inner, indent + self._dash)
-        return lines
-
-    def _item(self, value: Value, indent: int) -> list[str]:
-        space = " " * indent
-        if isinstance(value, str):
-            return [f"{space}- {written(value)}"]
-        assert isinstance(value, Mapping)
-        lines = [line for name, inner in value.items() for line in self._entry(name, inner, indent + 2)]
-        return [f"{space}- {lines[0].lstrip()}", *lines[1:]]
-
-
-def written(text: str, *, in_braces: bool = False) -> str:
-    """A text as YAML reads it back: plain if possible, otherwise in quotation marks. Raises `EditError`."""
-    text = text.strip()
-    if not text.isprintable():
-        raise EditError(f"{text[:40]!r} has a line end or a control character; write one line of text")
-    around = "[{}]\n" if in_braces else "- {}\n- a: {}\n"
-    try:
-        events = list(yaml.parse(around.replace("{}", text), Loader=yaml.SafeLoader))
-    except yaml.YAMLError:
-        events = []
-    values = [(e.value, e.tag, e.anchor, e.style) for e in events if isinstance(e, yaml.ScalarEvent)]
-    plain = (text, None, None)
-    wanted = [plain] if in_braces else [plain, ("a", None, None), plain]
-    if text and [value[:3] for value in values] == wanted and values[0][3] in (None, ""):
-        return text
-    return "'" + text.replace("'", "''") + "'"
-
-
-def _flow(value: Value) -> str:
-    """A value in braces and brackets, in one line."""
-    if isinstance(value, str):
-        return written(value, in_braces=True) if value else ""
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {_flow(inner)}".strip() for key, inner in value.items()) + "}"
-    return "[" + ", ".join(_flow(inner) for inner in value) + "]"
-
 
 def _without_item(starts: list[int], ends: list[int], index: int) -> Patch:
     """Remove one of several parts that are separated by commas."""
     if index + 1 < len(starts):
         return starts[index], starts[index + 1], ""
     return (ends[index - 1] if index else starts[index]), ends[index], ""
-
-
-def _style(root: MapNode | None) -> tuple[int, int]:
-    """Spaces before what stands below a key, and before the dash of a list below one."""
-    step = dash = None
-    pending: list[MapNode] = [root] if root is not None else []
-    while pending and (step is None or dash is None):
-        node = pending.pop(0)
-        for name, key in node.key_nodes.items():
-            value = node.items[name]
-            if isinstance(value, MapNode) and value.key_nodes and not value.flow:
-                first = next(iter(value.keys.values()))
-                step = first.column - key.place.column if step is None else step
-                pending.append(value)
-            elif isinstance(value, ListNode) and not value.flow and dash is None:
-                dash = value.place.column - key.place.column
-    return step or 2, 2 if dash is None else dash

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import get_origin
 
+from offboard.authoring.document import Document
 from offboard.chart.described import ValueDescription, descriptions
 from offboard.chart.kinds import LIMITS, Kind, kind_of_type
 from offboard.chart.vocabulary import WRITABLE, Vocabulary, choices_of
@@ -100,6 +101,14 @@ def catalogue(
         _primitive(name, text, own=not hasattr(Pilot, name)) for name, text in vocabulary.primitives.items()
     ]
     return Catalogue(tuple(entries), tuple(primitives))
+
+
+def catalogue_of(document: Document, pilot_class: type[Pilot] = Pilot) -> Catalogue:
+    """The names that a document's mission can use, with its own variables and the limits of its class."""
+    chart = document.chart
+    if chart is None:
+        return catalogue(pilot_class)
+    return catalogue(pilot_class, chart.variables, contest=chart.mission_class != "open")
 
 
 def _entries(path: tuple[str, ...], value: ValueDescription, contest: bool, *, own: bool) -> list[ValueEntry]:

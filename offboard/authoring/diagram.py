@@ -8,7 +8,7 @@ edits name.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from offboard.authoring.document import Document
 from offboard.authoring.outline import Event, Span, StateOutline, TransitionOutline
@@ -17,8 +17,7 @@ from offboard.chart.problems import Place
 from offboard.chart.spec import MissionFile, State, Transition, all_states
 from offboard.chart.yaml_nodes import Scalar
 
-START = "[*]"
-"""What leads to initial states, and to which finished states lead."""
+SETTINGS = ("name", "description", "class", "vision", "extends")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +84,9 @@ class Diagram:
 
     Attributes:
         initial: id of the state in which the mission starts; empty if it has none.
+        settings: the mission's own keys as written here: name, description, class, vision, extends.
+        variables: names and first values as written here.
+        templates: written here, with the paths of their states; one that nothing uses has no nodes.
         readable: the text can be understood; if not there are no nodes, and a page keeps its last diagram.
     """
 
@@ -92,7 +94,28 @@ class Diagram:
     initial: str
     nodes: tuple[Node, ...]
     edges: tuple[Edge, ...]
+    settings: dict[str, str] = field(default_factory=dict)
+    variables: dict[str, str] = field(default_factory=dict)
+    templates: dict[str, tuple[str, ...]] = field(default_factory=dict)
     readable: bool = True
+
+    def edge_taken(self, source: str, target: str, when: str) -> str:
+        """Id of the edge that the engine took, by its `TransitionTaken`; empty if none fits.
+
+        Args:
+            source: the state that was left.
+            target: the state that was entered.
+            when: the guard that held, "done" or "resume".
+        """
+        event = when if when in ("done", "resume") else "tick"
+        outer = source
+        while outer:
+            for edge in self.edges:
+                fits = edge.source == outer and edge.event == event and (event != "tick" or edge.when == when)
+                if fits and f"{target}.".startswith(f"{edge.target}."):
+                    return edge.id
+            outer = outer.rpartition(".")[0]
+        return ""
 
 
 def diagram(document: Document) -> Diagram:
@@ -106,7 +129,16 @@ def diagram(document: Document) -> Diagram:
     edges = tuple(
         edge for state in states.values() for edge in _edges(state, written) if edge.target in states
     )
-    return Diagram(chart.name, _initial(chart, states), nodes, edges)
+    outline = document.outline
+    return Diagram(
+        chart.name,
+        _initial(chart, states),
+        nodes,
+        edges,
+        settings={key: outline.text(key) for key in SETTINGS if outline.text(key)},
+        variables={name: value.text for name, value in outline.variables.items()},
+        templates={each.name: tuple(state.path for state in each.all()) for each in outline.templates},
+    )
 
 
 def _initial(chart: MissionFile, states: dict[str, State]) -> str:

@@ -155,7 +155,7 @@ class Document:
         return self._read[0]
 
     def read(self) -> MissionFile:
-        """What is written in it, without what it extends. Raises `MissionError` if that is not understood."""
+        """What it says, without what it extends. Raises `MissionError` with all faults of its form."""
         if self.nodes is None:
             return read_mission_file(self.text, self.path)  # says why
         written, problems = self._read

@@ -34,7 +34,10 @@ class TransitionPath(_Edit):
 
 
 class AddState(_Edit):
-    """A new state at the top, in a state or in a template; with `states` it starts in the first of them."""
+    """A new state at the top, in a state or in a template; with `states` it starts in the first of them.
+
+    At the top it may have the name of a state of the mission that is extended, and replaces that one.
+    """
 
     kind: Literal["add_state"] = "add_state"
     name: Name

@@ -74,8 +74,6 @@ def problems_of(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[P
     """What the checker notes of a document."""
     problems = ProblemList()
     try:
-        if document.unreadable is not None:
-            raise document.unreadable
         expand_and_check(document.read(), pilot_class, problems)
     except MissionError as error:
         return (*problems.all, *error.problems)

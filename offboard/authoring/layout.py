@@ -25,7 +25,7 @@ class LayoutError(UserError):
     """A layout file cannot be used; the message is one line."""
 
 
-class Box(BaseModel):
+class StateBox(BaseModel):
     """Where a state is drawn, in pixels of the page; with a width and height of its own if they were set."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -42,7 +42,7 @@ class Layout(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     version: Literal[1] = 1
-    states: dict[str, Box] = Field(default_factory=dict, max_length=5000)
+    states: dict[str, StateBox] = Field(default_factory=dict, max_length=5000)
     corners: dict[str, tuple[tuple[Coordinate, Coordinate], ...]] = Field(
         default_factory=dict, max_length=20_000
     )
@@ -121,6 +121,19 @@ def follow(layout: Layout, before: Document, edit: Edit, after: Document) -> Lay
     return Layout(
         states={change(name): box for name, box in layout.states.items() if change(name) in known},
         corners={_edge_id(name, change): points for name, points in layout.corners.items()},
+    )
+
+
+def completed(layout: Layout, earlier: Layout, document: Document) -> Layout:
+    """The layout of a document's states; those that have no place have the one of an earlier layout."""
+    if document.chart is None:
+        return layout
+    known = chart_ids(document)
+    states = {name: box for name, box in (earlier.states | layout.states).items() if name in known}
+    edges = earlier.corners | layout.corners
+    return Layout(
+        states=states,
+        corners={name: points for name, points in edges.items() if name.partition("/")[0] in known},
     )
 
 

@@ -11,19 +11,18 @@ import ast
 import re
 from dataclasses import dataclass, field
 
-from offboard.authoring.blocks import Blocks, Value
-from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
 from offboard.authoring.scxml_export import NAMESPACE, SCXML
 from offboard.authoring.xml_tree import Element, XmlError, parse_xml
+from offboard.authoring.yaml_writer import Style, Value
 from offboard.chart.native import RESUME, TICK
 from offboard.chart.problems import MAX_REPORTED, cut
-from offboard.chart.spec import look_up
+from offboard.chart.spec import MAX_STATES, look_up
 
 _INCLUDE = "http://www.w3.org/2001/XInclude"
 _STATES = ("state", "final")
-_CALL = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\(\s*\))?\s*")
-_ASSIGNMENT = re.compile(r"\s*([A-Za-z_][\w.]*)\s*=(?!=)\s*(.+?)\s*")
+_CALL = re.compile(r"([A-Za-z_]\w*) ?(?:\( ?\))?")
+_ASSIGNMENT = re.compile(r"([A-Za-z_][\w.]*) ?=(?!=) ?(.+)")
 _TEXTS = re.compile(r"('[^']*'|\"[^\"]*\")")
 _ECMASCRIPT = (
     (re.compile(r"\s*&&\s*"), " and "),
@@ -113,12 +112,12 @@ class _Importer:
             raise XmlError("\n".join(lines))
 
     def _text(self, value: dict[str, Value], states: dict[str, Value]) -> str:
-        blocks = Blocks(Document.from_text(""))
+        style = Style()
         try:
-            lines = [line for key, each in value.items() for line in blocks.entry_lines(key, each, 0)]
+            lines = [line for key, each in value.items() for line in style.entry(key, each, 0)]
             lines += ["", "states:"]
             for number, (name, state) in enumerate(states.items()):
-                lines += ([""] if number else []) + blocks.entry_lines(name, state, 2)
+                lines += ([""] if number else []) + style.entry(name, state, 2)
         except EditError as error:
             raise XmlError(str(error)) from None
         return "\n".join(lines) + "\n"
@@ -148,6 +147,8 @@ class _Importer:
         for element in children:
             if element.name not in _STATES:
                 continue
+            if len(self._paths) >= MAX_STATES:
+                raise XmlError(f"line {element.line}: more than {MAX_STATES} states; a mission has fewer")
             full_id = element.attributes.get("id", "")
             name = _state_name(full_id, parent.attributes.get("id", ""), names)
             names.add(name)
@@ -310,12 +311,13 @@ class _Importer:
         return found
 
     def _statement(self, element: Element, statement: str) -> str:
+        statement = " ".join(statement.split())
         call, assignment = _CALL.fullmatch(statement), _ASSIGNMENT.fullmatch(statement)
         if call is not None:
             return call.group(1)
         if assignment is not None:
             return f"{assignment.group(1)} = {_python(assignment.group(2))}"
-        text = f"'{cut(statement.strip())}' is no primitive such as hover() and no assignment"
+        text = f"'{cut(statement)}' is no primitive such as hover() and no assignment"
         self._refuse(element, f"<script>: {text}")
         return ""
 

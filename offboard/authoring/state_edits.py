@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from offboard.authoring.blocks import Owner, Value
+from offboard.authoring.blocks import Owner
 from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import (
     AddState,
@@ -20,6 +20,7 @@ from offboard.authoring.edits import (
 from offboard.authoring.outline import TEMPLATE, StateOutline
 from offboard.authoring.references import instances, prefix_change, references, relative
 from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, Work, keys_before
+from offboard.authoring.yaml_writer import Value, style_of
 from offboard.chart.problems import cut
 from offboard.chart.spec import all_states
 from offboard.chart.yaml_nodes import MapNode, Scalar
@@ -47,8 +48,8 @@ def add_template(work: Work, edit: AddTemplate) -> None:
 
 
 def _insert_state(work: Work, parent: str, name: str, value: Value, index: int | None) -> None:
-    """Insert a new state or, with the parent "@", a template."""
-    _refuse_taken(work, parent, name)
+    """Insert a new state or, with the parent "@", a template; it may replace one of the extended mission."""
+    _refuse_taken(work, parent, name, replacing=True)
     before = references(work.document).values()
     container, owner = _container(work, parent)
     if container is None or not container.items:
@@ -63,7 +64,7 @@ def _insert_state(work: Work, parent: str, name: str, value: Value, index: int |
             )
         else:
             blocks = work.blocks
-            lines = blocks.entry_lines(name, value, _column(work, container))
+            lines = style_of(work.document.nodes).entry(name, value, _column(work, container))
             work.patch(blocks.insert_entry_text(container, index, lines, apart=_are_apart(work, container)))
     if parent != TEMPLATE:
         _set_first_initial(work, parent, name)
@@ -110,13 +111,13 @@ def _container(work: Work, parent: str) -> tuple[MapNode | None, Owner]:
     return (node if isinstance(node, MapNode) else None), owner
 
 
-def _refuse_taken(work: Work, parent: str, name: str) -> None:
+def _refuse_taken(work: Work, parent: str, name: str, *, replacing: bool = False) -> None:
     outline = work.document.outline
     siblings = outline.templates if parent == TEMPLATE else outline.states_in(parent)
     if name in [state.name for state in siblings]:
         what = "template" if parent == TEMPLATE else "state"
         raise EditError(f"there is a {what} '{name}' already; choose another name")
-    if parent == "" and name in _base_names(work):
+    if parent == "" and not replacing and name in _base_names(work):
         raise EditError(f"'{outline.text('extends')}' has a state '{name}'; choose another name")
 
 
@@ -227,8 +228,7 @@ def _cut_and_insert(work: Work, state: StateOutline, parent: str, index: int) ->
     lines = blocks.shifted(blocks.entry(state.container, state.name), 0)
     old_parent = work.document.outline.get(state.parent)
     if old_parent is not None and len(old_parent.states) == 1 and isinstance(old_parent.node, MapNode):
-        start = work.document.positions.line_start(old_parent.node.key_nodes["states"].start)
-        work.patch((start, blocks.entry(old_parent.node, "states").end, ""))
+        _remove_with_key(work, old_parent.node, "states", state)
     else:
         work.patch(blocks.remove_state(state.container, state.name))
     container, owner = _container(work, parent)
@@ -310,10 +310,22 @@ def delete_state(work: Work, edit: DeleteState) -> None:
         return
     parent = work.document.outline.get(state.parent)
     if parent is not None and isinstance(parent.node, MapNode):
-        work.patch(work.blocks.remove_entry(parent.node, "states"))
+        _remove_with_key(work, parent.node, "states", state)
     else:
         key = "templates" if state.is_template else "states"
-        work.patch(work.blocks.remove_entry(work.document.outline.root, key))
+        _remove_with_key(work, work.document.outline.root, key, state)
+
+
+def _remove_with_key(work: Work, node: MapNode, key: str, state: StateOutline) -> None:
+    """Remove the only state of a mapping and the line of the mapping's key; other comments stay."""
+    if state.container.flow or node.flow:
+        work.patch(work.blocks.remove_entry(node, key))
+        return
+    span = work.blocks.entry(state.container, state.name)
+    own, lines = node.key_nodes[key], work.document.positions
+    if not lines.is_first_in_line(own.start):
+        raise EditError(f"'{key}' begins within a line; edit the text")
+    work.patch((span.start, span.end, ""), (lines.line_start(own.start), lines.line_end(own.end), ""))
 
 
 def _delete_references(work: Work, state: StateOutline) -> None:

@@ -121,6 +121,14 @@ class Positions:
         line = bisect_right(self._starts, offset)
         return self._starts[line] if line < len(self._starts) else len(self._text)
 
+    def column(self, offset: int) -> int:
+        """Characters before an offset in its line."""
+        return offset - self.line_start(offset)
+
+    def is_first_in_line(self, offset: int) -> bool:
+        """Whether only spaces are before an offset in its line."""
+        return not self._text[self.line_start(offset) : offset].strip()
+
     def offset_of_yaml(self, line: int, column: int) -> int:
         """Offset of a place that YAML's parser reported; lines and columns are counted from 1."""
         if line < 1:

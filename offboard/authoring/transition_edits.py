@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from offboard.authoring.blocks import Owner, Value
+from offboard.authoring.blocks import Owner
 from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import (
     AddTransition,
@@ -18,6 +18,7 @@ from offboard.authoring.edits import (
 from offboard.authoring.outline import Event, StateOutline
 from offboard.authoring.state_edits import delete_reference
 from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, TRANSITION_ORDER, Work, keys_before
+from offboard.authoring.yaml_writer import Value
 from offboard.chart.yaml_nodes import ListNode, MapNode, Scalar
 
 _KEYS: dict[Event, str] = {"done": "then", "resume": "resume"}

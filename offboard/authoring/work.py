@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from offboard.authoring.blocks import Blocks, Owner, Patch, Value
+from offboard.authoring.blocks import Blocks, Owner, Patch
 from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import TransitionPath
 from offboard.authoring.outline import TEMPLATE, StateOutline, TransitionOutline
 from offboard.authoring.references import Reference, chart_ids, instances, references, relative, shortest_text
 from offboard.authoring.text import Change
+from offboard.authoring.yaml_writer import Value
 from offboard.chart.problems import cut
 from offboard.chart.yaml_nodes import MapNode, Scalar
 

@@ -23,7 +23,7 @@ class Element:
     Attributes:
         namespace: its address; empty if it has none.
         attributes: those with a namespace as "address name".
-        text: all characters directly in it.
+        chunks: the characters directly in it.
         line: where it begins, counted from 1.
     """
 
@@ -32,14 +32,19 @@ class Element:
     attributes: dict[str, str]
     line: int
     children: list[Element] = field(default_factory=list)
-    text: str = ""
+    chunks: list[str] = field(default_factory=list)
+
+    @property
+    def text(self) -> str:
+        """All characters directly in it."""
+        return "".join(self.chunks)
 
 
 def parse_xml(data: bytes) -> Element:
     """The outermost element of an XML document. Raises `XmlError`."""
     if len(data) > MAX_XML_BYTES:
         raise XmlError("the file is larger than 1 MB; a chart is a few pages")
-    reader = _Reader()
+    reader = _XmlReader()
     try:
         reader.parser.Parse(data, True)
     except expat.ExpatError as error:
@@ -51,7 +56,7 @@ def parse_xml(data: bytes) -> Element:
     return reader.root
 
 
-class _Reader:
+class _XmlReader:
     def __init__(self) -> None:
         self.root: Element | None = None
         self._open: list[Element] = []
@@ -83,7 +88,7 @@ class _Reader:
 
     def _characters(self, text: str) -> None:
         if self._open:
-            self._open[-1].text += text
+            self._open[-1].chunks.append(text)
 
     def _refuse_document_type(self, *_: object) -> None:
         line = self.parser.CurrentLineNumber

@@ -39,7 +39,7 @@ def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList)
     if not problems.found and not shape.found:
         _check_vision(mission, pilot_class, problems)
     if not problems.found and not shape.found:
-        check_guards(mission, vocabulary, problems)
+        check_guards(mission, vocabulary, problems, own_pilot=pilot_class is not Pilot)
     problems.add_all(shape)
 
 

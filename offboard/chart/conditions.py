@@ -18,6 +18,7 @@ from itertools import pairwise
 from math import inf, isnan
 from typing import Any
 
+from offboard.chart.kinds import as_float
 from offboard.chart.messages import Message
 from offboard.chart.problems import cut
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary, choices_of, path_of
@@ -188,12 +189,12 @@ class Conditions:
         """The value of an expression that never changes: a float or a text; None if it may change."""
         match node:
             case ast.Constant(value=bool() | int() | float() as number):
-                return float(number)
+                return as_float(number)
             case ast.Constant(value=str() as text):
                 return text
             case ast.Name() | ast.Attribute():
                 value = self._constants.get(".".join(path_of(node)))
-                return float(value) if isinstance(value, (bool, int, float)) else value
+                return as_float(value) if isinstance(value, (bool, int, float)) else value
             case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign):
                 inner = self._constant(node.operand)
                 if isinstance(inner, float):
@@ -279,6 +280,6 @@ def _reason(tests: frozenset[_Test]) -> Message:
     term = _impossible_term(tests)
     assert term is not None
     own = " and ".join(sorted(str(test) for test in tests if test.term == term))
-    ends = f"at least {term.low:g}" if term.high == inf else f"from {term.low:g} to {term.high:g}"
-    ends = f"at most {term.high:g}" if term.low == -inf else ends
+    code = "guard.at_least" if term.high == inf else "guard.from_to"
+    ends = Message("guard.at_most" if term.low == -inf else code, low=term.low, high=term.high)
     return Message("guard.range", name=term.shown, meant=own, range=ends)

@@ -51,6 +51,16 @@ def descriptions(owner: type) -> Mapping[str, ValueDescription]:
     return _descriptions(owner)
 
 
+def unit_of(owner: type, name: str) -> str:
+    """The unit of a value by its dotted name, such as "m" of a pilot's "frame.d"; "" if none is known."""
+    kind: object = owner
+    found = NOT_DESCRIBED
+    for part in name.split("."):
+        found = descriptions(kind).get(part, NOT_DESCRIBED) if isinstance(kind, type) else NOT_DESCRIBED
+        kind = found.type
+    return found.unit
+
+
 @lru_cache(maxsize=64)
 def _descriptions(owner: type) -> Mapping[str, ValueDescription]:
     if owner.__module__ == "builtins":

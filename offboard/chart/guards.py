@@ -18,9 +18,19 @@ _CLOCKS = ("seconds_in_state", "seconds_in_mission")
 _LONG_S = 1e9
 
 
-def check_guards(mission: MissionFile, vocabulary: Vocabulary, problems: ProblemList) -> None:
-    """Warn of transitions that are never taken, and advise time-outs."""
-    constants = {f"memory.{name}": value for name, value in _constants(mission).items()}
+def check_guards(
+    mission: MissionFile, vocabulary: Vocabulary, problems: ProblemList, *, own_pilot: bool
+) -> None:
+    """Warn of transitions that are never taken, and advise time-outs.
+
+    Args:
+        mission: expanded, without errors.
+        vocabulary: its names.
+        problems: takes what is found.
+        own_pilot: the pilot is a contestant's, whose primitives may set variables.
+    """
+    known = {} if own_pilot else _constants(mission)
+    constants = {f"memory.{name}": value for name, value in known.items()}
     conditions = Conditions(vocabulary, constants)
     at_last = Conditions(vocabulary, constants | dict.fromkeys(_CLOCKS, _LONG_S))
     for state in all_states(mission.states):

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import is_dataclass
 from enum import Enum
+from math import inf
 from typing import get_args, get_origin
 
 from geometry.vectors import Vec3
@@ -270,10 +271,18 @@ def _number(node: ast.expr) -> float | None:
         case ast.Constant(value=bool()):
             return None
         case ast.Constant(value=int() | float() as value):
-            return float(value)
+            return as_float(value)
         case ast.UnaryOp(op=ast.USub()):
             inner = _number(node.operand)
             return None if inner is None else -inner
         case ast.UnaryOp(op=ast.UAdd()):
             return _number(node.operand)
     return None
+
+
+def as_float(number: float) -> float:
+    """A whole number of any size as a float, infinite if it is too large for one."""
+    try:
+        return float(number)
+    except OverflowError:
+        return inf if number > 0 else -inf

@@ -1,7 +1,7 @@
 """All texts about mission files, in one table: the words of each finding, by its code.
 
 A finding is made of a code and values; `ENGLISH` has the words. Another language is another table with the
-same codes: `Message.text(table)`.
+same codes, such as `spanish.SPANISH`: `Message.text(table)`.
 """
 
 from __future__ import annotations
@@ -116,6 +116,7 @@ ENGLISH: Mapping[str, str] = {
     "variable.text": "write a text in quotes: '{text}'",
     # The chart.
     "extends.package_only": "extends '{name}': here a mission extends one of the package; known: {names}",
+    "extends.elsewhere": "extends '{name}': is in another folder; copy that file beside this one",
     "extends.circle": "extends '{name}': runs in a circle or too deep",
     "template.unused": "template '{name}' is not used; remove it or 'use' it",
     "template.unknown": "state '{state}' uses the unknown template '{name}'; known: {known}",
@@ -170,6 +171,9 @@ ENGLISH: Mapping[str, str] = {
     "guard.constant": "it is always false",
     "guard.contradiction": "no value of {names} fulfils all of it; is an 'and' meant as 'or'?",
     "guard.range": "{name} is never {meant}; it is {range}",
+    "guard.at_least": "at least {low:g}",
+    "guard.at_most": "at most {high:g}",
+    "guard.from_to": "from {low:g} to {high:g}",
     "guard.always": "when '{when}' always holds: {reason}; leave 'when' out, or correct it",
     "guard.always_true": "it is true for every value",
     "vision.needed": "'{name}' needs the map of frames; add the line 'vision: frames' at the top of {file}",

@@ -11,6 +11,7 @@ from errors import UserError
 from offboard.chart.messages import Message, as_message
 
 MAX_REPORTED = 50
+MAX_NOTED = 500
 MAX_COMPARED = 200
 """Names that are compared with an unknown one to find the most similar; comparing is slow."""
 
@@ -91,8 +92,8 @@ class ProblemList:
 
     @property
     def full(self) -> bool:
-        """Whether no more would be reported."""
-        return len(self._by_place) > MAX_REPORTED
+        """Whether there are so many that looking for more is a waste of time."""
+        return len(self._by_place) > MAX_NOTED
 
     @property
     def all(self) -> tuple[Problem, ...]:

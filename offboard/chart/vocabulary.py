@@ -16,6 +16,8 @@ from scenarios.models import COLOURS
 
 WRITABLE = ("cmd", "colour", "goal_m", "memory")
 """What a mission may assign to; all else of the pilot is set by the engine."""
+MAX_ACTION_CHARACTERS = 200
+"""Of an unknown action that is searched for what was meant."""
 _MISTAKES_IN_ACTIONS = (
     (":=", "action.walrus"),
     ("==", "action.equal"),
@@ -67,7 +69,7 @@ class Vocabulary:
             return
         if name in self.values:
             raise UnknownNameError(Message("name.value_as_action", name=name))
-        advice = self._mistake_in(name) or self._similar(name, list(self.primitives))
+        advice = self._mistake_in(name[:MAX_ACTION_CHARACTERS]) or self._similar(name, list(self.primitives))
         raise UnknownNameError(Message("name.unknown_action", name=cut(name), advice=advice))
 
     def type_of(self, path: tuple[str, ...]) -> object:

@@ -45,7 +45,7 @@ _MAVLINK_2 = 0xFD  # the first byte of a packet
 
 _URGENT = (DocumentKind.HISTORY,)
 # Pieces not sent yet: the mission's own document is the longest, and maps are many.
-_IN_ORDER = (*_URGENT, DocumentKind.RESULT, DocumentKind.MISSION, DocumentKind.MAP)
+_IN_ORDER = (*_URGENT, DocumentKind.RESULT, DocumentKind.MISSION, DocumentKind.MAP, DocumentKind.GUARDS)
 
 logger = logging.getLogger(__name__)
 

@@ -59,6 +59,7 @@ class FakeMonitor:
         self._ended.clear()
         for path in SERVED:
             app.router.add_get(path, self._page)
+        app.router.add_get("/api/instance", self._instance)
         app.router.add_get("/ws/live", self._watch)
         app.router.add_get("/video/{id}/frames", self._frames)
         app.router.add_get("/api/competition/stage", self._stage)
@@ -112,6 +113,9 @@ class FakeMonitor:
         html = render_page(page, Visitor("", may_judge=False, may_fly=False), "fake", page.title, {})
         headers = {"Content-Security-Policy": CONTENT_POLICY}
         return web.Response(body=html.body, content_type="text/html", charset="utf-8", headers=headers)
+
+    async def _instance(self, request):
+        return web.json_response({"instance": "fake"})
 
     async def _watch(self, request):
         watcher = web.WebSocketResponse()

@@ -9,6 +9,11 @@ from tests.monitor.serving import serving
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 DATA = "JSON.parse(document.getElementById('page-data').textContent)"
+KEEP_PAGE = """document.addEventListener("monitor-restarted", (event) => {
+  window.wasAsked = true;
+  event.preventDefault();
+})"""
+IS_DIAGRAM_LOADED = "performance.getEntriesByType('resource').some((each) => /stateDiagram/.test(each.name))"
 SAMPLE = "tests.monitor.sample_page"
 LINK_IS = "words => document.querySelector('#link .words').textContent === words"
 PHONE = {"width": 390, "height": 800}
@@ -54,6 +59,31 @@ async def test_a_page_comes_back_by_itself_when_the_server_does(monkeypatch, chr
         async with serving(monkeypatch, SAMPLE, port=port):
             await until(page, "window.isOld === undefined", timeout_s=30.0)
             await until(page, LINK_IS, arg="live")
+
+
+async def test_a_page_with_unsaved_work_stays_when_the_server_was_restarted(monkeypatch, chromium):
+    async with phone(chromium) as page:
+        async with serving(monkeypatch, SAMPLE) as served:
+            port = served.port
+            await page.goto(served.url)
+            await until(page, LINK_IS, arg="live")
+            await page.evaluate(KEEP_PAGE)
+        async with serving(monkeypatch, SAMPLE, port=port):
+            await until(page, "window.wasAsked === true")
+            await until(page, LINK_IS, arg="live")
+            assert await page.evaluate("window.wasAsked")
+
+
+async def test_the_first_page_is_small(monkeypatch, chromium):
+    """It loads all that it uses, also the library for diagrams, before a drone is there."""
+    async with serving(monkeypatch, "monitor.pages.table") as served, phone(chromium) as page:
+        received = []
+        network = await page.context.new_cdp_session(page)
+        await network.send("Network.enable")
+        network.on("Network.loadingFinished", lambda event: received.append(event["encodedDataLength"]))
+        await page.goto(served.url)
+        await until(page, IS_DIAGRAM_LOADED)
+        assert 50_000 < sum(received) < 1_500_000
 
 
 async def test_a_lost_drone_is_shown_in_words(monkeypatch, chromium):

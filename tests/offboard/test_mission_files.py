@@ -225,6 +225,21 @@ def test_a_mission_cannot_extend_itself(tmp_path):
     assert "circle" in problems(tmp_path, "name: a\nextends: m.yaml\n")
 
 
+@pytest.mark.parametrize("name", ["../base.yaml", "{folder}/base.yaml", "link.yaml"])
+def test_a_mission_reads_no_file_outside_its_folder(tmp_path, name):
+    (tmp_path / "base.yaml").write_text(MINIMAL)
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    (inner / "link.yaml").symlink_to(tmp_path / "base.yaml")
+    path = inner / "mine.yaml"
+    path.write_text(f"name: mine\nextends: {name.format(folder=tmp_path)}\n")
+    with pytest.raises(MissionError, match="is in another folder"):
+        load_mission(path)
+    (inner / "base.yaml").write_text(MINIMAL)
+    path.write_text("name: mine\nextends: base.yaml\n")
+    assert load_mission(path).name == "mine"
+
+
 def test_a_template_used_twice_keeps_names_apart(tmp_path):
     text = dedent("""\
         initial: a

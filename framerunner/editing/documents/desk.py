@@ -95,18 +95,22 @@ class EditorDesk:
         Returns:
             The file's name. Raises `DeskError`.
         """
-        if not _NAME.fullmatch(name):
-            raise DeskError(f"'{name[:80]}': use small letters, digits and _, a letter first")
-        path = self.folder / f"{name}.yaml"
+        _check_name(name)
         if source == "empty":
             text = EMPTY_CHART.format(name=name)
         elif source == "example":
-            text = new_mission(name, self.folder, python=False).texts[path]
+            (text,) = new_mission(name, self.folder, python=False).texts.values()
         elif source in list_missions():
             text = (MISSIONS / f"{source}.yaml").read_text(encoding="utf-8")
             text = re.sub(rf"(?m)^name: {source}$", f"name: {name}", text, count=1)
         else:
             raise DeskError(f"unknown source '{source[:80]}'; use empty, example or a mission of the package")
+        return self.write(name, text)
+
+    def write(self, name: str, text: str) -> str:
+        """Make a mission file with a text; return its name. Raises `DeskError`."""
+        _check_name(name)
+        path = self.folder / f"{name}.yaml"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with path.open("x", encoding="utf-8", newline="") as file:
@@ -116,3 +120,8 @@ class EditorDesk:
         except OSError as error:
             raise DeskError(f"{path.name}: cannot be written ({error.strerror})") from None
         return path.name
+
+
+def _check_name(name: str) -> None:
+    if not _NAME.fullmatch(name):
+        raise DeskError(f"'{name[:80]}': use small letters, digits and _, a letter first")

@@ -6,10 +6,12 @@ import asyncio
 import json
 import logging
 from collections.abc import Callable, Sequence
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Body, HTTPException, Request
 from starlette.requests import HTTPConnection
+from starlette.responses import PlainTextResponse, Response
 from starlette.websockets import WebSocket
 
 from errors import UserError
@@ -31,11 +33,11 @@ from framerunner.editing.documents.messages import (
 )
 from framerunner.editing.documents.open_document import OpenDocument
 from monitor.access import refuse
-from offboard.authoring.edits import ReplaceText, parse_edit
-from offboard.authoring.text import Change
+from offboard.authoring import Change, Edit, export_scxml, import_scxml, mermaid_of, parse_edit
 from offboard.mission import MAX_FILE_BYTES, list_missions
 
 _Text = Annotated[str, Body(max_length=100)]
+_Scxml = Annotated[str, Body(max_length=1_000_000)]
 _JOURNAL_PERIOD_S = 2.0
 _BAD_MESSAGE_CODE = 4400  # as HTTP's
 _MAX_QUEUE = 200
@@ -65,21 +67,15 @@ class DocumentsDoor:
             if not may_act(request):
                 raise HTTPException(403, "only those who logged in may edit")
 
-        @router.get("/api/edit/files")
-        async def files(request: Request) -> dict[str, object]:
-            demand(request)
-            return {"files": await asyncio.to_thread(desk.files), "missions": list_missions()}
+        _add_files(router, desk, demand)
 
-        @router.post("/api/edit/files")
-        async def create(request: Request, name: _Text, source: _Text) -> dict[str, str]:
+        @router.get("/api/edit/export")
+        async def export(request: Request, file: str, kind: Literal["scxml", "mermaid"]) -> Response:
             demand(request)
-            try:
-                return {"file": await asyncio.to_thread(desk.create, name, source)}
-            except UserError as error:
-                raise HTTPException(400, str(error)) from None
+            return _export(desk, file, kind)
 
         @router.websocket("/ws/edit")
-        async def edit(websocket: WebSocket, file: str) -> None:
+        async def edit(websocket: WebSocket, file: str, language: str = "en") -> None:
             if not may_act(websocket):
                 await refuse(websocket, "only those who logged in may edit")
                 return
@@ -88,8 +84,9 @@ class DocumentsDoor:
             except UserError as error:
                 await refuse(websocket, str(error).partition("\n")[0])
                 return
+            shared.opened.speaks_spanish |= language == "es"
             await websocket.accept()
-            await _Connection(websocket, desk, file, shared).serve()
+            await _Window(websocket, desk, file, shared).serve()
 
         return router
 
@@ -103,8 +100,47 @@ class DocumentsDoor:
             self._desk.keep()
 
 
-class _Connection:
-    """One page's WebSocket."""
+def _add_files(router: APIRouter, desk: EditorDesk, demand: Callable[[Request], None]) -> None:
+    """Add the addresses of the folder's files; `demand` refuses those who may not edit."""
+
+    @router.get("/api/edit/files")
+    async def files(request: Request) -> dict[str, object]:
+        demand(request)
+        return {"files": await asyncio.to_thread(desk.files), "missions": list_missions()}
+
+    @router.post("/api/edit/files")
+    async def create(request: Request, name: _Text, source: _Text) -> dict[str, str]:
+        demand(request)
+        return {"file": await _made(lambda: desk.create(name, source))}
+
+    @router.post("/api/edit/import")
+    async def import_(request: Request, name: _Text, scxml: _Scxml) -> dict[str, str]:
+        demand(request)
+        return {"file": await _made(lambda: desk.write(name, import_scxml(scxml.encode(), name)))}
+
+
+async def _made(make: Callable[[], str]) -> str:
+    try:
+        return await asyncio.to_thread(make)
+    except UserError as error:
+        raise HTTPException(400, str(error)) from None
+
+
+def _export(desk: EditorDesk, file: str, kind: Literal["scxml", "mermaid"]) -> Response:
+    try:
+        chart = desk.open(file).opened.document.chart
+        desk.close(file)
+    except UserError as error:
+        raise HTTPException(400, str(error)) from None
+    if chart is None:
+        raise HTTPException(400, "the mission has mistakes; mend them, then export it")
+    text = export_scxml(chart) if kind == "scxml" else mermaid_of(chart)
+    name = f"{Path(file).stem}.{'scxml' if kind == 'scxml' else 'mmd'}"
+    return PlainTextResponse(text, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+
+
+class _Window:
+    """A page's WebSocket."""
 
     def __init__(self, websocket: WebSocket, desk: EditorDesk, file: str, shared: SharedDocument) -> None:
         self._websocket = websocket
@@ -173,7 +209,6 @@ class _Connection:
             return
         if changes:
             told = changed_message(opened, before, changes)
-            told["type"] = "changed"
             for viewer in self._shared.viewers:
                 if viewer != self._queue:
                     viewer(told)
@@ -218,13 +253,12 @@ def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[Change]:
     return changes
 
 
-def _replacement(opened: OpenDocument, typed: TypedChange) -> ReplaceText:
+def _replacement(opened: OpenDocument, typed: TypedChange) -> Edit:
     text, positions = opened.document.text, opened.document.positions
     last = typed.start + typed.removed
     if len(typed.inserted) > MAX_FILE_BYTES:
         raise PageMessageError("the mission would be larger than 1 MB; a mission is a page or two")
     if last > positions.to_utf16(len(text)):
         raise PageMessageError(f"typed text: {last} is after the end of the text; load the page again")
-    return ReplaceText(
-        start=positions.from_utf16(typed.start), end=positions.from_utf16(last), text=typed.inserted
-    )
+    start, end = positions.from_utf16(typed.start), positions.from_utf16(last)
+    return parse_edit({"kind": "replace_text", "start": start, "end": end, "text": typed.inserted})

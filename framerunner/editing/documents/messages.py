@@ -14,19 +14,26 @@ those before it, `status`, and `{"refused": reason}` in an answer.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from errors import UserError
 from framerunner.editing.documents.open_document import OpenDocument
-from offboard.authoring.catalogue import catalogue
-from offboard.authoring.diagram import Edge, Node, diagram
-from offboard.authoring.findings import Finding, check_document
-from offboard.authoring.layout import Box
-from offboard.authoring.outline import Span
-from offboard.authoring.text import Change, Positions
+from offboard.authoring import (
+    SPANISH,
+    Change,
+    Edge,
+    Finding,
+    Node,
+    Positions,
+    Span,
+    StateBox,
+    as_json,
+    catalogue,
+    check_document,
+    diagram,
+)
 
 _Number = Annotated[int, Field(ge=0, le=2**53)]
 
@@ -83,7 +90,7 @@ class LayoutMessage(_FromPage):
     """Where states are drawn."""
 
     type: Literal["layout"]
-    places: Annotated[dict[str, Box | None], Field(max_length=5000)]
+    places: Annotated[dict[str, StateBox | None], Field(max_length=5000)]
 
 
 PageMessage = EditMessage | TypeMessage | StepMessage | SaveMessage | LayoutMessage
@@ -102,7 +109,7 @@ def read_message(text: str | bytes) -> PageMessage:
 
 def document_message(opened: OpenDocument) -> dict[str, object]:
     """The whole document."""
-    return {"type": "document", "text": opened.document.text, **_state(opened)}
+    return {**_state(opened), "type": "document", "text": opened.document.text}
 
 
 def changed_message(opened: OpenDocument, before: str, changes: Sequence[Change]) -> dict[str, object]:
@@ -113,7 +120,7 @@ def changed_message(opened: OpenDocument, before: str, changes: Sequence[Change]
         removed = len(change.removed.encode("utf-16-le")) // 2
         written.append({"start": start, "removed": removed, "inserted": change.inserted})
         before = before[: change.start] + change.inserted + before[change.start + len(change.removed) :]
-    return {"type": "changed", "changes": written, **_state(opened)}
+    return {**_state(opened), "type": "changed", "changes": written}
 
 
 def status_message(opened: OpenDocument) -> dict[str, object]:
@@ -142,9 +149,10 @@ def _state(opened: OpenDocument) -> dict[str, object]:
         return [positions.to_utf16(each) if wide else each for each in (span.start, span.end)]
 
     drawn = diagram(document)
-    found = []
-    for each in check_document(document):
-        found.append({**_fields(each), "span": at(Span(each.start, each.end))})
+    found = [{**_fields(each), "span": at(Span(each.start, each.end))} for each in check_document(document)]
+    if opened.speaks_spanish:
+        for each, spanish in zip(found, check_document(document, texts=SPANISH), strict=True):
+            each["spanish"] = spanish.message
     nodes = [
         {**_fields(node), "span": at(node.span), "name_span": at(node.name_span)} for node in drawn.nodes
     ]
@@ -156,7 +164,6 @@ def _state(opened: OpenDocument) -> dict[str, object]:
     keys = ("name", "description", "class", "vision", "extends", "initial")
     return {
         **status_message(opened),
-        "type": "document",
         "name": opened.path.name,
         "revision": opened.revision,
         "restored": opened.restored,
@@ -174,4 +181,4 @@ def catalogue_message(opened: OpenDocument) -> dict[str, object]:
     """The names that the mission can use."""
     outline = opened.document.outline
     variables = dict.fromkeys(outline.variables, 0.0)
-    return asdict(catalogue(variables=variables, contest=outline.text("class") != "open"))
+    return as_json(catalogue(variables=variables, contest=outline.text("class") != "open"))

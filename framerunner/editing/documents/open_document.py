@@ -8,11 +8,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from errors import UserError
-from offboard.authoring.apply import EditSession
-from offboard.authoring.document import Document
-from offboard.authoring.edits import Edit, ReplaceText
-from offboard.authoring.layout import Box, Layout, LayoutError, follow, layout_path, read_layout, write_layout
-from offboard.authoring.text import Change
+from offboard.authoring import (
+    Change,
+    Document,
+    Edit,
+    EditSession,
+    Layout,
+    LayoutError,
+    ReplaceText,
+    StateBox,
+    layout_path,
+    read_layout,
+    write_layout,
+)
 
 _JOURNAL_SUFFIX = ".unsaved"
 
@@ -28,18 +36,18 @@ class OpenDocument:
     Attributes:
         path: of the file.
         session: the document with its edits.
-        layout: where its states are drawn.
         revision: counts the document's changes.
         restored: what a killed program had not saved was found and is shown.
+        speaks_spanish: a page wants findings in Spanish, too.
         problem: what else went wrong at opening, in one line; empty: nothing.
     """
 
     path: Path
     session: EditSession
-    layout: Layout
     revision: int = 0
     restored: bool = False
     problem: str = ""
+    speaks_spanish: bool = False
     _saved: bytes = b""
     _is_kept: bool = True  # the journal has the present text
     _typed_to: int = -1  # where the last edit ended, if it was typed letters
@@ -52,7 +60,7 @@ class OpenDocument:
             layout, problem = read_layout(path), ""
         except LayoutError as error:
             layout, problem = Layout(), str(error)
-        opened = cls(path, EditSession(document), layout, problem=problem, _saved=document.data)
+        opened = cls(path, EditSession(document, layout), problem=problem, _saved=document.data)
         opened._restore()
         return opened
 
@@ -63,13 +71,19 @@ class OpenDocument:
         except (OSError, UserError):
             return
         if kept != self._saved:
-            self.session.apply(ReplaceText(start=0, end=len(self.session.document.text), text=text))
+            end = len(self.session.document.text)
+            self.session.apply(ReplaceText(start=0, end=end, text=text))
             self.restored = True
 
     @property
     def document(self) -> Document:
         """As it is now."""
         return self.session.document
+
+    @property
+    def layout(self) -> Layout:
+        """Where its states are drawn."""
+        return self.session.layout
 
     @property
     def is_saved(self) -> bool:
@@ -86,13 +100,9 @@ class OpenDocument:
 
         Letters typed one after the other are undone together, a line at most.
         """
-        before = self.document
         typed = edit if isinstance(edit, ReplaceText) and _is_typed(edit) else None
         goes_on = typed is not None and typed.start == self._typed_to
-        changes = self.session.apply(edit, goes_on=goes_on)
-        if changes:
-            self.layout = follow(self.layout, before, edit, self.document)
-        self._changed(changes)
+        changes = self._changed(self.session.apply(edit, goes_on=goes_on))
         if typed is not None:
             self._typed_to = typed.start + len(typed.text)
         return changes
@@ -122,13 +132,13 @@ class OpenDocument:
             self._is_kept = False
         return changes
 
-    def place(self, places: dict[str, Box | None]) -> None:
+    def place(self, places: dict[str, StateBox | None]) -> None:
         """Keep where states are drawn, by their full ids; None forgets one. Raises `LayoutError`."""
         states = {**self.layout.states, **{name: box for name, box in places.items() if box is not None}}
         for name, box in places.items():
             if box is None:
                 states.pop(name, None)
-        self.layout = Layout(states=states, corners=self.layout.corners)
+        self.session.layout = Layout(states=states, corners=self.layout.corners)
         write_layout(self.path, self.layout)
 
     def keep(self) -> None:

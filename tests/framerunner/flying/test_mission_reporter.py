@@ -9,14 +9,15 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from framerunner.flying.mission_reporter import HISTORY, MissionReporter
+from framerunner.flying.mission_reporter import HISTORY, MAX_HISTORY_PIECES, MissionReporter
 from framerunner.flying.navigation_reporter import MAX_FRAMES, MAX_POINTS, navigation_json
 from offboard.app import Moment, fly_mission
 from offboard.drone import DroneState, VelocityCommand
-from offboard.engine import TransitionTaken
+from offboard.engine import MissionEngine, TransitionTaken
 from offboard.mission import load_mission, mermaid
 from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.view import NavigationView
+from offboard.pilot import Imu
 from scenarios.result import FlightResult
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone
 from vision.types import CameraFrame, Detection, Detections
@@ -319,3 +320,35 @@ async def test_a_whole_flight_is_reported_in_order():
     assert gaps.max() <= 100_000
     assert listener.states[-1].finished and not listener.states[-1].flying
     assert len(seen) / 2 <= len(listener.states) <= len(seen) / 2 + 2 * len(changes) + 10
+
+
+def test_a_history_of_long_guards_has_fewer_transitions_so_that_the_newest_arrives_at_once():
+    listener, reporter = make_reporter()
+    noise = np.random.default_rng(1).integers(33, 127, (12, 80))
+    for number, letters in enumerate(noise):
+        values = (("memory.text", "".join(map(chr, letters))),)
+        reporter.see(moment(number, transition=taken(number, values=values)))
+    last = listener.contents(DocumentKind.HISTORY)[-1]
+    assert last["transitions"][-1]["time_us"] == 550_000
+    assert 1 < len(last["transitions"]) < HISTORY
+    assert len(split_document(DocumentKind.HISTORY, last)[1]) <= MAX_HISTORY_PIECES
+
+
+async def test_what_the_guards_read_is_reported_twice_a_second_with_the_counts():
+    listener, reporter = make_reporter()
+    engine = MissionEngine(MISSION)
+    imu, time_us = Imu(-3.0, -3.0, 0.53, 1.0), 0
+    for tick in range(30):
+        time_us = 50_000 * tick
+        engine.tick(replace(imu, z=0.5 + 0.001 * tick), Detections(), time_us)
+        reporter.see(moment(tick, engine.state, transition=engine.transition))
+        await reporter.look(engine, DroneState(time_us, 0.0, 0.0, 0.0, 0.0))
+    told = listener.contents(DocumentKind.GUARDS)
+    assert [each["time_us"] for each in told] == [0, 500_000, 1_000_000]
+    last = told[-1]
+    assert last["counts"] == {"take_off.start/1": 1}
+    assert last["guards"] == [["take_off.set_base/1", False]]
+    assert last["values"] == [["distance_to_goal_m", 0.48, "m"]]
+    listener.sending = (DocumentKind.GUARDS,)
+    await reporter.look(engine, DroneState(9_000_000, 0.0, 0.0, 0.0, 0.0))
+    assert len(listener.contents(DocumentKind.GUARDS)) == 3

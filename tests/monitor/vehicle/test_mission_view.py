@@ -233,3 +233,32 @@ def test_a_result_without_a_verdict_is_refused(view):
         view.take(piece, 10.0)
     assert view.result is None
     assert view.problem == "result document: it has no verdict"
+
+
+def test_what_the_guards_read_is_told_until_another_mission_is_flown(view):
+    crc = view._document_crc
+    content = {
+        "mission_crc": crc,
+        "time_us": 1_500_000,
+        "counts": {"red.turning/1": 2},
+        "guards": [["red.turning/1", False], ["red.turning/2", None]],
+        "values": [["frame.d", 0.44, "m"], ["frame_seen", True, ""], ["memory.x", None, ""]],
+    }
+    _, pieces = documents(DocumentKind.GUARDS, content)
+    (told,) = [message for piece in pieces for message in view.take(piece, 10.0)]
+    assert told == {
+        "kind": "guards",
+        "id": 1,
+        "time_s": 1.5,
+        "counts": {"red.turning/1": 2},
+        "guards": [{"id": "red.turning/1", "holds": False}, {"id": "red.turning/2", "holds": None}],
+        "values": [
+            {"name": "frame.d", "value": 0.44, "unit": "m"},
+            {"name": "frame_seen", "value": True, "unit": ""},
+            {"name": "memory.x", "value": None, "unit": ""},
+        ],
+    }
+    assert told in view.standing()
+    (empty,) = view.take(state(crc + 1), 11.0)
+    assert (empty["kind"], empty["guards"], empty["counts"]) == ("guards", [], {})
+    assert all(message["kind"] != "guards" for message in view.standing())

@@ -45,7 +45,8 @@ export function line(from, to, lane) {
   const a = centre(from), b = centre(to);
   const length = Math.hypot(b.x - a.x, b.y - a.y) || 1;
   const side = { x: -(b.y - a.y) / length, y: (b.x - a.x) / length };
-  const middle = { x: (a.x + b.x) / 2 + side.x * lane * BEND, y: (a.y + b.y) / 2 + side.y * lane * BEND };
+  const out = border(from, b), into = border(to, a); // the middle between the boxes, however large they are
+  const middle = { x: (out.x + into.x) / 2 + side.x * lane * BEND, y: (out.y + into.y) / 2 + side.y * lane * BEND };
   const start = border(from, middle), end = border(to, middle);
   const bent = { x: 2 * middle.x - (start.x + end.x) / 2, y: 2 * middle.y - (start.y + end.y) / 2 };
   return {

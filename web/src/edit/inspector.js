@@ -1,5 +1,6 @@
 /** The form of what is selected: the mission, a state or a transition. Everything in it becomes an edit of the text. */
 import { make } from "../lib/dom.js";
+import { bounds } from "./names.js";
 import { button, choice, lineList, textField, tickBox } from "./fields.js";
 import { word } from "./words.js";
 
@@ -67,7 +68,6 @@ export class Inspector {
   #suggestions() {
     const { values, primitives } = this.#session.catalogue;
     const option = (value, text) => make("option", { value, label: text });
-    const bounds = ({ low, high, unit }) => [low !== null && high !== null ? `${low} … ${high}` : "", unit].filter(Boolean).join(" ");
     return make("div", { hidden: true },
       make("datalist", { id: ACTIONS },
         ...primitives.map(({ name, text }) => option(name, text)),

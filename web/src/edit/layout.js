@@ -5,17 +5,23 @@ import dagre from "@dagrejs/dagre";
  * @typedef {import("./session.js").Diagram} Diagram
  * @typedef {import("./session.js").Point} Point
  * @typedef {{x: number, y: number, width: number, height: number}} Box in the drawing's units, from its upper left
+ * @typedef {{from: string, to: string, width: number}} Join a transition between two states of a level, with its label's width
  */
 
 const LETTER = 7.2; // mean width of a letter
 const LEAF = { width: 110, height: 44 };
 const HEADER = 30; // of a superstate, with its name
 const PADDING = 18;
-const GAP = { nodesep: 36, ranksep: 56, edgesep: 16 };
+const LABEL = { letter: 6, height: 16, longest: 34, words: 84 };
+const GAP = { nodesep: 36, ranksep: 34, edgesep: 16 };
+const ROW_GAP = 56;
 const MOST_FOR_DAGRE = 80; // states and transitions of a level: it takes long if there are many
 const MOST_KEPT = 100;
 /** @type {Map<string, Map<string, Point>>} automatic places that were found before: most edits leave them as they are */
 const arranged = new Map();
+
+/** The room for a transition's label. @param {string} event @param {string} when */
+const labelWidth = (event, when) => (event === "tick" ? (Math.min(when.length, LABEL.longest) + 3) * LABEL.letter : LABEL.words);
 
 /** The width of a state's name. @param {string} text */
 const textWidth = (text) => Math.max(LEAF.width, Math.ceil(text.length * LETTER) + 34);
@@ -43,18 +49,19 @@ export function layOut(diagram, kept) {
     for (let at = path; at; at = parents.get(at)) found.unshift(at);
     return found;
   };
-  /** @type {Map<string, [string, string][]>} the transitions of each level, between its states */
+  /** @type {Map<string, Join[]>} the transitions of each level, between its states */
   const levels = new Map();
-  for (const { source, target } of diagram.edges) {
+  for (const { source, target, event, when } of diagram.edges) {
     if (source === target) continue;
     const from = chain(source), into = chain(target);
     let depth = 0;
     while (depth < from.length - 1 && depth < into.length - 1 && from[depth] === into[depth]) depth += 1;
     if (from[depth] === into[depth]) continue;
     const level = depth === 0 ? "" : from[depth - 1];
-    const pairs = levels.get(level);
-    if (pairs) pairs.push([from[depth], into[depth]]);
-    else levels.set(level, [[from[depth], into[depth]]]);
+    const join = { from: from[depth], to: into[depth], width: labelWidth(event, when) };
+    const joins = levels.get(level);
+    if (joins) joins.push(join);
+    else levels.set(level, [join]);
   }
   /** @type {Map<string, Box>} */
   const boxes = new Map();
@@ -85,16 +92,16 @@ export function layOut(diagram, kept) {
 /**
  * Place the states of one level.
  * @param {string[]} paths
- * @param {[string, string][]} pairs transitions
+ * @param {Join[]} joins
  * @param {Map<string, Box>} boxes with the states' sizes; their places are set
  * @param {Object<string, Point>} kept
  * @returns {{width: number, height: number}} what they need
  */
-function arrange(paths, pairs, boxes, kept) {
+function arrange(paths, joins, boxes, kept) {
   const isPlaced = (path) => kept[path] !== undefined;
   if (!paths.every(isPlaced)) {
-    const key = JSON.stringify([paths.map((path) => [path, boxes.get(path).width, boxes.get(path).height]), pairs]);
-    const found = arranged.get(key) ?? (paths.length + pairs.length > MOST_FOR_DAGRE ? inRows : byDagre)(paths, pairs, boxes);
+    const key = JSON.stringify([paths.map((path) => [path, boxes.get(path).width, boxes.get(path).height]), joins]);
+    const found = arranged.get(key) ?? (paths.length + joins.length > MOST_FOR_DAGRE ? inRows : byDagre)(paths, joins, boxes);
     arranged.delete(key); // what is used last is kept longest
     arranged.set(key, found);
     if (arranged.size > MOST_KEPT) arranged.delete(arranged.keys().next().value ?? "");
@@ -113,18 +120,18 @@ function arrange(paths, pairs, boxes, kept) {
 /**
  * Automatic places of the states of one level, by dagre.
  * @param {string[]} paths
- * @param {[string, string][]} pairs
+ * @param {Join[]} joins
  * @param {Map<string, Box>} boxes
  * @returns {Map<string, Point>}
  */
-function byDagre(paths, pairs, boxes) {
+function byDagre(paths, joins, boxes) {
   const graph = new dagre.graphlib.Graph();
   // Superstates follow each other to the right, so that a wide page is used.
   const hasSuper = paths.some((path) => boxes.get(path).height > LEAF.height);
   graph.setGraph({ rankdir: hasSuper ? "LR" : "TB", ranker: "network-simplex", ...GAP });
   graph.setDefaultEdgeLabel(() => ({}));
   for (const path of paths) graph.setNode(path, { ...boxes.get(path) });
-  for (const [from, to] of pairs) graph.setEdge(from, to);
+  for (const { from, to, width } of joins) graph.setEdge(from, to, { width, height: LABEL.height, labelpos: "c" });
   dagre.layout(graph);
   return new Map(paths.map((path) => {
     const { x, y, width, height } = graph.node(path);
@@ -135,14 +142,14 @@ function byDagre(paths, pairs, boxes) {
 /**
  * Automatic places of many states, in linear time: rows by distance from the first state, from above.
  * @param {string[]} paths
- * @param {[string, string][]} pairs
+ * @param {Join[]} joins
  * @param {Map<string, Box>} boxes
  * @returns {Map<string, Point>}
  */
-function inRows(paths, pairs, boxes) {
+function inRows(paths, joins, boxes) {
   /** @type {Map<string, string[]>} */
   const next = new Map(paths.map((path) => [path, []]));
-  for (const [from, to] of pairs) next.get(from)?.push(to);
+  for (const { from, to } of joins) next.get(from)?.push(to);
   const order = [], seen = new Set();
   for (const start of paths) { // those that the first one does not reach follow
     const queue = seen.has(start) ? [] : [start];
@@ -165,7 +172,7 @@ function inRows(paths, pairs, boxes) {
       x += box.width + GAP.nodesep;
       height = Math.max(height, box.height);
     }
-    y += height + GAP.ranksep;
+    y += height + ROW_GAP;
   }
   return places;
 }

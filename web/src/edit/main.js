@@ -10,7 +10,12 @@ import { RunPanel } from "./run_panel.js";
 import { EditSession } from "./session.js";
 import { Tabs } from "./tabs.js";
 import { TextView } from "./text_view.js";
-import { language, setLanguage, word } from "./words.js";
+import { changeLanguage, language } from "../lib/language.js";
+import { savePicture } from "./picture.js";
+import { showNames } from "./names.js";
+import { watchFlights } from "./live_light.js";
+import { LessonPanel } from "./lesson_panel.js";
+import { word } from "./words.js";
 
 /** @typedef {import("./diagram_view.js").Selection} Selection */
 
@@ -51,13 +56,34 @@ async function chooseFile() {
       if (made.ok) location.href = `/edit?file=${encodeURIComponent(created)}`;
       problem.hidden = made.ok;
       problem.textContent = typeof detail === "string" ? detail : made.statusText;
+    }),
+    importField(async (text, wanted) => {
+      const made = await fetch("/api/edit/import", {
+        method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ name: wanted, scxml: text }),
+      });
+      const { file: created, detail } = await made.json();
+      if (made.ok) location.href = `/edit?file=${encodeURIComponent(created)}`;
+      problem.hidden = made.ok;
+      problem.textContent = typeof detail === "string" ? detail : made.statusText;
     })));
+}
+
+/** A field for an SCXML file. @param {(text: string, name: string) => void} chosen */
+function importField(chosen) {
+  const input = /** @type {HTMLInputElement} */ (make("input", { type: "file", accept: ".scxml,.xml" }));
+  input.addEventListener("change", async () => {
+    const [picked] = input.files ?? [];
+    const name = picked?.name.replace(/\.[^.]*$/, "").toLowerCase().replace(/[^a-z0-9]+/g, "_").replace(/^[^a-z]+/, "");
+    if (picked) chosen(await picked.text(), name || "imported");
+  });
+  return make("label", { class: "e-field" }, make("span", {}, word("import_scxml")), input);
 }
 
 /** @param {string} name of the file */
 function edit(name) {
   /** @type {Selection} */
   let selection = { kind: "mission", id: "" };
+  const stem = name.replace(/\.ya?ml$/, "");
   const line = make("p", { class: "e-message", role: "status", hidden: true });
   const state = make("span", { class: "e-saved", role: "status" });
   const drawing = make("section", { class: "e-drawing", "aria-label": word("diagram") });
@@ -65,7 +91,13 @@ function edit(name) {
   const form = make("section", { class: "e-form panel", "aria-label": word("state") });
   const findings = make("div");
   const flying = make("div");
-  const tabs = new Tabs([["findings", word("checker"), findings], ["fly", word("fly"), flying]]);
+  const lesson = new URLSearchParams(location.search).get("lesson");
+  const teaching = make("div");
+  const names = make("div", { class: "e-names" });
+  const tabs = new Tabs([
+    ...(lesson ? [/** @type {[string, string, HTMLElement]} */ (["lesson", word("lesson"), teaching])] : []),
+    ["findings", word("checker"), findings], ["fly", word("fly"), flying], ["names", word("names"), names],
+  ]);
   const undo = button(word("undo"), () => session.undo(), { "aria-keyshortcuts": "Control+Z" });
   const redo = button(word("redo"), () => session.redo(), { "aria-keyshortcuts": "Control+Y" });
   const save = button(word("save"), store, { class: "e-first", "aria-keyshortcuts": "Control+S" });
@@ -76,13 +108,13 @@ function edit(name) {
     button(word("new_template"), () => inspector.addTemplate()),
     button(word("fit"), () => diagram.fit()),
     button(word("arrange"), arrange),
-    button(word("language"), () => {
-      setLanguage(language() === "en" ? "es" : "en");
-      location.reload();
-    }));
+    make("details", { class: "e-export" }, make("summary", {}, word("export")),
+      button("PNG", () => savePicture(drawing, stem, "png")), button("SVG", () => savePicture(drawing, stem, "svg")),
+      ...["mermaid", "scxml"].map((kind) => make("a", { href: `/api/edit/export?kind=${kind}&file=${encodeURIComponent(name)}`, download: true }, kind === "scxml" ? "SCXML" : "Mermaid"))),
+    button(word("language"), changeLanguage));
   root.replaceChildren(tools, line, make("div", { class: "e-panes" }, drawing, form, writing, tabs.root));
 
-  const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}`, {
+  const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}&language=${language()}`, {
     changed(changes, all) {
       if (all !== null) text.setText(all);
       else text.change(changes);
@@ -121,21 +153,39 @@ function edit(name) {
   }, { done: word("done"), resume: word("resume") });
   const inspector = new Inspector(form, session, (chosen) => select(chosen, true));
 
-  new RunPanel(flying, {
+  /** @param {string[]} active @param {Object<string, number>} counts @param {string[]} taken ids as flights have them */
+  function light(active, counts, taken) {
+    const ids = new Map(session.diagram.edges.map((edge) => [flownId(edge), edge.id]));
+    diagram.light(
+      new Set(active),
+      new Map(Object.entries(counts).map(([id, count]) => [ids.get(id) ?? "", count])),
+      new Set(taken.map((id) => ids.get(id) ?? "")));
+  }
+
+  const runs = new RunPanel(flying, {
     async text() {
       await session.flush();
       return text.text;
     },
-    lit(active, counts, taken) {
-      const ids = new Map(session.diagram.edges.map((edge) => [flownId(edge), edge.id]));
-      diagram.light(
-        new Set(active),
-        new Map(Object.entries(counts).map(([id, count]) => [ids.get(id) ?? "", count])),
-        new Set(taken.map((id) => ids.get(id) ?? "")));
-    },
+    lit: light,
     lost: (id) => select({ kind: "state", id }, true),
     selected: () => (selection.kind === "state" ? selection.id : ""),
   });
+
+  watchFlights(() => session.mission.name ?? "", (active, counts) => light(active, counts, []));
+  if (lesson) {
+    new LessonPanel(teaching, lesson, {
+      async text() {
+        await session.flush();
+        return text.text;
+      },
+      scenario: (name) => runs.choose(name),
+      flown(flight) {
+        runs.showFlight(flight);
+        if (flight.lost_in) select({ kind: "state", id: flight.lost_in }, true);
+      },
+    });
+  }
 
   function innermost(nodes) {
     return nodes.reduce((best, each) => (each.span[0] >= best.span[0] && each.span[1] <= best.span[1] ? each : best));
@@ -167,6 +217,7 @@ function edit(name) {
     text.setFindings(session.findings);
     inspector.show(selection);
     showFindings();
+    showNames(names, session.catalogue);
     root.classList.toggle("e-unreadable", !session.isReadable);
     if (!session.isReadable) tell(word("unreadable"));
     else if (line.textContent === word("unreadable")) tell("");

@@ -53,7 +53,8 @@ export class RunPanel {
     this.#pause = button(word("pause"), () => this.#togglePause());
     const drawing = make("div", { class: "e-top-view" });
     this.#view = new TopView(drawing);
-    root.append(
+    root.classList.add("e-fly");
+    root.append(drawing, make("div", {},
       this.#choices,
       make("div", { class: "e-row" },
         button(word("fly_once"), () => this.#start(false), { class: "e-first" }),
@@ -63,7 +64,7 @@ export class RunPanel {
         button(word("take_changes"), () => this.#change()),
         button(word("stop"), () => this.#order({ do: "stop" })),
         button(word("fly_many", { count: String(BATCH) }), () => this.#startBatch())),
-      this.#line, this.#strip, make("div", { class: "e-run-columns" }, drawing, make("div", {}, this.#guards, this.#values)), this.#table);
+      this.#line, this.#strip, make("div", { class: "e-run-columns" }, this.#guards, this.#values), this.#table));
     this.#flights = new Flights({ heard: (message) => this.#hear(message), lost: () => this.#forget() });
     this.#loadChoices();
   }
@@ -81,6 +82,19 @@ export class RunPanel {
         if (this.#run) this.#order({ do: "speed", speed: value ? Number(value) : null });
       }),
       choice(word("level"), words(levels), this.#level, (value) => { this.#level = value; }));
+  }
+
+  /** Fly in a scenario from now on. @param {string} scenario */
+  choose(scenario) {
+    this.#scenario = scenario;
+    this.#loadChoices();
+  }
+
+  /** Show a flight that is over. @param {Flight} flight */
+  showFlight(flight) {
+    this.#view.show(flight.layout, flight.track);
+    this.#listener.lit([], flight.counts, []);
+    setText(this.#line, flight.reason);
   }
 
   async #start(paused) {
@@ -193,10 +207,8 @@ export class RunPanel {
     const head = make("tr", {}, ...["scenario", "verdict", "lost_in", "seconds"].map((key) => make("th", {}, word(/** @type {any} */ (key)))));
     this.#table.replaceChildren(head, ...this.#rows.map((each) => {
       const show = button(each.scenario, () => {
-        this.#view.show(each.layout, each.track);
-        this.#listener.lit([], each.counts, []);
+        this.showFlight(each);
         if (each.lost_in) this.#listener.lost(each.lost_in);
-        setText(this.#line, each.reason);
       }, { class: "e-link" });
       return make("tr", { "data-completed": String(each.completed) },
         make("td", {}, show), make("td", {}, each.verdict), make("td", {}, each.lost_in), make("td", {}, number(each.total_time_s, 1)));

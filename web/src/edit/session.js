@@ -1,4 +1,5 @@
 /** The connection to the document that is edited; the server applies all edits, this page shows what comes back. */
+import { language } from "../lib/language.js";
 import { ReconnectingSocket } from "../lib/reconnecting_socket.js";
 
 const TYPING_PAUSE_MS = 80; // after which typed text is sent
@@ -6,7 +7,7 @@ const TYPING_PAUSE_MS = 80; // after which typed text is sent
 /**
  * @typedef {{start: number, removed: number, inserted: string}} TextChange offsets in UTF-16 code units
  * @typedef {[number, number]|null} Span offsets of the first character and of the one after the last
- * @typedef {{severity: "error"|"warning"|"advice", code: string, message: string, line: number, span: Span,
+ * @typedef {{severity: "error"|"warning"|"advice", code: string, message: string, spanish?: string, line: number, span: Span,
  *   state: string, event: string|null, index: number|null, nodes: string[]}} Finding
  * @typedef {{id: string, name: string, parent: string, initial: string, final: boolean, finish: boolean, enter: string[],
  *   during: string[], exit: string[], parameters: [string, string][], template: string, source: string, span: Span}} StateNode
@@ -163,6 +164,7 @@ export class EditSession {
     if (message.type === "document" || message.type === "changed") {
       this.revision = message.revision;
       for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) this[key] = message[key];
+      if (language() === "es") for (const finding of this.findings) finding.message = finding.spanish ?? finding.message;
       this.catalogue = message.catalogue ?? this.catalogue;
       // While the text cannot be read, the last diagram stays.
       if (message.diagram.readable) this.diagram = message.diagram;

@@ -42,7 +42,14 @@ export class TextView {
         this.#writable.of([]),
         basicSetup,
         yaml(),
-        EditorView.theme({ "&": { height: "100%", fontSize: "13px" }, ".cm-scroller": { overflow: "auto" } }),
+        EditorView.theme({
+          "&": { height: "100%", fontSize: "13px" }, ".cm-scroller": { overflow: "auto" },
+          // Instead of CodeMirror's pictures in data URLs, which the page's policy refuses.
+          ".cm-lintRange": { backgroundImage: "none", textDecoration: "underline wavy #888" },
+          ".cm-lintRange-error": { backgroundImage: "none", textDecoration: "underline wavy #b3171b" },
+          ".cm-lintRange-warning": { backgroundImage: "none", textDecoration: "underline wavy #8f5a00" },
+          ".cm-lintRange-info": { backgroundImage: "none" }, ".cm-lintRange-active": { backgroundColor: "#fff3c4" },
+        }),
         EditorView.contentAttributes.of({ "aria-label": "mission, YAML" }),
         EditorView.updateListener.of((update) => {
           if (update.docChanged && !update.transactions.some((each) => each.annotation(remote))) {

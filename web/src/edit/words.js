@@ -1,4 +1,5 @@
 /** The editor's texts in English and Spanish. */
+import { translator } from "../lib/language.js";
 
 const WORDS = {
   en: {
@@ -17,6 +18,8 @@ const WORDS = {
     foreign_note: "Written in the mission that this one extends; it can be changed there.", create: "Create", from: "Start from",
     empty: "an empty chart", example: "an example with comments", a_copy: "a copy of {name}", open: "Open a mission", no_files: "There are no missions in this folder yet.",
     overwrite: "Another program has changed the file. Save anyway?", text: "Text", diagram: "Diagram", add_transition: "Add a transition", new_name: "name",
+    export: "Export", import_scxml: "or import an SCXML file", search: "Search",
+    lesson: "Lesson", check_lesson: "Check the lesson", checking: "flying …", passed: "Passed!", not_yet: "Not yet", next_lesson: "To the lessons", hints: "Hints",
     templates: "Templates", template_name: "Name of the template", use_template: "New state that uses {name}",
     fly: "Fly", fly_once: "Fly", fly_paused: "Fly step by step", fly_many: "Fly {count} layouts", pause: "Pause", go_on: "Go on", step: "Step", stop: "Stop",
     break_here: "Stop at the selected state", take_changes: "Take changes", not_flying: "nothing is flying", time_line: "time line of states",
@@ -40,6 +43,8 @@ const WORDS = {
     foreign_note: "Escrito en la misión que esta amplía; se puede cambiar allí.", create: "Crear", from: "Empezar con",
     empty: "un diagrama vacío", example: "un ejemplo con comentarios", a_copy: "una copia de {name}", open: "Abrir una misión", no_files: "Aún no hay misiones en esta carpeta.",
     overwrite: "Otro programa ha cambiado el archivo. ¿Guardar de todos modos?", text: "Texto", diagram: "Diagrama", add_transition: "Añadir una transición", new_name: "nombre",
+    export: "Exportar", import_scxml: "o importar un archivo SCXML", search: "Buscar",
+    lesson: "Lección", check_lesson: "Comprobar la lección", checking: "volando …", passed: "¡Conseguido!", not_yet: "Aún no", next_lesson: "A las lecciones", hints: "Pistas",
     templates: "Plantillas", template_name: "Nombre de la plantilla", use_template: "Estado nuevo que usa {name}",
     fly: "Volar", fly_once: "Volar", fly_paused: "Volar paso a paso", fly_many: "Volar {count} disposiciones", pause: "Pausa", go_on: "Seguir", step: "Un paso", stop: "Parar",
     break_here: "Parar en el estado elegido", take_changes: "Usar los cambios", not_flying: "no vuela nada", time_line: "línea de tiempo de los estados",
@@ -48,21 +53,6 @@ const WORDS = {
     paused_in: "en pausa: {where}", verdict: "veredicto", lost_in: "perdido en", seconds: "segundos", flown_many: "{completed} de {flown} aterrizaron a tiempo",
   },
 };
-const KEPT = "framerunner-language";
 
-/** @returns {"en"|"es"} the language that was chosen last, or the browser's */
-export function language() {
-  const kept = localStorage.getItem(KEPT);
-  if (kept === "en" || kept === "es") return kept;
-  return navigator.language.startsWith("es") ? "es" : "en";
-}
-
-/** @param {"en"|"es"} chosen */
-export function setLanguage(chosen) {
-  localStorage.setItem(KEPT, chosen);
-}
-
-/** A text. @param {keyof typeof WORDS.en} key @param {Object<string, string>} [values] @returns {string} */
-export function word(key, values = {}) {
-  return WORDS[language()][key].replace(/\{(\w+)\}/g, (_, name) => values[name] ?? "");
-}
+/** A text of the editor. */
+export const word = translator(WORDS);

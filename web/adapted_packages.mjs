@@ -1,9 +1,12 @@
 /**
- * Makes Mermaid fit for a page whose Content-Security-Policy allows no inline styles, and leaves out what the pages
- * do not draw. A changed package in which a text below is not found stops the build.
+ * What is changed in packages when they are bundled. A new version in which a text below is not found stops the build.
  *
- * `mermaid.render` then returns its drawing as an element instead of text, because styles in a text are refused when
- * it is parsed, and adopts the drawing's style sheet, which it returns as `styles`.
+ * Mermaid is made fit for a page whose Content-Security-Policy allows no inline styles: `mermaid.render` returns its
+ * drawing as an element instead of text, because styles in a text are refused when it is parsed, and adopts the
+ * drawing's style sheet, which it returns as `styles`. Diagrams that the pages do not draw are left out.
+ *
+ * uPlot draws by the processor, as its small canvases change some five times a second: a browser without a graphics
+ * card would emulate one for each of them.
  */
 import { readFile } from "node:fs/promises";
 
@@ -31,6 +34,9 @@ const CHANGES = {
     ],
     ["svg: svgCode,", "svg: svgCode, styles,"],
   ],
+  "uPlot.esm.js": [
+    ['can.getContext("2d")', 'can.getContext("2d", { willReadFrequently: true })'],
+  ],
 };
 
 function changed(path, text) {
@@ -44,15 +50,15 @@ function changed(path, text) {
 }
 
 /** @returns {import("esbuild").Plugin} */
-export function strictMermaid() {
+export function adaptedPackages() {
   return {
-    name: "strict-mermaid",
+    name: "adapted-packages",
     setup(build) {
       build.onResolve({ filter: /^katex$/ }, () => LEFT_OUT);
       build.onResolve({ filter: DIAGRAM }, ({ kind, path }) =>
         kind === "dynamic-import" && !DRAWN.test(path) ? LEFT_OUT : undefined);
       build.onLoad({ filter: /.*/, namespace: "left-out" }, () => ({ contents: EMPTY }));
-      build.onLoad({ filter: /\/node_modules\/(mermaid|d3-selection)\/.*\.mjs$/ }, async ({ path }) => (
+      build.onLoad({ filter: /\/node_modules\/(mermaid|d3-selection|uplot)\/.*\.m?js$/ }, async ({ path }) => (
         { contents: changed(path, await readFile(path, "utf8")), loader: "js" }
       ));
     },

@@ -1,0 +1,104 @@
+/** The course: the lessons with a pupil's progress, and for teachers the table of the class. */
+import "./course.css";
+import { askCourse, inLanguage, learner, loadLessons, setLearner } from "../lib/course.js";
+import { make, number, setText } from "../lib/dom.js";
+import { changeLanguage, language, translator } from "../lib/language.js";
+import { pageData, pageRoot } from "../lib/page_data.js";
+
+const word = translator({
+  en: {
+    course: "Course", name: "Your name", language: "Español", start: "Begin", again: "Go on", done: "passed", minutes: "about {minutes} minutes",
+    need_name: "Write your name first.", class: "The class", pupil: "Pupil", flights: "{flights} flights", after: "passed after {minutes} min, {flights} flights",
+    log_in: "Log in to take part.", nobody: "Nobody has begun yet.",
+  },
+  es: {
+    course: "Curso", name: "Tu nombre", language: "English", start: "Empezar", again: "Seguir", done: "conseguida", minutes: "unos {minutes} minutos",
+    need_name: "Escribe antes tu nombre.", class: "La clase", pupil: "Alumno", flights: "{flights} vuelos", after: "conseguida tras {minutes} min, {flights} vuelos",
+    log_in: "Inicia sesión para participar.", nobody: "Nadie ha empezado aún.",
+  },
+});
+const REFRESH_MS = 5000;
+
+const root = pageRoot("course");
+const { mayAct } = pageData();
+document.documentElement.lang = language();
+
+const input = /** @type {HTMLInputElement} */ (make("input", { id: "learner", type: "text", maxlength: "40", autocomplete: "name" }));
+input.value = learner();
+input.addEventListener("input", () => {
+  setLearner(input.value.trim());
+  showProgress();
+});
+const other = make("button", { type: "button" }, word("language"));
+other.addEventListener("click", changeLanguage);
+const problem = make("p", { class: "problem", role: "alert", hidden: true });
+const list = make("ol", { class: "c-lessons" });
+const table = make("table", { class: "c-class" });
+root.append(
+  make("div", { class: "c-head" }, make("h1", {}, word("course")), other),
+  ...(mayAct ? [make("label", { class: "c-name", for: "learner" }, word("name"), input)] : [make("p", { class: "hint" }, word("log_in"))]),
+  problem, list,
+  ...(mayAct ? [make("h2", {}, word("class")), table] : []));
+
+/** @type {import("../lib/course.js").Lesson[]} */
+let lessons = [];
+/** @type {{name: string, lessons: Object<string, {flights: number, passed_after_s: number|null, last_reason: string}>}[]} */
+let learners = [];
+
+function tell(text) {
+  setText(problem, text);
+  problem.hidden = text === "";
+}
+
+async function open(lesson) {
+  if (!learner()) {
+    tell(word("need_name"));
+    input.focus();
+    return;
+  }
+  const told = await askCourse("open", { learner: learner(), lesson: lesson.name });
+  if (told.detail) tell(told.detail);
+  else location.href = `/edit?file=${encodeURIComponent(told.file)}&lesson=${encodeURIComponent(lesson.name)}`;
+}
+
+function showProgress() {
+  const own = learners.find(({ name }) => name === learner())?.lessons ?? {};
+  list.replaceChildren(...lessons.map((lesson) => {
+    const done = own[lesson.name];
+    const isPassed = done !== undefined && done.passed_after_s !== null;
+    const begin = make("button", { type: "button", disabled: !mayAct }, word(done ? "again" : "start"));
+    begin.addEventListener("click", () => open(lesson));
+    return make("li", { "data-passed": String(isPassed) },
+      make("strong", {}, inLanguage(lesson.title)), ` (${word("minutes", { minutes: String(lesson.minutes) })}) `,
+      isPassed ? make("span", { class: "c-done" }, `✓ ${word("done")}`) : null,
+      make("p", {}, inLanguage(lesson.goal)), begin);
+  }));
+}
+
+function showClass() {
+  const head = make("tr", {}, make("th", {}, word("pupil")), ...lessons.map(({ number: each, title }) => make("th", {}, `${each}. ${inLanguage(title)}`)));
+  const cell = (done) => {
+    if (!done) return make("td", {}, "");
+    const { flights, passed_after_s, last_reason } = done;
+    const text = passed_after_s === null ? word("flights", { flights: String(flights) })
+      : `✓ ${word("after", { minutes: number(passed_after_s / 60, 1), flights: String(flights) })}`;
+    return make("td", { title: last_reason, "data-passed": String(passed_after_s !== null) }, text);
+  };
+  const rows = learners.map((each) => make("tr", {}, make("th", { scope: "row" }, each.name), ...lessons.map(({ name }) => cell(each.lessons[name]))));
+  table.replaceChildren(head, ...(rows.length > 0 ? rows : [make("tr", {}, make("td", { colspan: "6", class: "hint" }, word("nobody")))]));
+}
+
+async function refresh() {
+  if (mayAct) {
+    const answer = await fetch("/api/course/class");
+    if (answer.ok) learners = (await answer.json()).learners;
+    showClass();
+  }
+  if (document.activeElement?.closest(".c-lessons") === null || list.childElementCount === 0) showProgress();
+}
+
+loadLessons().then((loaded) => {
+  lessons = loaded;
+  refresh();
+});
+setInterval(refresh, REFRESH_MS);
