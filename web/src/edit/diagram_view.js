@@ -13,6 +13,7 @@ import { layOut, placeWithin } from "./layout.js";
 const SVG = "http://www.w3.org/2000/svg";
 const LONGEST_LABEL = 34;
 const CLICK_PX = 4;
+const HANDLE = 6; // radius, in the drawing's units
 const ZOOM = { least: 0.15, most: 3, step: 1.0015 };
 
 /** @param {string} tag @param {Object<string, string|number>} [attributes] @returns {any} */
@@ -30,6 +31,7 @@ export class DiagramView {
   #words;
   #svg;
   #world;
+  #superstates;
   #lines;
   #states;
   #labels;
@@ -68,11 +70,12 @@ export class DiagramView {
     const arrow = svg("marker", {
       id: "e-arrow", viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 8, markerHeight: 8, orient: "auto-start-reverse",
     }, svg("path", { d: "M0,0L10,5L0,10z", class: "e-arrow" }));
-    this.#states = svg("g");
+    this.#superstates = svg("g");
+    this.#states = svg("g"); // in front of the lines, which would keep the mouse from a state that they pass
     this.#lines = svg("g");
     this.#labels = svg("g");
     this.#draft = svg("path", { class: "e-draft", visibility: "hidden" });
-    this.#world = svg("g", {}, this.#states, this.#lines, this.#labels, this.#draft);
+    this.#world = svg("g", {}, this.#superstates, this.#lines, this.#states, this.#labels, this.#draft);
     this.#svg = svg("svg", { class: "e-diagram", role: "group", "aria-label": "diagram" }, svg("defs", {}, arrow), this.#world);
     parent.append(this.#svg);
     this.#svg.addEventListener("pointerdown", (event) => this.#press(event));
@@ -104,7 +107,10 @@ export class DiagramView {
     this.#index();
     this.#stateElements.clear();
     this.#transitionElements.clear();
-    this.#states.replaceChildren(...diagram.nodes.map((state) => this.#state(state)));
+    const plain = [], around = [];
+    for (const state of diagram.nodes) (this.#children.has(state.id) ? around : plain).push(this.#state(state));
+    this.#superstates.replaceChildren(...around);
+    this.#states.replaceChildren(...plain);
     this.#makeTransitions();
     for (const id of this.#transitionElements.keys()) this.#drawLine(id);
     this.#mark(findings);
@@ -143,7 +149,7 @@ export class DiagramView {
     if (initial === id) group.append(svg("circle", { cx: 0, cy: isSuper ? 15 : box.height / 2, r: 5, class: "e-initial" }));
     if (final) group.append(svg("rect", { x: 3, y: 3, width: box.width - 6, height: box.height - 6, rx: 6, class: "e-inner" }));
     group.append(svg("circle", {
-      cx: box.width, cy: isSuper ? 15 : box.height / 2, r: 6, class: "e-handle", "data-handle": id,
+      cx: box.width, cy: this.#handleHeight(id), r: HANDLE, class: "e-handle",
     }, svg("title", {}, "drag to another state: a new transition")));
     this.#stateElements.set(id, group);
     this.#place(id);
@@ -290,6 +296,19 @@ export class DiagramView {
     return found;
   }
 
+  /** The state whose handle is at a point, also below a line. @param {Point} point */
+  #handleAt({ x, y }) {
+    for (const [path, box] of this.#boxes) {
+      if (Math.hypot(x - box.x - box.width, y - box.y - this.#handleHeight(path)) <= HANDLE) return path;
+    }
+    return null;
+  }
+
+  /** @param {string} path */
+  #handleHeight(path) {
+    return this.#children.has(path) ? 15 : this.#boxes.get(path).height / 2;
+  }
+
   /** @param {string} path @returns {string[]} it and all states in it */
   #family(path) {
     return [path, ...(this.#children.get(path) ?? []).flatMap((child) => this.#family(child))];
@@ -305,8 +324,8 @@ export class DiagramView {
   #press(event) {
     if (event.button !== 0) return;
     const target = event.target instanceof Element ? event.target : null;
-    const handle = target instanceof SVGElement ? target.dataset.handle : undefined;
-    if (handle !== undefined) this.#drag(event, this.#joining(handle));
+    const handle = this.#handleAt(this.#point(event));
+    if (handle !== null) this.#drag(event, this.#joining(handle));
     else {
       const found = this.#at(target);
       this.#listener.selected(found);
