@@ -52,6 +52,15 @@ async def program(tmp_path_factory):
         yield running
 
 
+async def eventually(condition, limit_s):
+    """Wait until something holds."""
+    loop = asyncio.get_running_loop()
+    end_s = loop.time() + limit_s
+    while not await condition():
+        assert loop.time() < end_s
+        await asyncio.sleep(0.05)
+
+
 class Windows:
     """Windows at one mission's page."""
 
@@ -124,7 +133,6 @@ async def test_control_z_in_the_text_takes_one_edit_back(windows):
     await user.select("wait")
     await user.rename("wait", "stay")
     await user.type_at(1, "!")
-    await user.page.wait_for_timeout(400)  # longer than the pause after which typed text is sent
     await user.page.keyboard.press("ControlOrMeta+z")
     await expect(user.page.locator(".cm-line").first).to_have_text(HOVER.splitlines()[0])
     await expect(user.state("stay")).to_be_attached()
@@ -197,8 +205,11 @@ async def test_typing_in_two_windows_at_once_ends_in_the_same_text(windows):
     for number in range(30):
         await one.page.keyboard.type(f"a{number}")
         await two.page.keyboard.type(f"b{number}")
-    await asyncio.sleep(1.0)
-    assert await one.text() == await two.text()
+
+    async def is_same():
+        return await one.text() == await two.text()
+
+    await eventually(is_same, 10.0)
     await one.saves()
     assert windows.path.read_text() == await one.text()
     assert not [*one.complaints, *two.complaints]
@@ -229,6 +240,11 @@ async def test_a_large_mission_is_drawn_typed_in_and_dragged(windows):
     assert not user.complaints  # also no request to another host
 
 
+def journal_of(path):
+    """What is kept of a mission's unsaved text."""
+    return "".join(each.read_text() for each in path.parent.glob(f".{path.name}.unsaved"))
+
+
 async def test_a_killed_program_loses_at_most_five_seconds(browser, tmp_path):
     path, port = tmp_path / "hover.yaml", free_port()
     path.write_text(HOVER)
@@ -237,7 +253,11 @@ async def test_a_killed_program_loses_at_most_five_seconds(browser, tmp_path):
         user = EditorUser(await context.new_page())
         await user.open(program.page(path.name))
         await user.add("New state", "kept")
-        await asyncio.sleep(5.0)
+
+        async def is_kept():
+            return "kept" in journal_of(path)
+
+        await eventually(is_kept, 5.0)
         await program.kill()
         await expect(user.page.locator(".e-message")).to_contain_text("no connection")
         await user.type_at(1, "typed in vain")
