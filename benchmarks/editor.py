@@ -40,7 +40,10 @@ WebSocket.prototype.send = function (data) {
 };
 const handler = Object.getOwnPropertyDescriptor(WebSocket.prototype, "onmessage");
 Object.defineProperty(WebSocket.prototype, "onmessage", { ...handler, set(hear) {
-  handler.set.call(this, (event) => { window.seen.arrived = performance.now(); hear(event); });
+  handler.set.call(this, (event) => {
+    if (String(event.data).startsWith('{"type": "changed"')) window.seen.arrived ??= performance.now();
+    hear(event);
+  });
 } });
 addEventListener("keydown", () => { window.seen = { key: performance.now() }; }, true);
 window.watchDiagram = () => new MutationObserver(() => {
