@@ -243,6 +243,11 @@ export class DiagramView {
     }
   }
 
+  /** Mark the state in which a flight was lost. @param {string} id empty: none */
+  markLost(id) {
+    for (const [path, group] of this.#stateElements) group.classList.toggle("e-lost", path === id);
+  }
+
   /** Show all of it. */
   fit() {
     const { width, height } = this.#svg.getBoundingClientRect();
@@ -316,7 +321,8 @@ export class DiagramView {
 
   /** @param {MouseEvent} event */
   #open(event) {
-    const found = this.#at(event.target);
+    // While the mouse is captured the event's target is the drawing.
+    const found = this.#at(document.elementFromPoint(event.clientX, event.clientY));
     if (found.kind !== "mission") this.#listener.opened(found);
   }
 

@@ -17,7 +17,7 @@ export function button(text, press, attributes = {}) {
  * @param {Object<string, string|boolean>} [attributes]
  */
 export function textField(label, value, change, attributes = {}) {
-  const input = /** @type {HTMLInputElement} */ (make("input", { type: "text", spellcheck: "false", autocomplete: "off", value, ...attributes }));
+  const input = /** @type {HTMLInputElement} */ (make("input", { type: "text", spellcheck: "false", autocomplete: "off", value, title: value || false, ...attributes }));
   input.addEventListener("change", () => change(input.value.trim()));
   input.addEventListener("keydown", (event) => {
     if (event.key === "Escape") {

@@ -8,12 +8,14 @@ export class LessonPanel {
   #root;
   #name;
   #listener;
+  /** @type {import("../lib/course.js").Lesson|null} */
+  #next = null;
   #line = make("p", { role: "status", class: "e-run-line" });
 
   /**
    * @param {HTMLElement} root
    * @param {string} name of the lesson
-   * @param {{text: () => Promise<string>, scenario: (name: string) => void, flown: (flight: any) => void}} listener
+   * @param {{text: () => Promise<string>, save: () => Promise<void>, scenario: (name: string) => void, flown: (flight: any) => void}} listener
    */
   constructor(root, name, listener) {
     this.#root = root;
@@ -23,8 +25,10 @@ export class LessonPanel {
   }
 
   async #load() {
-    const lesson = (await loadLessons()).find(({ name }) => name === this.#name);
+    const lessons = await loadLessons();
+    const lesson = lessons.find(({ name }) => name === this.#name);
     if (!lesson) return;
+    this.#next = lessons.find(({ number }) => number === lesson.number + 1) ?? null;
     const { title, goal, steps, hints, scenario } = lesson;
     this.#listener.scenario(scenario);
     const items = (list) => list.map((each) => make("li", {}, inLanguage(each)));
@@ -38,6 +42,14 @@ export class LessonPanel {
       make("details", {}, make("summary", {}, word("hints")), make("ul", {}, ...items(hints))));
   }
 
+  /** @param {string} name of another lesson */
+  async #open(name) {
+    await this.#listener.save();
+    const told = await askCourse("open", { learner: learner(), lesson: name });
+    if (told.detail) setText(this.#line, told.detail);
+    else location.href = `/edit?file=${encodeURIComponent(told.file)}&lesson=${encodeURIComponent(name)}`;
+  }
+
   async #check() {
     this.#line.removeAttribute("data-passed");
     setText(this.#line, word("checking"));
@@ -47,7 +59,11 @@ export class LessonPanel {
       return;
     }
     this.#line.setAttribute("data-passed", String(told.passed));
-    setText(this.#line, `${word(told.passed ? "passed" : "not_yet")}: ${told.reason}`);
+    setText(this.#line, told.passed ? word("passed") : `${word("not_yet")}: ${told.reason}`);
+    if (told.passed && this.#next) {
+      const { name } = this.#next;
+      this.#line.append(" ", button(word("next_one"), () => this.#open(name), { class: "e-first" }));
+    }
     if (told.flight?.track) this.#listener.flown(told.flight);
   }
 }

@@ -118,6 +118,7 @@ function edit(name) {
     changed(changes, all) {
       if (all !== null) text.setText(all);
       else text.change(changes);
+      tell(""); // what was said before concerned the mission as it was
       refresh();
     },
     connected(connection, reason) {
@@ -168,7 +169,7 @@ function edit(name) {
       return text.text;
     },
     lit: light,
-    lost: (id) => select({ kind: "state", id }, true),
+    lost: (id) => diagram.markLost(id),
     selected: () => (selection.kind === "state" ? selection.id : ""),
   });
 
@@ -179,10 +180,11 @@ function edit(name) {
         await session.flush();
         return text.text;
       },
+      save: store,
       scenario: (name) => runs.choose(name),
       flown(flight) {
         runs.showFlight(flight);
-        if (flight.lost_in) select({ kind: "state", id: flight.lost_in }, true);
+        diagram.markLost(flight.lost_in);
       },
     });
   }

@@ -98,6 +98,7 @@ export class RunPanel {
   }
 
   async #start(paused) {
+    setText(this.#line, word("starting"));
     const text = await this.#listener.text();
     if (this.#run) await this.#flights.ask({ do: "stop", run: this.#run });
     this.#counts = {};
@@ -142,6 +143,7 @@ export class RunPanel {
   }
 
   async #startBatch() {
+    setText(this.#line, word("starting"));
     const text = await this.#listener.text();
     this.#rows = [];
     this.#table.replaceChildren();
@@ -165,9 +167,9 @@ export class RunPanel {
       this.#root.classList.remove("e-paused");
       setText(this.#line, message.text);
       this.#listener.lit([], message.counts, []);
-      if (message.lost_in) this.#listener.lost(message.lost_in);
+      this.#listener.lost(message.lost_in);
     } else if (message.kind === "flight" && message.batch === this.#batch) this.#showFlight(message);
-    else if (message.kind === "batch_ended" && message.batch === this.#batch) setText(this.#line, message.text);
+    else if (message.kind === "batch_ended" && message.batch === this.#batch && message.text) setText(this.#line, message.text);
   }
 
   /** @param {Now} now */
@@ -208,7 +210,7 @@ export class RunPanel {
     this.#table.replaceChildren(head, ...this.#rows.map((each) => {
       const show = button(each.scenario, () => {
         this.showFlight(each);
-        if (each.lost_in) this.#listener.lost(each.lost_in);
+        this.#listener.lost(each.lost_in);
       }, { class: "e-link" });
       return make("tr", { "data-completed": String(each.completed) },
         make("td", {}, show), make("td", {}, each.verdict), make("td", {}, each.lost_in), make("td", {}, number(each.total_time_s, 1)));

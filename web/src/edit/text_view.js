@@ -42,6 +42,7 @@ export class TextView {
         this.#writable.of([]),
         basicSetup,
         yaml(),
+        EditorView.lineWrapping,
         EditorView.theme({
           "&": { height: "100%", fontSize: "13px" }, ".cm-scroller": { overflow: "auto" },
           // Instead of CodeMirror's pictures in data URLs, which the page's policy refuses.
