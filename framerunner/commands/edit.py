@@ -55,7 +55,7 @@ def edit(
         if not mission.exists():
             say(f"made: {folder / EditorDesk(folder).create(mission.stem, source)}")
         path = f"edit?file={quote(mission.name)}"
-    given = equipment(drone, None, Path("runs"), folder)
+    given = equipment(drone, None, Path("runs"), missions=folder)
     settings = MonitorSettings("127.0.0.1", port, DATABASE)
 
     def hear(words: str) -> None:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from scenarios.models import Scenario
 
 PASSWORD_VARIABLE = "FRAMERUNNER_JUDGE_PASSWORD"
+MISSIONS = Path("missions")
 DATABASE = "sqlite:///framerunner.db"
 _OPEN_FILES = 4096
 _NICENESS = 5  # beside a flight, which the monitor must not slow down
@@ -40,7 +41,7 @@ def monitor(
     port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8080,
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
-    missions: Annotated[Path, Parameter(help="folder that the editor shows")] = Path("missions"),
+    missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
     camera_host: Annotated[
         tuple[str, ...],
         Parameter(
@@ -76,7 +77,7 @@ def monitor(
 
     parse_url(drone)
     flown = None if scenario is None else load_scenario(scenario)
-    given = equipment(drone, flown, runs, missions, camera_host)
+    given = equipment(drone, flown, runs, camera_host, missions)
     password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()
     settings = MonitorSettings(bind, port, database, password, trusted_proxy, qr_codes=qr_codes)
     _allow_many_files()
@@ -91,8 +92,8 @@ def equipment(
     drone_url: str,
     scenario: Scenario | None,
     runs: Path,
-    missions: Path,
     camera_hosts: tuple[str, ...] = (),
+    missions: Path = MISSIONS,
 ) -> Equipment:
     """What the monitor, which may not import other rooms' functions, is given of them."""
     from framerunner.course.door import CourseDoor

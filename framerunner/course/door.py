@@ -119,7 +119,7 @@ class CourseDoor:
     async def _fly(self, lesson: Lesson, text: str) -> dict[str, Any]:
         """The flight as the editor's page is told it; only a `reason` if there was none."""
         watcher = _Result()
-        start = StartBatch(do="start_batch", text=text, level=None, scenarios=(lesson.scenario.name,))
+        start = StartBatch(do="start_batch", text=text, level=None, scenarios=(lesson.name,))
         await self._service.do(start, watcher)
         try:
             async with asyncio.timeout(_LONGEST_WAIT_S):

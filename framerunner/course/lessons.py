@@ -1,7 +1,7 @@
 """Lessons: a text, a scenario whose goals the referee checks, a mission to start from, and a solution.
 
-Each is a folder of `lessons/`, in the order of their numbers: `lesson.yaml`, `start.yaml`, `solution.yaml`,
-unless the lesson names a mission of the package as its solution. Its scenario is one of the package.
+Each is a folder of `lessons/`, in the order of their numbers: `lesson.yaml`, `scenario.yaml`, `start.yaml`
+and `solution.yaml`, unless the lesson names a mission of the package as its solution.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pydantic import Field
 
 from errors import UserError
 from offboard.mission import MISSIONS
-from scenarios.loader import load_scenario
+from scenarios.loader import parse_scenario
 from scenarios.models import Scenario
 from scenarios.part import Part
 from scenarios.yaml_file import FileKind
@@ -42,7 +42,6 @@ class Words(Part):
 class LessonText(Part):
     """What a lesson says."""
 
-    scenario: str = Field(description="name of the scenario of the package that is flown")
     minutes: int = Field(gt=0, le=120, description="that a pupil needs for it")
     title: Words = Field(description="a few words")
     goal: Words = Field(description="what the drone has to do, in a sentence")
@@ -110,4 +109,5 @@ def _load(number: int, folder: Traversable) -> Lesson:
     else:
         solution = (MISSIONS / f"{text.solution}.yaml").read_text(encoding="utf-8")
     start = (folder / "start.yaml").read_text(encoding="utf-8")
-    return Lesson(number, folder.name, text, load_scenario(text.scenario), start, solution)
+    scenario = parse_scenario((folder / "scenario.yaml").read_bytes(), f"{folder.name}/scenario.yaml")
+    return Lesson(number, folder.name, text, scenario, start, solution)

@@ -111,32 +111,34 @@ class _ControlledRun:
         os._exit(1)
 
     def _carry_out(self, order: messages.Order) -> None:
-        control = self._control
+        """Answer an order, then give it: what it does may be told at once and follows the answer."""
+        if isinstance(order, messages.Change):
+            self._change(order)
+            return
         try:
-            match order:
-                case messages.Change():
-                    self._change(order)
-                    return
-                case messages.Watch():
-                    self._reporter.tell_all()
-                    control.tell()
-                case messages.Pause():
-                    control.pause()
-                case messages.GoOn():
-                    control.go_on()
-                case messages.Step():
-                    control.step(order.ticks)
-                case messages.Speed():
-                    control.set_speed(order.speed)
-                case messages.BreakOn():
-                    _check_breaks(order.states, self._mission)
-                    control.break_on(order.states)
-                case messages.Stop():
-                    control.stop()
+            if isinstance(order, messages.BreakOn):
+                _check_breaks(order.states, self._mission)
         except UserError as error:
             self._tell(messages.Refused(tag=order.tag, text=str(error), run=self._task.run))
-        else:
-            self._tell(messages.Done(tag=order.tag))
+            return
+        self._tell(messages.Done(tag=order.tag))
+        control = self._control
+        match order:
+            case messages.Watch():
+                self._reporter.tell_all()
+                control.tell()
+            case messages.Pause():
+                control.pause()
+            case messages.GoOn():
+                control.go_on()
+            case messages.Step():
+                control.step(order.ticks)
+            case messages.Speed():
+                control.set_speed(order.speed)
+            case messages.BreakOn():
+                control.break_on(order.states)
+            case messages.Stop():
+                control.stop()
 
     def _change(self, order: messages.Change) -> None:
         run = self._task.run

@@ -252,7 +252,9 @@ def parse_edit(data: object) -> Edit:
         where = ".".join(str(part) for part in first["loc"]) or "edit"
         given = repr(first["input"])[:60]
         if first["type"] == "string_pattern_mismatch" and where.endswith("name"):
-            raise EditError(f"{given}: a name has small letters, digits and _, a letter first") from None
+            raise EditError(
+                f"{where} {given}: a name has small letters, digits and _, a letter first"
+            ) from None
         raise EditError(f"{where} {given}: {first['msg'][:200]}; correct the edit") from None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 
 from playwright.async_api import Locator, Page, expect
@@ -101,10 +102,10 @@ class EditorUser:
     async def join(self, source: str, target: str, when: str = "") -> None:
         """Drag from a state's handle to another state, and write the guard of the new transition."""
         await self.press("Show all")
-        handle = await self.state(source).locator(".e-handle").last.bounding_box()
+        handle = await box_of(self.state(source).locator(".e-handle").last)
         await self.page.mouse.move(handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2)
         await self.page.mouse.down()
-        box = await self.state(target).locator("> rect").first.bounding_box()
+        box = await box_of(self.state(target).locator("> rect").first)
         await self.page.mouse.move(box["x"] + 3, box["y"] + 3, steps=3)
         await self.page.mouse.up()
         await expect(self.form.locator("h2")).to_have_text(f"Transition {source} → {target}")
@@ -151,3 +152,11 @@ class EditorUser:
     async def until(self, expression: str, timeout_s: float = 30.0) -> None:
         """Wait until an expression is true in the page."""
         await until(self.page, expression, timeout_s=timeout_s)
+
+
+async def box_of(part):
+    """Where a part is; the page may draw it anew while it is looked for."""
+    async with asyncio.timeout(10):
+        while (box := await part.bounding_box()) is None:
+            await asyncio.sleep(0.02)
+    return box

@@ -29,8 +29,8 @@ export class LessonPanel {
     const lesson = lessons.find(({ name }) => name === this.#name);
     if (!lesson) return;
     this.#next = lessons.find(({ number }) => number === lesson.number + 1) ?? null;
-    const { title, goal, steps, hints, scenario } = lesson;
-    this.#listener.scenario(scenario);
+    const { title, goal, steps, hints } = lesson;
+    this.#listener.scenario(lesson.name);
     const items = (list) => list.map((each) => make("li", {}, inLanguage(each)));
     this.#root.append(
       make("h2", {}, `${lesson.number}. ${inLanguage(title)}`),

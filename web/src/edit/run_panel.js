@@ -72,10 +72,10 @@ export class RunPanel {
   async #loadChoices() {
     const answer = await fetch("/api/editing/choices");
     if (!answer.ok) return;
-    const { scenarios, levels } = await answer.json();
+    const { scenarios, lessons, levels } = await answer.json();
     const words = (list) => list.map((each) => /** @type {[string, string]} */ ([each, each]));
     this.#choices.replaceChildren(
-      choice(word("scenario"), words(scenarios), this.#scenario, (value) => { this.#scenario = value; }),
+      choice(word("scenario"), words([...scenarios, ...lessons]), this.#scenario, (value) => { this.#scenario = value; }),
       textField(word("or_layout"), "", (value) => { this.#scenario = value || "test-case-1"; }, { placeholder: "calm-17" }),
       choice(word("speed"), SPEEDS, this.#speed, (value) => {
         this.#speed = value;

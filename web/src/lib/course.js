@@ -5,7 +5,7 @@ const KEPT = "framerunner-learner";
 
 /**
  * @typedef {{en: string, es: string}} Words
- * @typedef {{number: number, name: string, scenario: string, minutes: number, title: Words, goal: Words, steps: Words[],
+ * @typedef {{number: number, name: string, minutes: number, title: Words, goal: Words, steps: Words[],
  *   hints: Words[], introduces: string[]}} Lesson
  */
 
