@@ -156,7 +156,9 @@ class EditorUser:
 
 async def box_of(part):
     """Where a part is; the page may draw it anew while it is looked for."""
-    async with asyncio.timeout(10):
-        while (box := await part.bounding_box()) is None:
-            await asyncio.sleep(0.02)
-    return box
+    for _ in range(500):
+        box = await part.bounding_box()
+        if box is not None:
+            return box
+        await asyncio.sleep(0.02)
+    raise AssertionError(f"{part} is not drawn")
