@@ -92,6 +92,8 @@ async def lead(user: EditorUser, source: str, target: str, event: str) -> None:
     """Draw a transition that is looked at on another event than a tick."""
     await user.join(source, target)
     await user.event(event)
+    # Applied and drawn: before that, states may still move away from the mouse.
+    await expect(user.transition(f"{source}/{event}/0")).to_have_count(1)
 
 
 async def build(user: EditorUser) -> None:
