@@ -1,4 +1,4 @@
-"""The `Drone` port over MAVSDK: any MAVLink vehicle with PX4's modes, simulated or real."""
+"""The `Drone` port over MAVSDK: any multicopter with PX4 or ArduPilot, simulated or real."""
 
 from __future__ import annotations
 
@@ -6,24 +6,25 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
 from mavsdk.asyncio import Configuration, ForwardingOption, Mavsdk, MavsdkError
 from mavsdk.asyncio.component_type import ComponentType
-from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
-from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
 
 from geometry.axes import Alignment, Pose
-from geometry.rotations import quaternion_from_euler
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.keep_in_box import Box, confine
-from offboard.link.commands import PendingRequests, SetpointStream, synchronous
+from offboard.link.autopilots import open_dialect
+from offboard.link.commands import PendingRequests, synchronous
 from offboard.link.companion import Companion
-from offboard.link.telemetry import CHECKS, Sample, TelemetryFeed, TickSource, VehicleClock, request_rates
+from offboard.link.dialect import Dialect
+from offboard.link.states import drone_state
+from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, request_rates
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
@@ -39,13 +40,12 @@ HOLD_SHOWN_S = 1.5  # wall time until a heartbeat, one a second, shows the new m
 LAND_LIMIT_S = 120.0  # vehicle time
 STREAM_BEFORE_OFFBOARD_S = 0.3  # PX4 enters offboard only with fresh setpoints
 FIRST_MODE_S = 8.0  # wall time for PX4's checks to pass in the mode it starts in
-PILOT_MODES = ("MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE")
 
 logger = logging.getLogger(__name__)
 
 
 class MavsdkDrone:
-    """A vehicle over MAVLink.
+    """A vehicle over MAVLink. What PX4 and ArduPilot do differently is in their dialects (`offboard/link/`).
 
     Axes: the vehicle is on `start_arena` when it connects; its telemetry there gives the transform between
     its local axes and the arena's (see `Alignment`), so it must be disarmed then.
@@ -97,8 +97,7 @@ class MavsdkDrone:
         self._system_id: int | None = None
         self._alignment: Alignment | None = None
         self._mavsdk: Mavsdk | None = None
-        self._action: Any = None
-        self._setpoints: SetpointStream | None = None
+        self._dialect: Dialect | None = None  # from `connect` on
         self._telemetry: Any = None
         self._direct: Any = None  # kept, because MAVSDK ends the subscriptions of a plugin that is deleted
         self._requests = PendingRequests()
@@ -167,11 +166,12 @@ class MavsdkDrone:
         for component in (self._recorder, self._companion):
             if component is not None:
                 component.announce(system_id)
-        self._action = ActionAsync(system)
-        self._setpoints = SetpointStream(OffboardAsync(system))
         self._telemetry = TelemetryAsync(system)
         self._direct = MavlinkDirectAsync(system)
-        self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct))
+        self._dialect = await open_dialect(system, self._direct, self._feed)
+        telemetry = synchronous(self._telemetry)
+        self._feed.subscribe(telemetry, synchronous(self._direct), self._dialect.numbered_modes)
+        await self._requests.wait(self._dialect.request_streams())
 
     async def _open_connections(self, mavsdk: Mavsdk) -> None:
         """To recorder, companion, ground stations and vehicle; MAVSDK forwards between them."""
@@ -215,7 +215,14 @@ class MavsdkDrone:
 
         PX4's checks are those of the mode it is in. At first that is hold, which requires a global position:
         in a hall, without GPS, they never pass; offboard's do. So offboard is tried when only they fail.
+        ArduPilot's first mode requires less than GUIDED, so it always enters that.
         """
+        if self._stream.checks_in_offboard:
+            async with asyncio.timeout(self._ready_limit_s):
+                while not self._in_offboard and not self._feed.armed:
+                    with contextlib.suppress(MavsdkError):  # refused without a position
+                        await self._requests.wait(self._stream.request_offboard())
+                    await self._becomes(lambda: self._in_offboard, HOLD_SHOWN_S)
         with contextlib.suppress(TimeoutError):
             await self._until(lambda: not self._feed.missing(), min(FIRST_MODE_S, self._ready_limit_s / 2))
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
@@ -237,6 +244,8 @@ class MavsdkDrone:
             self._latest = state
             if self._pilot_has_it:
                 self._send(VelocityCommand())
+            elif self._commanding:
+                self._stream.repeat()
             yield state
 
     async def motors_on(self, *, confirmed: bool = True) -> None:
@@ -244,9 +253,9 @@ class MavsdkDrone:
         await self._stream_before_offboard()
         self._watchdog.start()
         try:
-            request = self._stream.request_offboard()
-            await self._request("offboard mode", request, lambda: self._feed.mode == "OFFBOARD")
-            await self._request("arming", self._action.arm(), lambda: bool(self._feed.armed) or not confirmed)
+            offboard, request = self._stream.modes.offboard, self._stream.request_offboard()
+            await self._request(f"{offboard.lower()} mode", request, lambda: self._feed.mode == offboard)
+            await self._request("arming", self._stream.arm(), lambda: bool(self._feed.armed) or not confirmed)
         except BaseException:
             self._watchdog.stop()
             await self._hold_on_ground()
@@ -272,7 +281,7 @@ class MavsdkDrone:
         """Stop the motors at once (forced disarm), in the air too."""
         self._commanding = False
         self._feed.arming.forget()
-        await self._request("stopping the motors", self._action.kill(), lambda: self._feed.armed is False)
+        await self._request("stopping the motors", self._stream.kill(), lambda: self._feed.armed is False)
         self._watchdog.stop()
         with contextlib.suppress(MavsdkError):
             await self._requests.wait(self._stream.request_hold())
@@ -285,14 +294,14 @@ class MavsdkDrone:
             return feed.arming.is_armed(feed.time_us)
 
         self._commanding = False
-        request = self._action.land()
-        await self._request("landing", request, lambda: feed.mode == "LAND" or not armed())
+        request, land = self._stream.land(), self._stream.modes.land
+        await self._request("landing", request, lambda: feed.mode == land or not armed())
         self._watchdog.stop()
         limit_us = feed.time_us + int(LAND_LIMIT_S * 1e6)
         while armed():
             self._check_alive(await self._ticks.next(LINK_LOST_S))
             # One heartbeat has mode and arming, but MAVSDK passes them on one after the other.
-            if feed.mode != "LAND" and not await self._becomes(lambda: not armed(), 0.5):
+            if feed.mode != land and not await self._becomes(lambda: not armed(), 0.5):
                 raise DroneError(f"landing was interrupted: mode {feed.mode}{feed.recent_texts()}")
             if feed.time_us > limit_us:
                 raise DroneError(f"still not landed after {LAND_LIMIT_S:g} s{feed.recent_texts()}")
@@ -301,18 +310,19 @@ class MavsdkDrone:
         """Stop commanding permanently and request hold, unless the vehicle has left offboard already."""
         self._commanding = self._pilot_has_it = False
         self._watchdog.stop()
-        if self._setpoints is None:
+        if self._dialect is None:
             return
-        if self._feed.mode == "OFFBOARD":
+        modes = self._dialect.modes
+        if self._in_offboard:
             await self._leave_offboard()
-            if (mode := self._feed.mode) != "HOLD" and mode not in PILOT_MODES:
+            if (mode := self._feed.mode) != modes.hold and mode not in modes.pilot:
                 raise DroneError(f"the vehicle is in {mode} instead{self._feed.recent_texts()}")
         else:
             await asyncio.to_thread(self._stream.end)
 
     async def refuse(self) -> None:
         """Let the vehicle that was given back hold, and wait until it is given back again."""
-        if self._feed.mode == "OFFBOARD":
+        if self._in_offboard:
             await self._leave_offboard()
 
     async def _leave_offboard(self) -> None:
@@ -324,11 +334,11 @@ class MavsdkDrone:
         stream, refusal = self._stream, None
         for _ in range(HOLD_ATTEMPTS):
             refusal = None
-            try:  # not through the plugin if the watchdog has ended the stream
-                await self._request("hold", self._action.hold() if stream.ended else stream.request_hold())
+            try:
+                await self._request("hold", stream.request_hold())
             except DroneError as error:
                 refusal = error
-            if await self._becomes(lambda: self._feed.mode != "OFFBOARD", HOLD_SHOWN_S):
+            if await self._becomes(lambda: not self._in_offboard, HOLD_SHOWN_S):
                 return
         raise refusal or DroneError(
             f"requested {HOLD_ATTEMPTS} times and acknowledged, but telemetry still shows offboard; "
@@ -359,8 +369,8 @@ class MavsdkDrone:
         await self._requests.wait_for_all()
         if self._companion is None:
             await self.disconnect()
-        elif self._setpoints is not None:
-            await asyncio.to_thread(self._setpoints.end)  # even if hold failed
+        elif self._dialect is not None:
+            await asyncio.to_thread(self._dialect.end)  # even if hold failed
 
     async def disconnect(self) -> None:
         """Close the link and the recording; may be called again."""
@@ -379,9 +389,13 @@ class MavsdkDrone:
             self._send(VelocityCommand())
 
     @property
-    def _stream(self) -> SetpointStream:
-        assert self._setpoints is not None, "connect() comes first"
-        return self._setpoints
+    def _stream(self) -> Dialect:
+        assert self._dialect is not None, "connect() comes first"
+        return self._dialect
+
+    @property
+    def _in_offboard(self) -> bool:
+        return self._feed.mode == self._stream.modes.offboard
 
     def _send(self, command: VelocityCommand) -> None:
         if not self._watchdog.tripped_after_s:
@@ -392,28 +406,9 @@ class MavsdkDrone:
         """The state at the last tick; it holds those of the ticks that were skipped before it."""
         sample = self._feed.sample
         missed = [before for before in self._feed.take_samples() if before.time_us < sample.time_us]
-        return self._state(sample, tuple(map(self._state, missed)))
-
-    def _state(self, sample: Sample, missed: tuple[DroneState, ...] = ()) -> DroneState:
         assert self._alignment is not None, "ready() comes first"
-        feed = self._feed
-        pose = self._alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
-        attitude_ned = quaternion_from_euler(sample.roll_rad, sample.pitch_rad, sample.yaw_ned_rad)
-        return DroneState(
-            time_us=sample.time_us,
-            x=pose.position_m[0],
-            y=pose.position_m[1],
-            z=pose.position_m[2],
-            yaw=pose.yaw_rad,
-            velocity_arena_m_s=self._alignment.vector(sample.velocity_ned_m_s),
-            armed=feed.arming.is_armed(sample.time_us),
-            offboard=feed.mode == "OFFBOARD",
-            mode=feed.mode,
-            landed=feed.landed,
-            position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
-            attitude_arena=self._alignment.attitude(attitude_ned),
-            missed=missed,
-        )
+        state_at = partial(drone_state, self._feed, self._alignment, self._stream.modes.offboard)
+        return state_at(sample, tuple(map(state_at, missed)))
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s
@@ -439,7 +434,7 @@ class MavsdkDrone:
             raise DroneError(self._feed.not_shown("arming", CONFIRM_S))
         if not self._commanding or self._pilot_has_it:
             return
-        leaves = not state.offboard and state.mode not in PILOT_MODES
+        leaves = not state.offboard and state.mode not in self._stream.modes.pilot
         if not state.armed or (leaves and not self._feed.armed):
             raise DroneError(f"the vehicle was disarmed by others{self._feed.recent_texts()}")
         if leaves:
@@ -487,7 +482,7 @@ class MavsdkDrone:
         A vehicle that a pilot has must not be given back to a hung app, so the stream ends permanently.
         """
         with contextlib.suppress(Exception):  # without setpoints the vehicle's failsafe acts
-            if self._feed.mode == "OFFBOARD":
+            if self._in_offboard:
                 self._stream.request_hold_blocking()
             else:
                 self._stream.end()

@@ -15,7 +15,7 @@ import contextlib
 import json
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import nan, radians
 from typing import Any, Protocol
@@ -25,6 +25,7 @@ from mavsdk.asyncio import MavsdkError
 from geometry.vectors import Vec3
 from offboard.arming import Arming
 from offboard.drone import VelocityCommand
+from wire.dialect import AUTOPILOT_COMPONENT_ID
 from wire.mission_tunnel import TEXT_PREFIX
 from wire.vehicle_telemetry import MessageOrder
 
@@ -78,6 +79,7 @@ class TelemetryFeed:
         self._position_received_s = 0.0
         self._heartbeat_received_s = 0.0
         self._lag_s: float | None = None  # of vehicle time behind wall time
+        self._mode_names: dict[int, str] = {}
         self._texts: deque[tuple[float, str]] = deque(maxlen=TEXTS_KEPT)
         self._attitude_order = MessageOrder()
         self._position_order = MessageOrder()
@@ -85,13 +87,28 @@ class TelemetryFeed:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._new_tick = asyncio.Event()
 
-    def subscribe(self, plugin: Any, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
-        """Subscribe to MAVSDK's synchronous plugins `telemetry` and `mavlink_direct`."""
+    def subscribe(
+        self,
+        plugin: Any,  # noqa: ANN401 - MAVSDK is untyped
+        direct: Any,  # noqa: ANN401
+        numbered_modes: Mapping[int, str] | None = None,
+    ) -> None:
+        """Subscribe to MAVSDK's synchronous plugins `telemetry` and `mavlink_direct`.
+
+        Args:
+            plugin: `telemetry`.
+            direct: `mavlink_direct`.
+            numbered_modes: names of the vehicle's modes by HEARTBEAT.custom_mode; without, MAVSDK names them.
+        """
+        self._mode_names = dict(numbered_modes or {})
         self._loop = asyncio.get_running_loop()
         plugin.subscribe_attitude_euler(self._on_attitude)
         direct.subscribe_message("LOCAL_POSITION_NED", self._on_position)
         plugin.subscribe_armed(self._on_armed)
-        plugin.subscribe_flight_mode(self._on_mode)
+        if self._mode_names:
+            direct.subscribe_message("HEARTBEAT", self._on_heartbeat)
+        else:
+            plugin.subscribe_flight_mode(self._on_mode)
         plugin.subscribe_landed_state(self._on_landed)
         plugin.subscribe_health(self._on_health)
         plugin.subscribe_status_text(self._on_text)
@@ -216,6 +233,11 @@ class TelemetryFeed:
 
     def _on_mode(self, mode: Any, _user: object) -> None:  # noqa: ANN401
         self.mode = getattr(mode, "name", str(mode))
+
+    def _on_heartbeat(self, message: Any, _user: object) -> None:  # noqa: ANN401
+        if message.component_id == AUTOPILOT_COMPONENT_ID:
+            number = json.loads(message.fields_json)["custom_mode"]
+            self.mode = self._mode_names.get(number, f"mode {number}")
 
     def _on_landed(self, state: Any, _user: object) -> None:  # noqa: ANN401
         self.landed = getattr(state, "name", str(state)) == "ON_GROUND"
