@@ -135,7 +135,7 @@ class SimulatedVehicle(ABC):
         return self._sensors, place
 
     def _begin_tick(self) -> Sensors:
-        """Begin and end faults and discharge the battery; returns the true state with the battery's values."""
+        """Apply faults and discharge the battery; returns the true state, with the battery's values."""
         faults, sensors = self.faults, self._sensors
         if sensors.time_us >= faults.next_us:
             faults.update(sensors.time_us)
