@@ -37,6 +37,7 @@ def build_app() -> App:
         mission,
         mocap,
         monitor,
+        px4,
         replay,
         scenario,
         sim,
@@ -60,6 +61,7 @@ def build_app() -> App:
     app.command(evaluate.evaluate)
     app.command(bound.bound)
     app.command(monitor.monitor)
+    app.command(px4.app)
     app.command(replay.replay)
     app.command(film.film)
     app.command(mission.app)

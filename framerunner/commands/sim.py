@@ -6,16 +6,18 @@ import asyncio
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from errors import SettingError
 from framerunner.commands import Faults, Sensors, WholeNumber, check_range, say, with_faults, with_sensors
+from framerunner.commands.px4 import check_options, px4_server
 from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
+    from sitl.px4.server import Px4Server
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
@@ -93,6 +95,15 @@ def sim(
     fault: Faults = (),
     connections: Connections | None = None,
     onboard: Onboard | None = None,
+    autopilot: Annotated[
+        Literal["own", "px4"], Parameter(help="what flies: this project's autopilot, or a genuine PX4")
+    ] = "own",
+    px4: Annotated[
+        Path | None,
+        Parameter(
+            help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
+        ),
+    ] = None,
     monitor: Annotated[
         bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")
     ] = False,
@@ -122,20 +133,29 @@ def sim(
         framerunner sim --link tcpin://127.0.0.1:5760
 
         framerunner sim --link serial:///dev/ttyUSB0:57600
+
+        framerunner sim --scenario test-case-1 --autopilot px4 --px4 ../PX4-Autopilot
     """
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
     chosen, onboard = connections or Connections(), onboard or Onboard()
     watcher = _monitor(chosen.video_port, count) if monitor else None
-    if watcher is not None:
+    if watcher is not None and autopilot == "own":
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
 
-    from sitl.server import SimulatorServer
+    check_options(count=count, px4=px4, autopilot=autopilot, settings=settings)
+    grants = _grants(time_grants)
+    server: SimulatorServer | Px4Server
+    if autopilot == "px4":
+        check_range("--seed", seed, 0, 2**63 - 1)
+        server = px4_server(scenario, settings, onboard, fault, px4=px4, seed=seed, grants=grants)
+    else:
+        from sitl.server import SimulatorServer
 
-    simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
-    server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
+        simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
+        server = SimulatorServer(simulations, settings, notice=say, grants=grants)
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
 
@@ -232,7 +252,9 @@ def _read_key(path: Path | None) -> SigningKey | None:
         raise SettingError(f"--signing-key {path}: {error}") from None
 
 
-async def _run(server: SimulatorServer, monitor: MonitorProcess | None, *, lifeline: bool) -> None:
+async def _run(
+    server: SimulatorServer | Px4Server, monitor: MonitorProcess | None, *, lifeline: bool
+) -> None:
     from framerunner.child_process import until_standard_input_ends
 
     async with AsyncExitStack() as stack:
