@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from errors import SettingError
 from framerunner.commands import say, with_faults, with_sensors
 
 if TYPE_CHECKING:
@@ -101,25 +100,3 @@ def _px4_settings(simulation: Px4Simulation, settings: ServerSettings, px4: Path
     values = all_parameters(simulation.world.airframe, load_suite(scenario.sensors), settings.speed)
     folder = None if settings.storage is None else settings.storage / f"px4-{settings.instance}"
     return Px4Settings(Px4Process(build, settings.instance, folder, values), command)
-
-
-def check_options(*, count: int, px4: Path | None, autopilot: str, settings: ServerSettings) -> None:
-    """Refuse options that PX4 does not have, or that only it has.
-
-    Raises:
-        SettingError: one of them.
-    """
-    if autopilot != "px4":
-        if px4 is not None:
-            raise SettingError(f"--px4 {px4}: is for PX4; add --autopilot px4")
-        return
-    refused = [
-        ("--count", count != 1, "PX4 flies one drone; start another simulator with --instance 1"),
-        ("--link", bool(settings.links), "MAVLink is PX4's own"),
-        ("--signing-key", settings.signing_key is not None, "MAVLink is PX4's own"),
-        ("--parameters", settings.parameters is not None, "PX4 keeps its own, with --storage DIR"),
-        ("--shell", settings.shell, "MAVLink is PX4's own"),
-    ]
-    for option, given, why in refused:
-        if given:
-            raise SettingError(f"{option}: {why}; leave it out with --autopilot px4")

@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
 from cyclopts import Parameter
 
 from errors import SettingError
 from framerunner.commands import Faults, Sensors, WholeNumber, check_range, say, with_faults, with_sensors
-from framerunner.commands.px4 import check_options, px4_server
+from framerunner.commands.ardupilot import ardupilot_server
+from framerunner.commands.px4 import px4_server
 from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
-    from sitl.px4.server import Px4Server
-    from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
     from sitl.time_grants import TimeGrants
     from wire.signing import SigningKey
 
 _MAX_COUNT = 20
+
+
+class _Server(Protocol):
+    async def run(self) -> None:
+        """Run until cancelled."""
 
 
 @Parameter(name="*")
@@ -96,12 +101,20 @@ def sim(
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     autopilot: Annotated[
-        Literal["own", "px4"], Parameter(help="what flies: this project's autopilot, or a genuine PX4")
+        Literal["own", "px4", "ardupilot"],
+        Parameter(help="what flies: this project's autopilot, or a genuine PX4 or ArduCopter"),
     ] = "own",
     px4: Annotated[
         Path | None,
         Parameter(
             help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
+        ),
+    ] = None,
+    ardupilot: Annotated[
+        Path | None,
+        Parameter(
+            help="with --autopilot ardupilot: folder of an ArduPilot built for SITL, to be started; else "
+            "start it yourself"
         ),
     ] = None,
     monitor: Annotated[
@@ -135,6 +148,8 @@ def sim(
         framerunner sim --link serial:///dev/ttyUSB0:57600
 
         framerunner sim --scenario test-case-1 --autopilot px4 --px4 ../PX4-Autopilot
+
+        framerunner sim --scenario test-case-1 --autopilot ardupilot --ardupilot ../ardupilot
     """
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
@@ -145,11 +160,15 @@ def sim(
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
 
-    check_options(count=count, px4=px4, autopilot=autopilot, settings=settings)
+    check_range("--seed", seed, 0, 2**63 - 1)
+    _check_builds(autopilot, {"px4": px4, "ardupilot": ardupilot})
+    if autopilot != "own":
+        _check_genuine(autopilot, count, settings)
     grants = _grants(time_grants)
-    server: SimulatorServer | Px4Server
-    if autopilot == "px4":
-        check_range("--seed", seed, 0, 2**63 - 1)
+    server: _Server
+    if autopilot == "ardupilot":
+        server = ardupilot_server(scenario, settings, onboard, fault, ardupilot=ardupilot, seed=seed)
+    elif autopilot == "px4":
         server = px4_server(scenario, settings, onboard, fault, px4=px4, seed=seed, grants=grants)
     else:
         from sitl.server import SimulatorServer
@@ -158,6 +177,28 @@ def sim(
         server = SimulatorServer(simulations, settings, notice=say, grants=grants)
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
+
+
+def _check_builds(autopilot: str, builds: Mapping[str, Path | None]) -> None:
+    """Refuse the folder of an autopilot that is not chosen."""
+    for name, folder in builds.items():
+        if folder is not None and name != autopilot:
+            raise SettingError(f"--{name} {folder}: add --autopilot {name}")
+
+
+def _check_genuine(autopilot: str, count: int, settings: ServerSettings) -> None:
+    """Refuse options that only this project's autopilot has."""
+    name = {"px4": "PX4", "ardupilot": "ArduPilot"}[autopilot]
+    refused = [
+        ("--count", count != 1, f"{name} flies one drone; start another simulator with --instance 1"),
+        ("--link", bool(settings.links), f"MAVLink is {name}'s own"),
+        ("--signing-key", settings.signing_key is not None, f"MAVLink is {name}'s own"),
+        ("--parameters", settings.parameters is not None, f"{name} keeps its own, with --storage DIR"),
+        ("--shell", settings.shell, f"MAVLink is {name}'s own"),
+    ]
+    for option, given, why in refused:
+        if given:
+            raise SettingError(f"{option}: {why}; leave it out with --autopilot {autopilot}")
 
 
 def _grants(descriptor: int | None) -> TimeGrants | None:
@@ -252,9 +293,7 @@ def _read_key(path: Path | None) -> SigningKey | None:
         raise SettingError(f"--signing-key {path}: {error}") from None
 
 
-async def _run(
-    server: SimulatorServer | Px4Server, monitor: MonitorProcess | None, *, lifeline: bool
-) -> None:
+async def _run(server: _Server, monitor: MonitorProcess | None, *, lifeline: bool) -> None:
     from framerunner.child_process import until_standard_input_ends
 
     async with AsyncExitStack() as stack:
