@@ -7,7 +7,7 @@ from math import sqrt
 from errors import SettingError
 from firmware_py.airframe import Airframe
 from sitl.ardupilot.simulation import PULSE_MAX_US, PULSE_MIN_US
-from sitl.world import CONTROL_PERIOD_US
+from sitl.world import PHYSICS_RATE_HZ
 
 Value = int | float
 
@@ -39,11 +39,10 @@ def all_parameters(airframe: Airframe) -> dict[str, Value]:
 
 
 def simulation_parameters() -> dict[str, Value]:
-    """What a simulated ArduCopter needs: no sticks, and a loop at the rate of the simulation's steps."""
-    rate_hz = 1_000_000 // CONTROL_PERIOD_US
+    """What a simulated ArduCopter needs: no sticks, and a loop at half the rate of the simulation's steps."""
     return {
-        "SCHED_LOOP_RATE": rate_hz,
-        "SIM_RATE_HZ": rate_hz,
+        "SCHED_LOOP_RATE": PHYSICS_RATE_HZ // 2,
+        "SIM_RATE_HZ": PHYSICS_RATE_HZ,
         "FS_THR_ENABLE": 0,
         "SIM_BARO_RND": 0,
         "SIM_DRIFT_SPEED": 0,

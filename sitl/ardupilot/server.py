@@ -13,7 +13,7 @@ from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFr
 from sitl.ardupilot.simulation import PULSE_MIN_US, ArduPilotSimulation
 from sitl.server_settings import ServerSettings
 from sitl.streaming.drone_video import DroneVideo
-from sitl.world import CONTROL_PERIOD_US
+from sitl.world import PHYSICS_PERIOD_US
 from wire.transports.sockets import Address, UdpSocket, bind_udp
 
 _SILENCE_S = 2.0  # wall time without a frame that is reported
@@ -43,7 +43,7 @@ class FrameExchange:
 
     Args:
         new_simulation: makes the simulation anew, for an ArduPilot that has started again.
-        moved: called after each step, with the simulation.
+        moved: called at the end of each control period, with the simulation.
 
     Attributes:
         simulation: the present one.
@@ -71,10 +71,11 @@ class FrameExchange:
         if last is not None and frame.number < last:
             self.restart()
         self._number = frame.number
-        self.simulation.move(frame.pulses_us)
+        time_us = self.simulation.time_us
+        self._answer = self.simulation.step(frame.pulses_us)
         self.steps += 1
-        self._moved(self.simulation)
-        self._answer = self.simulation.sense()
+        if self.simulation.time_us != time_us:
+            self._moved(self.simulation)
         return self._answer
 
     def restart(self) -> None:
@@ -226,6 +227,6 @@ class ArduPilotServer:
         simulation = self._exchange.simulation
         end_us = simulation.time_us + _FALL_US
         while simulation.time_us < end_us:
-            simulation.move(_STANDING)
+            simulation.step(_STANDING)
             self._step_video(simulation)
-            await asyncio.sleep(CONTROL_PERIOD_US / 1e6 / self._settings.speed)
+            await asyncio.sleep(PHYSICS_PERIOD_US / 1e6 / self._settings.speed)
