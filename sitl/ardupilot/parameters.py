@@ -45,6 +45,7 @@ def simulation_parameters() -> dict[str, Value]:
         "SIM_RATE_HZ": PHYSICS_RATE_HZ,
         "FS_THR_ENABLE": 0,
         "SIM_BARO_RND": 0,
+        "SIM_GPS1_ACC": 0.05,
         "SIM_DRIFT_SPEED": 0,
         "BATT_MONITOR": 0,
         "FENCE_ENABLE": 0,

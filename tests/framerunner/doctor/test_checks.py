@@ -4,7 +4,8 @@ import struct
 
 import pytest
 
-from framerunner.doctor.checks import Level, can_fly, examine
+from framerunner.doctor.checks import can_fly, examine
+from framerunner.doctor.findings import Level
 from framerunner.doctor.listen import SUMMARY, Record, event_id
 from wire.dialect import mavlink
 
