@@ -12,6 +12,7 @@ from framerunner.commands import say, with_faults, with_sensors
 
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
+    from scenarios.models import Scenario
     from sitl.px4.server import Px4Server, Px4Settings
     from sitl.px4.simulation import Px4Simulation
     from sitl.server_settings import ServerSettings
@@ -55,6 +56,33 @@ def params(
     return 0
 
 
+def for_px4(scenario: Scenario) -> Scenario:
+    """A scenario with sensors from which PX4 can estimate its state; says so if they are others."""
+    from sitl.px4.simulation import with_sensors_for_px4
+
+    chosen = with_sensors_for_px4(scenario)
+    if chosen is not scenario:
+        say(f"PX4 takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
+    return chosen
+
+
+def check_px4_flight(px4: Path | None, *, drone: str | None, lockstep: bool) -> None:
+    """Refuse options of `framerunner fly` that do not go with PX4.
+
+    Raises:
+        SettingError: one of them.
+    """
+    if px4 is None:
+        return
+    if drone is not None:
+        raise SettingError(f"--px4 {px4}: flies a simulator that is started; leave it out with --drone")
+    if lockstep:
+        raise SettingError(f"--px4 {px4}: PX4 is another process; leave out --lockstep")
+    from sitl.px4.build import find_build
+
+    find_build(px4)
+
+
 def px4_server(
     scenario: str,
     settings: ServerSettings,
@@ -68,13 +96,9 @@ def px4_server(
     """The simulator with PX4, by the options of `framerunner sim`."""
     from scenarios.loader import load_scenario
     from sitl.px4.server import Px4Server
-    from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
+    from sitl.px4.simulation import Px4Simulation
 
-    chosen = with_sensors(load_scenario(scenario), onboard.sensors)
-    if chosen.sensors == "ideal":
-        chosen = with_sensors_for_px4(chosen)
-        say(f"PX4 takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
-    chosen = with_faults(chosen, fault)
+    chosen = with_faults(for_px4(with_sensors(load_scenario(scenario), onboard.sensors)), fault)
 
     def new_simulation() -> Px4Simulation:
         return Px4Simulation(chosen, seed=seed)
@@ -103,7 +127,9 @@ def _px4_settings(simulation: Px4Simulation, settings: ServerSettings, px4: Path
     return Px4Settings(Px4Process(build, settings.instance, folder, values), command)
 
 
-def check_options(*, count: int, px4: Path | None, autopilot: str, settings: ServerSettings) -> None:
+def check_options(
+    *, count: int, monitor: bool, px4: Path | None, autopilot: str, settings: ServerSettings
+) -> None:
     """Refuse options that PX4 does not have, or that only it has.
 
     Raises:
@@ -115,6 +141,7 @@ def check_options(*, count: int, px4: Path | None, autopilot: str, settings: Ser
         return
     refused = [
         ("--count", count != 1, "PX4 flies one drone; start another simulator with --instance 1"),
+        ("--monitor", monitor, "run framerunner monitor beside it, which listens to PX4 on UDP 14550"),
         ("--link", bool(settings.links), "MAVLink is PX4's own"),
         ("--signing-key", settings.signing_key is not None, "MAVLink is PX4's own"),
         ("--parameters", settings.parameters is not None, "PX4 keeps its own, with --storage DIR"),

@@ -140,12 +140,12 @@ def sim(
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
     chosen, onboard = connections or Connections(), onboard or Onboard()
-    watcher = _monitor(chosen.video_port, count) if monitor else None
-    if watcher is not None and autopilot == "own":
+    watcher = _monitor(chosen.video_port, count) if monitor and autopilot == "own" else None
+    if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
 
-    check_options(count=count, px4=px4, autopilot=autopilot, settings=settings)
+    check_options(count=count, monitor=monitor, px4=px4, autopilot=autopilot, settings=settings)
     grants = _grants(time_grants)
     server: SimulatorServer | Px4Server
     if autopilot == "px4":
