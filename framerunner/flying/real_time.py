@@ -134,9 +134,9 @@ async def _vehicle(
     # The simulator reads the scenario that was checked here, even if the user's file changes.
     scenario_file, px4 = str(records.folder.scenario), settings.px4
     links = () if monitor_url is None or px4 is not None else (monitor_url,)  # PX4 has its own links
-    sitl = await stack.enter_async_context(
-        SitlProcess(scenario_file, settings.speed, settings.instance, links, plan.seed or 0, px4=px4)
-    )
+    storage = None if px4 is None else records.folder.path
+    chosen = (scenario_file, settings.speed, settings.instance, links, plan.seed or 0)
+    sitl = await stack.enter_async_context(SitlProcess(*chosen, px4=px4, storage=storage))
     camera = plan.scenario.camera
     size_px = (camera.width_px, camera.height_px)
     shared = None if px4 is None else monitor_url

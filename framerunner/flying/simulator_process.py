@@ -33,7 +33,7 @@ _PX4_ANSWER_US = 20_000  # likewise; PX4 sends an attitude each 10 ms, when it c
 class SitlProcess(ChildProcess):
     """`framerunner sim` as a child process, with its options.
 
-    `px4` is the folder of a PX4 that flies instead of our own autopilot.
+    `px4` is the folder of a PX4 that flies instead of our own autopilot, `storage` that of the drone's files.
     """
 
     def __init__(
@@ -45,6 +45,7 @@ class SitlProcess(ChildProcess):
         seed: int = 0,
         *,
         px4: Path | None = None,
+        storage: Path | None = None,
     ) -> None:
         here, there = socket.socketpair()
         arguments = [
@@ -53,6 +54,7 @@ class SitlProcess(ChildProcess):
             *("--time-grants", str(there.fileno())),
             *(word for link in links for word in ("--link", link)),
             *(() if px4 is None else ("--autopilot", "px4", "--px4", str(px4))),
+            *(() if storage is None else ("--storage", str(storage))),
         ]
         super().__init__("the simulator", arguments, inherited=there)
         self.clock = SimulatorClock(here, _PX4_ANSWER_US if px4 else _ANSWER_US, answers_take_time=bool(px4))

@@ -16,8 +16,15 @@ _INTEGRAL_SHARE = 4 / 3  # of a rate controller's P, by PX4's defaults 0.15 and 
 _DERIVATIVE_SHARE = 0.02  # by PX4's defaults 0.15 and 0.003
 _RATE_BANDWIDTH_RAD_S = 20.0  # of roll and pitch, with motors that are fast enough
 _MOTOR_SHARE = 0.6  # of the motors' bandwidth that the rate controllers use at most
-_YAW_BANDWIDTH_RAD_S = 4.0
+_YAW_BANDWIDTH_RAD_S = 8.0
 _YAW_INTEGRAL_SHARE = 0.5
+_VELOCITY_CONTROL: dict[str, Value] = {
+    "MPC_XY_VEL_P_ACC": 4.0,  # PX4's default 1.8 follows a velocity 0.7 s later
+    "MPC_XY_VEL_I_ACC": 2.0,
+    "MPC_Z_VEL_P_ACC": 8.0,
+    "MC_YAW_TQ_CUTOFF": 0.0,
+}
+"""For apps that command velocities; accelerations for velocities, so the same for all airframes."""
 _MIN_THRUST_SHARE = 0.25  # of the hover thrust, in the air
 _MAX_PX4_MIN_THRUST = 0.12  # PX4's default
 _ARRIVAL_EARLY_MS = 4  # a pose or fix is stamped with the clock of the tick before that of its arrival
@@ -59,7 +66,7 @@ def airframe_parameters(airframe: Airframe) -> dict[str, Value]:
     hover = airframe.weight_n / airframe.full_thrust_n
     values["MPC_THR_HOVER"] = hover
     values["MPC_THR_MIN"] = min(_MAX_PX4_MIN_THRUST, _MIN_THRUST_SHARE * hover)
-    values |= _rate_controllers(airframe)
+    values |= _rate_controllers(airframe) | _VELOCITY_CONTROL
     return values | {name: value for name, value in airframe.parameters.items() if name != "MPC_THR_HOVER"}
 
 
