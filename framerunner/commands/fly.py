@@ -20,6 +20,7 @@ from framerunner.commands import (
     with_faults,
     with_sensors,
 )
+from framerunner.commands.px4 import check_px4_flight, for_px4
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -49,7 +50,12 @@ _Lockstep = Annotated[
     bool, Parameter(help="in simulated time, as fast as the machine can, the same each time; no log")
 ]
 _Seed = Annotated[
-    WholeNumber | None, Parameter(help="of everything random in a lockstep flight; 0 if not given")
+    WholeNumber | None,
+    Parameter(help="of everything random in a lockstep flight, or with --px4; 0 if not given"),
+]
+_Px4 = Annotated[
+    Path | None,
+    Parameter(help="folder of a PX4 built for SITL: it flies the simulated drone instead of our autopilot"),
 ]
 _Record = Annotated[bool, Parameter(help="write flight.mcap as well, for `framerunner replay` and Foxglove")]
 _Video = Annotated[
@@ -84,6 +90,7 @@ def fly(
     simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
+    px4: _Px4 = None,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
     sensors: Sensors = None,
@@ -113,6 +120,8 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
+        framerunner fly test-case-1 --px4 ../PX4-Autopilot --speed 4
+
         framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
@@ -121,16 +130,18 @@ def fly(
     camera = api.video_url if api is not None and camera is None else camera
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     _check(drone, camera, speed, instance, lockstep=lockstep)
-    seed = _checked_seed(seed, monitor, lockstep)
+    check_px4_flight(px4, drone=drone, lockstep=lockstep)
+    seed = _checked_seed(seed, monitor, lockstep, px4)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings, fly_once
 
     loaded = load_mission_with(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep)
+    chosen = chosen if px4 is None else for_px4(chosen)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = _calibrated(plan, calibration, drone)
-    real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
+    real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, px4, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
 
@@ -238,13 +249,13 @@ def _check(drone: str | None, camera: str | None, speed: float, instance: int, *
     check_range("--instance", instance, 0, 9)
 
 
-def _checked_seed(seed: int | None, monitor: bool, lockstep: bool) -> int | None:
-    """The seed of a flight in lockstep; None in real time."""
+def _checked_seed(seed: int | None, monitor: bool, lockstep: bool, px4: Path | None) -> int | None:
+    """The seed of a flight in lockstep or of one with PX4; None in real time."""
     if monitor and lockstep:
         raise SettingError("--monitor: shows flights in real time; leave it out with --lockstep")
     if seed is None:
-        return 0 if lockstep else None
-    if not lockstep:
+        return 0 if lockstep or px4 is not None else None
+    if not lockstep and px4 is None:
         raise SettingError(
             f"--seed {seed}: only a flight in lockstep repeats; add --lockstep or leave it out"
         )

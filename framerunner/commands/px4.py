@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
+from errors import SettingError
 from framerunner.commands import say, with_faults, with_sensors
 
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
+    from scenarios.models import Scenario
     from sitl.px4.server import Px4Server, Px4Settings
     from sitl.px4.simulation import Px4Simulation
     from sitl.server_settings import ServerSettings
@@ -54,6 +56,33 @@ def params(
     return 0
 
 
+def for_px4(scenario: Scenario) -> Scenario:
+    """A scenario with sensors from which PX4 can estimate its state; says so if they are others."""
+    from sitl.px4.simulation import with_sensors_for_px4
+
+    chosen = with_sensors_for_px4(scenario)
+    if chosen is not scenario:
+        say(f"PX4 takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
+    return chosen
+
+
+def check_px4_flight(px4: Path | None, *, drone: str | None, lockstep: bool) -> None:
+    """Refuse options of `framerunner fly` that do not go with PX4.
+
+    Raises:
+        SettingError: one of them.
+    """
+    if px4 is None:
+        return
+    if drone is not None:
+        raise SettingError(f"--px4 {px4}: flies a simulator that is started; leave it out with --drone")
+    if lockstep:
+        raise SettingError(f"--px4 {px4}: PX4 is another process; leave out --lockstep")
+    from sitl.px4.build import find_build
+
+    find_build(px4)
+
+
 def px4_server(
     scenario: str,
     settings: ServerSettings,
@@ -67,13 +96,9 @@ def px4_server(
     """The simulator with PX4, by the options of `framerunner sim`."""
     from scenarios.loader import load_scenario
     from sitl.px4.server import Px4Server
-    from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
+    from sitl.px4.simulation import Px4Simulation
 
-    chosen = with_sensors(load_scenario(scenario), onboard.sensors)
-    if chosen.sensors == "ideal":
-        chosen = with_sensors_for_px4(chosen)
-        say(f"PX4 takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
-    chosen = with_faults(chosen, fault)
+    chosen = with_faults(for_px4(with_sensors(load_scenario(scenario), onboard.sensors)), fault)
 
     def new_simulation() -> Px4Simulation:
         return Px4Simulation(chosen, seed=seed)

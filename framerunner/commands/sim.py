@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -86,6 +85,58 @@ class Connections:
     ] = "127.0.0.1"
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlownBy:
+    """Which autopilot flies the drone."""
+
+    autopilot: Annotated[
+        Literal["own", "px4", "ardupilot"],
+        Parameter(help="what flies: this project's autopilot, or a genuine PX4 or ArduCopter"),
+    ] = "own"
+    px4: Annotated[
+        Path | None,
+        Parameter(
+            help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
+        ),
+    ] = None
+    ardupilot: Annotated[
+        Path | None,
+        Parameter(
+            help="with --autopilot ardupilot: folder of an ArduPilot built for SITL, to be started; else "
+            "start it yourself"
+        ),
+    ] = None
+
+    def check(self, count: int, settings: ServerSettings, *, monitor: bool) -> None:
+        """Refuse options that the chosen autopilot does not have.
+
+        Raises:
+            SettingError: one of them is given.
+        """
+        for name, folder in (("px4", self.px4), ("ardupilot", self.ardupilot)):
+            if folder is not None and name != self.autopilot:
+                raise SettingError(f"--{name} {folder}: add --autopilot {name}")
+        if self.autopilot == "own":
+            return
+        name = {"px4": "PX4", "ardupilot": "ArduPilot"}[self.autopilot]
+        refused = [
+            ("--count", count != 1, f"{name} flies one drone; start another simulator with --instance 1"),
+            (
+                "--monitor",
+                monitor,
+                f"run framerunner monitor beside it, which listens to {name} on UDP 14550",
+            ),
+            ("--link", bool(settings.links), f"MAVLink is {name}'s own"),
+            ("--signing-key", settings.signing_key is not None, f"MAVLink is {name}'s own"),
+            ("--parameters", settings.parameters is not None, f"{name} keeps its own, with --storage DIR"),
+            ("--shell", settings.shell, f"MAVLink is {name}'s own"),
+        ]
+        for option, given, why in refused:
+            if given:
+                raise SettingError(f"{option}: {why}; leave it out with --autopilot {self.autopilot}")
+
+
 def sim(
     *,
     scenario: Annotated[
@@ -100,23 +151,7 @@ def sim(
     fault: Faults = (),
     connections: Connections | None = None,
     onboard: Onboard | None = None,
-    autopilot: Annotated[
-        Literal["own", "px4", "ardupilot"],
-        Parameter(help="what flies: this project's autopilot, or a genuine PX4 or ArduCopter"),
-    ] = "own",
-    px4: Annotated[
-        Path | None,
-        Parameter(
-            help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
-        ),
-    ] = None,
-    ardupilot: Annotated[
-        Path | None,
-        Parameter(
-            help="with --autopilot ardupilot: folder of an ArduPilot built for SITL, to be started; else "
-            "start it yourself"
-        ),
-    ] = None,
+    flown_by: FlownBy | None = None,
     monitor: Annotated[
         bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")
     ] = False,
@@ -155,21 +190,20 @@ def sim(
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
     chosen, onboard = connections or Connections(), onboard or Onboard()
-    watcher = _monitor(chosen.video_port, count) if monitor else None
-    if watcher is not None and autopilot == "own":
+    flown_by = flown_by or FlownBy()
+    watcher = _monitor(chosen.video_port, count) if monitor and flown_by.autopilot == "own" else None
+    if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
-
+    flown_by.check(count, settings, monitor=monitor)
     check_range("--seed", seed, 0, 2**63 - 1)
-    _check_builds(autopilot, {"px4": px4, "ardupilot": ardupilot})
-    if autopilot != "own":
-        _check_genuine(autopilot, count, settings)
     grants = _grants(time_grants)
     server: _Server
-    if autopilot == "ardupilot":
-        server = ardupilot_server(scenario, settings, onboard, fault, ardupilot=ardupilot, seed=seed)
-    elif autopilot == "px4":
-        server = px4_server(scenario, settings, onboard, fault, px4=px4, seed=seed, grants=grants)
+    if flown_by.autopilot == "ardupilot":
+        build = flown_by.ardupilot
+        server = ardupilot_server(scenario, settings, onboard, fault, ardupilot=build, seed=seed)
+    elif flown_by.autopilot == "px4":
+        server = px4_server(scenario, settings, onboard, fault, px4=flown_by.px4, seed=seed, grants=grants)
     else:
         from sitl.server import SimulatorServer
 
@@ -177,28 +211,6 @@ def sim(
         server = SimulatorServer(simulations, settings, notice=say, grants=grants)
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
-
-
-def _check_builds(autopilot: str, builds: Mapping[str, Path | None]) -> None:
-    """Refuse the folder of an autopilot that is not chosen."""
-    for name, folder in builds.items():
-        if folder is not None and name != autopilot:
-            raise SettingError(f"--{name} {folder}: add --autopilot {name}")
-
-
-def _check_genuine(autopilot: str, count: int, settings: ServerSettings) -> None:
-    """Refuse options that only this project's autopilot has."""
-    name = {"px4": "PX4", "ardupilot": "ArduPilot"}[autopilot]
-    refused = [
-        ("--count", count != 1, f"{name} flies one drone; start another simulator with --instance 1"),
-        ("--link", bool(settings.links), f"MAVLink is {name}'s own"),
-        ("--signing-key", settings.signing_key is not None, f"MAVLink is {name}'s own"),
-        ("--parameters", settings.parameters is not None, f"{name} keeps its own, with --storage DIR"),
-        ("--shell", settings.shell, f"MAVLink is {name}'s own"),
-    ]
-    for option, given, why in refused:
-        if given:
-            raise SettingError(f"{option}: {why}; leave it out with --autopilot {autopilot}")
 
 
 def _grants(descriptor: int | None) -> TimeGrants | None:

@@ -15,8 +15,9 @@ import contextlib
 import json
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import nan, radians
 from typing import Any, Protocol
 
@@ -79,7 +80,6 @@ class TelemetryFeed:
         self._position_received_s = 0.0
         self._heartbeat_received_s = 0.0
         self._lag_s: float | None = None  # of vehicle time behind wall time
-        self._mode_names: dict[int, str] = {}
         self._texts: deque[tuple[float, str]] = deque(maxlen=TEXTS_KEPT)
         self._attitude_order = MessageOrder()
         self._position_order = MessageOrder()
@@ -100,13 +100,12 @@ class TelemetryFeed:
             direct: `mavlink_direct`.
             numbered_modes: names of the vehicle's modes by HEARTBEAT.custom_mode; without, MAVSDK names them.
         """
-        self._mode_names = dict(numbered_modes or {})
         self._loop = asyncio.get_running_loop()
         plugin.subscribe_attitude_euler(self._on_attitude)
         direct.subscribe_message("LOCAL_POSITION_NED", self._on_position)
         plugin.subscribe_armed(self._on_armed)
-        if self._mode_names:
-            direct.subscribe_message("HEARTBEAT", self._on_heartbeat)
+        if numbered_modes:
+            direct.subscribe_message("HEARTBEAT", partial(_take_mode, self, numbered_modes))
         else:
             plugin.subscribe_flight_mode(self._on_mode)
         plugin.subscribe_landed_state(self._on_landed)
@@ -234,11 +233,6 @@ class TelemetryFeed:
     def _on_mode(self, mode: Any, _user: object) -> None:  # noqa: ANN401
         self.mode = getattr(mode, "name", str(mode))
 
-    def _on_heartbeat(self, message: Any, _user: object) -> None:  # noqa: ANN401
-        if message.component_id == AUTOPILOT_COMPONENT_ID:
-            number = json.loads(message.fields_json)["custom_mode"]
-            self.mode = self._mode_names.get(number, f"mode {number}")
-
     def _on_landed(self, state: Any, _user: object) -> None:  # noqa: ANN401
         self.landed = getattr(state, "name", str(state)) == "ON_GROUND"
 
@@ -258,6 +252,13 @@ class TelemetryFeed:
             loop.call_soon_threadsafe(self._new_tick.set)
         except RuntimeError:  # closed between the test and the call
             self._loop = None
+
+
+def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Any, _user: object) -> None:  # noqa: ANN401
+    """Take the mode in an autopilot's HEARTBEAT, of `mavlink_direct`."""
+    if heartbeat.component_id == AUTOPILOT_COMPONENT_ID:
+        number = json.loads(heartbeat.fields_json)["custom_mode"]
+        feed.mode = names.get(number, f"mode {number}")
 
 
 def _least_lag(before_s: float | None, lag_s: float) -> float:
@@ -292,7 +293,13 @@ async def request_rates(feed: TelemetryFeed, plugin: Any) -> None:  # noqa: ANN4
 
 
 class VehicleClock(Protocol):
-    """The time of a vehicle that can wait. Its coroutines raise `DroneError` when the vehicle is gone."""
+    """The time of a vehicle that can wait. Its coroutines raise `DroneError` when the vehicle is gone.
+
+    Attributes:
+        answers_take_time: the vehicle answers requests only while its time goes on, as PX4 does.
+    """
+
+    answers_take_time: bool
 
     async def stop(self) -> int:
         """Stop time; returns the time of the last telemetry, microseconds."""
@@ -357,6 +364,21 @@ class TickSource:
                 return True
             self.late += 1
         return False
+
+    async def until_done(self, work: Awaitable[None]) -> None:
+        """Wait for a request's answer, with vehicle time going on if the answer takes time."""
+        clock = self._clock
+        if clock is None or not self.waits or not clock.answers_take_time:
+            await work
+            return
+        task = asyncio.ensure_future(work)
+        try:
+            while not task.done():
+                await self.next(TICK_LOST_S)
+        except BaseException:
+            task.cancel()
+            raise
+        await task
 
     def release(self) -> None:
         """Let vehicle time run freely."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from struct import Struct
 
 from wire.dialect import mavlink
-from wire.framing import CHECKSUM_BYTES, HEADER_BYTES_V2, MARKER_V2, SIGNATURE_BYTES, SIGNED
+from wire.framing import CHECKSUM_BYTES, CRC_EXTRA, HEADER_BYTES_V2, MARKER_V2, SIGNATURE_BYTES, SIGNED
 
 _HEADER = Struct("<BBBBBBBHB")
 _CHECKSUM = Struct("<H")
@@ -86,7 +86,7 @@ class ControlsReader:
 
     def __init__(self) -> None:
         kind = mavlink.mavlink_map[mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS]
-        self._unpacker, self._crc_extra = kind.unpacker, kind.crc_extra
+        self._unpacker = kind.unpacker
         self._buffer = b""
         self.skipped_bytes = 0
 
@@ -109,13 +109,14 @@ class ControlsReader:
             packet_end = end + CHECKSUM_BYTES + (SIGNATURE_BYTES if flags & SIGNED else 0)
             if len(buffer) < packet_end:
                 break
-            if (low, high) == (mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS, 0):
-                (sent,) = _CHECKSUM.unpack_from(buffer, end)
-                if checksum(buffer[start + 1 : end], self._crc_extra) == sent:
-                    yield self._read(buffer[start + HEADER_BYTES_V2 : end])
-                else:
-                    packet_end = start + 1  # search for the next packet in it
-                    self.skipped_bytes += 1
+            seed = CRC_EXTRA.get(high << 16 | low)
+            (sent,) = _CHECKSUM.unpack_from(buffer, end)
+            if seed is None or checksum(buffer[start + 1 : end], seed) != sent:
+                self.skipped_bytes += 1
+                position = start + 1  # the next packet may begin in it
+                continue
+            if low == mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
+                yield self._read(buffer[start + HEADER_BYTES_V2 : end])
             position = packet_end
         self._buffer = buffer[position:]
 

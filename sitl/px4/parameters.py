@@ -14,12 +14,22 @@ Value = int | float
 
 _INTEGRAL_SHARE = 4 / 3  # of a rate controller's P, by PX4's defaults 0.15 and 0.2
 _DERIVATIVE_SHARE = 0.02  # by PX4's defaults 0.15 and 0.003
-_RATE_BANDWIDTH_RAD_S = 20.0  # of roll and pitch, with motors that are fast enough
-_MOTOR_SHARE = 0.6  # of the motors' bandwidth that the rate controllers use at most
-_YAW_BANDWIDTH_RAD_S = 4.0
+_RATE_BANDWIDTH_RAD_S = 26.0  # of roll and pitch, with motors that are fast enough
+_MOTOR_SHARE = 0.8  # of the motors' bandwidth that the rate controllers use at most
+_YAW_BANDWIDTH_RAD_S = 8.0
 _YAW_INTEGRAL_SHARE = 0.5
+_VELOCITY_CONTROL: dict[str, Value] = {
+    "MC_ROLL_P": 8.0,
+    "MC_PITCH_P": 8.0,
+    "MPC_XY_VEL_P_ACC": 5.0,  # with PX4's default 1.8 the drone follows a velocity 0.7 s later
+    "MPC_XY_VEL_I_ACC": 5.0,  # drag is taken over in one second, not in four
+    "MPC_Z_VEL_P_ACC": 8.0,
+    "MC_YAW_TQ_CUTOFF": 0.0,
+}
+"""For apps that command velocities; accelerations for velocities, so the same for all airframes."""
 _MIN_THRUST_SHARE = 0.25  # of the hover thrust, in the air
 _MAX_PX4_MIN_THRUST = 0.12  # PX4's default
+_HORIZON_RESERVE_MS = 24  # with less, poses come too late for their time and the estimate lags by 20 ms
 _ARRIVAL_EARLY_MS = 4  # a pose or fix is stamped with the clock of the tick before that of its arrival
 
 
@@ -59,7 +69,7 @@ def airframe_parameters(airframe: Airframe) -> dict[str, Value]:
     hover = airframe.weight_n / airframe.full_thrust_n
     values["MPC_THR_HOVER"] = hover
     values["MPC_THR_MIN"] = min(_MAX_PX4_MIN_THRUST, _MIN_THRUST_SHARE * hover)
-    values |= _rate_controllers(airframe)
+    values |= _rate_controllers(airframe) | _VELOCITY_CONTROL
     return values | {name: value for name, value in airframe.parameters.items() if name != "MPC_THR_HOVER"}
 
 
@@ -106,7 +116,7 @@ def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
             "EKF2_EV_DELAY": _delay_ms(pose.delay_s),
             "EKF2_EVP_NOISE": 0.01,
             "EKF2_EVA_NOISE": 0.02,
-            "EKF2_DELAY_MAX": max(20, _delay_ms(pose.delay_s) + _ARRIVAL_EARLY_MS),
+            "EKF2_DELAY_MAX": max(20, _delay_ms(pose.delay_s) + _HORIZON_RESERVE_MS),
             "EKF2_ASP_DELAY": 20,
             "EKF2_OF_DELAY": 20,
             "EKF2_TAU_POS": 0.1,

@@ -41,8 +41,11 @@ class Px4Server:
         settings: ports and speed; MAVLink is PX4's own.
         px4: how it is started.
         notice: called with lines for people.
-        grants: how far simulated time may advance; None: without a limit. With
-            them the end of PX4 ends the server.
+        grants: how far simulated time may advance; None: without a limit. With them the end of PX4 ends the
+            server.
+
+    Attributes:
+        link: to PX4; None before `run`.
     """
 
     def __init__(
@@ -57,7 +60,7 @@ class Px4Server:
         self._simulation = new_simulation()
         self._settings, self._px4, self._notice, self._grants = settings, px4, notice, grants
         self._video = DroneVideo(self._simulation, settings)
-        self._link: Px4Link | None = None
+        self.link: Px4Link | None = None
         self._simulation.faults.notice = notice
 
     async def run(self) -> None:
@@ -70,13 +73,13 @@ class Px4Server:
             Px4EndedError: it ended, and time is granted by another program.
         """
         settings = self._settings
-        self._link = Px4Link((settings.bind, FIRST_PORT + settings.instance), self._notice)
+        self.link = Px4Link((settings.bind, FIRST_PORT + settings.instance), self._notice)
         try:
             await self._video.open()
             self._notice(self._greeting())
-            await self._serve(self._link)
+            await self._serve(self.link)
         finally:
-            self._link.close()
+            self.link.close()
             if self._px4.process is not None:
                 await self._px4.process.stop()
             if self._grants is not None:
