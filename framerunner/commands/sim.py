@@ -114,9 +114,9 @@ class FlownBy:
         Raises:
             SettingError: one of them is given.
         """
-        for name, folder in (("px4", self.px4), ("ardupilot", self.ardupilot)):
+        for name, title, folder in (("px4", "PX4", self.px4), ("ardupilot", "ArduPilot", self.ardupilot)):
             if folder is not None and name != self.autopilot:
-                raise SettingError(f"--{name} {folder}: add --autopilot {name}")
+                raise SettingError(f"--{name} {folder}: is for {title}; add --autopilot {name}")
         if self.autopilot == "own":
             return
         name = {"px4": "PX4", "ardupilot": "ArduPilot"}[self.autopilot]
@@ -172,15 +172,11 @@ def sim(
 
         framerunner sim --scenario test-case-1 --monitor
 
-        framerunner sim --ground-remote 192.168.1.20
-
         framerunner sim --count 4 --video-rtp off
 
         framerunner sim --storage drone-files --parameters drone.params
 
         framerunner sim --link tcpin://127.0.0.1:5760
-
-        framerunner sim --link serial:///dev/ttyUSB0:57600
 
         framerunner sim --scenario test-case-1 --autopilot px4 --px4 ../PX4-Autopilot
 
@@ -197,20 +193,40 @@ def sim(
     settings = _settings(chosen, onboard, speed, instance, count)
     flown_by.check(count, settings, monitor=monitor)
     check_range("--seed", seed, 0, 2**63 - 1)
-    grants = _grants(time_grants)
-    server: _Server
-    if flown_by.autopilot == "ardupilot":
-        build = flown_by.ardupilot
-        server = ardupilot_server(scenario, settings, onboard, fault, ardupilot=build, seed=seed)
-    elif flown_by.autopilot == "px4":
-        server = px4_server(scenario, settings, onboard, fault, px4=flown_by.px4, seed=seed, grants=grants)
-    else:
-        from sitl.server import SimulatorServer
-
-        simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
-        server = SimulatorServer(simulations, settings, notice=say, grants=grants)
+    server = _server(flown_by, (scenario, settings, onboard, fault), count, seed, _grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
+
+
+def _server(
+    flown_by: FlownBy,
+    flown: tuple[str, ServerSettings, Onboard, tuple[str, ...]],
+    count: int,
+    seed: int,
+    grants: TimeGrants | None,
+) -> _Server:
+    """The simulator with the chosen autopilot."""
+    if flown_by.autopilot == "px4":
+        return px4_server(*flown, px4=flown_by.px4, seed=seed, grants=grants)
+    if flown_by.autopilot == "ardupilot":
+        return ardupilot_server(*flown, ardupilot=flown_by.ardupilot, seed=seed)
+    return _own_server(*flown, count=count, seed=seed, grants=grants)
+
+
+def _own_server(
+    scenario: str,
+    settings: ServerSettings,
+    onboard: Onboard,
+    fault: tuple[str, ...],
+    *,
+    count: int,
+    seed: int,
+    grants: TimeGrants | None,
+) -> _Server:
+    from sitl.server import SimulatorServer
+
+    simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
+    return SimulatorServer(simulations, settings, notice=say, grants=grants)
 
 
 def _grants(descriptor: int | None) -> TimeGrants | None:

@@ -81,7 +81,7 @@ def airframe_parameters(airframe: Airframe) -> dict[str, Value]:
         SettingError: it is no quadrotor in X.
     """
     motor, inertia = airframe.motor, airframe.inertia_kg_m2
-    spin_max = min(0.95, sqrt(airframe.weight_n / airframe.full_thrust_n / _HOVER_SHARE))
+    spin_max = min(1.0, sqrt(airframe.weight_n / airframe.full_thrust_n / _HOVER_SHARE))
     full_n = motor.thrust_n_s2 * (spin_max * motor.max_speed_rad_s) ** 2
     hover = airframe.weight_n / (full_n * len(airframe.rotors))
     values: dict[str, Value] = {

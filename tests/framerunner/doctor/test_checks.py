@@ -99,7 +99,7 @@ def test_a_healthy_drone_can_fly():
 @pytest.mark.parametrize(
     ("message", "subject"),
     [
-        (heartbeat(autopilot=8), "autopilot"),
+        (heartbeat(autopilot=15), "autopilot"),
         (heartbeat(kind=1), "autopilot"),
         (heartbeat(base_mode=157, state=4), "armed"),
         (heartbeat(state=5), "failsafe"),
