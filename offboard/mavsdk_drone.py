@@ -63,7 +63,7 @@ class MavsdkDrone:
         url: udpin://, udpout://, tcpout://, tcpin:// or serial:// (see `parse_url`).
         start_arena: where the drone is: x, y, z (metres) and yaw (radians), arena axes.
         connect_limit_s: wall time to find the vehicle.
-        ready_limit_s: wall time until it can be armed.
+        ready_limit_s: wall time until it can be armed; None: the autopilot's usual one.
         hang_report: a real file for the stack of a hung app; by default standard error.
         box: commands that were corrected here do not leave it; None: there is none.
         corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
@@ -81,7 +81,7 @@ class MavsdkDrone:
         *,
         start_arena: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
         connect_limit_s: float = 10.0,
-        ready_limit_s: float = 30.0,
+        ready_limit_s: float | None = None,
         hang_report: TextIO | None = None,
         box: Box | None = None,
         corrects: bool = True,
@@ -194,13 +194,14 @@ class MavsdkDrone:
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then determine the axes."""
+        limit_s = self._ready_limit_s or self._stream.ready_limit_s
         try:
-            await self._wait_for_checks()
+            await self._wait_for_checks(limit_s)
         except TimeoutError:
             missing = ", ".join(self._feed.missing())
             await self._hold_on_ground()
             raise DroneError(
-                f"not ready within {self._ready_limit_s:g} s: {missing}{self._feed.recent_texts()}; "
+                f"not ready within {limit_s:g} s: {missing}{self._feed.recent_texts()}; "
                 f"framerunner doctor --drone {self._url.text} says what is missing"
             ) from None
         if self._feed.armed:
@@ -210,7 +211,7 @@ class MavsdkDrone:
         self._alignment = Alignment(self._start_arena, Pose(feed.position_ned_m, feed.yaw_ned_rad))
         await self._ticks.begin()
 
-    async def _wait_for_checks(self) -> None:
+    async def _wait_for_checks(self, limit_s: float) -> None:
         """Wait until nothing is missing.
 
         PX4's checks are those of the mode it is in. At first that is hold, which requires a global position:
@@ -218,17 +219,17 @@ class MavsdkDrone:
         ArduPilot's first mode requires less than GUIDED, so it always enters that.
         """
         if self._stream.checks_in_offboard:
-            async with asyncio.timeout(self._ready_limit_s):
+            async with asyncio.timeout(limit_s):
                 while not self._in_offboard and not self._feed.armed:
                     with contextlib.suppress(MavsdkError):  # refused without a position
                         await self._requests.wait(self._stream.request_offboard())
                     await self._becomes(lambda: self._in_offboard, HOLD_SHOWN_S)
         with contextlib.suppress(TimeoutError):
-            await self._until(lambda: not self._feed.missing(), min(FIRST_MODE_S, self._ready_limit_s / 2))
+            await self._until(lambda: not self._feed.missing(), min(FIRST_MODE_S, limit_s / 2))
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
             await self._request("offboard mode", self._stream.request_offboard())
-        await self._until(lambda: not self._feed.missing(), self._ready_limit_s)
+        await self._until(lambda: not self._feed.missing(), limit_s)
 
     async def ticks(self) -> AsyncIterator[DroneState]:
         """States at 20 Hz of vehicle time; ticks that were not waited for are skipped."""

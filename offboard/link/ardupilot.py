@@ -72,6 +72,7 @@ class ArduPilotDialect:
     modes = ARDUPILOT_MODES
     numbered_modes = ardupilot_modes.NAMES
     checks_in_offboard = True
+    ready_limit_s = 90.0  # its estimator uses GPS some 40 s after its start
 
     def __init__(self, action: Any, direct: Any, feed: TelemetryFeed, system_id: int) -> None:  # noqa: ANN401
         self.ended = False

@@ -42,6 +42,7 @@ class Dialect(Protocol):
         modes: the names of its modes.
         numbered_modes: names by HEARTBEAT.custom_mode; empty: MAVSDK's names are used.
         ended: no setpoint is sent any more.
+        ready_limit_s: wall time until it can be armed, usually.
         checks_in_offboard: its pre-arm checks are those of its mode, so it must enter offboard to be ready.
     """
 
@@ -49,6 +50,7 @@ class Dialect(Protocol):
     numbered_modes: Mapping[int, str]
     ended: bool
     checks_in_offboard: bool
+    ready_limit_s: float
 
     async def request_streams(self) -> None:
         """Request what the vehicle does not send by itself, as soon as it is connected."""
@@ -87,6 +89,7 @@ class Px4Dialect(SetpointStream):
     modes = PX4_MODES
     numbered_modes: Mapping[int, str] = MappingProxyType({})
     checks_in_offboard = False
+    ready_limit_s = 30.0
 
     def __init__(self, offboard: OffboardAsync, action: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
         super().__init__(offboard)

@@ -107,8 +107,8 @@ def test_it_is_asked_for_its_own_parameters_and_for_streams():
     record.parameters.clear()
     asked = list(open_requests(record))
     names = {message.param_id for message in asked if message.get_type() == "PARAM_REQUEST_READ"}
-    assert names == {name.encode() for name in ARDUPILOT_PARAMETERS}
-    assert not names & {name.encode() for name in PARAMETERS}
+    assert names == set(ARDUPILOT_PARAMETERS)
+    assert not names & set(PARAMETERS)
     commands = {message.command for message in asked if message.get_type() == "COMMAND_LONG"}
     assert mavlink.MAV_CMD_SET_MESSAGE_INTERVAL in commands
     assert mavlink.MAV_CMD_COMPONENT_ARM_DISARM not in commands
