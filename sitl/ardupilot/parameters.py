@@ -46,6 +46,10 @@ def simulation_parameters() -> dict[str, Value]:
         "FS_THR_ENABLE": 0,
         "SIM_BARO_RND": 0,
         "SIM_GPS1_ACC": 0.05,
+        "SIM_GPS1_HZ": 10,
+        "GPS1_RATE_MS": 100,
+        "SIM_GPS1_LAG_MS": 100,
+        "GPS1_DELAY_MS": 100,  # by default the estimator assumes 120 or 220: 2 to 12 cm at 1 m/s
         "SIM_DRIFT_SPEED": 0,
         "BATT_MONITOR": 0,
         "FENCE_ENABLE": 0,
