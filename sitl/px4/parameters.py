@@ -12,17 +12,19 @@ from sitl.sensors.specs import SuiteSpec
 
 Value = int | float
 
-_INTEGRAL_SHARE = 4 / 3  # of a rate controller's P, by PX4's defaults 0.15 and 0.2
-_DERIVATIVE_SHARE = 0.02  # by PX4's defaults 0.15 and 0.003
-_RATE_BANDWIDTH_RAD_S = 26.0  # of roll and pitch, with motors that are fast enough
-_MOTOR_SHARE = 0.8  # of the motors' bandwidth that the rate controllers use at most
-_YAW_BANDWIDTH_RAD_S = 8.0
+_INTEGRAL_SHARE = 4 / 3  # 1/s, of a rate controller's P, by PX4's defaults 0.15 and 0.2
+_MAX_INTEGRAL_SHARE = 6.0  # for an airframe whose drag resists turning
+_TURNING_RAD_S = 0.4  # rate for which that drag is sent ahead
+_RATE_BANDWIDTH_RAD_S = 40.0  # of roll and pitch; D cancels the motors' lag, and filters leave 16 ms
+_YAW_BANDWIDTH_RAD_S = 12.0
 _YAW_INTEGRAL_SHARE = 0.5
 _VELOCITY_CONTROL: dict[str, Value] = {
+    "MC_AIRMODE": 1,  # a drone with little hover thrust has little torque otherwise
     "MC_ROLL_P": 8.0,
     "MC_PITCH_P": 8.0,
-    "MPC_XY_VEL_P_ACC": 5.0,  # with PX4's default 1.8 the drone follows a velocity 0.7 s later
-    "MPC_XY_VEL_I_ACC": 5.0,  # drag is taken over in one second, not in four
+    "MPC_XY_VEL_P_ACC": 1.6,  # with PX4's default 1.8 the drone follows a velocity 0.7 s later
+    "MPC_XY_VEL_I_ACC": 2.4,
+    "MPC_XY_VEL_D_ACC": 0.2,
     "MPC_Z_VEL_P_ACC": 8.0,
     "MC_YAW_TQ_CUTOFF": 0.0,
 }
@@ -80,15 +82,19 @@ def _rate_controllers(airframe: Airframe) -> dict[str, Value]:
     roll_nm = share * full_n * sum(abs(rotor.position_frd_m[1]) for rotor in rotors)
     pitch_nm = share * full_n * sum(abs(rotor.position_frd_m[0]) for rotor in rotors)
     yaw_nm = len(rotors) * motor.torque_nm_s2 * motor.max_speed_rad_s**2
-    fastest = _MOTOR_SHARE / motor.time_constant_s if motor.time_constant_s > 0.0 else _RATE_BANDWIDTH_RAD_S
-    bandwidth = min(_RATE_BANDWIDTH_RAD_S, fastest)
     values: dict[str, Value] = {}
-    for axis, moment_nm, about in (("ROLL", roll_nm, inertia[0]), ("PITCH", pitch_nm, inertia[1])):
-        gain = bandwidth * about / moment_nm
+    for axis, moment_nm, about, drag_nm_s2 in (
+        ("ROLL", roll_nm, inertia[0], airframe.drag.moment_nm_s2[0]),
+        ("PITCH", pitch_nm, inertia[1], airframe.drag.moment_nm_s2[1]),
+    ):
+        gain = _RATE_BANDWIDTH_RAD_S * about / moment_nm
+        damping_nm_s = drag_nm_s2 * _TURNING_RAD_S
+        integral_share = min(max(_INTEGRAL_SHARE, damping_nm_s / about), _MAX_INTEGRAL_SHARE)
         values[f"MC_{axis}RATE_P"] = gain
-        values[f"MC_{axis}RATE_I"] = _INTEGRAL_SHARE * gain
-        values[f"MC_{axis}RATE_D"] = _DERIVATIVE_SHARE * gain
-    gain = min(_YAW_BANDWIDTH_RAD_S, fastest) * inertia[2] / yaw_nm
+        values[f"MC_{axis}RATE_I"] = integral_share * gain
+        values[f"MC_{axis}RATE_D"] = motor.time_constant_s * gain
+        values[f"MC_{axis}RATE_FF"] = damping_nm_s / moment_nm
+    gain = _YAW_BANDWIDTH_RAD_S * inertia[2] / yaw_nm
     values["MC_YAWRATE_P"] = gain
     values["MC_YAWRATE_I"] = _YAW_INTEGRAL_SHARE * gain
     return values

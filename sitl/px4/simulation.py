@@ -24,11 +24,14 @@ class Px4Simulation(SimulatedVehicle):
     """One drone in one scenario, flown by PX4; see `SimulatedVehicle`. Its sensors must not be ideal.
 
     A tick has two halves: `sense`, whose messages are sent, and `move`, with PX4's answer to them.
+
+    Attributes:
+        messages: packs what `sense` returns.
     """
 
     def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
         super().__init__(scenario, airframe, seed)
-        self._messages = SensorMessages(self._suite.range_finder)
+        self.messages = SensorMessages(self._suite.range_finder)
         self._armed = False
         rotors, motor = len(self.world.airframe.rotors), self.world.airframe.motor
         self._still = (0.0,) * rotors
@@ -52,7 +55,7 @@ class Px4Simulation(SimulatedVehicle):
         if (faulty := self.faults.sensors) is not None:
             readings, pose = faulty.change(readings, pose)
         _, place = self.true_state()
-        return self._messages.pack(readings, pose, true, place)
+        return self.messages.pack(readings, pose, true, place)
 
     def move(self, controls: ActuatorControls | None) -> None:
         """End the tick with PX4's outputs; None: there are none, and the motors stand.
