@@ -68,7 +68,7 @@ web-check: ## bundle them with packages installed anew; the result must be what 
 .PHONY: test-ardupilot
 test-ardupilot: $(VENV)/installed-dev ## fly the challenge on a genuine ArduCopter: ARDUPILOT_DIR=its folder
 	@if [ -z "$(ARDUPILOT_DIR)" ]; then echo "no ArduPilot: give its folder, built for SITL, by ARDUPILOT_DIR=../ardupilot"; exit 1; fi
-	ARDUPILOT_DIR=$(abspath $(ARDUPILOT_DIR)) $(BIN)/pytest -s tests/genuine/test_ardupilot.py
+	ARDUPILOT_DIR=$(abspath $(ARDUPILOT_DIR)) $(BIN)/pytest -rs tests/sitl/ardupilot/test_genuine.py
 
 .PHONY: test-fast
 test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
