@@ -169,9 +169,7 @@ def latency(
             f"of {found.delay_s:.3f} s the terminal and the screen take {display_delay:g} s (--display-delay)"
         )
     delay_s = max(0.0, found.delay_s - (display_delay if led is None else 0.0))
-    print(
-        f"{found.images} images, {found.rate_hz:.1f} a second; correlation with the light {found.correlation:.2f}"
-    )
+    print(f"{found.images} images, {found.rate_hz:.1f} a second; correlation {found.correlation:.2f}")
     print(f"delay {delay_s:.3f} s (± {2 * found.std_s:.3f}); fly with --camera-delay {delay_s:.3f}")
     return 0
 
