@@ -174,6 +174,41 @@ def latency(
     return 0
 
 
+@app.command
+def colours(
+    swatches: Annotated[
+        list[str], Parameter(help="red=SOURCE green=SOURCE blue=SOURCE: images of the paint, or a camera")
+    ],
+    /,
+    *,
+    calibration: Annotated[
+        Path, Parameter(help="file of `framerunner camera calibrate`, which is given the colours")
+    ] = Path("camera.yaml"),
+) -> int:
+    """Learn the colours of your frames from swatches of their paint.
+
+    Each swatch must fill the middle of its image, a fifth of width and height, in the light of the hall. A
+    camera takes 20 images after you pressed Enter. Colours are then corrected in every image before frames
+    are looked for; grey stays grey.
+
+    **Examples**
+
+        framerunner camera colours red=red.jpg green=green.jpg blue=blue.jpg
+
+        framerunner camera colours red=0 green=0 blue=0 --calibration camera.yaml
+    """
+    from framerunner.camera_calibration.colours import learn
+
+    def ask(what: str) -> None:
+        try:
+            input(f"{what}, then press Enter ")
+        except EOFError:
+            raise SettingError("there is no terminal to press Enter in; give image files instead") from None
+
+    learn(swatches, calibration, ask)
+    return 0
+
+
 def _board(columns: int, rows: int, square: float, marker: float) -> Board:
     """Check the options."""
     from vision.calibration.board import Board
