@@ -7,13 +7,13 @@ import { pageData, pageRoot } from "../lib/page_data.js";
 
 const word = translator({
   en: {
-    course: "Course", name: "Your name", language: "Español", start: "Begin", again: "Go on", done: "passed", minutes: "about {minutes} minutes",
-    need_name: "Write your name first.", class: "The class", pupil: "Pupil", flights: "{flights} flights", after: "passed after {minutes} min, {flights} flights",
+    course: "Course", name: "Your name", language: "Español", start: "Begin", again: "Go on", done: "passed", minutes: "about {minutes} {minutes:minute|minutes}",
+    need_name: "Write your name first.", class: "The class", pupil: "Pupil", flights: "{flights} {flights:flight|flights}", after: "passed after {minutes} min, {flights} {flights:flight|flights}",
     log_in: "Log in to take part.", nobody: "Nobody has begun yet.",
   },
   es: {
-    course: "Curso", name: "Tu nombre", language: "English", start: "Empezar", again: "Seguir", done: "conseguida", minutes: "unos {minutes} minutos",
-    need_name: "Escribe antes tu nombre.", class: "La clase", pupil: "Alumno", flights: "{flights} vuelos", after: "conseguida tras {minutes} min, {flights} vuelos",
+    course: "Curso", name: "Tu nombre", language: "English", start: "Empezar", again: "Seguir", done: "conseguida", minutes: "unos {minutes} {minutes:minuto|minutos}",
+    need_name: "Escribe antes tu nombre.", class: "La clase", pupil: "Alumno", flights: "{flights} {flights:vuelo|vuelos}", after: "conseguida tras {minutes} min, {flights} {flights:vuelo|vuelos}",
     log_in: "Inicia sesión para participar.", nobody: "Nadie ha empezado aún.",
   },
 });
