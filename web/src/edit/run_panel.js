@@ -214,8 +214,9 @@ export class RunPanel {
     else if (message.kind === "batch_ended" && message.batch === this.#batch && message.text) setText(this.#line, message.text);
   }
 
-  /** @param {{text: string, result: import("./verdict.js").Result|null}} ended */
-  #showEnd({ text, result }) {
+  /** @param {{text: string, result: import("./verdict.js").Result|null, spans: {state: string, from_s: number, to_s: number}[]}} ended */
+  #showEnd({ text, result, spans }) {
+    this.#showStrip(spans);
     if (this.#isStopped) setText(this.#line, word("stopped"));
     else setText(this.#line, result ? verdictWords(result, this.#layout, this.#view.places) : word("fault", { text }));
     if (result) setText(this.#hit, hitWords(contactsOf(result)));
@@ -240,14 +241,16 @@ export class RunPanel {
       `${sign[String(holds)]} ${when || word("always")} → ${to}`)));
     this.#values.replaceChildren(...now.values.flatMap(({ name, value, unit }) => [
       make("dt", {}, name), make("dd", {}, typeof value === "number" ? `${number(value, 2)} ${unit}` : said(value))]));
-    if (now.state) this.#showStrip(now);
+    if (now.state) {
+      this.#showStrip([...this.#spans, { state: now.state, from_s: this.#spans.at(-1)?.to_s ?? now.time_s - now.seconds_in_state, to_s: now.time_s }]);
+    }
   }
 
-  /** @param {Now} now */
-  #showStrip(now) {
-    const all = [...this.#spans, { state: now.state, from_s: now.time_s - now.seconds_in_state, to_s: now.time_s }];
+  /** @param {{state: string, from_s: number, to_s: number}[]} all */
+  #showStrip(all) {
+    if (all.length === 0) return;
     const start = all[0].from_s;
-    const whole = Math.max(now.time_s - start, 0.001);
+    const whole = Math.max(all[all.length - 1].to_s - start, 0.001);
     this.#strip.replaceChildren(...all.map(({ state, from_s, to_s }) => {
       const part = make("span", { title: `${state}: ${number(from_s - start, 1)}–${number(to_s - start, 1)} s` }, state.split(".").at(-1) ?? "");
       part.style.width = `${100 * Math.max(to_s - from_s, 0) / whole}%`;
