@@ -159,7 +159,9 @@ def test_a_flight_is_told_from_start_to_end_and_is_that_of_lockstep():
 
 def test_a_contact_is_told_when_it_happens():
     lesson = find_lesson("4")
-    careless = lesson.solution.replace("- cmd.vel_x = 0.3\n    during:\n      - look_to_frame", "- cmd.vel_x = 0.3")
+    careless = lesson.solution.replace(
+        "- cmd.vel_x = 0.3\n    during:\n      - look_to_frame", "- cmd.vel_x = 0.3"
+    )
     assert careless != lesson.solution
     with page() as browser:
         browser.answer("start", text=careless, scenario=lesson.name, speed=None)

@@ -2,7 +2,8 @@
 import "./course.css";
 import { askCourse, inLanguage, learner, loadLessons, setLearner } from "../lib/course.js";
 import { make, number, setText } from "../lib/dom.js";
-import { changeLanguage, language, translator } from "../lib/language.js";
+import { changeLanguage, translator } from "../lib/language.js";
+import { translateHeader } from "../lib/navigation.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 
 const word = translator({
@@ -21,7 +22,7 @@ const REFRESH_MS = 5000;
 
 const root = pageRoot("course");
 const { mayAct } = pageData();
-document.documentElement.lang = language();
+translateHeader();
 
 const input = /** @type {HTMLInputElement} */ (make("input", { id: "learner", type: "text", maxlength: "40", autocomplete: "name" }));
 input.value = learner();
@@ -31,7 +32,7 @@ input.addEventListener("input", () => {
 });
 const other = make("button", { type: "button" }, word("language"));
 other.addEventListener("click", changeLanguage);
-const problem = make("p", { class: "problem", role: "alert", hidden: true });
+const problem = make("p", { class: "c-problem", role: "alert" });
 const list = make("ol", { class: "c-lessons" });
 const table = make("table", { class: "c-class" });
 root.append(
@@ -47,7 +48,6 @@ let learners = [];
 
 function tell(text) {
   setText(problem, text);
-  problem.hidden = text === "";
 }
 
 async function open(lesson) {

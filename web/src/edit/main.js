@@ -12,6 +12,7 @@ import { EditSession } from "./session.js";
 import { Tabs } from "./tabs.js";
 import { TextView } from "./text_view.js";
 import { changeLanguage, language } from "../lib/language.js";
+import { translateHeader } from "../lib/navigation.js";
 import { savePicture } from "./picture.js";
 import { showNames } from "./names.js";
 import { watchFlights } from "./live_light.js";
@@ -22,7 +23,7 @@ import { word } from "./words.js";
 
 const root = pageRoot("edit");
 const file = new URLSearchParams(location.search).get("file");
-document.documentElement.lang = language();
+translateHeader();
 
 if (file) edit(file);
 else chooseFile();
