@@ -73,7 +73,7 @@ class RunReporter:
             self._trail.append(_numbers(state.time_us / 1e6, state.x, state.y, state.z))
 
     def see_truth(self, truth: TrueState) -> None:
-        """Take a true state: note when the motors start, and the first contact with each frame and obstacle."""
+        """Note when the motors start, and the first contact with each frame and obstacle."""
         if self._began_us is None and truth.motors_on:
             self._began_us = truth.time_us
         for name in truth.contacts:

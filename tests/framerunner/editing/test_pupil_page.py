@@ -48,7 +48,7 @@ async def pupil(browser, program, file, lesson, locale="en-GB"):
 async def test_a_frame_that_is_hit_is_named_and_marked(browser, program):
     user = await pupil(browser, program, "careless.yaml", LESSON_4.name)
     await user.press("Fly", user.page.locator(".e-controls"))
-    await expect(user.page.locator(".e-hit")).to_have_text(
+    await expect(user.page.locator(".e-touched")).to_have_text(
         "The drone hit the red frame at 16 s.", timeout=30_000
     )
     await expect(user.page.locator(".t-hit")).to_have_count(1)

@@ -33,7 +33,7 @@ export class RunPanel {
   /** @type {Flight[]} */
   #rows = [];
   #line = make("p", { role: "status", class: "e-run-line" }, word("not_flying"));
-  #hit = make("p", { role: "status", class: "e-hit" });
+  #hit = make("p", { role: "status", class: "e-touched" });
   #strip = make("div", { class: "e-strip", role: "img", "aria-label": word("time_line") });
   #guards = make("ul", { class: "e-guards" });
   #values = make("dl", { class: "e-read" });
