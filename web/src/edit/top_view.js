@@ -6,7 +6,7 @@ import { word } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const MAP_PX = 190;
-const [LEFT_PX, TOP_PX, BOTTOM_PX, SCALE_PX] = [30, 8, 32, 50]; // the last: width of the scale of heights
+const [LEFT_PX, TOP_PX, BOTTOM_PX, SCALE_PX] = [30, 8, 32, 58]; // the last: width of the scale of heights
 const MAX_LINES = 20; // of the grid, in each direction
 
 /** @typedef {{name: string, time_s: number}} Contact since the start of the flight */

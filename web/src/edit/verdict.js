@@ -10,7 +10,7 @@ const word = translator({
     no_motors: "The drone never started its motors. The action hover does that.",
     beside: "The drone landed {distance} m from the middle of its base, not on it.", not_landed: "The drone did not take off and land.",
     no_hold: "The drone landed, but it was not at the point {place} for {seconds} s.", nearest: "The nearest it came to it was {distance} m; {radius} m or less counts.",
-    no_face: "The drone landed, but it did not look at the {colour} for {seconds} s from {least} to {most} m away.",
+    no_face: "The drone landed, but it did not look at {colour} for {seconds} s from {least} to {most} m away.",
     no_crossing: "The drone landed, but it did not fly through {frames}.",
     ended_early: "The flight ended early: {reason}.", hit: "The drone hit {things}.", hit_at: "{thing} at {time} s", outside: "It was outside the arena for {time} s.",
     red: "the red frame", green: "the green frame", blue: "the blue frame", cyan: "the cyan frame", magenta: "the magenta frame", pole: "a pole", wall: "a wall",

@@ -3,7 +3,7 @@ import { language } from "./language.js";
 
 const SPANISH = {
   "Live": "En vivo", "Statechart": "Diagrama", "Editor": "Editor", "Course": "Curso", "Pilot": "Piloto", "Competition": "Competición",
-  "Ranking": "Clasificación", "Stage": "Escenario", "Replay": "Repetición", "Log in": "Entrar", "Log out": "Salir", "Skip to the content": "Ir al contenido",
+  "Ranking": "Clasificación", "Stage": "Proyección", "Replay": "Repetición", "Log in": "Entrar", "Log out": "Salir", "Skip to the content": "Ir al contenido",
 };
 
 /** Set the page's language and show the header in it. */
