@@ -145,8 +145,11 @@ export class Inspector {
 
   /** @param {StateNode} state */
   #parameters(state) {
-    const rows = state.parameters.map(([name, value]) => make("li", {},
-      textField(name, value, (next) => this.#edit({ kind: "set_parameter", state: state.source, name, value: next }))));
+    const first = this.#parametersFirst(state);
+    const rows = state.parameters.map(([name, value], index) => make("li", {},
+      textField(name, value, (next) => this.#edit({ kind: "set_parameter", state: state.source, name, value: next })),
+      first.length > 0 ? button("×", () => this.#edit({ kind: "set_actions", state: state.source, section: "enter", actions: state.enter.filter((_, at) => at !== index) }),
+        { class: "e-small", "aria-label": `${word("remove")}: ${first[index]}` }) : null));
     return rows.length > 0 ? [make("fieldset", { class: "e-lines" }, make("legend", {}, word("parameters")), make("ul", {}, ...rows))] : [];
   }
 
