@@ -89,6 +89,7 @@ def _flight(batch: str, row: Row, scenario: Scenario) -> messages.Flight:
         counts=dict(row.transitions),
         track=_track(track),
         layout=scenario.model_dump(mode="json"),
+        result=row.as_json(),
     )
 
 

@@ -170,20 +170,29 @@ class StateTime(_Message):
     to_s: float
 
 
+class Contact(_Message):
+    """A first contact with a frame (its colour), a `pole` or a `wall`."""
+
+    name: str
+    time_s: float
+
+
 class Started(_Message):
-    """A flight was started."""
+    """A flight was started; `layout` is the scenario, as its file has it."""
 
     kind: Literal["started"] = "started"
     tag: int
     run: str
+    layout: Json
 
 
 class Now(_Message):
     """What the chart does now.
 
     Attributes:
-        full: `taken`, `counts`, `spans` and `trail` hold all so far and replace what was told before;
-            otherwise what is new since the last message, and of `counts` those that changed.
+        full: `taken`, `counts`, `spans`, `contacts` and `trail` hold all so far and replace what was told
+            before; otherwise what is new since the last message, and of `counts` those that changed.
+        began_s: when the motors started, from which the referee counts; null before.
         active: full ids of the active states, outermost first.
         stopped_in: the state whose entry paused the flight; "" if something else did.
         taken: the newest hundred.
@@ -197,6 +206,7 @@ class Now(_Message):
     run: str
     full: bool
     time_s: float
+    began_s: float | None
     state: str
     active: tuple[str, ...]
     seconds_in_state: float
@@ -208,6 +218,7 @@ class Now(_Message):
     taken: tuple[Taken, ...]
     counts: dict[str, int]
     spans: tuple[StateTime, ...]
+    contacts: tuple[Contact, ...]
     pose: tuple[float | None, ...]
     command: tuple[float | None, ...]
     trail: tuple[tuple[float | None, ...], ...]
@@ -280,6 +291,7 @@ class Flight(_Message):
         cause: what happened, in one line; "" of a clean flight.
         layout: the scenario, as its file has it.
         counts: how often each transition was taken.
+        result: as `result.json`.
     """
 
     kind: Literal["flight"] = "flight"
@@ -297,6 +309,7 @@ class Flight(_Message):
     counts: dict[str, int]
     track: FlownTrack
     layout: Json
+    result: Json
 
 
 class BatchEnded(_Message):

@@ -8,7 +8,7 @@ The WebSocket is closed with code 4403 if the visitor may not start flights. Eac
 request has `do` and may have `tag`, a whole number that comes back with its answer:
 
     {"do": "start", "text": MISSION, "scenario": "test-case-1", "seed": 0, "speed": 1 or null,
-     "paused": false, "break_on": [state ids]}      answer: started {run} or refused
+     "paused": false, "break_on": [state ids]}      answer: started {run, layout} or refused
     {"do": "pause" | "go_on" | "stop", "run"}       answer: done or refused; likewise those that follow
     {"do": "step", "run", "ticks": 1}
     {"do": "speed", "run", "speed": vehicle seconds a second, null: as fast as possible}
@@ -21,17 +21,20 @@ request has `do` and may have `tag`, a whole number that comes back with its ans
 
 The server tells `{"kind": ...}`:
 
-    now      {run, full, time_s, state, active, seconds_in_state, paused, stopped_in, speed,
+    now      {run, full, time_s, began_s, state, active, seconds_in_state, paused, stopped_in, speed,
               guards: [{id, to, when, holds}], values: [{name, value, unit}],
               taken: [{ids, source, target, when, values: [[name, value]], time_s, seconds}], counts: {id: n},
-              spans: [{state, from_s, to_s}], pose: [x, y, z, yaw], command: [forward, left, up, yaw rate],
+              spans: [{state, from_s, to_s}], contacts: [{name, time_s}], pose: [x, y, z, yaw],
+              command: [forward, left, up, yaw rate],
               trail: [[time_s, x, y, z]]}           at most 25 a second, at once when the flight pauses
     changed  {run, tag, ids: {id before: id now}}
     ended    {run, text, lost_in, result: as result.json or null, counts, spans}
     flight   {batch, scenario, seed, verdict, completed, reason, cause, lost_in, rank, total_time_s,
-              frames_crossed, counts, track: {time_s, x, y, z, state, states}, layout: the scenario}
+              frames_crossed, counts, track: {time_s, x, y, z, state, states}, layout: the scenario,
+              result: as result.json}
     batch_ended {batch, flown, completed, count, text, order}
-    refused  {tag, text, lines, run};  done {tag};  started {tag, run};  batch_started {tag, batch, count}
+    refused  {tag, text, lines, run};  done {tag};  started {tag, run, layout: the scenario};
+    batch_started {tag, batch, count}
 
 Ids of transitions are those of `offboard.chart.spec.transition_id`, such as `red.turning/2`, `red/then` and
 `red/resume`. `framerunner.editing.messages` has all fields. A mission is text, loaded by the checker of

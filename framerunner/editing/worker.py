@@ -81,17 +81,21 @@ class _ControlledRun:
         _check_breaks(start.break_on, mission)
         self._task, self._mission, self._pilot, self._tell = task, mission, pilot, tell
         self._plan = FlightPlan(find_scenario(start.scenario), mission, start.seed)
-        self._reporter = RunReporter(task.run, tell)
+        self._reporter = RunReporter(task.run, tell, solids=self._plan.scenario.solid_names)
         self._control = RunControl(
             speed=start.speed, paused=start.paused, break_on=start.break_on, listener=self._reporter.hear
         )
 
     def fly(self, orders: TextIO) -> None:
         """Fly to the end; this process ends when there can be no more orders."""
-        self._tell(messages.Started(tag=self._task.start.tag, run=self._task.run))
+        layout = self._plan.scenario.model_dump(mode="json")
+        self._tell(messages.Started(tag=self._task.start.tag, run=self._task.run, layout=layout))
         threading.Thread(target=self._take_orders, args=(orders,), daemon=True).start()
         flight = lockstep_flight(
-            self._plan, observers=(self._reporter.see,), before_tick=self._control.before_tick
+            self._plan,
+            observers=(self._reporter.see,),
+            truth_observers=(self._reporter.see_truth,),
+            before_tick=self._control.before_tick,
         )
         try:
             with processor_limit(self._task.processor_s):

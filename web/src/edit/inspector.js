@@ -109,7 +109,11 @@ export class Inspector {
     const isTop = !path.startsWith("@") || path.includes(".");
     const start = state.parent === "" ? diagram.initial : diagram.nodes.find(({ id }) => id === state.parent)?.initial;
     const initial = (value) => value && this.#edit({ kind: "set_initial", state: path.includes(".") ? path.replace(/\.[^.]+$/, "") : "", name: state.name });
-    const actions = (section) => lineList(word(section), state[section], (list) => this.#edit({ kind: "set_actions", state: path, section, actions: list }), ACTIONS);
+    const actions = (section) => {
+      const above = section === "enter" ? this.#parametersFirst(state) : [];
+      return lineList(word(section), state[section].slice(above.length),
+        (list) => this.#edit({ kind: "set_actions", state: path, section, actions: [...above, ...list] }), ACTIONS);
+    };
     const own = diagram.edges.filter(({ source }) => source === state.id);
     return [
       title,
@@ -133,10 +137,19 @@ export class Inspector {
     ];
   }
 
+  /** The actions on entry that are shown as parameters, if all others follow them. @param {StateNode} state @returns {string[]} */
+  #parametersFirst({ template, parameters, enter }) {
+    const first = template ? enter.slice(0, parameters.length) : [];
+    return first.every((action, index) => action.split("=")[0].trim() === parameters[index][0]) ? first : [];
+  }
+
   /** @param {StateNode} state */
   #parameters(state) {
-    const rows = state.parameters.map(([name, value]) => make("li", {},
-      textField(name, value, (next) => this.#edit({ kind: "set_parameter", state: state.source, name, value: next }))));
+    const first = this.#parametersFirst(state);
+    const rows = state.parameters.map(([name, value], index) => make("li", {},
+      textField(name, value, (next) => this.#edit({ kind: "set_parameter", state: state.source, name, value: next })),
+      first.length > 0 ? button("×", () => this.#edit({ kind: "set_actions", state: state.source, section: "enter", actions: state.enter.filter((_, at) => at !== index) }),
+        { class: "e-small", "aria-label": `${word("remove")}: ${first[index]}` }) : null));
     return rows.length > 0 ? [make("fieldset", { class: "e-lines" }, make("legend", {}, word("parameters")), make("ul", {}, ...rows))] : [];
   }
 

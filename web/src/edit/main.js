@@ -3,6 +3,7 @@ import "./edit.css";
 import { isTyping, make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 import { DiagramView } from "./diagram_view.js";
+import { divider } from "./divider.js";
 import { button, choice, textField } from "./fields.js";
 import { flownId } from "./flights.js";
 import { Inspector } from "./inspector.js";
@@ -11,6 +12,7 @@ import { EditSession } from "./session.js";
 import { Tabs } from "./tabs.js";
 import { TextView } from "./text_view.js";
 import { changeLanguage, language } from "../lib/language.js";
+import { translateHeader } from "../lib/navigation.js";
 import { savePicture } from "./picture.js";
 import { showNames } from "./names.js";
 import { watchFlights } from "./live_light.js";
@@ -21,7 +23,7 @@ import { word } from "./words.js";
 
 const root = pageRoot("edit");
 const file = new URLSearchParams(location.search).get("file");
-document.documentElement.lang = language();
+translateHeader();
 
 if (file) edit(file);
 else chooseFile();
@@ -112,7 +114,12 @@ function edit(name) {
       button("PNG", () => savePicture(drawing, stem, "png")), button("SVG", () => savePicture(drawing, stem, "svg")),
       ...["mermaid", "scxml"].map((kind) => make("a", { href: `/api/edit/export?kind=${kind}&file=${encodeURIComponent(name)}`, download: true }, kind === "scxml" ? "SCXML" : "Mermaid"))),
     button(word("language"), changeLanguage));
-  root.replaceChildren(tools, line, make("div", { class: "e-panes" }, drawing, form, writing, tabs.root));
+  const panes = make("div", { class: "e-panes" }, drawing, form, writing, tabs.root);
+  root.replaceChildren(tools, line, panes);
+  panes.append(
+    divider(panes, { name: "tabs", part: tabs.root, label: word("divide_rows"), isRow: true, least: 120, space: 100 }),
+    divider(panes, { name: "form", part: form, label: word("divide_form"), isRow: false, least: 180, space: 480 }),
+    divider(panes, { name: "writing", part: writing, label: word("divide_text"), isRow: false, least: 120, space: 480 }));
 
   const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}&language=${language()}`, {
     changed(changes, all) {
@@ -168,10 +175,11 @@ function edit(name) {
       await session.flush();
       return text.text;
     },
+    mistake,
     lit: light,
     lost: (id) => diagram.markLost(id),
     selected: () => (selection.kind === "state" ? selection.id : ""),
-  });
+  }, lesson !== null);
 
   watchFlights(() => session.mission.name ?? "", (active, counts) => light(active, counts, []));
   if (lesson) {
@@ -181,10 +189,11 @@ function edit(name) {
         return text.text;
       },
       save: store,
-      scenario: (name) => runs.choose(name),
+      mistake,
+      scenario: (name, isLast) => runs.choose(name, !isLast),
       flown(flight) {
-        runs.showFlight(flight);
         diagram.markLost(flight.lost_in);
+        return runs.showFlight(flight);
       },
     });
   }
@@ -225,17 +234,27 @@ function edit(name) {
     else if (line.textContent === word("unreadable")) tell("");
   }
 
+  /** What keeps the mission from flying, in a line; "" if nothing does. */
+  function mistake() {
+    const [error] = session.findings.filter(({ severity }) => severity === "error");
+    return error ? `${error.line ? `${error.line}: ` : ""}${error.message}` : "";
+  }
+
   function showFindings() {
-    const rows = session.findings.map((finding) => make("li", { "data-severity": finding.severity },
+    const row = (finding) => make("li", { "data-severity": finding.severity },
       button(`${finding.line ? `${finding.line}: ` : ""}${finding.message}`, () => {
         const [node] = finding.nodes;
         if (node) select(finding.event === null ? { kind: "state", id: node } : { kind: "transition", id: `${node}/${finding.event}/${finding.index}` }, false);
         if (finding.span) text.show(finding.span[0], finding.span[1]);
-      }, { class: "e-link" })));
-    const errors = session.findings.filter(({ severity }) => severity === "error").length;
-    tabs.mark("findings", errors > 0 ? `${errors} ✗` : rows.length > 0 ? `${rows.length} !` : "✓");
+      }, { class: "e-link" }));
+    const faults = session.findings.filter(({ severity }) => severity !== "advice");
+    const advice = session.findings.filter(({ severity }) => severity === "advice");
+    const errors = faults.filter(({ severity }) => severity === "error").length;
+    tabs.mark("findings", errors > 0 ? `${errors} ✗` : faults.length > 0 ? `${faults.length} !` : "✓");
+    const isOpen = findings.querySelector("details")?.open ?? false;
     findings.replaceChildren(
-      rows.length > 0 ? make("ul", {}, ...rows) : make("p", { class: "e-good" }, word("none")));
+      faults.length > 0 ? make("ul", {}, ...faults.map(row)) : make("p", { class: "e-good" }, word("none")),
+      ...(advice.length > 0 ? [make("details", { open: isOpen }, make("summary", {}, word("advice", { count: String(advice.length) })), make("ul", {}, ...advice.map(row)))] : []));
   }
 
   /** @param {string} from @param {string} to */
