@@ -42,8 +42,8 @@ an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a pat
 
 `apply(document, edit)` returns `Edited(document, changes)`; `EditSession(document, layout)` does so with
 `undo()`, `redo()` and a `layout` that follows; `place(places)` moves states and is undone likewise. A
-`Change` is {start, removed, inserted}; the changes of one edit follow each other, each made for the text after those before it. What cannot be applied raises
-`EditError` with one line, and nothing is changed.
+`Change` is {start, removed, inserted}; the changes of one edit follow each other, each made for the text
+after those before it. What cannot be applied raises `EditError` with one line, and nothing is changed.
 
 **Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
 advice), code, message, file, line, column, start, end, state, event, index, section, nodes.

@@ -321,22 +321,25 @@ def test_deleted_letters_are_undone_together(path):
 
 def test_a_move_of_boxes_is_undone_in_the_side_file_and_told_to_all_windows(path):
     side = path.with_name("hover.layout.json")
-    with served(path.parent) as server:
-        with server.window("hover.yaml") as one, server.window("hover.yaml") as two:
-            assert not one.ask("layout", places={"up": {"x": 1, "y": 1}}, settled=True)["can_undo"]
-            one.type(0, "#", revision=0)
-            one.ask("layout", places={"up": {"x": 2, "y": 2}})
-            assert read_layout(path).states["up"].x == 2
-            undone = one.ask("undo")
-            assert undone["layout"] == {"up": {"x": 1, "y": 1}}
-            assert undone["can_undo"]  # the typed letter
-            assert read_layout(path).states["up"].x == 1
-            while two.receive("status").get("layout") != {"up": {"x": 1, "y": 1}}:
-                pass
-            assert one.ask("redo")["layout"] == {"up": {"x": 2, "y": 2}}
-            assert one.ask("undo")["layout"] == {"up": {"x": 1, "y": 1}}
-            assert one.ask("undo")["changes"] == [{"start": 0, "removed": 1, "inserted": ""}]
-            assert not one.ask("layout", places={"gone": {"x": 1, "y": 1}}, settled=True)["can_undo"]
+    with (
+        served(path.parent) as server,
+        server.window("hover.yaml") as one,
+        server.window("hover.yaml") as two,
+    ):
+        assert not one.ask("layout", places={"up": {"x": 1, "y": 1}}, settled=True)["can_undo"]
+        one.type(0, "#", revision=0)
+        one.ask("layout", places={"up": {"x": 2, "y": 2}})
+        assert read_layout(path).states["up"].x == 2
+        undone = one.ask("undo")
+        assert undone["layout"] == {"up": {"x": 1, "y": 1}}
+        assert undone["can_undo"]  # the typed letter
+        assert read_layout(path).states["up"].x == 1
+        while two.receive("status").get("layout") != {"up": {"x": 1, "y": 1}}:
+            pass
+        assert one.ask("redo")["layout"] == {"up": {"x": 2, "y": 2}}
+        assert one.ask("undo")["layout"] == {"up": {"x": 1, "y": 1}}
+        assert one.ask("undo")["changes"] == [{"start": 0, "removed": 1, "inserted": ""}]
+        assert not one.ask("layout", places={"gone": {"x": 1, "y": 1}}, settled=True)["can_undo"]
     assert list(read_layout(path).states) == ["up"]
     assert side.exists()
 
