@@ -121,6 +121,9 @@ export class DiagramView {
     for (const [now, before] of renamed(this.#diagram, diagram)) {
       const place = this.#places.get(before);
       if (place && !kept[now]) this.#places.set(now, place);
+      this.#places.delete(before);
+      const box = this.#boxes.get(before);
+      if (box) this.#boxes.set(now, box);
     }
     this.#diagram = diagram;
     this.#boxes = layOut(diagram, {

@@ -1,6 +1,7 @@
 /** Where the diagram's states are drawn: what has a place keeps it, what is new gets a free one, level by level. */
 import { arrange } from "./arrange.js";
 import { freePlace, makeRoom } from "./free_place.js";
+import { overlap } from "./geometry.js";
 
 /**
  * @typedef {import("./session.js").Diagram} Diagram
@@ -124,6 +125,13 @@ function placeLevel(parent, paths, joins, boxes, before) {
       Object.assign(box, { x: point.x, y: point.y });
       placed.set(path, box);
     } else fresh.push(path);
+  }
+  for (const [path, box] of placed) {
+    // One that comes back has its place again, unless that has been taken.
+    const isBack = before.boxes.size > 0 && !before.boxes.has(path);
+    if (!isBack || ![...placed].some(([other, its]) => other !== path && overlap(box, its) > 0)) continue;
+    placed.delete(path);
+    fresh.push(path);
   }
   makeRoom(placed, before.boxes);
   if (fresh.length === paths.length || fresh.length > MOST_SINGLE) {
