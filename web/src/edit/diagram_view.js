@@ -15,7 +15,8 @@ import { HANDLE, labelWords, missingShape, stateShape, svg } from "./shapes.js";
 
 const CLICK_PX = 4;
 const END = 9; // how near to the end of a line the mouse takes it, in the drawing's units
-const MISSING = { height: 24, near: 150 };
+const END_INWARDS = 17; // how far from its state
+const MISSING_HEIGHT = 24;
 const ZOOM = { least: 0.15, most: 3, step: 1.0015 };
 const MARGIN = 24; // around what is brought into view, in pixels
 
@@ -252,10 +253,9 @@ export class DiagramView {
     for (const { id, source, target, missing } of this.#diagram.edges) {
       const box = this.#boxes.get(source);
       if (!missing || !box) continue;
-      const size = { width: textWidth(`${target} ?`) - 24, height: MISSING.height };
+      const size = { width: textWidth(`${target} ?`) - 24, height: MISSING_HEIGHT };
       const others = [...this.#boxes, ...this.#missing].filter(([other]) => !source.startsWith(`${other}.`)).map(([, each]) => each);
-      const around = { x: box.x - MISSING.near, y: box.y - MISSING.near, width: box.width + 3 * MISSING.near, height: box.height + 3 * MISSING.near };
-      this.#missing.set(id, { ...freePlace(size, others, [box], around, false), ...size });
+      this.#missing.set(id, { ...freePlace(size, others, [box], this.#isFresh ? null : this.#seen(), false), ...size });
     }
   }
 
@@ -291,8 +291,8 @@ export class DiagramView {
   }
 
   #showEnds() {
-    const curve = this.#transitionElements.get(this.#held)?.curve ?? [];
-    for (const [end, point] of /** @type {const} */ ([["source", curve[0]], ["target", curve.at(-1)]])) {
+    const [source, target] = this.#endsOf(this.#held);
+    for (const [end, point] of /** @type {const} */ ([["source", source], ["target", target]])) {
       const circle = this.#ends[end];
       circle.setAttribute("visibility", point ? "visible" : "hidden");
       circle.setAttribute("cx", point?.x ?? 0);
@@ -300,11 +300,17 @@ export class DiagramView {
     }
   }
 
+  /** Where the ends of a line are taken with the mouse: beside the handles of the states. @param {string} id @returns {Point[]} */
+  #endsOf(id) {
+    const curve = this.#transitionElements.get(id)?.curve;
+    if (!curve) return [];
+    const t = Math.min(0.3, END_INWARDS / (2 * Math.hypot(pointOn(curve, 0.5).x - curve[0].x, pointOn(curve, 0.5).y - curve[0].y) || 1));
+    return [pointOn(curve, t), pointOn(curve, 1 - t)];
+  }
+
   /** The end of a line that is at a point. @param {Point} point @param {string} id of the transition @returns {"source"|"target"|null} */
   #endAt({ x, y }, id) {
-    const curve = this.#transitionElements.get(id)?.curve;
-    if (!curve) return null;
-    const [start, end] = [curve[0], /** @type {Point} */ (curve.at(-1))].map((each) => Math.hypot(each.x - x, each.y - y));
+    const [start = Infinity, end = Infinity] = this.#endsOf(id).map((each) => Math.hypot(each.x - x, each.y - y));
     return Math.min(start, end) > END ? null : end <= start ? "target" : "source";
   }
 
@@ -461,8 +467,8 @@ export class DiagramView {
     const target = event.target instanceof Element ? event.target : null;
     const point = this.#point(event);
     const { kind, id } = this.#selection;
-    const own = kind === "transition" ? this.#endAt(point, id) : null; // of the selected one, also upon a handle
-    const handle = own ? null : this.#handleAt(point);
+    const handle = this.#handleAt(point);
+    const own = handle === null && kind === "transition" ? this.#endAt(point, id) : null;
     const pulled = own ? id : this.#hovered;
     const end = own ?? (handle === null ? this.#endAt(point, pulled) : null);
     if (handle !== null) this.#drag(event, this.#joining(handle));
