@@ -84,8 +84,8 @@ export class DiagramView {
     this.#labels = svg("g");
     this.#draft = svg("path", { class: "e-draft", visibility: "hidden" });
     this.#ends = {
-      source: svg("circle", { r: HANDLE, class: "e-end", visibility: "hidden" }, svg("title", {}, "drag to another state")),
-      target: svg("circle", { r: HANDLE, class: "e-end", visibility: "hidden" }, svg("title", {}, "drag to another state")),
+      source: svg("circle", { r: HANDLE, class: "e-end", visibility: "hidden" }),
+      target: svg("circle", { r: HANDLE, class: "e-end", visibility: "hidden" }),
     };
     this.#world = svg("g", {}, this.#superstates, this.#lines, this.#states, this.#labels, this.#ends.source, this.#ends.target, this.#draft);
     this.#svg = svg("svg", { class: "e-diagram", role: "group", "aria-label": "diagram" }, svg("defs", {}, arrow), this.#world);
@@ -94,8 +94,7 @@ export class DiagramView {
     this.#svg.addEventListener("dblclick", (event) => this.#open(event));
     this.#svg.addEventListener("pointerover", (event) => {
       const found = this.#at(event.target);
-      const isEnd = event.target instanceof Element && event.target.closest(".e-end") !== null;
-      if (event.buttons === 0 && !isEnd) this.#hover(found.kind === "transition" ? found.id : "");
+      if (event.buttons === 0) this.#hover(found.kind === "transition" ? found.id : "");
     });
     this.#svg.addEventListener("wheel", (event) => this.#zoom(event), { passive: false });
     this.#svg.addEventListener("keydown", (event) => {
