@@ -208,7 +208,7 @@ export class DiagramView {
   #makeTransitions() {
     this.#touching.clear();
     this.#placeMissing();
-    const router = new Router(new Map([...this.#boxes, ...this.#missing]), new Set(this.#children.keys()));
+    const router = new Router(new Map([...this.#boxes, ...this.#missing]), new Set(this.#children.keys()), this.#diagram.edges.length);
     const lanes = new Map();
     const lines = [], labels = [], missing = [], routes = [];
     for (const edge of this.#diagram.edges) {

@@ -14,6 +14,9 @@ const ASIDE = [0, -9, 9, -18, 18];
 const TRIED_LANES = [0, 1, -1, 2, -2, 3, -3.5];
 const LABEL = { letter: 6.1, above: 11, height: 15, margin: 2 };
 const COST = { along: 60, aside: 0.8, onBox: 3, crossed: 1, bent: 0.22 };
+const MANY = 150; // transitions; with more of them, there is no room to look for
+const QUICK = { along: [0.5, 0.35, 0.65], aside: [0], lanes: [0] };
+const THOROUGH = { along: ALONG, aside: ASIDE, lanes: TRIED_LANES };
 const SAMPLES = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 
 /** Boxes by place, so that those at a point are found without looking at all of them. */
@@ -55,6 +58,7 @@ class Index {
 
 export class Router {
   #boxes;
+  #tries;
   #states = new Index();
   #labels = new Index();
   /** @type {Map<string, Set<number>>} bends that are taken, by pair of states */
@@ -63,9 +67,11 @@ export class Router {
   /**
    * @param {Map<string, Box>} boxes of states, and of what stands for missing ones
    * @param {Set<string>} superstates
+   * @param {number} count of transitions
    */
-  constructor(boxes, superstates) {
+  constructor(boxes, superstates, count) {
     this.#boxes = boxes;
+    this.#tries = count > MANY ? QUICK : THOROUGH;
     for (const [id, box] of boxes) {
       this.#states.add(box, id);
       if (superstates.has(id)) this.#states.add({ ...box, width: Math.min(box.width, 130), height: 26 }, ""); // its name
@@ -85,14 +91,14 @@ export class Router {
    */
   lane(route, usual) {
     const from = /** @type {Box} */ (this.#boxes.get(route.from)), to = /** @type {Box} */ (this.#boxes.get(route.to));
-    if (isLoop(from, to)) return usual;
+    if (isLoop(from, to) || this.#tries.lanes.length === 1) return usual;
     const pair = [route.from, route.to].sort().join(" ");
     const sign = route.from < route.to ? 1 : -1; // the other direction bends to the other side
     const taken = this.#lanes.get(pair) ?? new Set();
     this.#lanes.set(pair, taken);
     const isInTheWay = this.#isInTheWay(route);
     let best = usual, least = Infinity;
-    for (const more of TRIED_LANES) {
+    for (const more of this.#tries.lanes) {
       const lane = usual + more;
       if (taken.has(lane * sign)) continue;
       const cost = COST.bent * Math.abs(more) + COST.crossed * this.#crossed(line(from, to, lane), route, isInTheWay);
@@ -126,9 +132,9 @@ export class Router {
     const all = () => true;
     const width = route.words.length * LABEL.letter + 2 * LABEL.margin;
     let best = pointOn(curve, 0.5), least = Infinity;
-    for (const t of ALONG) {
+    for (const t of this.#tries.along) {
       const point = pointOn(curve, t);
-      for (const dy of ASIDE) {
+      for (const dy of this.#tries.aside) {
         let cost = COST.along * Math.abs(t - 0.5) + COST.aside * Math.abs(dy);
         if (cost >= least) continue;
         const box = labelBox({ x: point.x, y: point.y + dy }, width);
