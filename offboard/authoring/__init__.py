@@ -27,7 +27,8 @@ holds, `edit_schema()` is their JSON Schema. `kind` is one of
     rename_state {state, name}                                  move_state {state, parent, index?}
     duplicate_state {state, name, parameters?: {name: value}}   delete_state {state, references?}
     add_transition {state, to, when?, actions?, event?, index?} delete_transition {transition}
-    redirect_transition {transition, to}                        move_transition {transition, index}
+    redirect_transition {transition, to}                        set_source {transition, state, to}
+    move_transition {transition, index}
     set_guard {transition, when}                                set_event {transition, event}
     set_transition_actions {transition, actions}                set_actions {state, section, actions}
     set_initial {state?, name}                                  set_final {state, final}
@@ -40,9 +41,9 @@ with `transition` = {state, event?: tick | done | resume, index?}, `section` = e
 an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a path or a full id.
 
 `apply(document, edit)` returns `Edited(document, changes)`; `EditSession(document, layout)` does so with
-`undo()`, `redo()` and a `layout` that follows. A `Change` is {start, removed, inserted}; the changes of one
-edit follow each other, each made for the text after those before it. What cannot be applied raises
-`EditError` with one line, and nothing is changed.
+`undo()`, `redo()` and a `layout` that follows; `place(places)` moves states and is undone likewise. A
+`Change` is {start, removed, inserted}; the changes of one edit follow each other, each made for the text
+after those before it. What cannot be applied raises `EditError` with one line, and nothing is changed.
 
 **Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
 advice), code, message, file, line, column, start, end, state, event, index, section, nodes.
@@ -82,6 +83,7 @@ from offboard.authoring.layout import (
     LayoutError,
     StateBox,
     follow,
+    known_places,
     layout_path,
     parse_layout,
     read_layout,
@@ -133,6 +135,7 @@ __all__ = [
     "export_scxml",
     "follow",
     "import_scxml",
+    "known_places",
     "layout_path",
     "mermaid_of",
     "parse_edit",

@@ -9,7 +9,7 @@ from typing import Any
 from offboard.authoring import edits, state_edits, transition_edits
 from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
-from offboard.authoring.layout import Layout, completed, follow
+from offboard.authoring.layout import Layout, StateBox, completed, follow, with_places
 from offboard.authoring.text import Change
 from offboard.authoring.work import Work
 from offboard.mission import MAX_FILE_BYTES
@@ -29,6 +29,7 @@ _STEPS: Mapping[type, Callable[[Work, Any], None]] = {
     edits.AddTransition: transition_edits.add_transition,
     edits.DeleteTransition: transition_edits.delete_transition,
     edits.RedirectTransition: transition_edits.redirect_transition,
+    edits.SetSource: transition_edits.set_source,
     edits.MoveTransition: transition_edits.move_transition,
     edits.SetGuard: transition_edits.set_guard,
     edits.SetEvent: transition_edits.set_event,
@@ -83,7 +84,7 @@ def _refuse_too_long(document: Document) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """An edit that was done or undone, with the layout before that."""
+    """An edit that was done or undone, with the layout before that; a move of boxes has no changes."""
 
     changes: tuple[Change, ...]
     layout: Layout
@@ -98,8 +99,8 @@ class EditSession:
 
     Attributes:
         document: as it is now.
-        layout: likewise; a page sets it when states were dragged, which is no edit. Renamed and moved states
-            keep their places, and states that an undone edit brings back have the places that they had.
+        layout: likewise. Renamed and moved states keep their places; undoing gives all states the places that
+            they had before the edit.
     """
 
     def __init__(self, document: Document, layout: Layout | None = None) -> None:
@@ -134,8 +135,23 @@ class EditSession:
             self.document = edited.document
         return edited.changes
 
+    def place(self, places: Mapping[str, StateBox | None]) -> None:
+        """Move states in the diagram, by their full ids; None forgets a place. It is undone as edits are."""
+        layout = with_places(self.layout, places)
+        if layout != self.layout:
+            self._done.append(_Step((), self.layout))
+            self._undone.clear()
+            self.layout = layout
+
+    def settle(self, places: Mapping[str, StateBox | None]) -> None:
+        """Note where a page has drawn states that nobody placed; it is no step of its own."""
+        self.layout = with_places(self.layout, places)
+
     def undo(self) -> tuple[Change, ...]:
-        """Take the last edit back and return the changes of the text. Raises `EditError` if there is none."""
+        """Take the last edit back and return the changes of the text. Raises `EditError` if there is none.
+
+        The last one may have been a move of boxes: then the text has no changes.
+        """
         if not self._done:
             raise EditError("there is nothing to undo")
         step = self._done.pop()
@@ -154,6 +170,8 @@ class EditSession:
         content = self.document.content
         for change in changes:
             content = content.changed(change)
-        self.document = Document(content, self.document.path)
-        self.layout = completed(self.layout, layout, self.document)
+        if changes:
+            self.document = Document(content, self.document.path)
+            layout = completed(layout, self.layout, self.document)
+        self.layout = layout
         return changes

@@ -117,6 +117,15 @@ class RedirectTransition(_Edit):
     to: StatePath
 
 
+class SetSource(_Edit):
+    """Another state that has a transition; it comes last there, with its guard and actions."""
+
+    kind: Literal["set_source"] = "set_source"
+    transition: TransitionPath
+    state: StatePath  # that has it from now on
+    to: StatePath  # its target, which stays
+
+
 class MoveTransition(_Edit):
     """Another order of priority for a transition."""
 
@@ -226,6 +235,7 @@ Edit = Annotated[
     | AddTransition
     | DeleteTransition
     | RedirectTransition
+    | SetSource
     | MoveTransition
     | SetGuard
     | SetEvent

@@ -6,6 +6,7 @@ The mission itself has no positions. A state without a place in the file is plac
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -122,6 +123,20 @@ def follow(layout: Layout, before: Document, edit: Edit, after: Document) -> Lay
         states={change(name): box for name, box in layout.states.items() if change(name) in known},
         corners={_edge_id(name, change): points for name, points in layout.corners.items()},
     )
+
+
+def with_places(layout: Layout, places: Mapping[str, StateBox | None]) -> Layout:
+    """A layout with other places of some states; None forgets one."""
+    states = {**layout.states, **{name: box for name, box in places.items() if box is not None}}
+    for name, box in places.items():
+        if box is None:
+            states.pop(name, None)
+    return Layout(states=states, corners=layout.corners)
+
+
+def known_places(layout: Layout, document: Document) -> Layout:
+    """The places of the states that a document has; all, if it cannot be understood."""
+    return layout if document.chart is None else completed(layout, Layout(), document)
 
 
 def completed(layout: Layout, earlier: Layout, document: Document) -> Layout:

@@ -12,6 +12,7 @@ from offboard.authoring.edits import (
     SetEvent,
     SetGuard,
     SetMission,
+    SetSource,
     SetTransitionActions,
     SetVariable,
 )
@@ -71,6 +72,18 @@ def redirect_transition(work: Work, edit: RedirectTransition) -> None:
         work.set_text(state, _KEYS[transition.event], to)
     else:
         work.set_key(Owner(None, transition.node), "to", to, TRANSITION_ORDER)
+
+
+def set_source(work: Work, edit: SetSource) -> None:
+    """Give a transition to another state."""
+    state, transition = work.transition(edit.transition)
+    if edit.state == state.path:
+        return
+    when = "" if transition.when is None else transition.when.text
+    actions = tuple(each.text for each in transition.actions)
+    to, event = edit.to, transition.event
+    add_transition(work, AddTransition(state=edit.state, to=to, when=when, actions=actions, event=event))
+    delete_reference(work, state.path, event, transition.index)
 
 
 def move_transition(work: Work, edit: MoveTransition) -> None:

@@ -28,6 +28,7 @@ from framerunner.editing.documents.messages import (
     catalogue_message,
     changed_message,
     document_message,
+    places_message,
     read_message,
     status_message,
 )
@@ -197,7 +198,7 @@ class _Window:
     def _take(self, message: PageMessage) -> None:
         """Do what a page asks for, tell all pages, and answer."""
         opened = self._shared.opened
-        before = opened.document.text
+        before, layout = opened.document.text, opened.layout
         answer: dict[str, object] = {"answers": message.number}
         try:
             changes = _carry_out(opened, message)
@@ -215,8 +216,10 @@ class _Window:
             own = {**told, "changes": []} if isinstance(message, TypeMessage) else told
             self._queue({**own, **answer, "catalogue": catalogue_message(opened)})
             return
+        status = status_message(opened)
+        if opened.layout is not layout:
+            status["layout"] = places_message(opened)
         for viewer in self._shared.viewers:
-            status = status_message(opened)
             viewer({**status, **answer} if viewer == self._queue else status)
 
     def _tell_others(self) -> None:
@@ -236,7 +239,7 @@ def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[Change]:
     if isinstance(message, SaveMessage):
         opened.save(force=message.force)
     elif isinstance(message, LayoutMessage):
-        opened.place(dict(message.places))
+        opened.place(dict(message.places), settled=message.settled)
     return ()
 
 

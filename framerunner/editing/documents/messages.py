@@ -5,10 +5,10 @@ From a page, each with a `number` that the answer repeats as `answers`:
     {"type": "edit", "edit": {...}}            an edit of `offboard.authoring.edits`
     {"type": "type", "revision": 3, "changes": [{"start", "removed", "inserted"}]}     typed text
     {"type": "undo"}, {"type": "redo"}, {"type": "save", "force": false}
-    {"type": "layout", "places": {"red": {"x": 1, "y": 2}, "green": null}}
+    {"type": "layout", "places": {"red": {"x": 1, "y": 2}, "green": null}, "settled": false}
 
 To a page: `document` with the whole text, `changed` with the changes of it, each made for the text after
-those before it, `status`, and `{"refused": reason}` in an answer.
+those before it, `status`, with the `layout` if only that has changed, and `{"refused": reason}` in an answer.
 """
 
 from __future__ import annotations
@@ -87,10 +87,11 @@ class SaveMessage(_FromPage):
 
 
 class LayoutMessage(_FromPage):
-    """Where states are drawn."""
+    """Where states are drawn; `settled`: by the page, which is nothing to undo."""
 
     type: Literal["layout"]
     places: Annotated[dict[str, StateBox | None], Field(max_length=5000)]
+    settled: bool = False
 
 
 PageMessage = EditMessage | TypeMessage | StepMessage | SaveMessage | LayoutMessage
@@ -133,6 +134,11 @@ def status_message(opened: OpenDocument) -> dict[str, object]:
     }
 
 
+def places_message(opened: OpenDocument) -> dict[str, object]:
+    """Where the states are drawn."""
+    return {name: {"x": box.x, "y": box.y} for name, box in opened.layout.states.items()}
+
+
 def _fields(each: Node | Edge | Finding) -> dict[str, object]:
     """As `dataclasses.asdict`, which copies all texts and takes a quarter of the answer's time."""
     return {name: getattr(each, name) for name in each.__slots__}
@@ -173,7 +179,7 @@ def _state(opened: OpenDocument) -> dict[str, object]:
         "variables": {name: value.text for name, value in outline.variables.items()},
         "templates": [state.name for state in outline.templates],
         "findings": found,
-        "layout": {name: {"x": box.x, "y": box.y} for name, box in opened.layout.states.items()},
+        "layout": places_message(opened),
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from offboard.authoring import (
     LayoutError,
     ReplaceText,
     StateBox,
+    known_places,
     layout_path,
     read_layout,
     write_layout,
@@ -27,6 +28,28 @@ _JOURNAL_SUFFIX = ".unsaved"
 
 class SaveRefusedError(UserError):
     """The file was not saved; the message is one line for people."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Typed:
+    """Letters that were typed or deleted.
+
+    Attributes:
+        start, end: offsets of what was replaced, before that.
+        cursor: where it was afterwards.
+    """
+
+    start: int
+    end: int
+    cursor: int
+    is_deletion: bool
+
+    def follows(self, before: _Typed) -> bool:
+        """Whether the same was done before, next to this."""
+        if self.is_deletion != before.is_deletion:
+            return False
+        # Letters are added and deleted forwards from the cursor, and deleted backwards towards it.
+        return self.start == before.cursor or (self.is_deletion and self.end == before.cursor)
 
 
 @dataclass(slots=True)
@@ -50,7 +73,7 @@ class OpenDocument:
     speaks_spanish: bool = False
     _saved: bytes = b""
     _is_kept: bool = True  # the journal has the present text
-    _typed_to: int = -1  # where the last edit ended, if it was typed letters
+    _typed: _Typed | None = None  # the last edit, if it was typed letters
 
     @classmethod
     def open(cls, path: Path) -> OpenDocument:
@@ -98,13 +121,12 @@ class OpenDocument:
     def apply(self, edit: Edit) -> tuple[Change, ...]:
         """Apply an edit; see `EditSession.apply`.
 
-        Letters typed one after the other are undone together, a line at most.
+        Letters typed one after the other are undone together, a line at most; deleted ones likewise.
         """
-        typed = edit if isinstance(edit, ReplaceText) and _is_typed(edit) else None
-        goes_on = typed is not None and typed.start == self._typed_to
+        typed = _typed(self.document.text, edit) if isinstance(edit, ReplaceText) else None
+        goes_on = typed is not None and self._typed is not None and typed.follows(self._typed)
         changes = self._changed(self.session.apply(edit, goes_on=goes_on))
-        if typed is not None:
-            self._typed_to = typed.start + len(typed.text)
+        self._typed = typed
         return changes
 
     def take_back(self, changes: Sequence[Change]) -> None:
@@ -118,28 +140,44 @@ class OpenDocument:
             )
 
     def undo(self) -> tuple[Change, ...]:
-        """Take the last edit back; see `EditSession.undo`."""
-        return self._changed(self.session.undo())
+        """Take the last edit or move of boxes back; see `EditSession.undo`."""
+        return self._stepped(self.session.undo)
 
     def redo(self) -> tuple[Change, ...]:
         """Do again what was undone last; see `EditSession.redo`."""
-        return self._changed(self.session.redo())
+        return self._stepped(self.session.redo)
+
+    def _stepped(self, step: Callable[[], tuple[Change, ...]]) -> tuple[Change, ...]:
+        before = self.layout
+        changes = self._changed(step())
+        self._typed = None
+        if self.layout != before:
+            self._write_layout()
+        return changes
 
     def _changed(self, changes: tuple[Change, ...]) -> tuple[Change, ...]:
         if changes:
             self.revision += 1
-            self._typed_to = -1
+            self._typed = None
             self._is_kept = False
         return changes
 
-    def place(self, places: dict[str, StateBox | None]) -> None:
-        """Keep where states are drawn, by their full ids; None forgets one. Raises `LayoutError`."""
-        states = {**self.layout.states, **{name: box for name, box in places.items() if box is not None}}
-        for name, box in places.items():
-            if box is None:
-                states.pop(name, None)
-        self.session.layout = Layout(states=states, corners=self.layout.corners)
-        write_layout(self.path, self.layout)
+    def place(self, places: dict[str, StateBox | None], *, settled: bool = False) -> None:
+        """Keep where states are drawn, by their full ids; None forgets one. Raises `LayoutError`.
+
+        Args:
+            places: of some states.
+            settled: by the page, of states that nobody placed: nothing to undo.
+        """
+        if settled:
+            self.session.settle(places)
+        else:
+            self.session.place(places)
+            self._typed = None
+        self._write_layout()
+
+    def _write_layout(self) -> None:
+        write_layout(self.path, known_places(self.layout, self.document))
 
     def keep(self) -> None:
         """Write the journal, if the text has changed since; a disk that refuses it is no reason to stop."""
@@ -176,7 +214,7 @@ class OpenDocument:
                 part.chmod(file.stat().st_mode & 0o777)
             os.replace(part, file)
             if layout_path(self.path).exists() or self.layout.states:
-                write_layout(self.path, self.layout)
+                self._write_layout()
         except OSError as error:
             part.unlink(missing_ok=True)
             raise SaveRefusedError(f"{name}: cannot be written ({error.strerror})") from None
@@ -185,5 +223,9 @@ class OpenDocument:
         self.journal.unlink(missing_ok=True)
 
 
-def _is_typed(edit: ReplaceText) -> bool:
-    return edit.start == edit.end and "\n" not in edit.text
+def _typed(text: str, edit: ReplaceText) -> _Typed | None:
+    """What was typed with an edit of a text: letters of one line, added or deleted; None if it was more."""
+    is_addition, is_deletion = edit.start == edit.end, edit.text == ""
+    if is_addition == is_deletion or "\n" in edit.text or "\n" in text[edit.start : edit.end]:
+        return None
+    return _Typed(edit.start, edit.end, edit.start + len(edit.text), is_deletion)

@@ -15,6 +15,7 @@ from starlette.websockets import WebSocketDisconnect
 from framerunner.editing.documents.desk import DeskError, EditorDesk
 from framerunner.editing.documents.door import DocumentsDoor
 from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
+from offboard.authoring import read_layout
 from offboard.authoring.edits import AddState, ReplaceText
 from offboard.mission import MISSIONS, list_missions
 
@@ -303,6 +304,44 @@ def test_typed_letters_are_undone_together_a_line_at_most(path):
         opened.undo()
         texts.append(opened.document.text)
     assert texts == [HOVER + "# ab\n# c", HOVER + "# ab\n", HOVER + "# ab", HOVER]
+
+
+def test_deleted_letters_are_undone_together(path):
+    opened = OpenDocument.open(path)
+    end = HOVER.index("\n")
+    for number in range(5):  # backwards
+        opened.apply(ReplaceText(start=end - number - 1, end=end - number, text=""))
+    for _ in range(3):  # forwards
+        opened.apply(ReplaceText(start=0, end=1, text=""))
+    opened.undo()
+    assert opened.document.text == HOVER.replace("hover", "", 1)
+    opened.undo()
+    assert opened.document.text == HOVER
+
+
+def test_a_move_of_boxes_is_undone_in_the_side_file_and_told_to_all_windows(path):
+    side = path.with_name("hover.layout.json")
+    with (
+        served(path.parent) as server,
+        server.window("hover.yaml") as one,
+        server.window("hover.yaml") as two,
+    ):
+        assert not one.ask("layout", places={"up": {"x": 1, "y": 1}}, settled=True)["can_undo"]
+        one.type(0, "#", revision=0)
+        one.ask("layout", places={"up": {"x": 2, "y": 2}})
+        assert read_layout(path).states["up"].x == 2
+        undone = one.ask("undo")
+        assert undone["layout"] == {"up": {"x": 1, "y": 1}}
+        assert undone["can_undo"]  # the typed letter
+        assert read_layout(path).states["up"].x == 1
+        while two.receive("status").get("layout") != {"up": {"x": 1, "y": 1}}:
+            pass
+        assert one.ask("redo")["layout"] == {"up": {"x": 2, "y": 2}}
+        assert one.ask("undo")["layout"] == {"up": {"x": 1, "y": 1}}
+        assert one.ask("undo")["changes"] == [{"start": 0, "removed": 1, "inserted": ""}]
+        assert not one.ask("layout", places={"gone": {"x": 1, "y": 1}}, settled=True)["can_undo"]
+    assert list(read_layout(path).states) == ["up"]
+    assert side.exists()
 
 
 def test_a_page_that_left_finds_its_text_again(path):

@@ -70,6 +70,12 @@ async function chooseFile() {
     })));
 }
 
+/** Whether something was typed into a field, which the browser undoes. @param {EventTarget|null} field */
+function isFilledIn(field) {
+  return (field instanceof HTMLInputElement && field.type === "text" && field.value !== field.defaultValue)
+    || (field instanceof HTMLElement && field.isContentEditable);
+}
+
 /** A field for an SCXML file. @param {(text: string, name: string) => void} chosen */
 function importField(chosen) {
   const input = /** @type {HTMLInputElement} */ (make("input", { type: "file", accept: ".scxml,.xml" }));
@@ -122,12 +128,15 @@ function edit(name) {
     divider(panes, { name: "writing", part: writing, label: word("divide_text"), isRow: false, least: 120, space: 480 }));
 
   const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}&language=${language()}`, {
-    changed(changes, all) {
+    changed(changes, all, isOwn) {
       if (all !== null) text.setText(all);
-      else text.change(changes);
+      else text.change(changes, isOwn);
       tell(""); // what was said before concerned the mission as it was
       refresh();
+      if (isOwn) settle();
+      if (text.cursor !== null) follow(text.cursor);
     },
+    placed: refresh,
     connected(connection, reason) {
       text.setReadOnly(connection !== "open"); // what is typed without a connection would be lost
       if (connection === "open") tell("");
@@ -141,19 +150,18 @@ function edit(name) {
     typed: (take) => session.type(take),
     undo: () => session.undo(),
     redo: () => session.redo(),
-    moved: (offset) => {
-      const around = session.diagram.nodes.filter(({ span }) => span && span[0] <= offset && offset <= span[1]);
-      const at = session.diagram.edges.find(({ span }) => span && span[0] <= offset && offset <= span[1]);
-      if (at) select({ kind: "transition", id: at.id }, false);
-      else if (around.length > 0) select({ kind: "state", id: innermost(around).id }, false);
-      else select({ kind: "mission", id: "" }, false);
-    },
+    moved: follow,
   });
   const diagram = new DiagramView(drawing, {
-    selected: (chosen) => select(chosen, true),
-    placed: (places) => session.place(places),
+    selected: (chosen) => select(chosen, true, false),
+    placed(places) {
+      settle();
+      session.place(places);
+      refresh();
+    },
     joined: (from, to) => join(from, to),
-    moved: (moved, parent) => move(moved, parent),
+    moved: (moved, parent, place) => move(moved, parent, place),
+    led: (id, end, to) => lead(id, end, to),
     opened: (chosen) => {
       select(chosen, true);
       inspector.focus();
@@ -198,8 +206,21 @@ function edit(name) {
     });
   }
 
-  function innermost(nodes) {
-    return nodes.reduce((best, each) => (each.span[0] >= best.span[0] && each.span[1] <= best.span[1] ? each : best));
+  /** Select what is written at the cursor; of the uses of a template, the one that was selected stays. @param {number} offset */
+  function follow(offset) {
+    const { nodes, edges } = session.diagram;
+    const isAt = ({ span }) => span && span[0] <= offset && offset <= span[1];
+    const kept = (found) => found.find(({ id }) => selection.id.startsWith(id.replace(/\/.*/, ""))) ?? found[0];
+    const around = nodes.filter(isAt), at = edges.filter(isAt);
+    const inmost = around.filter(({ span }) => around.every((other) => other.span[0] <= span[0] && span[1] <= other.span[1]));
+    if (at.length > 0) select({ kind: "transition", id: (at.find(({ id }) => id === selection.id) ?? kept(at)).id }, false);
+    else if (inmost.length > 0) select({ kind: "state", id: (inmost.find(({ id }) => id === selection.id) ?? kept(inmost)).id }, false);
+    else select({ kind: "mission", id: "" }, false);
+  }
+
+  /** Keep where new states are drawn: they stay there. */
+  function settle() {
+    if (session.isReadable) session.place(diagram.unkept, true);
   }
 
   function tell(words) {
@@ -213,14 +234,16 @@ function edit(name) {
     redo.toggleAttribute("disabled", !session.canRedo);
   }
 
-  /** @param {Selection} chosen @param {boolean} showText */
-  function select(chosen, showText) {
+  /** @param {Selection} chosen @param {boolean} showText @param {boolean} [showDiagram] */
+  function select(chosen, showText, showDiagram = true) {
+    const isOther = chosen.kind !== selection.kind || chosen.id !== selection.id;
     selection = chosen;
     diagram.select(chosen);
+    if (showDiagram && isOther) diagram.reveal(chosen);
     inspector.show(chosen);
     const { nodes, edges } = session.diagram;
     const { span } = (chosen.kind === "state" ? nodes : edges).find(({ id }) => id === chosen.id) ?? {};
-    if (showText && span && !text.hasFocus) text.show(span[0], span[1]);
+    if (showText && span) text.show(span[0], span[1]);
   }
 
   function refresh() {
@@ -269,18 +292,46 @@ function edit(name) {
     return undefined;
   }
 
-  /** @param {string} moved @param {string} parent */
-  async function move(moved, parent) {
+  /**
+   * Lead a transition to another state, or let it come from another one.
+   * @param {string} id @param {"source"|"target"} end @param {string} to
+   */
+  async function lead(id, end, to) {
+    const { nodes, edges } = session.diagram;
+    const edge = edges.find((each) => each.id === id);
+    if (!edge || to === edge[end]) return undefined;
+    if (!edge.source_state) return tell(word("foreign_note"));
+    const transition = { state: edge.source_state, event: edge.event, index: edge.source_index };
+    if (end === "target") {
+      if (await session.edit({ kind: "redirect_transition", transition, to: session.target(edge.source, to) })) select({ kind: "transition", id }, true);
+      return undefined;
+    }
+    const source = nodes.find((node) => node.id === to)?.source;
+    if (!source) return tell(word("foreign_note"));
+    const count = edge.event === "tick" ? edges.filter(({ source: from, event }) => from === to && event === "tick").length : 0;
+    if (await session.edit({ kind: "set_source", transition, state: source, to: session.target(to, edge.target) })) {
+      select({ kind: "transition", id: `${to}/${edge.event}/${count}` }, true);
+    }
+    return undefined;
+  }
+
+  /** @param {string} moved @param {string} parent @param {{x: number, y: number}} place in the new superstate */
+  async function move(moved, parent, place) {
     const { nodes } = session.diagram;
     const source = (id) => nodes.find((node) => node.id === id)?.source ?? "";
     if (await session.edit({ kind: "move_state", state: source(moved), parent: source(parent) })) {
-      select({ kind: "state", id: [parent, moved.split(".").at(-1)].filter(Boolean).join(".") }, true);
+      const id = [parent, moved.split(".").at(-1)].filter(Boolean).join(".");
+      session.place({ [id]: place }, true);
+      refresh();
+      select({ kind: "state", id }, true);
     } else refresh();
   }
 
   function arrange() {
-    session.place(Object.fromEntries(Object.keys(session.layout).map((id) => [id, null])));
-    refresh();
+    settle(); // so that it can be undone
+    diagram.forget();
+    diagram.draw(session.diagram, {}, session.findings);
+    session.place(diagram.unkept);
     diagram.fit();
   }
 
@@ -299,7 +350,7 @@ function edit(name) {
     if (isCommand && key === "s") {
       event.preventDefault();
       store();
-    } else if (isCommand && (key === "z" || key === "y") && !isTyping(event)) {
+    } else if (isCommand && (key === "z" || key === "y") && !isFilledIn(event.target)) {
       event.preventDefault();
       if (key === "y" || event.shiftKey) session.redo();
       else session.undo();

@@ -11,7 +11,7 @@ const TYPING_PAUSE_MS = 80; // after which typed text is sent
  *   state: string, event: string|null, index: number|null, nodes: string[]}} Finding
  * @typedef {{id: string, name: string, parent: string, initial: string, final: boolean, finish: boolean, enter: string[],
  *   during: string[], exit: string[], parameters: [string, string][], template: string, source: string, span: Span}} StateNode
- * @typedef {{id: string, source: string, target: string, event: "tick"|"done"|"resume", order: number, when: string,
+ * @typedef {{id: string, source: string, target: string, missing: boolean, event: "tick"|"done"|"resume", order: number, when: string,
  *   actions: string[], source_state: string, source_index: number, span: Span}} Edge
  * @typedef {{initial: string, readable: boolean, nodes: StateNode[], edges: Edge[]}} Diagram the chart as it is flown
  * @typedef {{x: number, y: number}} Point
@@ -56,10 +56,10 @@ export class EditSession {
 
   /**
    * @param {string} address of the document's WebSocket
-   * @param {{changed: (changes: TextChange[], text: string|null) => void,
+   * @param {{changed: (changes: TextChange[], text: string|null, isOwn: boolean) => void, placed: () => void,
    *   connected: (state: string, reason: string) => void, refused: (reason: string) => void, status: () => void,
    *   note: (text: string) => void}} listener changed: told after each change of the document; with a text that is
-   *   not null, all of it is new
+   *   not null, all of it is new; isOwn: this page asked for it; placed: told when states were moved
    */
   constructor(address, listener) {
     this.#listener = listener;
@@ -98,13 +98,19 @@ export class EditSession {
     return this.#ask({ type: "save", force });
   }
 
-  /** Keep where states are drawn. @param {Object<string, Point|null>} places null forgets one */
-  place(places) {
+  /**
+   * Keep where states are drawn.
+   * @param {Object<string, Point|null>} places null forgets one
+   * @param {boolean} [settled] the page has found these places: nothing to undo
+   */
+  async place(places, settled = false) {
+    if (Object.keys(places).length === 0) return true;
+    await this.flush();
     for (const [path, point] of Object.entries(places)) {
       if (point) this.layout[path] = point;
       else delete this.layout[path];
     }
-    return this.#ask({ type: "layout", places });
+    return this.#ask({ type: "layout", places, settled });
   }
 
   /**
@@ -172,11 +178,15 @@ export class EditSession {
       this.#setStatus(message);
       // A change that overtakes typed text makes the server refuse that and send the whole text.
       const isOvertaken = this.#isTypedUnderWay && message.answers === undefined;
-      this.#listener.changed(isOvertaken ? [] : message.changes ?? [], message.text ?? null);
+      this.#listener.changed(isOvertaken ? [] : message.changes ?? [], message.text ?? null, message.answers !== undefined && message.text === undefined);
       if (message.text !== undefined && message.restored) this.#listener.note("restored");
       if (message.text !== undefined && message.problem) this.#listener.refused(message.problem);
     } else {
       this.#setStatus(message);
+      if (message.layout && !isSame(message.layout, this.layout)) {
+        this.layout = message.layout;
+        this.#listener.placed();
+      }
     }
     const answer = this.#waiting.get(message.answers);
     if (answer) {
@@ -193,4 +203,10 @@ export class EditSession {
     this.canRedo = message.can_redo ?? this.canRedo;
     this.others = message.others ?? this.others;
   }
+}
+
+/** Whether two layouts are the same. @param {Object<string, Point>} one @param {Object<string, Point>} other */
+function isSame(one, other) {
+  const names = Object.keys(one);
+  return names.length === Object.keys(other).length && names.every((name) => one[name].x === other[name]?.x && one[name].y === other[name]?.y);
 }
