@@ -95,6 +95,10 @@ def fly(
     drone_limits: _DroneLimits = None,
     response: _Response = None,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
+    monitor_link: Annotated[
+        str | None, Parameter(show=False, help="MAVLink URL by which the simulated drone also sends")
+    ] = None,
+    lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
@@ -131,7 +135,12 @@ def fly(
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = _calibrated(plan, calibration, drone)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
-    return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
+    work = fly_once(FlightSettings(plan, real_time, out, record, video, monitor, monitor_link))
+    if lifeline:
+        from framerunner.child_process import until_standard_input_ends
+
+        return asyncio.run(until_standard_input_ends(work)) or 0
+    return asyncio.run(work)
 
 
 def _scenario(

@@ -42,12 +42,12 @@ an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a pat
 `apply(document, edit)` returns `Edited(document, changes)`; `EditSession(document, layout)` does so with
 `undo()`, `redo()` and a `layout` that follows. A `Change` is {start, removed, inserted}; the changes of one
 edit follow each other, each made for the text after those before it. What cannot be applied raises
-`EditError` with one line, and nothing is changed.
+`EditError` with one line, and nothing is changed; its `message.text(EDIT_SPANISH)` says it in Spanish.
 
 **Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
 advice), code, message, file, line, column, start, end, state, event, index, section, nodes.
 `problems_of` has them before they are put into words. `check_document(document, texts=SPANISH)` says them in
-Spanish.
+Spanish; for several languages, `findings_of(document, reported_problems(document))` checks once.
 
 **Catalogue**: `catalogue_of(document, pilot_class)`: `values` (name, type, text, unit, low,
 high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
@@ -76,7 +76,13 @@ from offboard.authoring.diagram import Diagram, Edge, Node, diagram
 from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import Edit, ReplaceText, TransitionPath, edit_schema, parse_edit
-from offboard.authoring.findings import Finding, check_document, problems_of
+from offboard.authoring.findings import (
+    Finding,
+    check_document,
+    findings_of,
+    problems_of,
+    reported_problems,
+)
 from offboard.authoring.layout import (
     Layout,
     LayoutError,
@@ -87,9 +93,11 @@ from offboard.authoring.layout import (
     read_layout,
     write_layout,
 )
+from offboard.authoring.messages import EDIT_SPANISH
 from offboard.authoring.outline import Span
 from offboard.authoring.scxml_export import export_scxml
 from offboard.authoring.scxml_import import import_scxml
+from offboard.authoring.strict_model import StrictModel
 from offboard.authoring.text import Change, Positions
 from offboard.authoring.xml_tree import XmlError
 from offboard.chart.messages import ENGLISH
@@ -100,6 +108,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 __all__ = [
+    "EDIT_SPANISH",
     "ENGLISH",
     "SPANISH",
     "Catalogue",
@@ -120,6 +129,7 @@ __all__ = [
     "ReplaceText",
     "Span",
     "StateBox",
+    "StrictModel",
     "TransitionPath",
     "ValueEntry",
     "XmlError",
@@ -131,6 +141,7 @@ __all__ = [
     "diagram",
     "edit_schema",
     "export_scxml",
+    "findings_of",
     "follow",
     "import_scxml",
     "layout_path",
@@ -139,6 +150,7 @@ __all__ = [
     "parse_layout",
     "problems_of",
     "read_layout",
+    "reported_problems",
     "write_layout",
 ]
 

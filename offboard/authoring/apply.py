@@ -57,7 +57,7 @@ def apply(document: Document, edit: edits.Edit) -> Edited:
     work = Work(document)
     _STEPS[type(edit)](work, edit)
     if work.document.unreadable is not None:
-        raise EditError("the text is written in a way that this edit would break; edit the text instead")
+        raise EditError("edit.breaks")
     _refuse_too_long(work.document)
     return Edited(work.document, tuple(work.changes))
 
@@ -65,11 +65,11 @@ def apply(document: Document, edit: edits.Edit) -> Edited:
 def _replace_text(document: Document, edit: edits.ReplaceText) -> Edited:
     length = len(document.text)
     if not edit.start <= edit.end <= length:
-        raise EditError(f"start {edit.start}, end {edit.end}: the text has {length} characters")
+        raise EditError("edit.range", start=edit.start, end=edit.end, length=length)
     try:
         edit.text.encode("utf-8")
     except UnicodeEncodeError:
-        raise EditError("text: half of a surrogate pair cannot be saved; send whole characters") from None
+        raise EditError("edit.half_pair") from None
     change = document.content.change(edit.start, edit.end, edit.text)
     changed = Document(document.content.changed(change), document.path)
     _refuse_too_long(changed)
@@ -78,7 +78,7 @@ def _replace_text(document: Document, edit: edits.ReplaceText) -> Edited:
 
 def _refuse_too_long(document: Document) -> None:
     if len(document.data) > MAX_FILE_BYTES:
-        raise EditError("the mission would be larger than 1 MB; a mission is a page or two")
+        raise EditError("edit.too_large")
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +137,7 @@ class EditSession:
     def undo(self) -> tuple[Change, ...]:
         """Take the last edit back and return the changes of the text. Raises `EditError` if there is none."""
         if not self._done:
-            raise EditError("there is nothing to undo")
+            raise EditError("edit.no_undo")
         step = self._done.pop()
         self._undone.append(_Step(step.changes, self.layout))
         return self._change(tuple(change.inverse for change in reversed(step.changes)), step.layout)
@@ -145,7 +145,7 @@ class EditSession:
     def redo(self) -> tuple[Change, ...]:
         """Do again what was undone last. Raises `EditError` if nothing was."""
         if not self._undone:
-            raise EditError("there is nothing to do again")
+            raise EditError("edit.no_redo")
         step = self._undone.pop()
         self._done.append(_Step(step.changes, self.layout))
         return self._change(step.changes, step.layout)

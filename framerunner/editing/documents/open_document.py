@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from secrets import token_urlsafe
 
-from errors import UserError
+from errors import UserError, is_disk_full
+from framerunner.editing.words import Said, SaidError
 from offboard.authoring import (
     Change,
     Document,
@@ -21,12 +24,13 @@ from offboard.authoring import (
     read_layout,
     write_layout,
 )
+from offboard.pilot import Pilot
 
 _JOURNAL_SUFFIX = ".unsaved"
 
 
-class SaveRefusedError(UserError):
-    """The file was not saved; the message is one line for people."""
+class SaveRefusedError(SaidError):
+    """The file was not saved."""
 
 
 @dataclass(slots=True)
@@ -40,6 +44,8 @@ class OpenDocument:
         restored: what a killed program had not saved was found and is shown.
         speaks_spanish: a page wants findings in Spanish, too.
         problem: what else went wrong at opening, in one line; empty: nothing.
+        pilot_class: whose names the mission uses.
+        name: of this opening; after the program was started again it is another.
     """
 
     path: Path
@@ -48,19 +54,23 @@ class OpenDocument:
     restored: bool = False
     problem: str = ""
     speaks_spanish: bool = False
+    pilot_class: type[Pilot] = Pilot
+    name: str = field(default_factory=lambda: token_urlsafe(9))
     _saved: bytes = b""
     _is_kept: bool = True  # the journal has the present text
     _typed_to: int = -1  # where the last edit ended, if it was typed letters
+    _journal_fails: bool = False
 
     @classmethod
-    def open(cls, path: Path) -> OpenDocument:
+    def open(cls, path: Path, pilot_class: type[Pilot] = Pilot) -> OpenDocument:
         """Open a file. Raises `MissionError` if it cannot be read."""
         document = Document.open(path)
         try:
             layout, problem = read_layout(path), ""
         except LayoutError as error:
             layout, problem = Layout(), str(error)
-        opened = cls(path, EditSession(document, layout), problem=problem, _saved=document.data)
+        session = EditSession(document, layout)
+        opened = cls(path, session, problem=problem, pilot_class=pilot_class, _saved=document.data)
         opened._restore()
         return opened
 
@@ -139,28 +149,51 @@ class OpenDocument:
             if box is None:
                 states.pop(name, None)
         self.session.layout = Layout(states=states, corners=self.layout.corners)
-        write_layout(self.path, self.layout)
+        try:
+            write_layout(self.path, self.layout)
+        except LayoutError as error:
+            raise SaidError("places.not_written", reason=error) from None
 
-    def keep(self) -> None:
-        """Write the journal, if the text has changed since; a disk that refuses it is no reason to stop."""
+    def is_outdated(self) -> bool:
+        """Whether the file has another text, and nothing here is to be saved."""
+        try:
+            return self.is_saved and self.path.read_bytes() != self._saved
+        except OSError:
+            return False
+
+    def keep(self) -> Said | None:
+        """Write the journal, if the text has changed since.
+
+        A disk that refuses it is no reason to stop: it is tried again at the next call.
+
+        Returns:
+            What to tell the person, once for each time that writing begins to fail; None if it is written.
+        """
         if self._is_kept:
-            return
-        self._is_kept = True
-        if self.is_saved:
-            self.journal.unlink(missing_ok=True)
-            return
+            return None
         part = self.journal.with_suffix(".part")
         try:
-            part.write_bytes(self.document.data)
-            os.replace(part, self.journal)
-        except OSError:
-            part.unlink(missing_ok=True)
+            if self.is_saved:
+                self.journal.unlink(missing_ok=True)
+            else:
+                part.write_bytes(self.document.data)
+                os.replace(part, self.journal)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            known, self._journal_fails = self._journal_fails, True
+            return None if known else Said("journal.not_written", reason=_words(error))
+        self._is_kept, self._journal_fails = True, False
+        return None
 
-    def save(self, *, force: bool = False) -> None:
+    def save(self, *, force: bool = False) -> Said | None:
         """Write the file.
 
         Args:
             force: also if another program has changed it meanwhile.
+
+        Returns:
+            What else to tell the person; None: nothing.
 
         Raises:
             SaveRefusedError: it cannot be written, or another program has changed it.
@@ -170,19 +203,35 @@ class OpenDocument:
         part = file.with_name(f".{file.name}.part")
         try:
             if not force and file.exists() and file.read_bytes() != self._saved:
-                raise SaveRefusedError(f"{name} was changed by another program since it was opened")
+                raise SaveRefusedError("desk.changed", name=name)
             part.write_bytes(self.document.data)
             if file.exists():
                 part.chmod(file.stat().st_mode & 0o777)
             os.replace(part, file)
-            if layout_path(self.path).exists() or self.layout.states:
-                write_layout(self.path, self.layout)
         except OSError as error:
-            part.unlink(missing_ok=True)
-            raise SaveRefusedError(f"{name}: cannot be written ({error.strerror})") from None
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            raise SaveRefusedError("desk.not_written", name=name, **write_problem(error)) from None
         self._saved = self.document.data
         self._is_kept = True
-        self.journal.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            self.journal.unlink(missing_ok=True)
+        try:
+            if layout_path(self.path).exists() or self.layout.states:
+                write_layout(self.path, self.layout)
+        except LayoutError as error:
+            return Said("places.not_written", reason=error)
+        return None
+
+
+def write_problem(error: OSError) -> dict[str, object]:
+    """Reason and advice of a file that cannot be written, for `desk.not_written`."""
+    advice = "advice.space" if is_disk_full(error) else "advice.again"
+    return {"reason": _words(error), "advice": Said(advice)}
+
+
+def _words(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()
 
 
 def _is_typed(edit: ReplaceText) -> bool:

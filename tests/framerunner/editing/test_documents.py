@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
@@ -144,7 +145,7 @@ def test_pages_name_files_of_the_folder_and_no_others(tmp_path, name):
     folder.mkdir()
     (tmp_path / "x.yaml").write_text(HOVER)
     with pytest.raises(DeskError, match="is no mission file of this folder"):
-        EditorDesk(folder).open(name)
+        asyncio.run(EditorDesk(folder).open(name))
 
 
 @pytest.mark.parametrize("name", ["../x", "X", "", "a b", "a" * 61, "x.yaml", "ü"])
@@ -163,7 +164,7 @@ def test_new_missions_are_made_from_an_empty_chart_an_example_or_a_copy(tmp_path
     copied = (desk.folder / "mine.yaml").read_text()
     assert copied == shipped.replace("name: frame_challenge\n", "name: mine\n")
     for file in desk.files():
-        assert desk.open(file).opened.document.text
+        assert OpenDocument.open(desk.folder / file).document.text
     with pytest.raises(DeskError, match="is there already"):
         desk.create("mine", "empty")
     with pytest.raises(DeskError, match="unknown source"):
