@@ -4,8 +4,9 @@
 characters, "max_count": flights of a batch}`. A `scenario` below is the name of one or of a lesson, whose
 goals then count; random ones are named as level and seed, such as `calm-17`.
 
-`/ws/editing?language=es` has the server's words in Spanish. It is closed with code 4403 if the visitor may not
-start flights. Each message is a JSON object. A request has `do` and may have `tag`, a whole number that comes back with its answer:
+`/ws/editing?language=es` has the server's words in Spanish. It is closed with code 4403 if the visitor may
+not start flights. Each message is a JSON object. A request has `do` and may have `tag`, a whole number that
+comes back with its answer:
 
     {"do": "start", "text": MISSION, "scenario": "test-case-1", "seed": 0, "speed": 1 or null,
      "paused": false, "break_on": [state ids]}      answer: started {run} or refused

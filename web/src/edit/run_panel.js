@@ -2,6 +2,7 @@
 import { make, number, setText } from "../lib/dom.js";
 import { button, choice, textField } from "./fields.js";
 import { Flights } from "./flights.js";
+import { drawStrip } from "./state_strip.js";
 import { TopView } from "./top_view.js";
 import { word } from "./words.js";
 
@@ -39,7 +40,8 @@ export class RunPanel {
   /**
    * @param {HTMLElement} root
    * @param {{text: () => Promise<string>, lit: (active: string[], counts: Object<string, number>, taken: string[]) => void,
-   *   lost: (state: string) => void, selected: () => string}} listener text: of the mission; selected: id of the selected state
+   *   lost: (state: string) => void, selected: () => string, live: (message: any) => void}} listener live: told how the flight
+   *   in the real simulator stands; text: of the mission; selected: id of the selected state
    */
   constructor(root, listener) {
     this.#root = root;
@@ -160,7 +162,13 @@ export class RunPanel {
     this.#root.classList.remove("e-paused");
   }
 
+  /** Ask for something that is no flight of this panel. @param {object} request @returns {Promise<any>} the answer */
+  ask(request) {
+    return this.#flights.ask(request);
+  }
+
   #hear(message) {
+    if (message.kind === "live") this.#listener.live(message);
     if (message.kind === "now" && message.run === this.#run) this.#showNow(message);
     else if (message.kind === "ended" && message.run === this.#run) {
       this.#run = "";
@@ -193,13 +201,7 @@ export class RunPanel {
   /** @param {Now} now */
   #showStrip(now) {
     const all = [...this.#spans, { state: now.state, from_s: now.time_s - now.seconds_in_state, to_s: now.time_s }];
-    const start = all[0].from_s;
-    const whole = Math.max(now.time_s - start, 0.001);
-    this.#strip.replaceChildren(...all.map(({ state, from_s, to_s }) => {
-      const part = make("span", { title: `${state}: ${number(from_s - start, 1)}–${number(to_s - start, 1)} s` }, state.split(".").at(-1) ?? "");
-      part.style.width = `${100 * Math.max(to_s - from_s, 0) / whole}%`;
-      return part;
-    }));
+    drawStrip(this.#strip, all, { end_s: now.time_s });
   }
 
   /** @param {Flight} flight */
