@@ -13,7 +13,15 @@ from cyclopts import Parameter
 
 from errors import SettingError
 from framerunner.commands import WholeNumber, check_range, say
+from framerunner.commands.monitor import PilotOption
 
+_Drone = Annotated[
+    str | None,
+    Parameter(
+        help="MAVLink URL: where drones send to ground stations; by default udpin://127.0.0.1:14550, or "
+        "another port if that one is taken"
+    ),
+]
 _SUFFIXES = (".yaml", ".yml")
 
 
@@ -23,16 +31,8 @@ def edit(
     source: Annotated[
         str, Parameter(name="--from", help="what a new one begins as: empty, example, or a mission to copy")
     ] = "empty",
-    pilot: Annotated[
-        Path | None, Parameter(help="Python file with primitives and values of your own; it is executed")
-    ] = None,
-    drone: Annotated[
-        str | None,
-        Parameter(
-            help="MAVLink URL: where drones send to ground stations; by default udpin://127.0.0.1:14550, or "
-            "another port if that one is taken"
-        ),
-    ] = None,
+    pilot: PilotOption = None,
+    drone: _Drone = None,
     port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8090,
     browser: Annotated[bool, Parameter(help="open the page in the browser", negative="--no-browser")] = True,
 ) -> int:

@@ -29,6 +29,14 @@ SYSTEM_ID = 250
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 
 
+_TrustedProxy = Annotated[
+    tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
+]
+PilotOption = Annotated[
+    Path | None, Parameter(help="Python file with primitives of your own, for the editor; it is executed")
+]
+
+
 def monitor(
     *,
     drone: Annotated[
@@ -44,18 +52,14 @@ def monitor(
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
     missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
-    pilot: Annotated[
-        Path | None, Parameter(help="Python file with primitives of your own, for the editor; it is executed")
-    ] = None,
+    pilot: PilotOption = None,
     camera_host: Annotated[
         tuple[str, ...],
         Parameter(
             help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"
         ),
     ] = (),
-    trusted_proxy: Annotated[
-        tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
-    ] = (),
+    trusted_proxy: _TrustedProxy = (),
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.

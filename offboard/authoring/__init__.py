@@ -74,8 +74,7 @@ from offboard.authoring.apply import Edited, EditSession, apply
 from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue, catalogue_of
 from offboard.authoring.diagram import Diagram, Edge, Node, diagram
 from offboard.authoring.document import Document
-from offboard.authoring.edit_error import EditError
-from offboard.authoring.edits import Edit, ReplaceText, TransitionPath, edit_schema, parse_edit
+from offboard.authoring.edits import Edit, ReplaceText, StrictModel, TransitionPath, edit_schema, parse_edit
 from offboard.authoring.findings import (
     Finding,
     check_document,
@@ -93,11 +92,10 @@ from offboard.authoring.layout import (
     read_layout,
     write_layout,
 )
-from offboard.authoring.messages import EDIT_SPANISH
+from offboard.authoring.messages import EDIT_SPANISH, EditError
 from offboard.authoring.outline import Span
 from offboard.authoring.scxml_export import export_scxml
 from offboard.authoring.scxml_import import import_scxml
-from offboard.authoring.strict_model import StrictModel
 from offboard.authoring.text import Change, Positions
 from offboard.authoring.xml_tree import XmlError
 from offboard.chart.messages import ENGLISH

@@ -8,8 +8,8 @@ from typing import Any
 
 from offboard.authoring import edits, state_edits, transition_edits
 from offboard.authoring.document import Document
-from offboard.authoring.edit_error import EditError
 from offboard.authoring.layout import Layout, completed, follow
+from offboard.authoring.messages import EditError
 from offboard.authoring.text import Change
 from offboard.authoring.work import Work
 from offboard.mission import MAX_FILE_BYTES

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 
 from offboard.authoring.document import Document
-from offboard.authoring.edit_error import EditError
+from offboard.authoring.messages import EditError
 from offboard.authoring.outline import Span
 from offboard.authoring.yaml_writer import Value, flow, style_of, written
 from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar

@@ -9,17 +9,22 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from offboard.authoring.edit_error import EditError
+from offboard.authoring.messages import EditError
 from offboard.authoring.outline import Event, Section
-from offboard.authoring.strict_model import StrictModel
 
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=60, description="small letters")]
 StatePath = Annotated[str, Field(max_length=1000, description="as written, such as landing.stop")]
 Line = Annotated[str, Field(max_length=500, pattern=r"^[^\r\n]*$", description="one line")]
 Actions = Annotated[tuple[Line, ...], Field(max_length=200, description="primitives and assignments")]
 Index = Annotated[int, Field(ge=0, le=10_000)]
+
+
+class StrictModel(BaseModel):
+    """Data that comes from outside: it cannot be changed, and has no fields but its own."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class TransitionPath(StrictModel):

@@ -13,9 +13,8 @@ from pydantic import Field, ValidationError
 
 from errors import UserError
 from offboard.authoring.document import Document
-from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState
+from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState, StrictModel
 from offboard.authoring.references import chart_ids, instances, prefix_change
-from offboard.authoring.strict_model import StrictModel
 
 MAX_LAYOUT_BYTES = 1_000_000
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]

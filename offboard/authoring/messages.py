@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from errors import UserError
 from offboard.chart.messages import Message
 
 EDIT_ENGLISH: Mapping[str, str] = {
@@ -138,3 +139,19 @@ class EditMessage(Message):
     """A text about an edit."""
 
     english = EDIT_ENGLISH
+
+
+class EditError(UserError):
+    """An edit cannot be applied, and nothing was changed; the text is one line for people, in English.
+
+    Args:
+        code: of the kind of fault.
+        values: that its text has.
+
+    Attributes:
+        message: the same as code and values, for other languages.
+    """
+
+    def __init__(self, code: str, **values: object) -> None:
+        self.message = EditMessage(code, **values)
+        super().__init__(str(self.message))

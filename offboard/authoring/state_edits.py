@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from offboard.authoring.blocks import Owner
-from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import (
     AddState,
     AddTemplate,
@@ -17,7 +16,7 @@ from offboard.authoring.edits import (
     SetParameter,
     SetUse,
 )
-from offboard.authoring.messages import EditMessage
+from offboard.authoring.messages import EditError, EditMessage
 from offboard.authoring.outline import TEMPLATE, StateOutline
 from offboard.authoring.references import instances, prefix_change, references, relative
 from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, Work, keys_before

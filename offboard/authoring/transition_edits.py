@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from offboard.authoring.blocks import Owner
-from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import (
     AddTransition,
     DeleteTransition,
@@ -15,6 +14,7 @@ from offboard.authoring.edits import (
     SetTransitionActions,
     SetVariable,
 )
+from offboard.authoring.messages import EditError
 from offboard.authoring.outline import Event, StateOutline
 from offboard.authoring.state_edits import delete_reference
 from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, TRANSITION_ORDER, Work, keys_before

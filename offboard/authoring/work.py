@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterable
 
 from offboard.authoring.blocks import Blocks, Owner, Patch
 from offboard.authoring.document import Document
-from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import TransitionPath
-from offboard.authoring.messages import EditMessage
+from offboard.authoring.messages import EditError, EditMessage
 from offboard.authoring.outline import TEMPLATE, StateOutline, TransitionOutline
 from offboard.authoring.references import Reference, chart_ids, instances, references, relative, shortest_text
 from offboard.authoring.text import Change

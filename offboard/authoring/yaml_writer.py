@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import yaml
 
-from offboard.authoring.edit_error import EditError
+from offboard.authoring.messages import EditError
 from offboard.chart.yaml_nodes import ListNode, MapNode
 
 Value = str | Sequence["Value"] | Mapping[str, "Value"]

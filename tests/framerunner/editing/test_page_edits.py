@@ -1,4 +1,4 @@
-"""Missions and edits drawn at random, through the page's socket: bytes survive, and edits stay in their lines."""
+"""Missions and edits drawn at random, through the page's socket: bytes survive, edits stay local."""
 
 from __future__ import annotations
 
