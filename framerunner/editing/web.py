@@ -4,8 +4,9 @@
 characters, "max_count": flights of a batch}`. A `scenario` below is the name of one or of a lesson, whose
 goals then count; random ones are named as level and seed, such as `calm-17`.
 
-The WebSocket is closed with code 4403 if the visitor may not start flights. Each message is a JSON object. A
-request has `do` and may have `tag`, a whole number that comes back with its answer:
+`/ws/editing?language=es` has the server's words in Spanish. It is closed with code 4403 if the visitor may
+not start flights. Each message is a JSON object. A request has `do` and may have `tag`, a whole number that
+comes back with its answer:
 
     {"do": "start", "text": MISSION, "scenario": "test-case-1", "seed": 0, "speed": 1 or null,
      "paused": false, "break_on": [state ids]}      answer: started {run, layout} or refused
@@ -18,6 +19,8 @@ request has `do` and may have `tag`, a whole number that comes back with its ans
     {"do": "start_batch", "text", "level": "calm", "count": 20, "first_seed": 1}
     {"do": "start_batch", "text", "scenarios": [names]}      answer: batch_started {batch, count} or refused
     {"do": "cancel", "batch"}                       its results stay
+    {"do": "start_live", "text", "scenario", "speed": 1.0}   a flight in the real simulator: `framerunner fly`
+    {"do": "stop_live"}                             answer: done or refused
 
 The server tells `{"kind": ...}`:
 
@@ -31,7 +34,8 @@ The server tells `{"kind": ...}`:
     ended    {run, text, lost_in, result: as result.json or null, counts, spans}
     flight   {batch, scenario, seed, verdict, completed, reason, cause, lost_in, rank, total_time_s,
               frames_crossed, counts, track: {time_s, x, y, z, state, states}, layout: the scenario,
-              result: as result.json}
+              result: as result.json, replay: its name in /api/runs}
+    live     {state: starting | flying | ended | stopped, scenario, speed, text}   the real simulator, to all
     batch_ended {batch, flown, completed, count, text, order}
     refused  {tag, text, lines, run};  done {tag};  started {tag, run, layout: the scenario};
     batch_started {tag, batch, count}
@@ -58,6 +62,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from framerunner.editing import messages
 from framerunner.editing.places import lesson_names, level_names, scenario_names
 from framerunner.editing.service import EditingService, EditingSettings
+from framerunner.editing.words import Language, Said, language_of, say
 from monitor.access import refuse
 from monitor.pilot_channel import Allowance
 from scenarios.result import first_error
@@ -93,11 +98,12 @@ class EditingDoor:
 
         @router.websocket("/ws/editing")
         async def editing(websocket: WebSocket) -> None:
+            language = language_of(websocket)
             if not may_act(websocket):
-                await refuse(websocket, "only those who logged in may start flights")
+                await refuse(websocket, say(Said("access.fly"), language))
                 return
             await websocket.accept()
-            await _Connection(websocket, self._service).serve()
+            await _Connection(websocket, self._service, language).serve()
 
         return router
 
@@ -112,7 +118,8 @@ class EditingDoor:
 class _Connection:
     """One browser's WebSocket; a watcher of the service."""
 
-    def __init__(self, websocket: WebSocket, service: EditingService) -> None:
+    def __init__(self, websocket: WebSocket, service: EditingService, language: Language) -> None:
+        self.language = language
         self._websocket = websocket
         self._service = service
         self._outbox: deque[str] = deque()
@@ -154,14 +161,15 @@ class _Connection:
 
     async def _take(self, text: str) -> None:
         if len(text) > _MAX_MESSAGE:
-            self.put(messages.Refused(tag=0, text="the message is too long").model_dump_json())
+            text = say(Said("message.too_long"), self.language)
+            self.put(messages.Refused(tag=0, text=text).model_dump_json())
             return
         try:
             request = messages.REQUEST.validate_json(text)
         except ValidationError as error:
             self.put(messages.Refused(tag=_tag_in(text), text=first_error(error)).model_dump_json())
             return
-        await self._service.do(request, self)
+        await self._service.do(request.model_copy(update={"language": self.language}), self)
 
     async def _send(self) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):

@@ -43,12 +43,13 @@ an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a pat
 `apply(document, edit)` returns `Edited(document, changes)`; `EditSession(document, layout)` does so with
 `undo()`, `redo()` and a `layout` that follows; `place(places)` moves states and is undone likewise. A
 `Change` is {start, removed, inserted}; the changes of one edit follow each other, each made for the text
-after those before it. What cannot be applied raises `EditError` with one line, and nothing is changed.
+after those before it. What cannot be applied raises `EditError` with one line, and nothing is changed; its
+`message.text(EDIT_SPANISH)` says it in Spanish.
 
 **Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
 advice), code, message, file, line, column, start, end, state, event, index, section, nodes.
 `problems_of` has them before they are put into words. `check_document(document, texts=SPANISH)` says them in
-Spanish.
+Spanish; for several languages, `findings_of(document, reported_problems(document))` checks once.
 
 **Catalogue**: `catalogue_of(document, pilot_class)`: `values` (name, type, text, unit, low,
 high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
@@ -75,9 +76,14 @@ from offboard.authoring.apply import Edited, EditSession, apply
 from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue, catalogue_of
 from offboard.authoring.diagram import Diagram, Edge, Node, diagram
 from offboard.authoring.document import Document
-from offboard.authoring.edit_error import EditError
-from offboard.authoring.edits import Edit, ReplaceText, TransitionPath, edit_schema, parse_edit
-from offboard.authoring.findings import Finding, check_document, problems_of
+from offboard.authoring.edits import Edit, ReplaceText, StrictModel, TransitionPath, edit_schema, parse_edit
+from offboard.authoring.findings import (
+    Finding,
+    check_document,
+    findings_of,
+    problems_of,
+    reported_problems,
+)
 from offboard.authoring.layout import (
     Layout,
     LayoutError,
@@ -89,6 +95,7 @@ from offboard.authoring.layout import (
     read_layout,
     write_layout,
 )
+from offboard.authoring.messages import EDIT_SPANISH, EditError
 from offboard.authoring.outline import Span
 from offboard.authoring.scxml_export import export_scxml
 from offboard.authoring.scxml_import import import_scxml
@@ -102,6 +109,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 __all__ = [
+    "EDIT_SPANISH",
     "ENGLISH",
     "SPANISH",
     "Catalogue",
@@ -122,6 +130,7 @@ __all__ = [
     "ReplaceText",
     "Span",
     "StateBox",
+    "StrictModel",
     "TransitionPath",
     "ValueEntry",
     "XmlError",
@@ -133,6 +142,7 @@ __all__ = [
     "diagram",
     "edit_schema",
     "export_scxml",
+    "findings_of",
     "follow",
     "import_scxml",
     "known_places",
@@ -142,6 +152,7 @@ __all__ = [
     "parse_layout",
     "problems_of",
     "read_layout",
+    "reported_problems",
     "write_layout",
 ]
 

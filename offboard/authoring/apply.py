@@ -8,8 +8,8 @@ from typing import Any
 
 from offboard.authoring import edits, state_edits, transition_edits
 from offboard.authoring.document import Document
-from offboard.authoring.edit_error import EditError
 from offboard.authoring.layout import Layout, StateBox, completed, follow, with_places
+from offboard.authoring.messages import EditError
 from offboard.authoring.text import Change
 from offboard.authoring.work import Work
 from offboard.mission import MAX_FILE_BYTES
@@ -58,7 +58,7 @@ def apply(document: Document, edit: edits.Edit) -> Edited:
     work = Work(document)
     _STEPS[type(edit)](work, edit)
     if work.document.unreadable is not None:
-        raise EditError("the text is written in a way that this edit would break; edit the text instead")
+        raise EditError("edit.breaks")
     _refuse_too_long(work.document)
     return Edited(work.document, tuple(work.changes))
 
@@ -66,11 +66,11 @@ def apply(document: Document, edit: edits.Edit) -> Edited:
 def _replace_text(document: Document, edit: edits.ReplaceText) -> Edited:
     length = len(document.text)
     if not edit.start <= edit.end <= length:
-        raise EditError(f"start {edit.start}, end {edit.end}: the text has {length} characters")
+        raise EditError("edit.range", start=edit.start, end=edit.end, length=length)
     try:
         edit.text.encode("utf-8")
     except UnicodeEncodeError:
-        raise EditError("text: half of a surrogate pair cannot be saved; send whole characters") from None
+        raise EditError("edit.half_pair") from None
     change = document.content.change(edit.start, edit.end, edit.text)
     changed = Document(document.content.changed(change), document.path)
     _refuse_too_long(changed)
@@ -79,7 +79,7 @@ def _replace_text(document: Document, edit: edits.ReplaceText) -> Edited:
 
 def _refuse_too_long(document: Document) -> None:
     if len(document.data) > MAX_FILE_BYTES:
-        raise EditError("the mission would be larger than 1 MB; a mission is a page or two")
+        raise EditError("edit.too_large")
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ class EditSession:
         The last one may have been a move of boxes: then the text has no changes.
         """
         if not self._done:
-            raise EditError("there is nothing to undo")
+            raise EditError("edit.no_undo")
         step = self._done.pop()
         self._undone.append(_Step(step.changes, self.layout))
         return self._change(tuple(change.inverse for change in reversed(step.changes)), step.layout)
@@ -161,7 +161,7 @@ class EditSession:
     def redo(self) -> tuple[Change, ...]:
         """Do again what was undone last. Raises `EditError` if nothing was."""
         if not self._undone:
-            raise EditError("there is nothing to do again")
+            raise EditError("edit.no_redo")
         step = self._undone.pop()
         self._done.append(_Step(step.changes, self.layout))
         return self._change(step.changes, step.layout)

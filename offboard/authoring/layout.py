@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from errors import UserError
 from offboard.authoring.document import Document
-from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState
+from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState, StrictModel
 from offboard.authoring.references import chart_ids, instances, prefix_change
 
 MAX_LAYOUT_BYTES = 1_000_000
@@ -26,10 +26,8 @@ class LayoutError(UserError):
     """A layout file cannot be used; the message is one line."""
 
 
-class StateBox(BaseModel):
+class StateBox(StrictModel):
     """Where a state is drawn, in pixels of the page; with a width and height of its own if they were set."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     x: Coordinate
     y: Coordinate
@@ -37,10 +35,8 @@ class StateBox(BaseModel):
     height: Size | None = None
 
 
-class Layout(BaseModel):
+class Layout(StrictModel):
     """Places by full id of the state, and the corners of edges by the edge's id."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     version: Literal[1] = 1
     states: dict[str, StateBox] = Field(default_factory=dict, max_length=5000)

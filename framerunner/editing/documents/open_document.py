@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from secrets import token_urlsafe
 
-from errors import UserError
+from errors import UserError, is_disk_full
+from framerunner.editing.words import Said, SaidError
 from offboard.authoring import (
     Change,
     Document,
@@ -22,12 +25,13 @@ from offboard.authoring import (
     read_layout,
     write_layout,
 )
+from offboard.pilot import Pilot
 
 _JOURNAL_SUFFIX = ".unsaved"
 
 
-class SaveRefusedError(UserError):
-    """The file was not saved; the message is one line for people."""
+class SaveRefusedError(SaidError):
+    """The file was not saved."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +67,8 @@ class OpenDocument:
         restored: what a killed program had not saved was found and is shown.
         speaks_spanish: a page wants findings in Spanish, too.
         problem: what else went wrong at opening, in one line; empty: nothing.
+        pilot_class: whose names the mission uses.
+        name: of this opening; after the program was started again it is another.
     """
 
     path: Path
@@ -71,19 +77,23 @@ class OpenDocument:
     restored: bool = False
     problem: str = ""
     speaks_spanish: bool = False
+    pilot_class: type[Pilot] = Pilot
+    name: str = field(default_factory=lambda: token_urlsafe(9))
     _saved: bytes = b""
     _is_kept: bool = True  # the journal has the present text
     _typed: _Typed | None = None  # the last edit, if it was typed letters
+    _journal_fails: bool = False
 
     @classmethod
-    def open(cls, path: Path) -> OpenDocument:
+    def open(cls, path: Path, pilot_class: type[Pilot] = Pilot) -> OpenDocument:
         """Open a file. Raises `MissionError` if it cannot be read."""
         document = Document.open(path)
         try:
             layout, problem = read_layout(path), ""
         except LayoutError as error:
             layout, problem = Layout(), str(error)
-        opened = cls(path, EditSession(document, layout), problem=problem, _saved=document.data)
+        session = EditSession(document, layout)
+        opened = cls(path, session, problem=problem, pilot_class=pilot_class, _saved=document.data)
         opened._restore()
         return opened
 
@@ -163,11 +173,14 @@ class OpenDocument:
         return changes
 
     def place(self, places: dict[str, StateBox | None], *, settled: bool = False) -> None:
-        """Keep where states are drawn, by their full ids; None forgets one. Raises `LayoutError`.
+        """Keep where states are drawn, by their full ids; None forgets one.
 
         Args:
             places: of some states.
             settled: by the page, of states that nobody placed: nothing to undo.
+
+        Raises:
+            SaidError: the file of places cannot be written.
         """
         if settled:
             self.session.settle(places)
@@ -177,28 +190,51 @@ class OpenDocument:
         self._write_layout()
 
     def _write_layout(self) -> None:
-        write_layout(self.path, known_places(self.layout, self.document))
+        try:
+            write_layout(self.path, known_places(self.layout, self.document))
+        except LayoutError as error:
+            raise SaidError("places.not_written", reason=error) from None
 
-    def keep(self) -> None:
-        """Write the journal, if the text has changed since; a disk that refuses it is no reason to stop."""
+    def is_outdated(self) -> bool:
+        """Whether the file has another text, and nothing here is to be saved."""
+        try:
+            return self.is_saved and self.path.read_bytes() != self._saved
+        except OSError:
+            return False
+
+    def keep(self) -> Said | None:
+        """Write the journal, if the text has changed since.
+
+        A disk that refuses it is no reason to stop: it is tried again at the next call.
+
+        Returns:
+            What to tell the person, once for each time that writing begins to fail; None if it is written.
+        """
         if self._is_kept:
-            return
-        self._is_kept = True
-        if self.is_saved:
-            self.journal.unlink(missing_ok=True)
-            return
+            return None
         part = self.journal.with_suffix(".part")
         try:
-            part.write_bytes(self.document.data)
-            os.replace(part, self.journal)
-        except OSError:
-            part.unlink(missing_ok=True)
+            if self.is_saved:
+                self.journal.unlink(missing_ok=True)
+            else:
+                part.write_bytes(self.document.data)
+                os.replace(part, self.journal)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            known, self._journal_fails = self._journal_fails, True
+            return None if known else Said("journal.not_written", reason=_words(error))
+        self._is_kept, self._journal_fails = True, False
+        return None
 
-    def save(self, *, force: bool = False) -> None:
+    def save(self, *, force: bool = False) -> Said | None:
         """Write the file.
 
         Args:
             force: also if another program has changed it meanwhile.
+
+        Returns:
+            What else to tell the person; None: nothing.
 
         Raises:
             SaveRefusedError: it cannot be written, or another program has changed it.
@@ -208,19 +244,35 @@ class OpenDocument:
         part = file.with_name(f".{file.name}.part")
         try:
             if not force and file.exists() and file.read_bytes() != self._saved:
-                raise SaveRefusedError(f"{name} was changed by another program since it was opened")
+                raise SaveRefusedError("desk.changed", name=name)
             part.write_bytes(self.document.data)
             if file.exists():
                 part.chmod(file.stat().st_mode & 0o777)
             os.replace(part, file)
-            if layout_path(self.path).exists() or self.layout.states:
-                self._write_layout()
         except OSError as error:
-            part.unlink(missing_ok=True)
-            raise SaveRefusedError(f"{name}: cannot be written ({error.strerror})") from None
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            raise SaveRefusedError("desk.not_written", name=name, **write_problem(error)) from None
         self._saved = self.document.data
         self._is_kept = True
-        self.journal.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            self.journal.unlink(missing_ok=True)
+        try:
+            if layout_path(self.path).exists() or self.layout.states:
+                self._write_layout()
+        except SaidError as error:
+            return error.message
+        return None
+
+
+def write_problem(error: OSError) -> dict[str, object]:
+    """Reason and advice of a file that cannot be written, for `desk.not_written`."""
+    advice = "advice.space" if is_disk_full(error) else "advice.again"
+    return {"reason": _words(error), "advice": Said(advice)}
+
+
+def _words(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()
 
 
 def _typed(text: str, edit: ReplaceText) -> _Typed | None:

@@ -1,4 +1,5 @@
 /** The connection to flights: starts and controls one flight or a batch, and hears of them. */
+import { language } from "../lib/language.js";
 import { ReconnectingSocket } from "../lib/reconnecting_socket.js";
 import { word } from "./words.js";
 
@@ -23,11 +24,11 @@ export class Flights {
   /** @param {{heard: (message: any) => void, lost: () => void}} listener */
   constructor(listener) {
     this.#listener = listener;
-    this.#socket = new ReconnectingSocket("/ws/editing", {
+    this.#socket = new ReconnectingSocket(`/ws/editing?language=${language()}`, {
       message: (message) => this.#hear(message),
       state: (state) => {
         if (state === "open") return;
-        for (const answer of this.#waiting.values()) answer({ kind: "refused", text: word("away") });
+        for (const answer of this.#waiting.values()) answer({ kind: "refused", text: word("lost_connection") });
         this.#waiting.clear();
         listener.lost();
       },
@@ -38,7 +39,7 @@ export class Flights {
   ask(request) {
     this.#tag += 1;
     const tag = this.#tag;
-    if (!this.#socket.send({ ...request, tag })) return Promise.resolve({ kind: "refused", text: word("away") });
+    if (!this.#socket.send({ ...request, tag })) return Promise.resolve({ kind: "refused", text: word("no_connection") });
     return new Promise((resolve) => this.#waiting.set(tag, resolve));
   }
 

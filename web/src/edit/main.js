@@ -16,6 +16,8 @@ import { translateHeader } from "../lib/navigation.js";
 import { savePicture } from "./picture.js";
 import { showNames } from "./names.js";
 import { watchFlights } from "./live_light.js";
+import { LivePanel } from "./live_panel.js";
+import { ReplayPanel } from "./replay_panel.js";
 import { LessonPanel } from "./lesson_panel.js";
 import { word } from "./words.js";
 
@@ -34,7 +36,7 @@ async function chooseFile() {
   const problem = make("p", { class: "problem", role: "alert", hidden: true });
   const list = make("ul", { class: "e-files" });
   root.append(make("h1", {}, word("open")), problem, list);
-  const answer = await fetch("/api/edit/files");
+  const answer = await fetch(`/api/edit/files?language=${language()}`);
   const told = await answer.json();
   if (!answer.ok) {
     problem.hidden = false;
@@ -51,7 +53,7 @@ async function chooseFile() {
     textField(word("name"), name, (value) => { name = value; }),
     choice(word("from"), /** @type {[string, string][]} */ (sources), source, (value) => { source = value; }),
     button(word("create"), async () => {
-      const made = await fetch("/api/edit/files", {
+      const made = await fetch(`/api/edit/files?language=${language()}`, {
         method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ name, source }),
       });
       const { file: created, detail } = await made.json();
@@ -60,7 +62,7 @@ async function chooseFile() {
       problem.textContent = typeof detail === "string" ? detail : made.statusText;
     }),
     importField(async (text, wanted) => {
-      const made = await fetch("/api/edit/import", {
+      const made = await fetch(`/api/edit/import?language=${language()}`, {
         method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ name: wanted, scxml: text }),
       });
       const { file: created, detail } = await made.json();
@@ -91,6 +93,7 @@ function importField(chosen) {
 function edit(name) {
   /** @type {Selection} */
   let selection = { kind: "mission", id: "" };
+  let refusal = ""; // code of the last one
   const stem = name.replace(/\.ya?ml$/, "");
   const line = make("p", { class: "e-message", role: "status", hidden: true });
   const state = make("span", { class: "e-saved", role: "status" });
@@ -101,10 +104,13 @@ function edit(name) {
   const flying = make("div");
   const lesson = new URLSearchParams(location.search).get("lesson");
   const teaching = make("div");
+  const replaying = make("div");
+  const living = make("div");
   const names = make("div", { class: "e-names" });
   const tabs = new Tabs([
     ...(lesson ? [/** @type {[string, string, HTMLElement]} */ (["lesson", word("lesson"), teaching])] : []),
-    ["findings", word("checker"), findings], ["fly", word("fly"), flying], ["names", word("names"), names],
+    ["findings", word("checker"), findings], ["fly", word("fly"), flying], ["live", word("live"), living],
+    ["replay", word("replay"), replaying], ["names", word("names"), names],
   ]);
   const undo = button(word("undo"), () => session.undo(), { "aria-keyshortcuts": "Control+Z" });
   const redo = button(word("redo"), () => session.redo(), { "aria-keyshortcuts": "Control+Y" });
@@ -118,7 +124,7 @@ function edit(name) {
     button(word("arrange"), arrange),
     make("details", { class: "e-export" }, make("summary", {}, word("export")),
       button("PNG", () => savePicture(drawing, stem, "png")), button("SVG", () => savePicture(drawing, stem, "svg")),
-      ...["mermaid", "scxml"].map((kind) => make("a", { href: `/api/edit/export?kind=${kind}&file=${encodeURIComponent(name)}`, download: true }, kind === "scxml" ? "SCXML" : "Mermaid"))),
+      ...["mermaid", "scxml"].map((kind) => make("a", { href: `/api/edit/export?kind=${kind}&language=${language()}&file=${encodeURIComponent(name)}`, download: true }, kind === "scxml" ? "SCXML" : "Mermaid"))),
     button(word("language"), changeLanguage));
   const panes = make("div", { class: "e-panes" }, drawing, form, writing, tabs.root);
   root.replaceChildren(tools, line, panes);
@@ -127,7 +133,7 @@ function edit(name) {
     divider(panes, { name: "form", part: form, label: word("divide_form"), isRow: false, least: 180, space: 480 }),
     divider(panes, { name: "writing", part: writing, label: word("divide_text"), isRow: false, least: 120, space: 480 }));
 
-  const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}&language=${language()}`, {
+  const session = new EditSession(name, {
     changed(changes, all, isOwn) {
       if (all !== null) text.setText(all);
       else text.change(changes, isOwn);
@@ -142,7 +148,11 @@ function edit(name) {
       if (connection === "open") tell("");
       else tell(connection === "refused" ? reason : word("away"));
     },
-    refused: tell,
+    refused: (reason, code) => {
+      refusal = code;
+      tell(reason);
+    },
+    text: () => text.text,
     note: (note) => tell(word(/** @type {any} */ (note))),
     status: showStatus,
   });
@@ -187,9 +197,28 @@ function edit(name) {
     lit: light,
     lost: (id) => diagram.markLost(id),
     selected: () => (selection.kind === "state" ? selection.id : ""),
+    live: (message) => live.hear(message),
   }, lesson !== null);
+  const live = new LivePanel(living, {
+    ask: (request) => runs.ask(request),
+    async text() {
+      await session.flush();
+      return text.text;
+    },
+  });
+  const replay = new ReplayPanel(replaying, {
+    lit: light, lost: (id) => diagram.markLost(id), mission: () => session.mission.name ?? "",
+  });
+  tabs.onShow = (key) => {
+    if (key === "replay") replay.load();
+    else replay.pause();
+  };
 
-  watchFlights(() => session.mission.name ?? "", (active, counts) => light(active, counts, []));
+  watchFlights(() => session.mission.name ?? "", {
+    light: (active, counts) => light(active, counts, []),
+    moved: (place, t, state) => live.move(place, t, state),
+    world: (scenario) => live.setWorld(scenario),
+  });
   if (lesson) {
     new LessonPanel(teaching, lesson, {
       async text() {
@@ -337,7 +366,7 @@ function edit(name) {
 
   async function store() {
     if (await session.save()) tell("");
-    else if (line.textContent?.includes("another program") && confirm(word("overwrite"))) await session.save(true);
+    else if (refusal === "desk.changed" && confirm(word("overwrite"))) await session.save(true);
   }
 
   addEventListener("beforeunload", (event) => {

@@ -2,6 +2,7 @@
 import { make, number, setText } from "../lib/dom.js";
 import { button, choice, textField } from "./fields.js";
 import { Flights } from "./flights.js";
+import { drawStrip } from "./state_strip.js";
 import { TopView } from "./top_view.js";
 import { contactsOf, hitWords, shortVerdict, verdictWords } from "./verdict.js";
 import { word } from "./words.js";
@@ -46,8 +47,9 @@ export class RunPanel {
   /**
    * @param {HTMLElement} root
    * @param {{text: () => Promise<string>, mistake: () => string, lit: (active: string[], counts: Object<string, number>, taken: string[]) => void,
-   *   lost: (state: string) => void, selected: () => string}} listener text: of the mission; mistake: that keeps it from flying, "" if there is
-   *   none, asked after the text; selected: id of the selected state
+   *   lost: (state: string) => void, selected: () => string, live: (message: any) => void}} listener text: of the mission; mistake: that
+   *   keeps it from flying, "" if there is none, asked after the text; selected: id of the selected state; live: told how the flight in
+   *   the real simulator stands
    * @param {boolean} isSimple without what a beginner does not need
    */
   constructor(root, listener, isSimple) {
@@ -203,7 +205,13 @@ export class RunPanel {
     this.#batch = "";
   }
 
+  /** Ask for something that is no flight of this panel. @param {object} request @returns {Promise<any>} the answer */
+  ask(request) {
+    return this.#flights.ask(request);
+  }
+
   #hear(message) {
+    if (message.kind === "live") this.#listener.live(message);
     if (message.kind === "now" && message.run === this.#run) this.#showNow(message);
     else if (message.kind === "ended" && message.run === this.#run) {
       this.#setRun("");
@@ -248,14 +256,7 @@ export class RunPanel {
 
   /** @param {{state: string, from_s: number, to_s: number}[]} all */
   #showStrip(all) {
-    if (all.length === 0) return;
-    const start = all[0].from_s;
-    const whole = Math.max(all[all.length - 1].to_s - start, 0.001);
-    this.#strip.replaceChildren(...all.map(({ state, from_s, to_s }) => {
-      const part = make("span", { title: `${state}: ${number(from_s - start, 1)}–${number(to_s - start, 1)} s` }, state.split(".").at(-1) ?? "");
-      part.style.width = `${100 * Math.max(to_s - from_s, 0) / whole}%`;
-      return part;
-    }));
+    if (all.length > 0) drawStrip(this.#strip, all, { end_s: all[all.length - 1].to_s });
   }
 
   /** @param {Flight} flight */
