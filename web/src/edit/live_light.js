@@ -1,11 +1,12 @@
 /** Lights the chart of a mission that a drone flies now, as the live channel tells it. */
 import { LiveChannel } from "../lib/live_channel.js";
+import { yawOf } from "../lib/yaw.js";
 
 /**
  * @param {() => string} name of the mission that is shown
  * @param {{light: (active: string[], counts: Object<string, number>) => void, moved: (place: number[], t: number, state: string) => void,
  *   world: (scenario: any) => void}} listener light: told the active states, and how often transitions were taken, when
- *   they change; none when nobody flies it. moved: where the drone that flies it is. world: the scenario that is flown
+ *   they change; none when nobody flies it. moved: where the drone that flies it is: x, y, z and yaw. world: the scenario that is flown
  */
 export function watchFlights(name, listener) {
   const channel = new LiveChannel(["pose", "chart", "status", "guards", "world"]);
@@ -30,7 +31,7 @@ export function watchFlights(name, listener) {
     if (!drone) return;
     const state = charts.get(drone.id)?.states[drone.s] ?? "";
     show(state);
-    if (drone.fresh) listener.moved(drone.p, drone.t, state);
+    if (drone.fresh) listener.moved([...drone.p, yawOf(drone.q)], drone.t, state);
   });
   channel.on("status", ({ drones }) => {
     const isFlown = drones.some(({ mission }) => mission?.name === name() && mission.alive);

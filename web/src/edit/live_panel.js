@@ -84,12 +84,12 @@ export class LivePanel {
 
   #clear() {
     this.#track = [];
-    this.#view.clear();
+    this.#view.setWorld(null);
   }
 
   /** The world is known. @param {any} scenario */
   setWorld(scenario) {
-    if (scenario) this.#view.show(scenario, { x: [], y: [] });
+    if (scenario) this.#view.setWorld(scenario);
   }
 
   /** Where the drone is now, and its mission's state. @param {number[]} place @param {number} t @param {string} state */
@@ -97,8 +97,8 @@ export class LivePanel {
     const [x, y] = place;
     const last = this.#track.at(-1);
     if (last && t < last[0]) this.#track = [];
-    if (!last || Math.hypot(x - last[1], y - last[2]) > STEP_M) this.#track.push([t, ...place]);
-    this.#view.add(true, this.#track, place);
+    if (!last || Math.hypot(x - last[1], y - last[2]) > STEP_M) this.#track.push([t, x, y, place[2]]);
+    this.#view.add(true, this.#track, place, []);
     if (state) setText(this.#line, state);
   }
 }

@@ -3,9 +3,11 @@ import { make, number, setText } from "../lib/dom.js";
 import { Bar } from "../lib/replay/bar.js";
 import { Clock } from "../lib/replay/clock.js";
 import { fetchJson, Run } from "../lib/replay/run.js";
+import { yawOf } from "../lib/yaw.js";
 import { button } from "./fields.js";
 import { drawStrip } from "./state_strip.js";
 import { TopView } from "./top_view.js";
+import { contactsOf } from "./verdict.js";
 import { word } from "./words.js";
 
 const MAX_LISTED = 100;
@@ -97,7 +99,7 @@ export class ReplayPanel {
     this.#drawn = -1;
     for (const part of [this.#bar, this.#strip, this.#values, this.#table]) part.replaceChildren();
     setText(this.#line, "");
-    this.#view.clear();
+    this.#view.setWorld(null);
     this.#listener.lit([], {}, []);
     this.#listener.lost("");
   }
@@ -111,7 +113,7 @@ export class ReplayPanel {
     this.#clock = clock;
     new Bar(this.#bar, clock, [run], { keys: false });
     drawStrip(this.#strip, spansOf(run), { end_s: run.end, seek: (t) => clock.seek(t) });
-    this.#view.show(run.world.scenario, { x: [], y: [] });
+    this.#view.setWorld(run.world.scenario);
     clock.listen(({ t }) => {
       if (this.#clock === clock) this.#showTime(t);
     });
@@ -128,7 +130,8 @@ export class ReplayPanel {
     this.#listener.lit(active, countsUntil(run, count), recent.flatMap((/** @type {Taken} */ { ids }) => ids));
     const trail = run.poses.slice(0, run.posesUntil(t)).map(({ t: time_s, p }) => [time_s, ...p]);
     const pose = run.poseAt(t);
-    if (pose) this.#view.add(true, trail, pose.p);
+    const hits = run.result ? contactsOf(run.result).filter(({ time_s }) => time_s <= t) : [];
+    if (pose) this.#view.add(true, trail, [...pose.p, yawOf(pose.q)], hits);
     const notes = [`${number(t, 1)} s: ${state ?? "–"} (${number(seconds, 1)} s)`];
     if (run.chart && run.chart.name !== this.#listener.mission()) notes.push(word("other_mission", { name: run.chart.name }));
     if (run.result && t >= run.end) notes.push(run.result.reason ?? "");
