@@ -89,7 +89,6 @@ def px4_server(
     onboard: Onboard,
     fault: tuple[str, ...],
     *,
-    px4: Path | None,
     seed: int,
     grants: TimeGrants | None,
 ) -> Px4Server:
@@ -104,7 +103,7 @@ def px4_server(
         return Px4Simulation(chosen, seed=seed)
 
     simulation = new_simulation()  # so that what is wrong with it is said first
-    start = _px4_settings(simulation, settings, px4)
+    start = _px4_settings(simulation, settings, onboard.px4)
     return Px4Server(new_simulation, settings, start, notice=say, grants=grants)
 
 
@@ -127,17 +126,15 @@ def _px4_settings(simulation: Px4Simulation, settings: ServerSettings, px4: Path
     return Px4Settings(Px4Process(build, settings.instance, folder, values), command)
 
 
-def check_options(
-    *, count: int, monitor: bool, px4: Path | None, autopilot: str, settings: ServerSettings
-) -> None:
-    """Refuse options that PX4 does not have, or that only it has.
+def check_options(onboard: Onboard, settings: ServerSettings, *, count: int, monitor: bool) -> None:
+    """Refuse options of `framerunner sim` that PX4 does not have, or that only it has.
 
     Raises:
         SettingError: one of them.
     """
-    if autopilot != "px4":
-        if px4 is not None:
-            raise SettingError(f"--px4 {px4}: is for PX4; add --autopilot px4")
+    if onboard.autopilot != "px4":
+        if onboard.px4 is not None:
+            raise SettingError(f"--px4 {onboard.px4}: is for PX4; add --autopilot px4")
         return
     refused = [
         ("--count", count != 1, "PX4 flies one drone; start another simulator with --instance 1"),

@@ -30,8 +30,17 @@ _MAX_COUNT = 20
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Onboard:
-    """What the drone has besides flying."""
+    """What the drone has."""
 
+    autopilot: Annotated[
+        Literal["own", "px4"], Parameter(help="what flies: this project's autopilot, or a genuine PX4")
+    ] = "own"
+    px4: Annotated[
+        Path | None,
+        Parameter(
+            help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
+        ),
+    ] = None
     storage: Annotated[
         Path | None,
         Parameter(help="folder for its files and flight logs, DIR/0 for instance 0; else kept in memory"),
@@ -95,15 +104,6 @@ def sim(
     fault: Faults = (),
     connections: Connections | None = None,
     onboard: Onboard | None = None,
-    autopilot: Annotated[
-        Literal["own", "px4"], Parameter(help="what flies: this project's autopilot, or a genuine PX4")
-    ] = "own",
-    px4: Annotated[
-        Path | None,
-        Parameter(
-            help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
-        ),
-    ] = None,
     monitor: Annotated[
         bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")
     ] = False,
@@ -140,24 +140,35 @@ def sim(
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
     chosen, onboard = connections or Connections(), onboard or Onboard()
-    watcher = _monitor(chosen.video_port, count) if monitor and autopilot == "own" else None
+    watcher = _monitor(chosen.video_port, count) if monitor and onboard.autopilot == "own" else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
-
-    check_options(count=count, monitor=monitor, px4=px4, autopilot=autopilot, settings=settings)
+    check_options(onboard, settings, count=count, monitor=monitor)
+    check_range("--seed", seed, 0, 2**63 - 1)
     grants = _grants(time_grants)
-    server: SimulatorServer | Px4Server
-    if autopilot == "px4":
-        check_range("--seed", seed, 0, 2**63 - 1)
-        server = px4_server(scenario, settings, onboard, fault, px4=px4, seed=seed, grants=grants)
-    else:
-        from sitl.server import SimulatorServer
-
-        simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
-        server = SimulatorServer(simulations, settings, notice=say, grants=grants)
+    server = _server(scenario, settings, onboard, fault, count=count, seed=seed, grants=grants)
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
+
+
+def _server(
+    scenario: str,
+    settings: ServerSettings,
+    onboard: Onboard,
+    fault: tuple[str, ...],
+    *,
+    count: int,
+    seed: int,
+    grants: TimeGrants | None,
+) -> SimulatorServer | Px4Server:
+    if onboard.autopilot == "px4":
+        return px4_server(scenario, settings, onboard, fault, seed=seed, grants=grants)
+
+    from sitl.server import SimulatorServer
+
+    simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
+    return SimulatorServer(simulations, settings, notice=say, grants=grants)
 
 
 def _grants(descriptor: int | None) -> TimeGrants | None:
@@ -222,7 +233,6 @@ def _simulations(
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
-    check_range("--seed", seed, 0, 2**63 - 1)
     scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
     if count == 1:
         return [Simulation(scenario, seed=seed)]
