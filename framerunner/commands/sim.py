@@ -130,24 +130,22 @@ def sim(
 
         framerunner sim --storage drone-files --parameters drone.params
 
-        framerunner sim --link tcpin://127.0.0.1:5760
-
         framerunner sim --link serial:///dev/ttyUSB0:57600
 
-        framerunner sim --scenario test-case-1 --autopilot px4 --px4 ../PX4-Autopilot
+        framerunner sim --autopilot px4 --px4 ../PX4-Autopilot
     """
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
+    check_range("--seed", seed, 0, 2**63 - 1)
     chosen, onboard = connections or Connections(), onboard or Onboard()
     watcher = _monitor(chosen.video_port, count) if monitor and onboard.autopilot == "own" else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
     check_options(onboard, settings, count=count, monitor=monitor)
-    check_range("--seed", seed, 0, 2**63 - 1)
-    grants = _grants(time_grants)
-    server = _server(scenario, settings, onboard, fault, count=count, seed=seed, grants=grants)
+    given = (scenario, settings, onboard, fault)
+    server = _server(*given, count=count, seed=seed, grants=_grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
 
