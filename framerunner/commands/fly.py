@@ -128,16 +128,13 @@ def fly(
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    _check(drone, camera, speed, instance, lockstep=lockstep)
-    check_px4_flight(px4, drone=drone, lockstep=lockstep)
+    _check(drone, camera, speed, instance, lockstep=lockstep, px4=px4)
     seed = _checked_seed(seed, monitor, lockstep, px4)
-
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
 
     loaded = load_mission_with(mission, pilot)
-    chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep)
-    chosen = chosen if px4 is None else for_px4(chosen)
+    chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep, px4=px4)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, px4, camera_delay)
     plan = _calibrated(plan, calibration, drone)
@@ -153,7 +150,13 @@ def _run(settings: FlightSettings, *, lifeline: bool) -> int:
 
 
 def _scenario(
-    name: str, sensors: str | None, fault: tuple[str, ...], *, starts: bool, lockstep: bool
+    name: str,
+    sensors: str | None,
+    fault: tuple[str, ...],
+    *,
+    starts: bool,
+    lockstep: bool,
+    px4: Path | None,
 ) -> Scenario:
     """The scenario that the options describe; `starts`: a simulated drone is started."""
     from scenarios.loader import load_scenario
@@ -169,7 +172,7 @@ def _scenario(
             f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
             "add --lockstep, or start framerunner sim and fly it with --drone"
         )
-    return scenario
+    return scenario if px4 is None else for_px4(scenario)
 
 
 def _calibrated(plan: FlightPlan, path: Path | None, drone: str | None) -> FlightPlan:
@@ -238,8 +241,11 @@ def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
         raise SettingError(f"--simulator {error}") from None
 
 
-def _check(drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool) -> None:
+def _check(
+    drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool, px4: Path | None
+) -> None:
     """Refuse options that do not go together."""
+    check_px4_flight(px4, drone=drone, lockstep=lockstep)
     if drone is not None and camera is None:
         raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")
     if drone is None and camera is not None:

@@ -22,8 +22,8 @@ _VELOCITY_CONTROL: dict[str, Value] = {
     "MC_AIRMODE": 1,  # a drone with little hover thrust has little torque otherwise
     "MC_ROLL_P": 8.0,
     "MC_PITCH_P": 8.0,
-    "MPC_XY_VEL_P_ACC": 1.6,  # with PX4's default 1.8 the drone follows a velocity 0.7 s later
-    "MPC_XY_VEL_I_ACC": 2.4,
+    "MPC_XY_VEL_P_ACC": 1.1,  # with PX4's default 1.8 the drone follows a velocity 0.7 s later
+    "MPC_XY_VEL_I_ACC": 1.3,
     "MPC_XY_VEL_D_ACC": 0.2,
     "MPC_Z_VEL_P_ACC": 8.0,
     "MC_YAW_TQ_CUTOFF": 0.0,

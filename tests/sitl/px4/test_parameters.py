@@ -15,7 +15,7 @@ def test_the_x500_is_px4s_own():
     assert places == [(0.174, 0.174), (-0.174, -0.174), (0.174, -0.174), (-0.174, 0.174)]
     assert [values[f"CA_ROTOR{n}_KM"] > 0 for n in range(4)] == [True, True, False, False]  # ccw is positive
     assert values["MPC_THR_HOVER"] == pytest.approx(0.592, abs=0.001)
-    assert values["MC_ROLLRATE_P"] == pytest.approx(0.15, rel=0.3)  # PX4's default, made for such a drone
+    assert values["MC_ROLLRATE_P"] == pytest.approx(0.15, rel=0.6)  # PX4's default, for such drones
 
 
 def test_a_small_strong_drone_gets_small_gains_and_a_low_least_thrust():
