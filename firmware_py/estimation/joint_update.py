@@ -14,8 +14,8 @@ import numpy as np
 from firmware_py.estimation.error_state import ErrorCovariance, Matrix
 
 _Fused = tuple[int, float, float, list[float]]
-"""A number that was fused: its index, 1 over the root of its variance given those before, its innovation times
-that, and its row of the factor without the diagonal."""
+"""A number that was fused: its index, 1 over the root of its variance given those before, its innovation
+times that, and its row of the factor without the diagonal."""
 
 
 class JointUpdate:

@@ -68,8 +68,8 @@ class Lens:
         )
         above = upper_left + (upper_right - upper_left) * right
         below = lower_left + (lower_right - lower_left) * right
-        corrected = above + (below - above) * down
-        return corrected[..., None].view(np.float64)
+        corrected: Floats = (above + (below - above) * down)[..., None].view(np.float64)
+        return corrected
 
     def seen(self, right_px: float, down_px: float) -> tuple[float, float]:
         """The pixel of the image at which an ideal camera's pixel is seen."""

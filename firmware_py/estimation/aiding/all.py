@@ -129,7 +129,7 @@ class Aiding:
         )
 
     def fuse(self, sample: Sample) -> list[float]:
-        """Correct the filter, predicted to a measurement's time, by it; return the errors found, shape (n,)."""
+        """Correct the filter by a measurement of its time; return the errors found, shape (n,)."""
         into = self.target.filter
         if type(sample) is ExternalPose:
             self._pose.fuse(sample)

@@ -112,9 +112,7 @@ def _passes(
         for row in rows:
             size, added, rate, command_m_s = row[i - 1]
             if rate < inf:
-                allowed = rate * (command_m_s - size * root - added * square)
-                if allowed < rise:  # a call of min() takes longer than all the rest
-                    rise = allowed
+                rise = min(rise, rate * (command_m_s - size * root - added * square))
         square = max(min(square + STEP_S * rise, most[i]), _LEAST)
         squares.append(square)
     for i in range(len(squares) - 2, -1, -1):
