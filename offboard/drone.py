@@ -97,6 +97,17 @@ class Drone(Protocol):
     async def hold(self) -> None:
         """Stop commanding permanently and request hold, unless a pilot or a failsafe has the vehicle."""
 
+    async def land_now(self, *, demanded: bool = False) -> None:
+        """Stop commanding permanently and let the vehicle land where it is; returns when it is disarmed.
+
+        A vehicle that a pilot or a failsafe has is left to them, and this returns at once, unless it lands
+        already. A vehicle that cannot be brought to land gets a request for hold, as by `hold`; then its own
+        failsafe acts.
+
+        Args:
+            demanded: by the operator, who overrules a failsafe that does not land; a pilot keeps the vehicle.
+        """
+
     async def refuse(self) -> None:
         """Let the vehicle that a pilot gave back hold, and wait until it is given back again."""
 
