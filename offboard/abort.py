@@ -1,4 +1,4 @@
-"""Brings a drone down when its flight is aborted: hold or a landing, and the operator's stop of the motors."""
+"""Brings a drone down when its flight is aborted: hold or a landing, and an operator's stop of the motors."""
 
 from __future__ import annotations
 
@@ -83,6 +83,8 @@ class FlightAbort:
                 await close()
 
     async def _kill(self) -> str:
+        if self._safety.operator is not None:
+            self._safety.operator.on_stop(None)  # a third press must not interrupt this
         try:
             await self._drone.motors_off()
         except DroneError as error:

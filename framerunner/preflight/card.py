@@ -1,0 +1,146 @@
+"""The flight card: one page with all that matters of a flight, written before the drone is armed."""
+
+from __future__ import annotations
+
+import getpass
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from framerunner.extras import install_advice
+from framerunner.preflight.run import PreflightReport
+from framerunner.runs.run_folder import warn
+from offboard.safety.check import Outcome
+
+if TYPE_CHECKING:
+    from framerunner.flying.plan import FlightPlan
+    from framerunner.preflight.run import PreflightSettings
+    from offboard.safety.rules import AbortAction
+
+HTML_NAME, PDF_NAME = "flight_card.html", "flight_card.pdf"
+PROCEDURE = (
+    "Stop: press SPACE. The drone lands where it is.",
+    "Stop the motors at once: press SPACE again. The drone falls.",
+    "The app does not answer: move the mode switch to position mode and land; the kill switch stops the motors.",
+    "The app ends or the link is lost: the drone's failsafes above land it.",
+    "A fence, a failsafe or the app's box acts: let the drone land; do not restart before the cause is known.",
+)
+"""What the operator does when something goes wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A table of the card; the first column names what the others tell."""
+
+    title: str
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FlightCard:
+    """The card's contents, for people."""
+
+    title: str
+    sections: tuple[Section, ...]
+
+
+def make_card(
+    plan: FlightPlan,
+    settings: PreflightSettings,
+    report: PreflightReport,
+    *,
+    abort: AbortAction,
+    operator: str,
+    dry_run: bool,
+    now: datetime,
+) -> FlightCard:
+    """Put the card together.
+
+    Args:
+        plan: with a mission.
+        settings: of the checks.
+        report: of the checks.
+        abort: what the drone does when the flight is aborted.
+        operator: who flies.
+        dry_run: nothing is armed.
+        now: with a time zone.
+    """
+    fence, caps = report.fence, settings.caps
+    corners = ", ".join(f"({x:.1f}, {y:.1f})" for x, y in fence.corners_arena_m)
+    flight = (
+        ("date", now.strftime("%Y-%m-%d %H:%M %Z").strip()),
+        ("operator", operator or getpass.getuser()),
+        ("kind", "dry run: nothing is armed" if dry_run else "flight"),
+        ("drone", report.vehicle),
+        ("link", settings.drone_url),
+        ("camera", settings.camera_url or "none"),
+        ("scenario", plan.scenario.name),
+        ("mission", f"{plan.chart.name}, class {plan.chart.mission_class}"),
+        ("time limit", f"{plan.limit_s:g} s from motors on"),
+        ("on abort", "lands where it is" if abort == "land" else "holds"),
+    )
+    limits = (
+        ("caps", caps.words),
+        ("fence, arena axes", f"x, y in m: {corners}"),
+        ("fence, height and radius", f"{fence.height_m:g} m above the start, {fence.radius_m:g} m around it"),
+    )
+    checks = tuple(
+        (check.name, check.outcome.value, check.value, check.limit, check.advice) for check in report.checks
+    )
+    overridden = tuple(
+        (check.name, check.value) for check in report.checks if check.outcome is Outcome.ACCEPTED
+    )
+    changes = tuple((each.name, f"{each.before:g}", f"{each.after:g}") for each in report.changes)
+    if report.kept is not None:
+        changes += (("old values", str(report.kept), ""),)
+    return FlightCard(
+        f"Flight card: {plan.scenario.name}",
+        (
+            Section("Flight", flight),
+            Section("Caps and fence", limits),
+            Section("Failed checks that the operator accepts", overridden or (("none", ""),)),
+            Section("Parameters changed: name, before, now", changes or (("none", "", ""),)),
+            Section("Abort procedure", tuple((str(n), step) for n, step in enumerate(PROCEDURE, 1))),
+            Section("Checks: name, result, value, allowed, what to do", checks),
+        ),
+    )
+
+
+def write_card(card: FlightCard, folder: Path) -> None:
+    """Write the card as a page and as a PDF; what cannot be written is reported on standard error."""
+    try:
+        (folder / HTML_NAME).write_text(card_html(card), encoding="utf-8")
+    except OSError as error:
+        warn(f"cannot write '{folder / HTML_NAME}': {error.strerror or error}")
+    try:
+        from framerunner.preflight.card_pdf import write_pdf
+
+        write_pdf(card, folder / PDF_NAME)
+    except ModuleNotFoundError as error:
+        missing = install_advice(error.name or "")
+        if missing is None:
+            raise
+        warn(f"{PDF_NAME} was not written: {missing}")
+    except OSError as error:
+        warn(f"cannot write '{folder / PDF_NAME}': {error.strerror or error}")
+
+
+def card_html(card: FlightCard) -> str:
+    """The card as a page without scripts; all texts are escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("framerunner.preflight", "templates")
+    page = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return page.get_template("flight_card.html.j2").render(card=card)
+
+
+def wrapped_rows(section: Section, widths: Sequence[int]) -> list[tuple[list[str], ...]]:
+    """A section's rows with each cell broken into lines of at most a column's width in characters."""
+    from textwrap import wrap
+
+    return [
+        tuple(wrap(cell, width) or [""] for cell, width in zip(row, widths, strict=False))
+        for row in section.rows
+    ]
