@@ -20,6 +20,7 @@ from framerunner.commands import (
     with_faults,
     with_sensors,
 )
+from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -94,12 +95,17 @@ def fly(
     pilot: _Pilot = None,
     drone_limits: _DroneLimits = None,
     response: _Response = None,
+    hardware: HardwareOptions = NONE,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
+    A drone given by --drone is taken for a real one unless --simulated says otherwise: it is checked before
+    arming, a flight card is written, and the operator holds G to arm; SPACE lands, and SPACE again stops the
+    motors.
+
     In lockstep there is no log, and a video only with --video. Exit code 0: completed, 1: flown but not
-    completed, 2: bad input.
+    completed, 2: bad input or a check that failed.
 
     **Examples**
 
@@ -113,7 +119,9 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
-        framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100
+        framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100 --simulated
+
+        framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1 --dry-run
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
@@ -122,16 +130,21 @@ def fly(
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     _check(drone, camera, speed, instance, lockstep=lockstep)
     seed = _checked_seed(seed, monitor, lockstep)
+    procedure, caps = hardware_of(hardware, drone), caps_of(hardware, drone)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings, fly_once
+    from framerunner.preflight.settings import DRY_RUN_S
 
     loaded = load_mission_with(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep)
+    if hardware.dry_run:
+        chosen = chosen.model_copy(update={"try_limit_s": min(DRY_RUN_S, chosen.try_limit_s)})
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    plan = _calibrated(plan, calibration, drone)
-    real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
-    return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
+    plan = replace(_calibrated(plan, calibration, drone), caps=caps)
+    real_time = RealTimeSettings(drone, camera, api, speed, instance, camera_delay, procedure)
+    settings = FlightSettings(plan, None if lockstep else real_time, out, record, video, monitor)
+    return asyncio.run(fly_once(settings))
 
 
 def _scenario(

@@ -19,6 +19,7 @@ from framerunner.runs.track import Track, TrackRecorder
 from offboard.app import MissionEnd, Moment, Observer, TickHook, fly_mission
 from offboard.drone import Drone
 from offboard.perception import Perception
+from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.faults.outcome import fault_fields
 from scenarios.result import FlightResult, RefereeReport
 
@@ -44,6 +45,7 @@ async def fly(
     run: Run | None = None,
     measured: Callable[[], Mapping[str, Any]] = dict,
     before_tick: TickHook | None = None,
+    safety: SafetyRules = SIMULATED,
 ) -> FinishedFlight:
     """Fly a plan's mission from connecting to the verdict.
 
@@ -56,6 +58,7 @@ async def fly(
         run: awaits the flight itself, without the judgement; for what must be done around it.
         measured: called at the end; further fields of the result, such as `timing`.
         before_tick: awaited before each tick of the mission; it may wait only in lockstep.
+        safety: the operator, and what the drone does when the flight is aborted.
 
     Raises:
         DroneError: the drone cannot be reached or made ready.
@@ -80,6 +83,7 @@ async def fly(
         limits=plan.command_limits,
         surroundings=plan.surroundings,
         before_tick=before_tick,
+        safety=safety,
     )
     outcome = await (flight if run is None else run(flight))
     report = await judge.report(

@@ -23,9 +23,9 @@ HTML_NAME, PDF_NAME = "flight_card.html", "flight_card.pdf"
 PROCEDURE = (
     "Stop: press SPACE. The drone lands where it is.",
     "Stop the motors at once: press SPACE again. The drone falls.",
-    "The app does not answer: move the mode switch to position mode and land; the kill switch stops the motors.",
+    "The app does not answer: move the mode switch to position mode and land, or use the kill switch.",
     "The app ends or the link is lost: the drone's failsafes above land it.",
-    "A fence, a failsafe or the app's box acts: let the drone land; do not restart before the cause is known.",
+    "A fence, a failsafe or the app's box acts: let the drone land; find the cause before the next start.",
 )
 """What the operator does when something goes wrong."""
 
@@ -67,7 +67,7 @@ def make_card(
         dry_run: nothing is armed.
         now: with a time zone.
     """
-    fence, caps = report.fence, settings.caps
+    fence = report.fence
     corners = ", ".join(f"({x:.1f}, {y:.1f})" for x, y in fence.corners_arena_m)
     flight = (
         ("date", now.strftime("%Y-%m-%d %H:%M %Z").strip()),
@@ -82,7 +82,7 @@ def make_card(
         ("on abort", "lands where it is" if abort == "land" else "holds"),
     )
     limits = (
-        ("caps", caps.words),
+        ("caps", "none" if plan.caps is None else plan.caps.words),
         ("fence, arena axes", f"x, y in m: {corners}"),
         ("fence, height and radius", f"{fence.height_m:g} m above the start, {fence.radius_m:g} m around it"),
     )

@@ -7,7 +7,7 @@ import sys
 import threading
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import isnan, nan
 from pathlib import Path
 
@@ -23,8 +23,6 @@ from framerunner.preflight.parameters import ParameterValue, read_parameters, se
 from framerunner.preflight.session import TIME_REQUESTS, VehicleSession, open_link
 from geometry.axes import Alignment, Pose
 from offboard.drone import DroneError
-from offboard.keep_in_box import Box
-from offboard.safety.caps import Caps
 from offboard.safety.check import Check, Outcome, accept, failures, passed
 from offboard.safety.failsafes import failsafe_checks, failsafe_rows, values_to_set
 from offboard.safety.fence import FlightFence, flight_fence
@@ -65,7 +63,6 @@ class PreflightSettings:
         drone_url: of the vehicle.
         camera_url: of its camera; None: it is not checked.
         camera_delay_s: of images without time stamps.
-        caps: of the flight.
         set_parameters: failsafe parameters that fail are set, and their old values kept.
         accepted: names of checks that may fail.
         folder: where the old values are written.
@@ -74,7 +71,6 @@ class PreflightSettings:
     drone_url: str
     camera_url: str | None = None
     camera_delay_s: float = 0.1
-    caps: Caps = field(default_factory=Caps)
     set_parameters: bool = False
     accepted: tuple[str, ...] = ()
     folder: Path = Path()
@@ -131,11 +127,6 @@ class _Measured:
     changes: tuple[ParameterChange, ...]
 
 
-def capped_box(plan: FlightPlan, caps: Caps | None) -> Box:
-    """The box of a flight, with its ceiling at the cap on height."""
-    return plan.box if caps is None else caps.box(plan.box, plan.start_pose[2])
-
-
 async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> PreflightReport:
     """Check a disarmed vehicle and its camera; takes some eight seconds.
 
@@ -144,7 +135,7 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
         LinkError: its link cannot be opened.
         SettingError: a name that is accepted is no check's, or the old parameters cannot be kept.
     """
-    fence = flight_fence(capped_box(plan, settings.caps), plan.start_pose[:3])
+    fence = flight_fence(plan.box, plan.start_pose[:3])
     cancelled = threading.Event()
     camera = None if settings.camera_url is None else _camera(settings.camera_url)
     watching = None if camera is None else asyncio.create_task(camera)
@@ -163,7 +154,7 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
         battery_check(_battery(record)),
         *link_checks(measured.link),
         *measured.checks,
-        _caps_check(plan, settings.caps, fence),
+        _caps_check(plan, fence),
     ]
     if times is not None:
         clock_ms = record.clock_ms[-1] if record.clock_ms else None
@@ -266,8 +257,11 @@ def _fence_check(session: VehicleSession, plan: FlightPlan, fence: FlightFence) 
     return passed(name, back == vertices, value, limit, "try again; another station may write to it")
 
 
-def _caps_check(plan: FlightPlan, caps: Caps, fence: FlightFence) -> Check:
-    limits, height_m = plan.command_limits, capped_box(plan, caps).high_m[2] - plan.start_pose[2]
+def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
+    limits, height_m = plan.command_limits, plan.box.high_m[2] - plan.start_pose[2]
+    caps = plan.caps
+    if caps is None:
+        return Check("caps", Outcome.FAIL, "none", "", "give --max-speed")
     value = f"{caps.words}; {height_m:.1f} m above the start"
     limit = f"below the fence, {fence.height_m:g} m"
     if limits.forward_m_s > caps.level_m_s or max(limits.up_m_s, limits.down_m_s) > caps.vertical_m_s:
