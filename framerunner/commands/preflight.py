@@ -69,7 +69,8 @@ def preflight(
     tell(report)
     now = datetime.now().astimezone()
     write_card(
-        make_card(plan, settings, report, abort="land", operator="", dry_run=True, now=now), settings.folder
+        make_card(plan, settings, report, abort="land", operator="", kind="checks only", now=now),
+        settings.folder,
     )
     return 0 if report.may_arm else 1
 

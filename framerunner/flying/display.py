@@ -195,9 +195,9 @@ def _faults_in_words(result: FlightResult) -> str:
 
 def dry_run_line(end: MissionEnd) -> str:
     """How a dry run ended, in a line for people."""
-    why = f": {end.reason}" if end.ended == "aborted" else ""
+    how = f"aborted: {end.reason}" if end.ended == "aborted" else "done"
     return (
-        f"dry run {end.ended}{why}; the mission ran for {end.flight_time_s:.1f} s in {end.ticks} ticks, last "
+        f"dry run {how}; the mission ran for {end.flight_time_s:.1f} s in {end.ticks} ticks, last "
         f"in {end.mission_state}; nothing was armed"
     )
 

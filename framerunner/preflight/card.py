@@ -53,7 +53,7 @@ def make_card(
     *,
     abort: AbortAction,
     operator: str,
-    dry_run: bool,
+    kind: str,
     now: datetime,
 ) -> FlightCard:
     """Put the card together.
@@ -64,7 +64,7 @@ def make_card(
         report: of the checks.
         abort: what the drone does when the flight is aborted.
         operator: who flies.
-        dry_run: nothing is armed.
+        kind: of the flight, such as "dry run".
         now: with a time zone.
     """
     fence = report.fence
@@ -72,7 +72,7 @@ def make_card(
     flight = (
         ("date", now.strftime("%Y-%m-%d %H:%M %Z").strip()),
         ("operator", operator or getpass.getuser()),
-        ("kind", "dry run: nothing is armed" if dry_run else "flight"),
+        ("kind", kind),
         ("drone", report.vehicle),
         ("link", settings.drone_url),
         ("camera", settings.camera_url or "none"),

@@ -50,7 +50,7 @@ async def prepare(plan: FlightPlan, checks: PreflightSettings, hardware: Hardwar
         report,
         abort=hardware.abort,
         operator=hardware.operator,
-        dry_run=hardware.dry_run,
+        kind="dry run: nothing is armed" if hardware.dry_run else "flight",
         now=datetime.now().astimezone(),
     )
     write_card(card, checks.folder)
