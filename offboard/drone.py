@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, isnan
 from typing import Protocol
 
 from errors import UserError
@@ -51,6 +51,11 @@ class VelocityCommand:
     left_m_s: float = 0.0
     up_m_s: float = 0.0
     yaw_rate_rad_s: float = 0.0
+
+    @property
+    def is_number(self) -> bool:
+        """No component is NaN."""
+        return not isnan(self.forward_m_s + self.left_m_s + self.up_m_s + self.yaw_rate_rad_s)
 
 
 class Drone(Protocol):

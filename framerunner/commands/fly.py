@@ -20,7 +20,7 @@ from framerunner.commands import (
     with_faults,
     with_sensors,
 )
-from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of
+from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -100,9 +100,8 @@ def fly(
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
-    A drone given by --drone is taken for a real one unless --simulated says otherwise: it is checked before
-    arming, a flight card is written, and the operator holds G to arm; SPACE lands, and SPACE again stops the
-    motors.
+    A drone given by --drone is taken for a real one, unless it is --simulated: it is checked, and the
+    operator holds G to arm; SPACE lands, and SPACE again stops the motors.
 
     In lockstep there is no log, and a video only with --video. Exit code 0: completed, 1: flown but not
     completed, 2: bad input or a check that failed.
@@ -111,44 +110,39 @@ def fly(
 
         framerunner fly test-case-1
 
-        framerunner fly test-case-1 --monitor
-
-        framerunner fly my_scenario.yaml --mission frame_challenge --speed 2
-
         framerunner fly test-case-1 --lockstep --record --sensors mocap
 
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
-        framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100 --simulated
-
-        framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1 --dry-run
+        framerunner fly --dry-run --drone serial:///dev/ttyUSB0:57600 --camera 0
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    check_range("--camera-delay", camera_delay, 0.0, 0.5)
-    _check(drone, camera, speed, instance, lockstep=lockstep)
-    seed = _checked_seed(seed, monitor, lockstep)
-    procedure, caps = hardware_of(hardware, drone), caps_of(hardware, drone)
+    _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
+    seed, procedure = _checked_seed(seed, monitor, lockstep), hardware_of(hardware, drone)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings, fly_once
-    from framerunner.preflight.settings import DRY_RUN_S
 
     loaded = load_mission_with(mission, pilot)
-    chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep)
-    if hardware.dry_run:
-        chosen = chosen.model_copy(update={"try_limit_s": min(DRY_RUN_S, chosen.try_limit_s)})
+    chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    plan = replace(_calibrated(plan, calibration, drone), caps=caps)
+    plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
     real_time = RealTimeSettings(drone, camera, api, speed, instance, camera_delay, procedure)
     settings = FlightSettings(plan, None if lockstep else real_time, out, record, video, monitor)
     return asyncio.run(fly_once(settings))
 
 
 def _scenario(
-    name: str, sensors: str | None, fault: tuple[str, ...], *, starts: bool, lockstep: bool
+    name: str,
+    sensors: str | None,
+    fault: tuple[str, ...],
+    hardware: HardwareOptions,
+    *,
+    starts: bool,
+    lockstep: bool,
 ) -> Scenario:
     """The scenario that the options describe; `starts`: a simulated drone is started."""
     from scenarios.loader import load_scenario
@@ -157,7 +151,8 @@ def _scenario(
         raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
     if fault and not starts:
         raise SettingError("--fault: is for a simulated drone that is started; leave it out with --drone")
-    scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
+    loaded = with_dry_limit(load_scenario(name), hardware)
+    scenario = with_faults(with_sensors(loaded, sensors), fault)
     failing = next((each for each in scenario.faults if each.part == "link"), None)
     if failing is not None and starts and not lockstep:
         raise SettingError(
@@ -233,8 +228,11 @@ def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
         raise SettingError(f"--simulator {error}") from None
 
 
-def _check(drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool) -> None:
-    """Refuse options that do not go together."""
+def _check(
+    drone: str | None, camera: str | None, camera_delay: float, speed: float, instance: int, *, lockstep: bool
+) -> None:
+    """Refuse options that are out of range or do not go together."""
+    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     if drone is not None and camera is None:
         raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")
     if drone is None and camera is not None:

@@ -13,6 +13,7 @@ from framerunner.commands import check_range
 if TYPE_CHECKING:
     from framerunner.preflight.settings import HardwareSettings
     from offboard.safety.caps import Caps
+    from scenarios.models import Scenario
 
 
 @Parameter(name="*")
@@ -104,3 +105,12 @@ def hardware_of(options: HardwareOptions, drone: str | None) -> HardwareSettings
         accepted=options.accept,
         operator=options.operator,
     )
+
+
+def with_dry_limit(scenario: Scenario, options: HardwareOptions) -> Scenario:
+    """The scenario with the short time limit of a dry run, if it is one."""
+    from framerunner.preflight.settings import DRY_RUN_S
+
+    if not options.dry_run:
+        return scenario
+    return scenario.model_copy(update={"try_limit_s": min(DRY_RUN_S, scenario.try_limit_s)})

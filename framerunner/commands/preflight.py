@@ -6,11 +6,15 @@ import asyncio
 from contextlib import closing
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from framerunner.commands import DEFAULT_MISSION, check_range, load_mission_with
+
+if TYPE_CHECKING:
+    from framerunner.flying.plan import FlightPlan
+    from framerunner.preflight.run import PreflightSettings
 
 
 def preflight(
@@ -46,11 +50,11 @@ def preflight(
 
     **Examples**
 
-        framerunner preflight test-case-1 --drone serial:///dev/ttyUSB0:921600 --camera rtsp://192.168.1.10/live
+        framerunner preflight --drone serial:///dev/ttyUSB0:921600 --camera 0
 
-        framerunner preflight test-case-1 --drone udpin://0.0.0.0:14540 --set-parameters
+        framerunner preflight --set-parameters
 
-        framerunner preflight --drone udpin://0.0.0.0:14540 --restore-parameters parameters-before.params
+        framerunner preflight --restore-parameters parameters-before.params
     """
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     if restore_parameters is not None:
@@ -58,20 +62,24 @@ def preflight(
 
     from framerunner.commands.hardware import HardwareOptions, caps_of
     from framerunner.flying.plan import FlightPlan
-    from framerunner.preflight.card import make_card, write_card
-    from framerunner.preflight.run import PreflightSettings, run_preflight, tell
+    from framerunner.preflight.run import PreflightSettings
     from scenarios.loader import load_scenario
 
-    caps = caps_of(HardwareOptions(max_speed=max_speed, max_height=max_height), drone)
-    plan = FlightPlan(load_scenario(scenario), load_mission_with(mission, None), None, caps=caps)
-    settings = PreflightSettings(drone, camera, camera_delay, set_parameters, accept, out)
+    caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission_with(mission, None)
+    plan = FlightPlan(load_scenario(scenario), loaded, None, caps=caps)
+    return _check(plan, PreflightSettings(drone, camera, camera_delay, set_parameters, accept, out))
+
+
+def _check(plan: FlightPlan, settings: PreflightSettings) -> int:
+    from framerunner.preflight.card import make_card
+    from framerunner.preflight.card_files import write_card
+    from framerunner.preflight.run import run_preflight, tell
+
     report = asyncio.run(run_preflight(plan, settings))
     tell(report)
     now = datetime.now().astimezone()
-    write_card(
-        make_card(plan, settings, report, abort="land", operator="", kind="checks only", now=now),
-        settings.folder,
-    )
+    card = make_card(plan, settings, report, abort="land", operator="", kind="checks only", now=now)
+    write_card(card, settings.folder)
     return 0 if report.may_arm else 1
 
 

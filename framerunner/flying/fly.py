@@ -74,9 +74,7 @@ async def fly(
             see(moment)
 
     flight = fly_mission(
-        drone,
-        perception,
-        plan.chart,
+        *(drone, perception, plan.chart),
         limit_s=plan.limit_s,
         observer=observe,
         box=plan.box,
@@ -94,8 +92,9 @@ async def fly(
     track = recorder.track(began_us)
     cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
     failed = fault_fields(await judge.faults(), report, plan.scenario.sensors)
-    more = {**failed, **measured()}
-    result = _result(plan, report, outcome, track, cause=cause, judged_by=judge.source, measured=more)
+    result = _result(
+        plan, report, outcome, track, cause=cause, judged_by=judge.source, measured={**failed, **measured()}
+    )
     return FinishedFlight(result, outcome, track)
 
 

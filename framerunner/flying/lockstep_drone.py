@@ -211,9 +211,7 @@ class LockstepDrone:
         if self._mode in (FlightMode.OFFBOARD, FlightMode.LAND) or demanded:
             await self.land()
 
-    async def refuse(self) -> None:
-        """As `hold`: no pilot takes this drone, so none gives it back."""
-        await self.hold()
+    refuse = hold  # no pilot takes this drone, so none gives it back
 
     def command(self, command: VelocityCommand) -> None:
         """Set the velocity to fly from now on. Without motors on it is ignored."""

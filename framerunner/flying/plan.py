@@ -59,6 +59,11 @@ class FlightPlan:
             raise ValueError("the plan has no mission to be flown")
         return self.mission
 
+    @property
+    def title(self) -> str:
+        """Scenario and mission, for people."""
+        return f"{self.scenario.name}: {self.chart.name}"
+
     @cached_property
     def airframe(self) -> Airframe:
         """The drone; AirframeError if there is none of the scenario's name."""

@@ -100,8 +100,7 @@ async def fly_in_real_time(
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
         if clock is not None:
             clock.wait_for_images_of(perception)
-        title = f"{plan.scenario.name}: {plan.chart.name}"
-        display = FlightDisplay(title, plan.limit_s, records.recorder, judge)
+        display = FlightDisplay(plan.title, plan.limit_s, records.recorder, judge)
 
         async def run(flight: Coroutine[Any, Any, MissionEnd]) -> MissionEnd:
             async with display:

@@ -6,12 +6,9 @@ import getpass
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from framerunner.extras import install_advice
 from framerunner.preflight.run import PreflightReport
-from framerunner.runs.run_folder import warn
 from offboard.safety.check import Outcome
 
 if TYPE_CHECKING:
@@ -19,7 +16,6 @@ if TYPE_CHECKING:
     from framerunner.preflight.run import PreflightSettings
     from offboard.safety.rules import AbortAction
 
-HTML_NAME, PDF_NAME = "flight_card.html", "flight_card.pdf"
 PROCEDURE = (
     "Stop: press SPACE. The drone lands where it is.",
     "Stop the motors at once: press SPACE again. The drone falls.",
@@ -86,12 +82,7 @@ def make_card(
         ("fence, arena axes", f"x, y in m: {corners}"),
         ("fence, height and radius", f"{fence.height_m:g} m above the start, {fence.radius_m:g} m around it"),
     )
-    checks = tuple(
-        (check.name, check.outcome.value, check.value, check.limit, check.advice) for check in report.checks
-    )
-    overridden = tuple(
-        (check.name, check.value) for check in report.checks if check.outcome is Outcome.ACCEPTED
-    )
+    overridden = tuple((each.name, each.value) for each in report.checks if each.outcome is Outcome.ACCEPTED)
     changes = tuple((each.name, f"{each.before:g}", f"{each.after:g}") for each in report.changes)
     if report.kept is not None:
         changes += (("old values", str(report.kept), ""),)
@@ -103,37 +94,15 @@ def make_card(
             Section("Failed checks that the operator accepts", overridden or (("none", ""),)),
             Section("Parameters changed: name, before, now", changes or (("none", "", ""),)),
             Section("Abort procedure", tuple((str(n), step) for n, step in enumerate(PROCEDURE, 1))),
-            Section("Checks: name, result, value, allowed, what to do", checks),
+            Section("Checks: name, result, value, allowed, what to do", _check_rows(report)),
         ),
     )
 
 
-def write_card(card: FlightCard, folder: Path) -> None:
-    """Write the card as a page and as a PDF; what cannot be written is reported on standard error."""
-    try:
-        (folder / HTML_NAME).write_text(card_html(card), encoding="utf-8")
-    except OSError as error:
-        warn(f"cannot write '{folder / HTML_NAME}': {error.strerror or error}")
-    try:
-        from framerunner.preflight.card_pdf import write_pdf
-
-        write_pdf(card, folder / PDF_NAME)
-    except ModuleNotFoundError as error:
-        missing = install_advice(error.name or "")
-        if missing is None:
-            raise
-        warn(f"{PDF_NAME} was not written: {missing}")
-    except OSError as error:
-        warn(f"cannot write '{folder / PDF_NAME}': {error.strerror or error}")
-
-
-def card_html(card: FlightCard) -> str:
-    """The card as a page without scripts; all texts are escaped."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    loader = PackageLoader("framerunner.preflight", "templates")
-    page = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    return page.get_template("flight_card.html.j2").render(card=card)
+def _check_rows(report: PreflightReport) -> tuple[tuple[str, ...], ...]:
+    return tuple(
+        (check.name, check.outcome.value, check.value, check.limit, check.advice) for check in report.checks
+    )
 
 
 def wrapped_rows(section: Section, widths: Sequence[int]) -> list[tuple[list[str], ...]]:

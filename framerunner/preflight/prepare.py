@@ -7,12 +7,15 @@ from datetime import datetime
 
 from errors import SettingError
 from framerunner.flying.plan import FlightPlan
-from framerunner.preflight.card import HTML_NAME, make_card, write_card
+from framerunner.preflight.card import make_card
+from framerunner.preflight.card_files import HTML_NAME, write_card
 from framerunner.preflight.keys import HINT, has_terminal
 from framerunner.preflight.run import PreflightSettings, run_preflight, tell
 from framerunner.preflight.settings import HardwareSettings
 from offboard.safety.operator import Operator
 from offboard.safety.rules import SafetyRules
+from vision.sources import open_source
+from wire.transports.urls import parse_url
 
 
 def check_operator(hardware: HardwareSettings) -> None:
@@ -36,10 +39,15 @@ async def prepare(plan: FlightPlan, checks: PreflightSettings, hardware: Hardwar
         The rules of the flight, with its operator.
 
     Raises:
+        LinkError: the drone's address is bad, or its link cannot be opened.
+        CameraError: the camera's URL can be no camera.
         NotArmedError: a check has failed that the operator does not accept.
         DroneError: the vehicle is not heard or does not answer.
         SettingError: there is no terminal for the operator, or a name is no check's.
     """
+    parse_url(checks.drone_url)
+    if checks.camera_url is not None:
+        open_source(checks.camera_url)  # says in a line what can be no camera; it is opened later
     check_operator(hardware)
     print("checks before arming, some ten seconds:", file=sys.stderr, flush=True)
     report = await run_preflight(plan, checks)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
-from math import hypot
+from math import hypot, inf
 
 from errors import SettingError
 from offboard.drone import DroneState, VelocityCommand
 from offboard.keep_in_box import FLOOR_M, Box, confine
-from offboard.limits import clamped
+from offboard.limits import CommandLimits, clamped
 
 logger = logging.getLogger(__name__)
 
@@ -69,6 +69,9 @@ class CapKeeper:
         self.acted: set[str] = set()
         self._caps = caps
         self._box = box
+        level_m_s, vertical_m_s = caps.level_m_s, caps.vertical_m_s
+        both = (level_m_s, level_m_s, vertical_m_s, vertical_m_s, caps.yaw_rate_rad_s)
+        self._limits = CommandLimits(*both, level_m_s=level_m_s)
 
     def limit(self, command: VelocityCommand, state: DroneState | None) -> VelocityCommand:
         """The command that may be sent; the same object if no cap acts.
@@ -86,21 +89,31 @@ class CapKeeper:
         return kept
 
     def _capped_speed(self, command: VelocityCommand) -> VelocityCommand:
-        caps = self._caps
-        level_m_s = hypot(command.forward_m_s, command.left_m_s)
-        up_m_s = clamped(command.up_m_s, caps.vertical_m_s, caps.vertical_m_s)
-        rate_rad_s = clamped(command.yaw_rate_rad_s, caps.yaw_rate_rad_s, caps.yaw_rate_rad_s)
-        share = 1.0
-        if level_m_s > caps.level_m_s:
-            share = caps.level_m_s / level_m_s
+        caps, limits = self._caps, self._limits
+        if not command.is_number:
+            self._note("numbers", "a command is not a number, so the drone hovers")
+            return VelocityCommand()
+        forward_m_s, left_m_s = self._capped_level(command.forward_m_s, command.left_m_s)
+        up_m_s = clamped(command.up_m_s, limits.down_m_s, limits.up_m_s)
+        rate_rad_s = clamped(command.yaw_rate_rad_s, limits.yaw_rate_rad_s, limits.yaw_rate_rad_s)
+        kept = VelocityCommand(forward_m_s, left_m_s, up_m_s, rate_rad_s)
+        if kept == command:
+            return command
+        if (forward_m_s, left_m_s) != (command.forward_m_s, command.left_m_s):
+            level_m_s = hypot(command.forward_m_s, command.left_m_s)
             self._note("level speed", f"{level_m_s:.2f} m/s level commanded, {caps.level_m_s:g} flown")
         if up_m_s != command.up_m_s:
             self._note("vertical speed", f"{command.up_m_s:.2f} m/s upwards commanded, {up_m_s:g} flown")
         if rate_rad_s != command.yaw_rate_rad_s:
             self._note("yaw rate", f"{command.yaw_rate_rad_s:.2f} rad/s commanded, {rate_rad_s:g} flown")
-        if share == 1.0 and up_m_s == command.up_m_s and rate_rad_s == command.yaw_rate_rad_s:
-            return command
-        return VelocityCommand(share * command.forward_m_s, share * command.left_m_s, up_m_s, rate_rad_s)
+        return kept
+
+    def _capped_level(self, forward_m_s: float, left_m_s: float) -> tuple[float, float]:
+        level_m_s, most_m_s = hypot(forward_m_s, left_m_s), self._caps.level_m_s
+        if level_m_s == inf:
+            return self._limits.level(forward_m_s, left_m_s)
+        share = most_m_s / level_m_s if level_m_s > most_m_s else 1.0
+        return share * forward_m_s, share * left_m_s
 
     def _note(self, cap: str, words: str) -> None:
         if cap not in self.acted:
