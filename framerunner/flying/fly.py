@@ -65,8 +65,7 @@ async def fly(
         CameraLostError: the camera gives no image at the start.
         ValueError: the plan has no mission.
     """
-    recorder = TrackRecorder()
-    causes = CauseWatch()
+    recorder, causes = TrackRecorder(), CauseWatch()
     watching = (recorder.see, causes.see, *observers, judge.see)
 
     def observe(moment: Moment) -> None:
@@ -84,9 +83,8 @@ async def fly(
         safety=safety,
     )
     outcome = await (flight if run is None else run(flight))
-    report = await judge.report(
-        outcome.mission_state, None if outcome.ended == "finished" else outcome.reason
-    )
+    why = None if outcome.ended == "finished" else outcome.reason
+    report = await judge.report(outcome.mission_state, why)
     standing = await judge.standing()
     began_us = None if standing is None else standing.began_us
     track = recorder.track(began_us)
