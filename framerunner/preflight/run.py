@@ -188,7 +188,7 @@ def _measure(
         facts = LinkFacts(record.packets.lost_share, session.round_trips_s(), TIME_REQUESTS)
         has_position = has_global_position(record)
         checks: list[Check] = []
-        rows = failsafe_rows("px4" if session.is_px4 else "other")
+        rows = failsafe_rows(session.autopilot)
         if not rows:
             advice = "check them by hand, then accept it by --accept failsafes"
             checks.append(Check("failsafes", Outcome.FAIL, "no table for this autopilot", "", advice))

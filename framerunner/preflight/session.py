@@ -18,6 +18,7 @@ TIME_REQUESTS = 20
 _TIME_PERIOD_S = 0.05
 _LAST_ANSWER_S = 0.5
 _HEARTBEAT_S = 1.0
+_AUTOPILOTS = {mavlink.MAV_AUTOPILOT_PX4: "px4", mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot"}
 
 T = TypeVar("T")
 
@@ -54,9 +55,14 @@ class VehicleSession:
         return self.record.system_id
 
     @property
+    def autopilot(self) -> str:
+        """Its autopilot, as the table of failsafes names it: px4, ardupilot, or other."""
+        return _AUTOPILOTS.get(self.record.latest["HEARTBEAT"].autopilot, "other")
+
+    @property
     def is_px4(self) -> bool:
         """Its autopilot is PX4, or one that presents itself as PX4."""
-        return bool(self.record.latest["HEARTBEAT"].autopilot == mavlink.MAV_AUTOPILOT_PX4)
+        return self.autopilot == "px4"
 
     def listen(self, seconds: float) -> None:
         """Let the record collect what the doctor requests."""
