@@ -24,6 +24,7 @@ from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardwa
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
+    from framerunner.flying.run import FlightSettings
     from offboard.mission import Mission
     from scenarios.models import Scenario
     from wire.simulator_api import SimulatorApi
@@ -71,6 +72,10 @@ _Response = Annotated[
         "seconds and metres"
     ),
 ]
+_MonitorLink = Annotated[
+    str | None, Parameter(show=False, help="MAVLink URL by which the simulated drone also sends")
+]
+_Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input ends")]
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
 
 
@@ -97,14 +102,14 @@ def fly(
     response: _Response = None,
     hardware: HardwareOptions = NONE,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
+    monitor_link: _MonitorLink = None,
+    lifeline: _Lifeline = False,
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
     A drone given by --drone is taken for a real one, unless it is --simulated: it is checked, and the
-    operator holds G to arm; SPACE lands, and SPACE again stops the motors.
-
-    In lockstep there is no log, and a video only with --video. Exit code 0: completed, 1: flown but not
-    completed, 2: bad input or a check that failed.
+    operator holds G to arm; SPACE lands, and SPACE again stops the motors. In lockstep there is no log, and a
+    video only with --video. Exit code 0: completed, 1: flown but not completed, 2: bad input or failed check.
 
     **Examples**
 
@@ -112,27 +117,34 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --record --sensors mocap
 
-        framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
-
         framerunner fly --dry-run --drone serial:///dev/ttyUSB0:57600 --camera 0
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
+    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
+    _check(drone, camera, speed, instance, lockstep=lockstep)
     seed, procedure = _checked_seed(seed, monitor, lockstep), hardware_of(hardware, drone)
 
     from framerunner.flying.real_time import RealTimeSettings
-    from framerunner.flying.run import FlightSettings, fly_once
+    from framerunner.flying.run import FlightSettings
 
     loaded = load_mission_with(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
     real_time = RealTimeSettings(drone, camera, api, speed, instance, camera_delay, procedure)
-    settings = FlightSettings(plan, None if lockstep else real_time, out, record, video, monitor)
-    return asyncio.run(fly_once(settings))
+    ends = (plan, None if lockstep else real_time, out, record, video, monitor, monitor_link)
+    return _run(FlightSettings(*ends), lifeline=lifeline)
+
+
+def _run(settings: FlightSettings, *, lifeline: bool) -> int:
+    from framerunner.child_process import until_standard_input_ends
+    from framerunner.flying.run import fly_once
+
+    work = fly_once(settings)
+    return asyncio.run(until_standard_input_ends(work)) or 0 if lifeline else asyncio.run(work)
 
 
 def _scenario(
@@ -228,11 +240,8 @@ def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
         raise SettingError(f"--simulator {error}") from None
 
 
-def _check(
-    drone: str | None, camera: str | None, camera_delay: float, speed: float, instance: int, *, lockstep: bool
-) -> None:
-    """Refuse options that are out of range or do not go together."""
-    check_range("--camera-delay", camera_delay, 0.0, 0.5)
+def _check(drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool) -> None:
+    """Refuse options that do not go together."""
     if drone is not None and camera is None:
         raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")
     if drone is None and camera is not None:

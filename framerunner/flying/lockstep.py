@@ -54,6 +54,7 @@ async def lockstep_flight(
     *,
     observers: Sequence[Observer] = (),
     on_image: ImageObserver | None = None,
+    truth_observers: Sequence[TruthObserver] = (),
     before_tick: TickHook | None = None,
     safety: SafetyRules = SIMULATED,
 ) -> FinishedFlight:
@@ -63,6 +64,7 @@ async def lockstep_flight(
         plan: with a mission.
         observers: called at every tick, in this order; must be quick.
         on_image: called with each image.
+        truth_observers: called with the true state of every control tick; must be quick.
         before_tick: awaited before each tick, while simulated time stands still; see `RunControl`.
         safety: the operator, and what the drone does when the flight is aborted.
 
@@ -71,7 +73,7 @@ async def lockstep_flight(
         ValueError: the plan has no mission.
     """
     states = StateHash()
-    vehicle = LockstepVehicle(plan, on_image, observers=(states.add,))
+    vehicle = LockstepVehicle(plan, on_image, observers=(states.add, *truth_observers))
     return await fly(
         plan,
         vehicle.drone,
