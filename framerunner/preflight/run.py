@@ -40,7 +40,7 @@ from wire.px4_modes import mode_words
 
 LISTEN_S = 5.0
 CAMERA_S = 3.0
-KEPT_PARAMETERS = "parameters-before.params"
+KEPT_PARAMETERS = "parameters-before{}.params"
 _OWN = frozenset(
     # Findings of the doctor that checks with a limit replace.
     (
@@ -125,6 +125,7 @@ class _Measured:
     link: LinkFacts
     checks: tuple[Check, ...]
     changes: tuple[ParameterChange, ...]
+    kept: Path | None
 
 
 async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> PreflightReport:
@@ -160,8 +161,7 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
         clock_ms = record.clock_ms[-1] if record.clock_ms else None
         checks += camera_checks(times.facts(clock_ms, settings.camera_delay_s))
     accepted = tuple(accept(checks, settings.accepted))
-    kept = settings.folder / KEPT_PARAMETERS if measured.changes else None
-    return PreflightReport(_vehicle_words(record), accepted, fence, measured.changes, kept)
+    return PreflightReport(_vehicle_words(record), accepted, fence, measured.changes, measured.kept)
 
 
 def tell(report: PreflightReport) -> None:
@@ -194,24 +194,32 @@ def _measure(
             checks.append(Check("failsafes", Outcome.FAIL, "no table for this autopilot", "", advice))
         values = read_parameters(session, [row.name for row in rows])
         changes: tuple[ParameterChange, ...] = ()
+        kept = _unused(settings.folder)
         if settings.set_parameters and not record.armed:
             numbers = {name: each.value for name, each in values.items()}
             wanted = values_to_set(numbers, fence, has_global_position=has_position, rows=rows)
-            changes = _set(session, wanted, values, settings.folder)
+            changes = _set(session, wanted, values, kept)
             values |= read_parameters(session, wanted)
         numbers = {name: each.value for name, each in values.items()}
         checks += failsafe_checks(numbers, fence, has_global_position=has_position, rows=rows)
         checks.append(_fence_check(session, plan, fence))
-    return _Measured(record, facts, tuple(checks), changes)
+    return _Measured(record, facts, tuple(checks), changes, kept if changes else None)
 
 
 def _set(
-    session: VehicleSession, wanted: Mapping[str, float], values: Mapping[str, ParameterValue], folder: Path
+    session: VehicleSession, wanted: Mapping[str, float], values: Mapping[str, ParameterValue], path: Path
 ) -> tuple[ParameterChange, ...]:
     if not wanted:
         return ()
-    set_and_keep(session, wanted, values, folder / KEPT_PARAMETERS)
+    set_and_keep(session, wanted, values, path)
     return tuple(ParameterChange(name, values[name].value, value) for name, value in wanted.items())
+
+
+def _unused(folder: Path) -> Path:
+    """A new file for old values, so that those of an earlier flight are never lost."""
+    numbers = ("", *(f"-{number}" for number in range(2, 1000)))
+    paths = (folder / KEPT_PARAMETERS.format(number) for number in numbers)
+    return next(path for path in paths if not path.exists())
 
 
 def has_global_position(record: Record) -> bool:

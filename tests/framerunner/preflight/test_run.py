@@ -76,6 +76,16 @@ async def test_parameters_are_set_and_returned(link, plan, tmp_path):
     assert {name: link.simulation.autopilot.parameters.value(name) for name in FAILING} == before
 
 
+async def test_old_values_that_are_kept_are_not_overwritten(link, plan, tmp_path):
+    first = await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    link.simulation.autopilot.parameters.set("NAV_RCL_ACT", 1)
+    second = await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    third = await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    assert [first.kept.name, second.kept.name] == ["parameters-before.params", "parameters-before-2.params"]
+    assert [each.name for each in load_parameters(second.kept)] == ["NAV_RCL_ACT"]
+    assert (third.kept, third.changes) == (None, ())
+
+
 async def test_nothing_is_set_if_the_old_values_cannot_be_kept(link, plan, tmp_path):
     nowhere = settings(tmp_path / "nowhere", set_parameters=True)
     with pytest.raises(SettingError, match="nothing was set"):
