@@ -37,6 +37,7 @@ def build_app() -> App:
         mission,
         mocap,
         monitor,
+        preflight,
         replay,
         scenario,
         sim,
@@ -57,6 +58,7 @@ def build_app() -> App:
     app.command(camera.app)
     app.command(mocap.mocap)
     app.command(doctor.doctor)
+    app.command(preflight.preflight)
     app.command(evaluate.evaluate)
     app.command(bound.bound)
     app.command(monitor.monitor)
