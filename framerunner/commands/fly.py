@@ -107,8 +107,8 @@ def fly(
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
-    A drone given by --drone is taken for a real one, unless it is --simulated: it is checked, and the
-    operator holds G to arm; SPACE lands, and SPACE again stops the motors. In lockstep there is no log, and a
+    A drone given by --drone is taken for a real one, unless it is `framerunner sim` or --simulated: it is
+    checked, and the operator holds G to arm; SPACE lands, and SPACE again stops the motors. In lockstep there is no log, and a
     video only with --video. Exit code 0: completed, 1: flown but not completed, 2: bad input or failed check.
 
     **Examples**

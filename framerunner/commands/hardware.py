@@ -104,6 +104,7 @@ def hardware_of(options: HardwareOptions, drone: str | None) -> HardwareSettings
         set_parameters=options.set_parameters,
         accepted=options.accept,
         operator=options.operator,
+        capped=options.max_speed is not None or options.max_height is not None,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Coroutine
 from contextlib import AsyncExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from framerunner.flying.fly import FinishedFlight, fly
@@ -87,6 +87,7 @@ async def fly_in_real_time(
         vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
         named = settings.simulator is not None
         judge, plan = await choose_judge(plan, vehicle.api, session, named=named)
+        settings, plan = await _without_procedure(settings, plan)
         safety = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)
@@ -118,6 +119,21 @@ async def fly_in_real_time(
         flown = await fly(*what, run=run, measured=timing, before_tick=reporter.look, safety=safety)
         await reporter.send_result(records.complete(flown.result))
     return flown
+
+
+async def _without_procedure(
+    settings: RealTimeSettings, plan: FlightPlan
+) -> tuple[RealTimeSettings, FlightPlan]:
+    """The same without the checks and caps of a real drone, if it says that it is framerunner's simulated one."""
+    hardware, drone_url = settings.hardware, settings.drone_url
+    if hardware is None or drone_url is None or not hardware.asks_nothing:
+        return settings, plan
+    from framerunner.preflight.prepare import is_own_simulator
+
+    if not await is_own_simulator(drone_url):
+        return settings, plan
+    caps = plan.caps if hardware.capped else None
+    return replace(settings, hardware=None), replace(plan, caps=caps)
 
 
 async def _safety(

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import sys
+import threading
+from contextlib import closing
 from datetime import datetime
 
 from errors import SettingError
@@ -11,6 +14,7 @@ from framerunner.preflight.card import make_card
 from framerunner.preflight.card_files import HTML_NAME, write_card
 from framerunner.preflight.keys import HINT, has_terminal
 from framerunner.preflight.run import PreflightSettings, run_preflight, tell
+from framerunner.preflight.session import VehicleSession, open_link
 from framerunner.preflight.settings import HardwareSettings
 from offboard.safety.operator import Operator
 from offboard.safety.rules import SafetyRules
@@ -25,6 +29,26 @@ def check_operator(hardware: HardwareSettings) -> None:
             "a real drone is armed only by an operator's key, and there is no terminal: start it in one; "
             "--yes flies without an operator, --simulated says that the drone is a simulation"
         )
+
+
+async def is_own_simulator(drone_url: str) -> bool:
+    """Whether the vehicle on a link is framerunner's simulated drone, by what it says of itself.
+
+    Raises:
+        LinkError: the address is bad, or the link cannot be opened.
+        DroneError: no vehicle is heard.
+    """
+    parse_url(drone_url)
+    cancelled = threading.Event()
+
+    def ask() -> bool:
+        with closing(open_link(drone_url)) as link:
+            return VehicleSession(link, cancelled).is_own_simulator
+
+    try:
+        return await asyncio.to_thread(ask)
+    finally:
+        cancelled.set()
 
 
 async def prepare(plan: FlightPlan, checks: PreflightSettings, hardware: HardwareSettings) -> SafetyRules:

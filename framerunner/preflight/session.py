@@ -10,6 +10,7 @@ from typing import TypeVar
 from framerunner.doctor.listen import COMPONENT_ID, FIND_S, SYSTEM_ID, Record, find, listen
 from offboard.drone import DroneError
 from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, ground_station_heartbeat, mavlink
+from wire.simulator_identity import is_simulator
 from wire.transports.vehicle_link import VehicleLink
 
 ANSWER_S = 0.5
@@ -63,6 +64,24 @@ class VehicleSession:
     def is_px4(self) -> bool:
         """Its autopilot is PX4, or one that presents itself as PX4."""
         return self.autopilot == "px4"
+
+    @property
+    def is_own_simulator(self) -> bool:
+        """Whether it says that it is framerunner's simulated drone."""
+        request = mavlink.MAVLink_command_long_message(
+            self.system_id,
+            AUTOPILOT_COMPONENT_ID,
+            mavlink.MAV_CMD_REQUEST_MESSAGE,
+            0,
+            mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+            *(0.0,) * 6,
+        )
+
+        def uid(message: Message) -> int | None:
+            return message.uid if message.get_type() == "AUTOPILOT_VERSION" else None
+
+        found = self.request(request, uid, tries=3)
+        return found is not None and is_simulator(found, self.system_id)
 
     def listen(self, seconds: float) -> None:
         """Let the record collect what the doctor requests."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from offboard.safety.rules import AbortAction
 
@@ -21,6 +21,7 @@ class HardwareSettings:
         set_parameters: failsafe parameters that fail their check are set; their old values are kept.
         accepted: names of checks that may fail.
         operator: who flies, for the flight card; empty: the user of this computer.
+        capped: caps on speed or height were asked for.
     """
 
     needs_go: bool = True
@@ -29,3 +30,9 @@ class HardwareSettings:
     set_parameters: bool = False
     accepted: tuple[str, ...] = ()
     operator: str = ""
+    capped: bool = False
+
+    @property
+    def asks_nothing(self) -> bool:
+        """Nothing of the procedure was asked for; a simulated drone that is recognised needs none."""
+        return replace(self, capped=False) == HardwareSettings()
