@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera.component import CameraComponent
 from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink, VideoStream
+from firmware_py.mavlink.camera.streaming import Streaming
 from firmware_py.mavlink.commands.flight import FlightCommands
 from firmware_py.mavlink.commands.maintenance import FailureSink, MaintenanceCommands
 from firmware_py.mavlink.commands.protocol import CommandService
@@ -59,7 +60,8 @@ class NodeOptions:
     shell: bool = False  # whether SERIAL_CONTROL is answered
     log_text: Callable[[int, StatusText], None] | None = None  # called with vehicle time and each text
     camera: CameraModel | None = None
-    captures: CaptureSink | None = None  # takes and keeps pictures; by default they are only counted
+    captures: CaptureSink | None = None  # keeps pictures and records video; by default they are only counted
+    switch_video: Callable[[bool], None] | None = None  # starts and stops the streams in RTP
     failures: FailureSink | None = None  # breaks parts on purpose
     truth: Truth | None = None  # the true state, of a simulated vehicle whose sensors have errors
 
@@ -68,9 +70,8 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
     """All services of the vehicle, in the order in which they are updated."""
     camera = None
     if options.camera is not None:
-        camera = CameraComponent(
-            autopilot, exchange, options.camera, tuple(options.video), sink=options.captures
-        )
+        streaming = Streaming(tuple(options.video), options.switch_video)
+        camera = CameraComponent(autopilot, exchange, options.camera, streaming, options.captures)
     files = options.firmware_files
     if files is None:
         files = ExtraFiles(autopilot.parameters)
