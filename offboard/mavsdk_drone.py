@@ -18,7 +18,6 @@ from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
 
 from geometry.axes import Alignment, Pose
-from geometry.rotations import quaternion_from_euler
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.keep_in_box import Box, confine
 from offboard.link.commands import PendingRequests, SetpointStream, synchronous
@@ -398,7 +397,7 @@ class MavsdkDrone:
         assert self._alignment is not None, "ready() comes first"
         feed = self._feed
         pose = self._alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
-        attitude_ned = quaternion_from_euler(sample.roll_rad, sample.pitch_rad, sample.yaw_ned_rad)
+        camera_ned = sample.camera_attitude_ned
         return DroneState(
             time_us=sample.time_us,
             x=pose.position_m[0],
@@ -411,7 +410,8 @@ class MavsdkDrone:
             mode=feed.mode,
             landed=feed.landed,
             position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
-            attitude_arena=self._alignment.attitude(attitude_ned),
+            attitude_arena=self._alignment.attitude(sample.attitude_ned),
+            camera_attitude_arena=None if camera_ned is None else self._alignment.attitude(camera_ned),
             missed=missed,
         )
 

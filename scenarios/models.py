@@ -15,6 +15,7 @@ from geometry.solids import Solid
 from geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.air import Wind
 from scenarios.faults.declaration import Fault
+from scenarios.gimbal import Gimbal
 from scenarios.goals import Goal
 from scenarios.imaging.clutter import Hall, Patch
 from scenarios.imaging.effects import CameraEffects
@@ -201,7 +202,7 @@ def _standing(name: str, place_m: tuple[float, float], yaw_rad: float, size_m: V
 
 
 class Camera(Part):
-    """A pinhole camera fixed to the drone, looking along its x axis."""
+    """A pinhole camera that looks along the drone's x axis, fixed to it or on a gimbal."""
 
     width_px: int = Field(320, ge=16, le=4096, description="columns of the image")
     height_px: int = Field(240, ge=16, le=4096, description="rows of the image")
@@ -214,6 +215,8 @@ class Camera(Part):
     effects: CameraEffects | None = Field(
         None, description="what a real camera does to images; by default they are ideal"
     )
+
+    gimbal: Gimbal | None = Field(None, description="carries the camera; by default it is fixed to the drone")
 
     @property
     def focal_px(self) -> float:
@@ -233,7 +236,7 @@ class Camera(Part):
 
     @model_serializer(mode="wrap")
     def _without_unused_effects(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return _without_defaults(self, write(self), ("effects",))
+        return _without_defaults(self, write(self), ("effects", "gimbal"))
 
 
 class Light(Part):
@@ -402,6 +405,14 @@ class Scenario(Part):
                 yield part, (name, index)
 
 
+@dataclass(frozen=True, slots=True)
+class CameraMotion:
+    """How a camera on a gimbal looks and turns."""
+
+    attitude_arena: Quaternion  # forward-left-up of the camera to arena
+    rate_frd_rad_s: Vec3  # angular velocity in the camera's axes forward, right, down
+
+
 @dataclass(slots=True)
 class TrueState:
     """State of the drone at one instant, simulated or from a real drone's telemetry."""
@@ -413,6 +424,7 @@ class TrueState:
     motors_on: bool
     contacts: tuple[str, ...] = ()  # what it touches: colours of frames, "pole", "wall", "base" or "floor"
     rate_frd_rad_s: Vec3 = ZERO3  # angular velocity, body axes forward, right, down; 0 if not known
+    camera: CameraMotion | None = None  # of a camera on a gimbal; None: it is fixed to the drone
 
 
 def is_over_base(base: Base, x_m: float, y_m: float) -> bool:

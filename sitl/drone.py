@@ -81,6 +81,7 @@ class ServedDrone:
                 camera=model if settings.camera else None,
                 captures=self._album,
                 switch_video=self._switch_rtp,
+                gimbal=simulation.gimbal,
                 failures=simulation.faults,
                 truth=simulation.true_state,
             ),

@@ -13,6 +13,9 @@ from firmware_py.mavlink.commands.flight import FlightCommands
 from firmware_py.mavlink.commands.maintenance import FailureSink, MaintenanceCommands
 from firmware_py.mavlink.commands.protocol import CommandService
 from firmware_py.mavlink.external_pose import ExternalPoseService
+from firmware_py.mavlink.gimbal.device import GimbalComponent
+from firmware_py.mavlink.gimbal.manager import GimbalManager
+from firmware_py.mavlink.gimbal.model import GIMBAL_COMPONENT_ID, GimbalDevice
 from firmware_py.mavlink.ground_station.events import EventService
 from firmware_py.mavlink.ground_station.file_transfer import FileTransferService
 from firmware_py.mavlink.ground_station.log_transfer import LogTransferService
@@ -62,6 +65,7 @@ class NodeOptions:
     camera: CameraModel | None = None
     captures: CaptureSink | None = None  # keeps pictures and records video; by default they are only counted
     switch_video: Callable[[bool], None] | None = None  # starts and stops the streams in RTP
+    gimbal: GimbalDevice | None = None  # carries the camera
     failures: FailureSink | None = None  # breaks parts on purpose
     truth: Truth | None = None  # the true state, of a simulated vehicle whose sensors have errors
 
@@ -77,7 +81,12 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         files = ExtraFiles(autopilot.parameters)
     events = EventService(autopilot, exchange)
     clocks = Clocks()
-    mission = MissionExecution(autopilot, exchange, camera)
+    gimbals: tuple[Service, ...] = ()
+    manager = None
+    if options.gimbal is not None:
+        manager = GimbalManager(autopilot, exchange, options.gimbal)
+        gimbals = (manager, GimbalComponent(autopilot, exchange, options.gimbal))
+    mission = MissionExecution(autopilot, exchange, camera, manager)
     others: dict[int, AutopilotSource] = {
         mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
         mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: lambda autopilot: hil_state_quaternion(
@@ -97,13 +106,14 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         mission,
         *((ShellService(autopilot, exchange),) if options.shell else ()),
         *((camera,) if camera is not None else ()),
+        *gimbals,
         # The others have no `update`.
         ConnectionService(autopilot, exchange, clocks),
         ExternalPoseService(autopilot, exchange, clocks),
         AutopilotTelemetry(autopilot, state_messages),
         OffboardService(autopilot, exchange),
         ManualControlService(autopilot, exchange),
-        FlightCommands(autopilot),
+        FlightCommands(autopilot) if manager is None else FlightCommands(autopilot, manager.look_at),
         MaintenanceCommands(autopilot, options.failures),
         MetadataService(autopilot, exchange),
         RemoteIdService(autopilot, exchange),
@@ -113,17 +123,24 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         merged(service.sources for service in services),
         merged(service.replies for service in services),
     )
-    own = [service for service in (streams, *services) if service is not camera]
+    own = [service for service in (streams, *services) if service.component_id == AUTOPILOT_COMPONENT_ID]
     commands = CommandService(
         exchange,
         AUTOPILOT_COMPONENT_ID,
         merged(service.commands for service in own),
         lambda command: camera is None or not camera.takes_broadcast(command),
     )
-    if camera is None:
-        return (streams, *services, commands)
-    camera_commands = CommandService(exchange, CAMERA_COMPONENT_ID, camera.commands, camera.takes_broadcast)
-    return (streams, *services, commands, camera_commands)
+    others_commands = [
+        CommandService(
+            exchange,
+            service.component_id,
+            service.commands,
+            camera.takes_broadcast if service is camera and camera is not None else lambda _command: False,
+        )
+        for service in services
+        if service.component_id != AUTOPILOT_COMPONENT_ID
+    ]
+    return (streams, *services, commands, *others_commands)
 
 
 class MavlinkNode:
@@ -152,6 +169,8 @@ class MavlinkNode:
         component_ids = {AUTOPILOT_COMPONENT_ID}
         if options.camera is not None:
             component_ids.add(CAMERA_COMPONENT_ID)
+        if options.gimbal is not None:
+            component_ids.add(GIMBAL_COMPONENT_ID)
         signing = Signing(options.signing_key, options.boot_unix_us)
         self._autopilot = autopilot
         self._exchange = Exchange(options.system_id, frozenset(component_ids), signing, options.boot_unix_us)

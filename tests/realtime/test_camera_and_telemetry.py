@@ -93,7 +93,7 @@ async def test_video_is_recorded_and_storage_formatted_and_what_is_not_there_is_
     await asyncio.sleep(1.0)
     await camera.stop_video(CAMERA)
     listed = await drone.ftp.list_directory("DCIM")
-    assert [each for each in listed.dirs] != []
+    assert listed.dirs
     await camera.stop_video_streaming(CAMERA, 0)
     await camera.start_video_streaming(CAMERA, 0)
     await camera.format_storage(CAMERA, 0)
