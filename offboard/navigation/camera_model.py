@@ -1,4 +1,4 @@
-"""Where a point of the arena is in the image: a pinhole camera without tilt, fixed to the drone or on a gimbal."""
+"""Where a point of the arena is in the image of a pinhole camera, fixed to the drone or on a gimbal."""
 
 from __future__ import annotations
 
