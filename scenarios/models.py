@@ -28,7 +28,18 @@ MissionClass = Literal["contest", "open"]
 DecoyColour = Literal["cyan", "magenta"]
 DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
-_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors", "wind", "faults", "hall", "patches", "goals")
+_OFTEN_UNUSED = (
+    "decoys",
+    "poles",
+    "walls",
+    "sensors",
+    "wind",
+    "faults",
+    "hall",
+    "patches",
+    "gripper",
+    "goals",
+)
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
@@ -303,6 +314,7 @@ class Scenario(Part):
     try_limit_s: float = Field(180.0, gt=0, le=36000, description="longest try, motors on to motors off")
     airframe: str = Field("abejorro", description="name of the drone to fly")
     origin: Origin = Field(Origin(), description="where on Earth the arena is")
+    gripper: bool = Field(False, description="whether the drone has one; what it holds has no mass")
     sensors: str = Field("ideal", description="name of the drone's sensor suite, or a file of one")
     wind: Wind = Field(Wind(), description="how the air moves; by default it is still")
     faults: tuple[Fault, ...] = Field((), max_length=20, description="what fails, and when")

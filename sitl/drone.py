@@ -82,6 +82,7 @@ class ServedDrone:
                 captures=self._album,
                 switch_video=self._switch_rtp,
                 gimbal=simulation.gimbal,
+                gripper=simulation.scenario.gripper,
                 failures=simulation.faults,
                 truth=simulation.true_state,
             ),

@@ -10,6 +10,7 @@ from firmware_py.mavlink.camera.component import CameraComponent
 from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink, VideoStream
 from firmware_py.mavlink.camera.streaming import Streaming
 from firmware_py.mavlink.commands.flight import FlightCommands
+from firmware_py.mavlink.commands.gripper import GripperService
 from firmware_py.mavlink.commands.maintenance import FailureSink, MaintenanceCommands
 from firmware_py.mavlink.commands.protocol import CommandService
 from firmware_py.mavlink.external_pose import ExternalPoseService
@@ -66,6 +67,7 @@ class NodeOptions:
     captures: CaptureSink | None = None  # keeps pictures and records video; by default they are only counted
     switch_video: Callable[[bool], None] | None = None  # starts and stops the streams in RTP
     gimbal: GimbalDevice | None = None  # carries the camera
+    gripper: bool = False
     failures: FailureSink | None = None  # breaks parts on purpose
     truth: Truth | None = None  # the true state, of a simulated vehicle whose sensors have errors
 
@@ -86,7 +88,8 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
     if options.gimbal is not None:
         manager = GimbalManager(autopilot, exchange, options.gimbal)
         gimbals = (manager, GimbalComponent(autopilot, exchange, options.gimbal))
-    mission = MissionExecution(autopilot, exchange, camera, manager)
+    gripper = GripperService(autopilot) if options.gripper else None
+    mission = MissionExecution(autopilot, exchange, camera, manager, gripper)
     others: dict[int, AutopilotSource] = {
         mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
         mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: lambda autopilot: hil_state_quaternion(
@@ -107,6 +110,7 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         *((ShellService(autopilot, exchange),) if options.shell else ()),
         *((camera,) if camera is not None else ()),
         *gimbals,
+        *((gripper,) if gripper is not None else ()),
         # The others have no `update`.
         ConnectionService(autopilot, exchange, clocks),
         ExternalPoseService(autopilot, exchange, clocks),

@@ -27,7 +27,7 @@ _CAMERA = frozenset(
         Do.VIDEO_STOP_CAPTURE,
     }
 )
-_ABSENT = frozenset({Do.GRIPPER, Do.WINCH, Do.SET_ACTUATOR, Do.OBLIQUE_SURVEY, Do.VTOL_TRANSITION})
+_ABSENT = frozenset({Do.WINCH, Do.SET_ACTUATOR, Do.OBLIQUE_SURVEY, Do.VTOL_TRANSITION})
 _NO_PARAMS = (0.0,) * 7
 REGIONS = frozenset({Do.NAV_ROI, Do.SET_ROI, Do.SET_ROI_LOCATION, Do.SET_ROI_NONE, Do.SET_ROI_WPNEXT_OFFSET})
 
@@ -111,7 +111,7 @@ class MissionActions:
             self._start_by_distance(item, view.position_ned_m)
         elif command == Do.SET_CAM_TRIGG_INTERVAL:
             self._start_by_time(item)
-        elif command in (Do.SET_HOME, Do.ARM_DISARM):
+        elif command in (Do.SET_HOME, Do.ARM_DISARM, Do.GRIPPER):
             self._pass_on(item)
         elif command in _ABSENT:
             self.say(WARNING, f"Mission item {item.seq + 1} does nothing: no such device here")

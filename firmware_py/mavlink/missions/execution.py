@@ -7,6 +7,7 @@ from math import isfinite
 from firmware_py.autopilot import Autopilot
 from firmware_py.geodesy import LocalProjection
 from firmware_py.mavlink.camera.model import CameraControl
+from firmware_py.mavlink.commands.gripper import GripperService
 from firmware_py.mavlink.gimbal.manager import GimbalManager
 from firmware_py.mavlink.missions.messages import mission_current
 from firmware_py.mavlink.service import Command, Service
@@ -42,11 +43,13 @@ class MissionExecution(Service):
         exchange: Exchange,
         camera: CameraControl | None,
         gimbal: GimbalManager | None = None,
+        gripper: GripperService | None = None,
     ) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._camera = camera
         self._gimbal = gimbal
+        self._gripper = gripper
         self._fence = Geofence(autopilot.missions, autopilot.parameters)
         self._view = View()
         self._origin: GeodeticPoint | None = None
@@ -168,8 +171,6 @@ class MissionExecution(Service):
 
     def _execute(self, issued: IssuedCommand) -> CommandResult:
         autopilot = self._autopilot
-        if issued.command in _GIMBALS or issued.command in REGIONS:
-            return self._point_gimbal(issued)
         first, x, y, z = issued.params[0], *issued.params[4:]
         match issued.command:
             case mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
@@ -179,17 +180,20 @@ class MissionExecution(Service):
                     return autopilot.set_home(None)
                 known = isfinite(x) and isfinite(y) and isfinite(z)
                 return autopilot.set_home(GeodeticPoint(x, y, z)) if known else CommandResult.DENIED
-        if self._camera is None:
-            return CommandResult.UNSUPPORTED
-        return self._camera.run(issued.command, issued.params)
+        return self._command_device(issued)
 
-    def _point_gimbal(self, issued: IssuedCommand) -> CommandResult:
-        gimbal = self._gimbal
-        if gimbal is not None and issued.command in _GIMBALS:
-            return gimbal.run(issued.command, issued.params)
-        if gimbal is not None:
-            gimbal.look_at(issued.place_ned_m)
-        return CommandResult.ACCEPTED
+    def _command_device(self, issued: IssuedCommand) -> CommandResult:
+        """Pass a command on to gimbal, gripper or camera."""
+        command, gimbal = issued.command, self._gimbal
+        if command in REGIONS:
+            if gimbal is not None:
+                gimbal.look_at(issued.place_ned_m)
+            return CommandResult.ACCEPTED
+        if command in _GIMBALS:
+            return CommandResult.ACCEPTED if gimbal is None else gimbal.run(command, issued.params)
+        if command == mavlink.MAV_CMD_DO_GRIPPER and self._gripper is not None:
+            return self._gripper.run(issued.params)
+        return CommandResult.UNSUPPORTED if self._camera is None else self._camera.run(command, issued.params)
 
 
 def _mission_state(autopilot: Autopilot) -> int:
