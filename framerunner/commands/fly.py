@@ -23,6 +23,7 @@ from framerunner.commands import (
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
+    from framerunner.flying.run import FlightSettings
     from offboard.mission import Mission
     from scenarios.models import Scenario
     from wire.simulator_api import SimulatorApi
@@ -70,6 +71,10 @@ _Response = Annotated[
         "seconds and metres"
     ),
 ]
+_MonitorLink = Annotated[
+    str | None, Parameter(show=False, help="MAVLink URL by which the simulated drone also sends")
+]
+_Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input ends")]
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
 
 
@@ -95,6 +100,8 @@ def fly(
     drone_limits: _DroneLimits = None,
     response: _Response = None,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
+    monitor_link: _MonitorLink = None,
+    lifeline: _Lifeline = False,
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
@@ -111,27 +118,33 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --record --sensors mocap
 
-        framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
-
         framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
+    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     _check(drone, camera, speed, instance, lockstep=lockstep)
     seed = _checked_seed(seed, monitor, lockstep)
 
     from framerunner.flying.real_time import RealTimeSettings
-    from framerunner.flying.run import FlightSettings, fly_once
+    from framerunner.flying.run import FlightSettings
 
     loaded = load_mission_with(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    plan = _calibrated(plan, calibration, drone)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
-    return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
+    plan = _calibrated(plan, calibration, drone)
+    return _run(FlightSettings(plan, real_time, out, record, video, monitor, monitor_link), lifeline=lifeline)
+
+
+def _run(settings: FlightSettings, *, lifeline: bool) -> int:
+    from framerunner.child_process import until_standard_input_ends
+    from framerunner.flying.run import fly_once
+
+    work = fly_once(settings)
+    return asyncio.run(until_standard_input_ends(work)) or 0 if lifeline else asyncio.run(work)
 
 
 def _scenario(

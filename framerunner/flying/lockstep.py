@@ -52,6 +52,7 @@ async def lockstep_flight(
     *,
     observers: Sequence[Observer] = (),
     on_image: ImageObserver | None = None,
+    truth_observers: Sequence[TruthObserver] = (),
     before_tick: TickHook | None = None,
 ) -> FinishedFlight:
     """Fly a plan as fast as the machine can; its seed is of wind and of what else is random.
@@ -60,6 +61,7 @@ async def lockstep_flight(
         plan: with a mission.
         observers: called at every tick, in this order; must be quick.
         on_image: called with each image.
+        truth_observers: called with the true state of every control tick; must be quick.
         before_tick: awaited before each tick, while simulated time stands still; see `RunControl`.
 
     Raises:
@@ -67,7 +69,7 @@ async def lockstep_flight(
         ValueError: the plan has no mission.
     """
     states = StateHash()
-    vehicle = LockstepVehicle(plan, on_image, observers=(states.add,))
+    vehicle = LockstepVehicle(plan, on_image, observers=(states.add, *truth_observers))
     return await fly(
         plan,
         vehicle.drone,

@@ -34,6 +34,7 @@ class FlightSettings:
     record: bool = False  # write an MCAP file too
     video: bool = False  # write a video in lockstep too
     monitor: bool = False  # open the Game Monitor
+    monitor_link: str | None = None  # where a monitor that is open already listens for the simulated drone
 
 
 async def fly_once(settings: FlightSettings) -> int:
@@ -45,7 +46,7 @@ async def fly_once(settings: FlightSettings) -> int:
         SettingError: the simulator or the monitor cannot be started.
     """
     if settings.real_time is None or not settings.monitor:
-        return await _fly_and_judge(settings, None)
+        return await _fly_and_judge(settings, settings.monitor_link)
     from framerunner.child_process import MonitorProcess
 
     # The simulator that is started has a referee; a running drone may have none.

@@ -41,19 +41,15 @@ async def test_the_gimbal_is_found_and_turned_by_angles_rates_and_a_place(sim, i
     async with mavsdk_system(sim.process, instance) as system:
         gimbal = GimbalAsync(system)
         async with asyncio.timeout(10.0):
-            while not (found := (await gimbal.gimbal_list()).gimbals):
-                await asyncio.sleep(0.1)
+            found = await anext(each.gimbals async for each in gimbal.subscribe_gimbal_list() if each.gimbals)
         assert [(each.gimbal_device_id, each.model_name) for each in found] == [(154, "simulated gimbal")]
 
-        async def angles(pitch_deg, yaw_deg, limit_s=10.0):
-            async with asyncio.timeout(limit_s):
-                while True:
-                    seen = (await gimbal.get_attitude(1)).euler_angle_forward
-                    if seen.pitch_deg == pytest.approx(pitch_deg, abs=1.0) and (
-                        seen.yaw_deg == pytest.approx(yaw_deg, abs=1.0)
-                    ):
+        async def angles(pitch_deg, yaw_deg):
+            async with asyncio.timeout(10.0):
+                async for update in gimbal.subscribe_attitude():
+                    seen = update.euler_angle_forward
+                    if (seen.pitch_deg, seen.yaw_deg) == pytest.approx((pitch_deg, yaw_deg), abs=1.0):
                         return
-                    await asyncio.sleep(0.1)
 
         await gimbal.take_control(1, ControlMode.PRIMARY)
         await gimbal.set_angles(1, 0.0, -60.0, 45.0, GimbalMode.YAW_FOLLOW, SendMode.ONCE)
