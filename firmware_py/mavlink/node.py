@@ -72,24 +72,57 @@ class NodeOptions:
     truth: Truth | None = None  # the true state, of a simulated vehicle whose sensors have errors
 
 
+@dataclass(frozen=True, slots=True)
+class _Devices:
+    """What the vehicle carries, those that it has."""
+
+    camera: CameraComponent | None = None
+    manager: GimbalManager | None = None
+    gimbal: GimbalComponent | None = None
+    gripper: GripperService | None = None
+
+    @classmethod
+    def of(cls, autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> _Devices:
+        """The devices of a vehicle's options."""
+        camera = manager = gimbal = None
+        if options.camera is not None:
+            streaming = Streaming(tuple(options.video), options.switch_video)
+            camera = CameraComponent(autopilot, exchange, options.camera, streaming, options.captures)
+        if options.gimbal is not None:
+            manager = GimbalManager(autopilot, exchange, options.gimbal)
+            gimbal = GimbalComponent(autopilot, exchange, options.gimbal)
+        return cls(camera, manager, gimbal, GripperService(autopilot) if options.gripper else None)
+
+    @property
+    def services(self) -> tuple[Service, ...]:
+        """Of those that there are."""
+        services = (self.camera, self.manager, self.gimbal, self.gripper)
+        return tuple(service for service in services if service is not None)
+
+    def command_services(self, exchange: Exchange) -> tuple[CommandService, ...]:
+        """The commands of those that are components of their own."""
+        camera, gimbal, services = self.camera, self.gimbal, []
+        if camera is not None:
+            services.append(
+                CommandService(exchange, CAMERA_COMPONENT_ID, camera.commands, camera.takes_broadcast)
+            )
+        if gimbal is not None:
+            services.append(
+                CommandService(exchange, GIMBAL_COMPONENT_ID, gimbal.commands, lambda _command: False)
+            )
+        return tuple(services)
+
+
 def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
     """All services of the vehicle, in the order in which they are updated."""
-    camera = None
-    if options.camera is not None:
-        streaming = Streaming(tuple(options.video), options.switch_video)
-        camera = CameraComponent(autopilot, exchange, options.camera, streaming, options.captures)
+    devices = _Devices.of(autopilot, exchange, options)
+    camera, manager = devices.camera, devices.manager
     files = options.firmware_files
     if files is None:
         files = ExtraFiles(autopilot.parameters)
     events = EventService(autopilot, exchange)
     clocks = Clocks()
-    gimbals: tuple[Service, ...] = ()
-    manager = None
-    if options.gimbal is not None:
-        manager = GimbalManager(autopilot, exchange, options.gimbal)
-        gimbals = (manager, GimbalComponent(autopilot, exchange, options.gimbal))
-    gripper = GripperService(autopilot) if options.gripper else None
-    mission = MissionExecution(autopilot, exchange, camera, manager, gripper)
+    mission = MissionExecution(autopilot, exchange, camera, manager, devices.gripper)
     others: dict[int, AutopilotSource] = {
         mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
         mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: lambda autopilot: hil_state_quaternion(
@@ -108,9 +141,7 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         MissionService(autopilot, exchange, mission),
         mission,
         *((ShellService(autopilot, exchange),) if options.shell else ()),
-        *((camera,) if camera is not None else ()),
-        *gimbals,
-        *((gripper,) if gripper is not None else ()),
+        *devices.services,
         # The others have no `update`.
         ConnectionService(autopilot, exchange, clocks),
         ExternalPoseService(autopilot, exchange, clocks),
@@ -134,17 +165,7 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         merged(service.commands for service in own),
         lambda command: camera is None or not camera.takes_broadcast(command),
     )
-    others_commands = [
-        CommandService(
-            exchange,
-            service.component_id,
-            service.commands,
-            camera.takes_broadcast if service is camera and camera is not None else lambda _command: False,
-        )
-        for service in services
-        if service.component_id != AUTOPILOT_COMPONENT_ID
-    ]
-    return (streams, *services, commands, *others_commands)
+    return (streams, *services, commands, *devices.command_services(exchange))
 
 
 class MavlinkNode:

@@ -93,12 +93,12 @@ async def test_video_is_recorded_and_storage_formatted_and_what_is_not_there_is_
     await asyncio.sleep(1.0)
     await camera.stop_video(CAMERA)
     listed = await drone.ftp.list_directory("DCIM")
-    assert listed.dirs
+    assert [entry.name for entry in listed.entries] != []
     await camera.stop_video_streaming(CAMERA, 0)
     await camera.start_video_streaming(CAMERA, 0)
     await camera.format_storage(CAMERA, 0)
     await camera.reset_settings(CAMERA)
-    assert "DCIM" not in (await drone.ftp.list_directory("/")).dirs
+    assert "DCIM" not in [entry.name for entry in (await drone.ftp.list_directory("/")).entries]
     with pytest.raises(CameraError):
         await camera.zoom_in_start(CAMERA)
     stream = (await first(camera.subscribe_video_stream_info(), lambda update: update)).video_stream_info
