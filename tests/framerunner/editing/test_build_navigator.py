@@ -147,7 +147,7 @@ async def test_the_papers_navigator_is_built_by_hand_checked_saved_and_flown(tmp
         await user.page.get_by_role("tab", name="Fly").click()
         await user.page.get_by_role("combobox", name="Speed").select_option(label="fastest")
         await user.press("Fly", user.page.locator(".e-tabs .e-tab:not([hidden])"))
-        line = user.page.locator(".e-run-line")
+        line = user.page.locator(".e-tabs .e-tab:not([hidden]) .e-run-line")
         await expect(line).to_have_text(LANDED, timeout=60_000)
         assert not user.complaints
 

@@ -55,7 +55,7 @@ async def test_a_frame_that_is_hit_is_named_and_marked(browser, program):
     await expect(user.page.locator('.t-frame[data-colour="red"]')).to_have_count(
         2
     )  # from above and its height
-    await expect(user.page.locator(".e-run-line")).to_contain_text(
+    await expect(user.page.locator(".e-tabs .e-tab:not([hidden]) .e-run-line")).to_contain_text(
         "The time was up after 120 s", timeout=60_000
     )
     assert not user.complaints
@@ -70,7 +70,7 @@ async def test_a_beginner_sees_the_goal_and_only_what_is_needed_without_scrollin
         ).to_be_in_viewport()
     await expect(user.page.locator(".e-more")).to_be_hidden()
     await user.press("Volar", user.page.locator(".e-controls"))
-    line = user.page.locator(".e-run-line")
+    line = user.page.locator(".e-tabs .e-tab:not([hidden]) .e-run-line")
     told = "El dron aterrizó, pero no estuvo 3 s en el punto (0, 0, 1.5). Lo más cerca"
     await expect(line).to_contain_text(told, timeout=30_000)
     await expect(line).to_be_in_viewport()

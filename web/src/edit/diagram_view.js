@@ -79,7 +79,7 @@ export class DiagramView {
       id: "e-arrow", viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 8, markerHeight: 8, orient: "auto-start-reverse",
     }, svg("path", { d: "M0,0L10,5L0,10z", class: "e-arrow" }));
     this.#superstates = svg("g");
-    this.#states = svg("g"); // in front of the lines, which would keep the mouse from a state that they pass
+    this.#states = svg("g"); // in front of lines and labels, which would keep the mouse from a state that they pass
     this.#lines = svg("g");
     this.#labels = svg("g");
     this.#draft = svg("path", { class: "e-draft", visibility: "hidden" });
@@ -87,7 +87,7 @@ export class DiagramView {
       source: svg("circle", { r: HANDLE, class: "e-end", visibility: "hidden" }),
       target: svg("circle", { r: HANDLE, class: "e-end", visibility: "hidden" }),
     };
-    this.#world = svg("g", {}, this.#superstates, this.#lines, this.#states, this.#labels, this.#ends.source, this.#ends.target, this.#draft);
+    this.#world = svg("g", {}, this.#superstates, this.#lines, this.#labels, this.#states, this.#ends.source, this.#ends.target, this.#draft);
     this.#svg = svg("svg", { class: "e-diagram", role: "group", "aria-label": "diagram" }, svg("defs", {}, arrow), this.#world);
     parent.append(this.#svg);
     this.#svg.addEventListener("pointerdown", (event) => this.#press(event));
