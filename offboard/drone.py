@@ -34,6 +34,7 @@ class DroneState:
     landed: bool = True  # on the ground or on the base
     position_age_s: float = 0.0  # how much older the position and the velocity are than `time_us`
     attitude_arena: Quaternion = (1.0, 0.0, 0.0, 0.0)  # body FLU to arena, with the heading `yaw`
+    camera_attitude_arena: Quaternion | None = None  # of a camera on a gimbal, forward-left-up to arena
     missed: tuple[DroneState, ...] = ()  # at the ticks that were skipped before this one, oldest first
 
     @property

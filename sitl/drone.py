@@ -13,9 +13,10 @@ from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoSt
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from geometry.solids import Solid
 from scenarios.result import LocalFrame, Standing
-from sitl.drone_files import PictureAlbum, flight_recorder
+from sitl.drone_files import flight_recorder
 from sitl.link_hub import LinkHub
 from sitl.parameter_file import ParameterKeeper, open_parameters
+from sitl.payload.album import CameraAlbum
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.storage import open_storage
@@ -65,7 +66,7 @@ class ServedDrone:
         storage = open_storage(settings.storage, settings.instance)
         camera = simulation.scenario.camera
         model = CameraModel(camera.width_px, camera.height_px, camera.horizontal_fov_rad, camera.rate_hz)
-        self._album = PictureAlbum(storage, boot_unix_us)
+        self._album = CameraAlbum(storage, boot_unix_us, camera.rate_hz)
         self._recorder = flight_recorder(storage, boot_unix_us)
         self.node = MavlinkNode(
             simulation.autopilot,
@@ -79,6 +80,9 @@ class ServedDrone:
                 log_text=self._recorder.hear_text,
                 camera=model if settings.camera else None,
                 captures=self._album,
+                switch_video=self._switch_rtp,
+                gimbal=simulation.gimbal,
+                gripper=simulation.scenario.gripper,
                 failures=simulation.faults,
                 truth=simulation.true_state,
             ),
@@ -88,6 +92,7 @@ class ServedDrone:
         self._camera: CameraFeed | FaultyFeed | None = None
         self._video: VideoServer | None = None
         self._rtp: RtpSender | None = None
+        self._rtp_sends = True
         self._image_us = -1
 
     async def open_links(self) -> None:
@@ -98,6 +103,8 @@ class ServedDrone:
         """
         for profile, addresses in self._settings.default_links:
             await self._hub.open_udp(profile, addresses)
+        if self._settings.payload is not None:
+            await self._hub.open_payload(*self._settings.payload)
         self._hub.update(0)
         if self._keeper is not None:
             self._keeper.start()
@@ -134,6 +141,9 @@ class ServedDrone:
         await video.start()
         self._camera = new_feed(scenario, simulation.faults, simulation.seed, others)
 
+    def _switch_rtp(self, on: bool) -> None:  # the interface's
+        self._rtp_sends = on
+
     def _warn(self, line: str) -> None:
         """Show a line at the terminal and at ground stations."""
         self._notice(line)
@@ -154,8 +164,8 @@ class ServedDrone:
             time_us, image = arrived
             self._image_us = time_us
             self._video.publish(image, time_us)
-            self._album.show(image)
-            if self._rtp is not None:
+            self._album.show(image, time_us)
+            if self._rtp is not None and self._rtp_sends:
                 self._rtp.send(image, time_us)
 
     async def hold(self, grants: TimeGrants) -> None:
@@ -170,6 +180,7 @@ class ServedDrone:
     async def close(self) -> None:
         """Finish the log, save the parameters, stop the video and close the links."""
         self._recorder.finish(self.simulation.autopilot)
+        self._album.stop_video()
         if self._keeper is not None:
             await self._keeper.close()
         if self._video is not None:

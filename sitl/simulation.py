@@ -15,11 +15,12 @@ from firmware_py.parameters import Parameters
 from firmware_py.types import GeodeticPoint, Sensors
 from geometry.axes import flip_vector
 from geometry.vectors import ZERO3, Vec3
-from scenarios.models import Scenario, ground_height
+from scenarios.models import CameraMotion, Scenario, ground_height
 from scenarios.referee import Referee
 from scenarios.result import BegunFault, FailsafeText, FaultFacts
 from sitl.battery import Battery
 from sitl.faults.faults import Faults
+from sitl.payload.gimbal import SimulatedGimbal
 from sitl.sensors.assumptions import estimator_settings, parameter_defaults
 from sitl.sensors.specs import SuiteSpec
 from sitl.sensors.suite import SensorSuite, load_suite
@@ -89,6 +90,7 @@ class Simulation:
         faults: declared in the scenario and injected over MAVLink.
         referee: sees the true state of every control tick; a new one for each try.
         battery: of the drone.
+        gimbal: of the camera; None: it is fixed to the drone.
         truth: the true state now.
     """
 
@@ -111,9 +113,13 @@ class Simulation:
         self.referee = Referee(scenario, airframe.envelope_m)
         self.battery = Battery(airframe, self.autopilot.parameters)
         self.faults = Faults(scenario.faults, suite, self.world, self.battery, seed)
+        settings = scenario.camera.gimbal
+        self.gimbal = None if settings is None else SimulatedGimbal(settings)
         self._battery_due_us = 0
         self._sensors = self.world.sensors()
         self.truth = self.world.truth(self._sensors, motors_on=False)
+        if self.gimbal is not None:
+            self._turn_camera(self.gimbal)
         self.referee.update(self.truth)
 
     def _frame_place(self, suite: SuiteSpec, place: GeodeticPoint) -> GeodeticPoint:
@@ -178,7 +184,13 @@ class Simulation:
         if armed is not self.truth.motors_on:
             self._change_arming(armed)
         self.truth = self.world.truth(self._sensors, motors_on=armed)
+        if self.gimbal is not None:
+            self._turn_camera(self.gimbal)
         self.referee.update(self.truth)
+
+    def _turn_camera(self, gimbal: SimulatedGimbal) -> None:
+        gimbal.step(CONTROL_PERIOD_US / 1e6, self._sensors.attitude)
+        self.truth.camera = CameraMotion(gimbal.attitude_arena, gimbal.rate_frd_rad_s)
 
     def _change_arming(self, armed: bool) -> None:
         if not armed:

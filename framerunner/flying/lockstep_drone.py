@@ -316,6 +316,10 @@ class LockstepDrone:
         yaw_rad = _received_angle(state.yaw_rad)
         pose = alignment.pose(Pose(self._position_ned_m, yaw_rad))
         roll_rad, pitch_rad = _received_angle(state.roll_rad), _received_angle(state.pitch_rad)
+        gimbal, camera_attitude = self._simulation.gimbal, None
+        if gimbal is not None:
+            camera_ned = quaternion_from_euler(0.0, gimbal.pitch_rad, yaw_rad + gimbal.yaw_rad)
+            camera_attitude = alignment.attitude(camera_ned)
         return DroneState(
             state.time_us,
             *pose.position_m,
@@ -327,6 +331,7 @@ class LockstepDrone:
             self._autopilot.status.landed_state is LandedState.ON_GROUND,
             (state.time_us - self._sent_position_us) * 1e-6,
             alignment.attitude(quaternion_from_euler(roll_rad, pitch_rad, yaw_rad)),
+            camera_attitude,
         )
 
 

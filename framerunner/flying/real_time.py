@@ -124,7 +124,7 @@ async def fly_in_real_time(
 async def _without_procedure(
     settings: RealTimeSettings, plan: FlightPlan
 ) -> tuple[RealTimeSettings, FlightPlan]:
-    """The same without the checks and caps of a real drone, if it says that it is framerunner's simulated one."""
+    """The same without what a real drone needs, if it says that it is framerunner's simulated one."""
     hardware, drone_url = settings.hardware, settings.drone_url
     if hardware is None or drone_url is None or not hardware.asks_nothing:
         return settings, plan

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from geometry.axes import Alignment, Pose
-from geometry.rotations import quaternion_from_euler
 from offboard.drone import DroneState
 from offboard.link.telemetry import Sample, TelemetryFeed
 
@@ -20,7 +19,7 @@ def reported_state(
         missed: states at the ticks that were skipped before this one, oldest first.
     """
     pose = alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
-    attitude_ned = quaternion_from_euler(sample.roll_rad, sample.pitch_rad, sample.yaw_ned_rad)
+    camera_ned = sample.camera_attitude_ned
     return DroneState(
         time_us=sample.time_us,
         x=pose.position_m[0],
@@ -33,6 +32,7 @@ def reported_state(
         mode=feed.mode,
         landed=feed.landed,
         position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
-        attitude_arena=alignment.attitude(attitude_ned),
+        attitude_arena=alignment.attitude(sample.attitude_ned),
+        camera_attitude_arena=None if camera_ned is None else alignment.attitude(camera_ned),
         missed=missed,
     )
