@@ -226,16 +226,19 @@ async def _wait_or_cancel(work: asyncio.Task[T], watching: asyncio.Task[str]) ->
         _uncancel()  # the work's result says that it was interrupted
 
 
-async def until_standard_input_ends(work: Coroutine[object, object, None]) -> None:
-    """Do some work until it is done; cancel it if standard input ends, because the parent has ended."""
+async def until_standard_input_ends(work: Coroutine[object, object, T]) -> T | None:
+    """Do some work until it is done; cancel it if standard input ends, because the parent has ended.
+
+    Returns:
+        The work's result; None if it was cancelled.
+    """
     running = asyncio.create_task(work)
     watching = asyncio.create_task(_standard_input_ends())
     done, _ = await asyncio.wait({running, watching}, return_when=asyncio.FIRST_COMPLETED)
     for task in (running, watching):
         task.cancel()
     await asyncio.gather(running, watching, return_exceptions=True)
-    if running in done:
-        running.result()
+    return running.result() if running in done else None
 
 
 async def _standard_input_ends() -> None:

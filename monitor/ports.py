@@ -41,6 +41,7 @@ class RunInfo:
     verdict: str  # of the referee; "" if the flight was not judged
     total_time_s: float | None  # with penalties; None if not judged
     started: str  # ISO 8601; "" if unknown
+    session: bool = False  # flown from a page of this program; kept until it ends
 
 
 class RunLibrary(Protocol):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, isnan
 from typing import Protocol
 
 from errors import UserError
@@ -52,6 +52,11 @@ class VelocityCommand:
     up_m_s: float = 0.0
     yaw_rate_rad_s: float = 0.0
 
+    @property
+    def is_number(self) -> bool:
+        """No component is NaN."""
+        return not isnan(self.forward_m_s + self.left_m_s + self.up_m_s + self.yaw_rate_rad_s)
+
 
 class Drone(Protocol):
     """A vehicle. All coroutines raise `DroneError` with a reason when the vehicle does not comply.
@@ -96,6 +101,17 @@ class Drone(Protocol):
 
     async def hold(self) -> None:
         """Stop commanding permanently and request hold, unless a pilot or a failsafe has the vehicle."""
+
+    async def land_now(self, *, demanded: bool = False) -> None:
+        """Stop commanding permanently and let the vehicle land where it is; returns when it is disarmed.
+
+        A vehicle that a pilot or a failsafe has is left to them, and this returns at once, unless it lands
+        already. A vehicle that cannot be brought to land gets a request for hold, as by `hold`; then its own
+        failsafe acts.
+
+        Args:
+            demanded: by the operator, who overrules a failsafe that does not land; a pilot keeps the vehicle.
+        """
 
     async def refuse(self) -> None:
         """Let the vehicle that a pilot gave back hold, and wait until it is given back again."""

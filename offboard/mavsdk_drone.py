@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any, TextIO
 
-from mavsdk.asyncio import Configuration, ForwardingOption, Mavsdk, MavsdkError
+from mavsdk.asyncio import Configuration, Mavsdk, MavsdkError
 from mavsdk.asyncio.component_type import ComponentType
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
@@ -18,15 +18,17 @@ from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
 
 from geometry.axes import Alignment, Pose
-from geometry.rotations import quaternion_from_euler
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.keep_in_box import Box, confine
 from offboard.link.commands import PendingRequests, SetpointStream, synchronous
 from offboard.link.companion import Companion
-from offboard.link.telemetry import CHECKS, Sample, TelemetryFeed, TickSource, VehicleClock, request_rates
+from offboard.link.connections import open_connections
+from offboard.link.reported_state import reported_state
+from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, request_rates
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
+from offboard.safety.caps import CapKeeper, Caps
 from wire.transports.sockets import check_free
 from wire.transports.urls import LinkError, parse_url
 
@@ -67,6 +69,7 @@ class MavsdkDrone:
         hang_report: a real file for the stack of a hung app; by default standard error.
         box: commands that were corrected here do not leave it; None: there is none.
         corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
+        caps: no command exceeds them, and none leads out of the box; None: there are none.
 
     Attributes:
         recording_problem: why recording ended before the flight; set by `disconnect`.
@@ -85,6 +88,7 @@ class MavsdkDrone:
         hang_report: TextIO | None = None,
         box: Box | None = None,
         corrects: bool = True,
+        caps: Caps | None = None,
     ) -> None:
         self.recording_problem = ""
         self._url = parse_url(url)
@@ -113,6 +117,7 @@ class MavsdkDrone:
         self._watchdog = Watchdog(self._stand_still, self._stop_from_watchdog, hang_report)
         self._shared_with: list[str] = []
         self._box = box
+        self._caps = None if caps is None else CapKeeper(caps, box)
 
     def record_to(self, path: Path) -> None:
         """Record all MAVLink traffic as a tlog from `connect` to `close`."""
@@ -151,7 +156,9 @@ class MavsdkDrone:
         log_subscribe(_log)
         # As a ground station: PX4 sends the reasons of its refusals (STATUSTEXT) only to ground stations.
         self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
-        await self._open_connections(self._mavsdk)
+        self._recorder = await open_connections(
+            self._mavsdk, (*self._shared_with, self._url.text), self._tlog_path, self._companion
+        )
         system: Any = await self._mavsdk.first_autopilot(self._connect_limit_s)
         if system is None:
             raise DroneError(
@@ -172,25 +179,6 @@ class MavsdkDrone:
         self._telemetry = TelemetryAsync(system)
         self._direct = MavlinkDirectAsync(system)
         self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct))
-
-    async def _open_connections(self, mavsdk: Mavsdk) -> None:
-        """To recorder, companion, ground stations and vehicle; MAVSDK forwards between them."""
-        if self._tlog_path is not None:
-            try:
-                self._recorder = TlogRecorder(self._tlog_path)
-                await mavsdk.add_any_connection(await self._recorder.listen(), ForwardingOption.ON)
-            except (OSError, MavsdkError) as error:
-                raise DroneError(f"cannot record to {self._tlog_path}: {error}") from None
-        if self._companion is not None:
-            try:
-                await mavsdk.add_any_connection(self._companion.listen(), ForwardingOption.ON)
-            except (OSError, MavsdkError) as error:  # the mission can be flown without
-                logger.warning("the mission cannot be reported: %s", error)
-        try:
-            for url in (*self._shared_with, self._url.text):
-                await mavsdk.add_any_connection(url, ForwardingOption.ON)
-        except MavsdkError as error:
-            raise DroneError(f"cannot open {self._url.text}: {error}") from None
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then determine the axes."""
@@ -297,6 +285,20 @@ class MavsdkDrone:
             if feed.time_us > limit_us:
                 raise DroneError(f"still not landed after {LAND_LIMIT_S:g} s{feed.recent_texts()}")
 
+    async def land_now(self, *, demanded: bool = False) -> None:
+        """Stop commanding permanently and let the vehicle land; see `Drone.land_now`."""
+        self._stand_still()  # MAVSDK repeats this until the vehicle leaves offboard
+        self._commanding = self._pilot_has_it = False
+        lands = self._feed.mode in ("OFFBOARD", "LAND") or (demanded and self._feed.mode not in PILOT_MODES)
+        if self._setpoints is None or not lands:
+            await self.hold()
+            return
+        try:
+            await self.land()
+        except DroneError as error:
+            await self.hold()
+            raise DroneError(f"{error}; hold was requested instead") from None
+
     async def hold(self) -> None:
         """Stop commanding permanently and request hold, unless the vehicle has left offboard already."""
         self._commanding = self._pilot_has_it = False
@@ -349,7 +351,7 @@ class MavsdkDrone:
             command = self._tracker.correct(command, latest)
             if self._box is not None:
                 command, _ = confine(command, latest, self._box)
-        self._send(command)
+        self._send(command if self._caps is None else self._caps.limit(command, latest))
 
     async def close(self) -> None:
         """End all commanding and, without a companion, disconnect."""
@@ -390,30 +392,11 @@ class MavsdkDrone:
 
     def _newest_state(self) -> DroneState:
         """The state at the last tick; it holds those of the ticks that were skipped before it."""
+        assert self._alignment is not None, "ready() comes first"
         sample = self._feed.sample
         missed = [before for before in self._feed.take_samples() if before.time_us < sample.time_us]
-        return self._state(sample, tuple(map(self._state, missed)))
-
-    def _state(self, sample: Sample, missed: tuple[DroneState, ...] = ()) -> DroneState:
-        assert self._alignment is not None, "ready() comes first"
-        feed = self._feed
-        pose = self._alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
-        attitude_ned = quaternion_from_euler(sample.roll_rad, sample.pitch_rad, sample.yaw_ned_rad)
-        return DroneState(
-            time_us=sample.time_us,
-            x=pose.position_m[0],
-            y=pose.position_m[1],
-            z=pose.position_m[2],
-            yaw=pose.yaw_rad,
-            velocity_arena_m_s=self._alignment.vector(sample.velocity_ned_m_s),
-            armed=feed.arming.is_armed(sample.time_us),
-            offboard=feed.mode == "OFFBOARD",
-            mode=feed.mode,
-            landed=feed.landed,
-            position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
-            attitude_arena=self._alignment.attitude(attitude_ned),
-            missed=missed,
-        )
+        states = tuple(reported_state(before, self._feed, self._alignment) for before in missed)
+        return reported_state(sample, self._feed, self._alignment, states)
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s

@@ -393,6 +393,12 @@ class Scenario(Part):
         obstacles: tuple[Pole | Wall, ...] = (*self.poles, *self.walls)
         return tuple(solid for obstacle in obstacles for solid in obstacle.solids(self.arena.height_m))
 
+    @property
+    def solid_names(self) -> frozenset[str]:
+        """Names in `TrueState.contacts` that count as contacts: colours of frames, `pole` and `wall`."""
+        frames, prisms = self.all_frames, self.prisms
+        return frozenset((*(each.colour for each in frames), *(each.name for each in prisms)))
+
     def _placed(self) -> Iterator[tuple[Part, tuple[str | int, ...]]]:
         """All that is in the arena, with its path in the file."""
         yield self.start, ("start",)

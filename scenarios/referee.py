@@ -63,10 +63,7 @@ class Referee:
         crossable = () if scenario.goals else scenario.frames
         self._frames = sorted(crossable, key=lambda frame: COLOURS.index(frame.colour))
         self._expected = tuple(frame.colour for frame in self._frames)
-        self._solids = {
-            *(each.colour for each in scenario.all_frames),
-            *(each.name for each in scenario.prisms),
-        }
+        self._solids = scenario.solid_names
         self._ignored = 0
         self._over = False
         self._time_us = -1

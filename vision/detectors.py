@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+from vision.calibration.colours import correct_colours
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.detector import detect
@@ -40,6 +41,10 @@ def new_detector(
     """
     if calibration is not None:
         focal_px = calibration.fx_px
+        if (matrix := calibration.colour_matrix) is not None:
+            plain = calibration.model_copy(update={"colour_matrix": None})
+            detector = new_detector(kind, rendered=rendered, smooth=smooth, calibration=plain)
+            return lambda image, time_us: detector(correct_colours(image, matrix), time_us)
     if kind == "boxes":
         return partial(detect, focal_px=focal_px)
     if focal_px is None:

@@ -32,7 +32,8 @@ def open_source(
 
     Args:
         url_or_path: http(s):// is MJPEG over HTTP, unless it ends like a video file; a folder is its
-            images; a number is a video device; anything else is left to OpenCV (rtsp://, udp://, files).
+            images; a number is a video device; rtp://HOST:PORT is H.264 sent to this UDP port; anything
+            else is left to OpenCV (rtsp://, udp://, files).
         timeout_s: how long to wait for the camera, and for each of its images.
         size_px: width and height of an MJPEG camera's images, others are skipped; None for any.
 
@@ -51,6 +52,8 @@ def open_source(
             from vision.http_source import HttpSource  # noqa: PLC0415 - its library is slow to import
 
             return HttpSource(text, timeout_s, size_px)
+        if parts.scheme.lower() == "rtp":
+            _check_rtp(text)
         return CaptureSource(text, timeout_s)
     path = Path(text)
     try:
@@ -62,6 +65,16 @@ def open_source(
     if not found:
         raise CameraError(f"camera '{shown_url(text)}': no such file, folder, device or URL")
     return CaptureSource(text, timeout_s)
+
+
+def _check_rtp(url: str) -> None:
+    try:
+        parts = urlsplit(url)
+        known = bool(parts.hostname and parts.port) and re.fullmatch(r"rtp://[\w.:\[\]-]+/?", url) is not None
+    except ValueError:  # the port
+        known = False
+    if not known:
+        raise CameraError(f"camera {shown_url(url)}: write rtp://HOST:PORT, such as rtp://0.0.0.0:5600")
 
 
 class CaptureSource:

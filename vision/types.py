@@ -135,7 +135,7 @@ class CameraFrame:
 
     image: Image  # BGR, shape (height, width, 3), uint8
     time_us: int | None  # vehicle time of its exposure; None if the source does not send it
-    received_s: float  # monotonic wall time of its arrival
+    received_s: float  # monotonic time of its arrival, without the jitter if the stream has time stamps
     jpeg: bytes | None = field(default=None, repr=False)  # as received, to record it without encoding
 
 

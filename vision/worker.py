@@ -17,6 +17,7 @@ import signal
 import socket
 import struct
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -25,15 +26,25 @@ from enum import IntEnum
 import cv2
 import numpy as np
 
+from vision.stream_clock import StreamClock
 from vision.types import Image
+from wire.h264_rtp import describe_h264_rtp
 
 MAX_IMAGE_BYTES = 3 * 4096 * 4096
 MEMORY_LIMIT_BYTES = 4 << 30
 DECODE_LIMIT_S = 0.5
 """Longest time for one image: thirty times what a baseline JPEG of 1920 x 1080 pixels takes."""
 _PARENT_CHECK_S = 1.0
+_LATEST = "fflags;nobuffer|flags;low_delay|analyzeduration;1000000|fpsprobesize;0"
+_LIVE_OPTIONS = {  # FFmpeg's, in OpenCV's form; of live streams the latest image is wanted, not every one
+    "rtsp": f"rtsp_transport;tcp|{_LATEST}",
+    "udp": _LATEST,
+    "rtp": f"protocol_whitelist;file,udp,rtp|{_LATEST}",
+}
 REQUEST = struct.Struct("<BI")  # kind, and the number of bytes that follow
-ANSWER = struct.Struct("<BIId")  # kind, width and height (pixels), monotonic time of arrival (seconds)
+ANSWER = struct.Struct(
+    "<BIId"
+)  # kind, width and height (pixels), monotonic time of capture or arrival (seconds)
 
 
 class Request(IntEnum):
@@ -64,6 +75,7 @@ class _Capture:
         with _limited(2 * limit_ms / 1000):
             self._capture = _opened(url, limit_ms)
         self._is_file = self._capture.get(cv2.CAP_PROP_FRAME_COUNT) > 0
+        self._clock = StreamClock()
         self._latest: tuple[Image, float] | None = None
         self._ended = False
         self._changed = threading.Condition()
@@ -88,6 +100,13 @@ class _Capture:
             return (Reply.END_OF_FILE if self._is_file else Reply.END_OF_STREAM), None, 0.0
         return Reply.IMAGE, *taken
 
+    def _captured_s(self) -> float:
+        """Monotonic time of the image read last; of a file's it is the time at which it was read."""
+        now_s = time.monotonic()
+        if self._is_file:
+            return now_s
+        return self._clock.captured_s(self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0, now_s)
+
     def _read(self) -> None:
         rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
         period_s = 1.0 / rate_hz if self._is_file and 0 < rate_hz < 1000 else 0.0  # a file at its own speed
@@ -99,7 +118,7 @@ class _Capture:
                 done, image = False, None
             with self._changed:
                 if done and image is not None:
-                    self._latest = (np.asarray(image, np.uint8), time.monotonic())
+                    self._latest = (np.asarray(image, np.uint8), self._captured_s())
                 self._ended = not done
                 self._changed.notify()
             if not done:
@@ -112,8 +131,18 @@ def _opened(url: str, limit_ms: int) -> cv2.VideoCapture:
     if url.isdecimal():
         return cv2.VideoCapture(int(url))
     settings = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, limit_ms, cv2.CAP_PROP_READ_TIMEOUT_MSEC, limit_ms]
-    capture = cv2.VideoCapture(url, cv2.CAP_FFMPEG, settings)
-    return capture if capture.isOpened() else cv2.VideoCapture(url)
+    scheme, _, place = url.partition("://")
+    options = _LIVE_OPTIONS.get(scheme.lower())
+    if options is not None:
+        os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", options)
+    if scheme.lower() != "rtp":
+        capture = cv2.VideoCapture(url, cv2.CAP_FFMPEG, settings)
+        return capture if capture.isOpened() or options is not None else cv2.VideoCapture(url)
+    host, _, port = place.rstrip("/").rpartition(":")
+    with tempfile.NamedTemporaryFile("w", suffix=".sdp", newline="") as file:
+        file.write(describe_h264_rtp(host, int(port)))
+        file.flush()
+        return cv2.VideoCapture(file.name, cv2.CAP_FFMPEG, settings)
 
 
 def _decoded(data: bytes) -> Image | None:

@@ -129,6 +129,86 @@ def calibrate(
     return 0
 
 
+@app.command
+def latency(
+    source: Annotated[str, Parameter(help="URL or device of the camera, as for `fly --camera`")],
+    /,
+    *,
+    seconds: Annotated[WholeNumber, Parameter(help="how long to film")] = 20,
+    led: Annotated[
+        Path | None,
+        Parameter(
+            help="file that switches an LED instead: /sys/class/leds/NAME/brightness; 1 is lit, 0 dark"
+        ),
+    ] = None,
+    display_delay: Annotated[
+        float, Parameter(help="of terminal and screen, s; it is subtracted. An LED has none")
+    ] = 0.03,
+) -> int:
+    """Measure how long the camera's images take from exposure to arrival.
+
+    The terminal blinks in white and black at random intervals, and the camera films it. The delay with which
+    the images follow is what `fly --camera-delay` needs. Run it on the computer that flies the mission, with
+    the camera, its settings and its link as in flight; fix the exposure if the camera lets you.
+
+    **Examples**
+
+        framerunner camera latency /dev/video0
+
+        framerunner camera latency rtsp://10.0.0.2/1 --led /sys/class/leds/ACT/brightness
+    """
+    check_range("--seconds", seconds, 8, 300)
+    check_range("--display-delay", display_delay, 0.0, 0.2)
+
+    from framerunner.camera_calibration.latency import LedLight, TerminalLight, film
+
+    light = TerminalLight() if led is None else LedLight(led)
+    found = asyncio.run(film(light, source, float(seconds), say))
+    if led is None:
+        print(
+            f"of {found.delay_s:.3f} s the terminal and the screen take {display_delay:g} s (--display-delay)"
+        )
+    delay_s = max(0.0, found.delay_s - (display_delay if led is None else 0.0))
+    print(f"{found.images} images, {found.rate_hz:.1f} a second; correlation {found.correlation:.2f}")
+    print(f"delay {delay_s:.3f} s (± {2 * found.std_s:.3f}); fly with --camera-delay {delay_s:.3f}")
+    return 0
+
+
+@app.command
+def colours(
+    swatches: Annotated[
+        list[str], Parameter(help="red=SOURCE green=SOURCE blue=SOURCE: images of the paint, or a camera")
+    ],
+    /,
+    *,
+    calibration: Annotated[
+        Path, Parameter(help="file of `framerunner camera calibrate`, which is given the colours")
+    ] = Path("camera.yaml"),
+) -> int:
+    """Learn the colours of your frames from swatches of their paint.
+
+    Each swatch must fill the middle of its image, a fifth of width and height, in the light of the hall. A
+    camera takes 20 images after you pressed Enter. Colours are then corrected in every image before frames
+    are looked for; grey stays grey.
+
+    **Examples**
+
+        framerunner camera colours red=red.jpg green=green.jpg blue=blue.jpg
+
+        framerunner camera colours red=0 green=0 blue=0 --calibration camera.yaml
+    """
+    from framerunner.camera_calibration.colours import learn
+
+    def ask(what: str) -> None:
+        try:
+            input(f"{what}, then press Enter ")
+        except EOFError:
+            raise SettingError("there is no terminal to press Enter in; give image files instead") from None
+
+    learn(swatches, calibration, ask)
+    return 0
+
+
 def _board(columns: int, rows: int, square: float, marker: float) -> Board:
     """Check the options."""
     from vision.calibration.board import Board

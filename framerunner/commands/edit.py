@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import webbrowser
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +13,15 @@ from cyclopts import Parameter
 
 from errors import SettingError
 from framerunner.commands import WholeNumber, check_range, say
+from framerunner.commands.monitor import PilotOption
 
+_Drone = Annotated[
+    str | None,
+    Parameter(
+        help="MAVLink URL: where drones send to ground stations; by default udpin://127.0.0.1:14550, or "
+        "another port if that one is taken"
+    ),
+]
 _SUFFIXES = (".yaml", ".yml")
 
 
@@ -22,9 +31,8 @@ def edit(
     source: Annotated[
         str, Parameter(name="--from", help="what a new one begins as: empty, example, or a mission to copy")
     ] = "empty",
-    drone: Annotated[
-        str, Parameter(help="MAVLink URL: where drones send to ground stations")
-    ] = "udpin://127.0.0.1:14550",
+    pilot: PilotOption = None,
+    drone: _Drone = None,
     port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8090,
     browser: Annotated[bool, Parameter(help="open the page in the browser", negative="--no-browser")] = True,
 ) -> int:
@@ -38,15 +46,16 @@ def edit(
         framerunner edit my_mission.yaml
 
         framerunner edit my_mission.yaml --from frame_challenge
+
+        framerunner edit my_mission.yaml --pilot my_pilot.py
     """
     check_range("--port", port, 0, 65535)
     from framerunner.commands.monitor import DATABASE, equipment
     from framerunner.editing.documents.desk import EditorDesk
     from monitor.run import serve
     from monitor.settings import MonitorSettings
-    from wire.transports.urls import parse_url
 
-    parse_url(drone)
+    url = _drone_url(drone)
     folder = Path(".") if mission is None else mission.parent
     path = "edit"
     if mission is not None:
@@ -55,7 +64,7 @@ def edit(
         if not mission.exists():
             say(f"made: {folder / EditorDesk(folder).create(mission.stem, source)}")
         path = f"edit?file={quote(mission.name)}"
-    given = equipment(drone, None, Path("runs"), missions=folder)
+    given = equipment(url, None, Path("runs"), missions=folder, pilot=pilot)
     settings = MonitorSettings("127.0.0.1", port, DATABASE)
 
     def hear(words: str) -> None:
@@ -68,3 +77,32 @@ def edit(
 
     asyncio.run(serve(given, settings, hear))
     return 0
+
+
+def _drone_url(given: str | None) -> str:
+    """Where drones are heard: as given, or at the port to which they send, or at a free one if that is taken.
+
+    Raises:
+        LinkError: the URL is none.
+        SettingError: its port is taken.
+    """
+    from framerunner.editing.live import GROUND_PORT, is_free
+    from wire.transports.urls import parse_url
+
+    if given is None:
+        if is_free(GROUND_PORT, socket.SOCK_DGRAM):
+            return f"udpin://127.0.0.1:{GROUND_PORT}"
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        say(
+            f"UDP port {GROUND_PORT} is taken, by a monitor for example, which shows other drones; those "
+            f"that are started in the editor are shown here, by port {port}"
+        )
+        return f"udpin://127.0.0.1:{port}"
+    url = parse_url(given)
+    if url.scheme == "udpin" and not is_free(url.number, socket.SOCK_DGRAM):
+        raise SettingError(
+            f"--drone {given}: port {url.number} is taken; choose another, or leave --drone out"
+        )
+    return given

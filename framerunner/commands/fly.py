@@ -20,10 +20,12 @@ from framerunner.commands import (
     with_faults,
     with_sensors,
 )
+from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
 from framerunner.commands.px4 import check_px4_flight, for_px4
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
+    from framerunner.flying.run import FlightSettings
     from offboard.mission import Mission
     from scenarios.models import Scenario
     from wire.simulator_api import SimulatorApi
@@ -76,6 +78,10 @@ _Response = Annotated[
         "seconds and metres"
     ),
 ]
+_MonitorLink = Annotated[
+    str | None, Parameter(show=False, help="MAVLink URL by which the simulated drone also sends")
+]
+_Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input ends")]
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
 
 
@@ -101,49 +107,58 @@ def fly(
     pilot: _Pilot = None,
     drone_limits: _DroneLimits = None,
     response: _Response = None,
+    hardware: HardwareOptions = NONE,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
+    monitor_link: _MonitorLink = None,
+    lifeline: _Lifeline = False,
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
-    In lockstep there is no log, and a video only with --video. Exit code 0: completed, 1: flown but not
-    completed, 2: bad input.
+    A drone given by --drone is taken for a real one, unless it is --simulated: it is checked, and the
+    operator holds G to arm; SPACE lands, and SPACE again stops the motors. In lockstep there is no log, and a
+    video only with --video. Exit code 0: completed, 1: flown but not completed, 2: bad input or failed check.
 
     **Examples**
 
-        framerunner fly test-case-1
-
-        framerunner fly my_scenario.yaml --mission frame_challenge --speed 2
-
         framerunner fly test-case-1 --lockstep --record --sensors mocap
 
-        framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
+        framerunner fly test-case-1 --px4 ../PX4-Autopilot --speed 3
 
-        framerunner fly test-case-1 --px4 ../PX4-Autopilot --speed 4
-
-        framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100
+        framerunner fly --dry-run --drone serial:///dev/ttyUSB0:57600 --camera 0
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
+    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     _check(drone, camera, speed, instance, lockstep=lockstep, px4=px4)
-    seed = _checked_seed(seed, monitor, lockstep, px4)
+    seed, procedure = _checked_seed(seed, monitor, lockstep, px4), hardware_of(hardware, drone)
+
     from framerunner.flying.real_time import RealTimeSettings
-    from framerunner.flying.run import FlightSettings, fly_once
+    from framerunner.flying.run import FlightSettings
 
     loaded = load_mission_with(mission, pilot)
-    chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep, px4=px4)
+    chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep, px4=px4)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    plan = _calibrated(plan, calibration, drone)
-    real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, px4, camera_delay)
-    return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
+    plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
+    real_time = RealTimeSettings(drone, camera, api, speed, instance, px4, camera_delay, procedure)
+    ends = (plan, None if lockstep else real_time, out, record, video, monitor, monitor_link)
+    return _run(FlightSettings(*ends), lifeline=lifeline)
+
+
+def _run(settings: FlightSettings, *, lifeline: bool) -> int:
+    from framerunner.child_process import until_standard_input_ends
+    from framerunner.flying.run import fly_once
+
+    work = fly_once(settings)
+    return asyncio.run(until_standard_input_ends(work)) or 0 if lifeline else asyncio.run(work)
 
 
 def _scenario(
     name: str,
     sensors: str | None,
     fault: tuple[str, ...],
+    hardware: HardwareOptions,
     *,
     starts: bool,
     lockstep: bool,
@@ -156,7 +171,8 @@ def _scenario(
         raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
     if fault and not starts:
         raise SettingError("--fault: is for a simulated drone that is started; leave it out with --drone")
-    scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
+    loaded = with_dry_limit(load_scenario(name), hardware)
+    scenario = with_faults(with_sensors(loaded, sensors), fault)
     failing = next((each for each in scenario.faults if each.part == "link"), None)
     if failing is not None and starts and not lockstep:
         raise SettingError(

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import atexit
 import os
 import resource
+import shutil
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,6 +29,14 @@ SYSTEM_ID = 250
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 
 
+_TrustedProxy = Annotated[
+    tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
+]
+PilotOption = Annotated[
+    Path | None, Parameter(help="Python file with primitives of your own, for the editor; it is executed")
+]
+
+
 def monitor(
     *,
     drone: Annotated[
@@ -42,15 +52,14 @@ def monitor(
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
     missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
+    pilot: PilotOption = None,
     camera_host: Annotated[
         tuple[str, ...],
         Parameter(
             help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"
         ),
     ] = (),
-    trusted_proxy: Annotated[
-        tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
-    ] = (),
+    trusted_proxy: _TrustedProxy = (),
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.
@@ -77,7 +86,7 @@ def monitor(
 
     parse_url(drone)
     flown = None if scenario is None else load_scenario(scenario)
-    given = equipment(drone, flown, runs, camera_host, missions)
+    given = equipment(drone, flown, runs, camera_host, missions=missions, pilot=pilot)
     password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()
     settings = MonitorSettings(bind, port, database, password, trusted_proxy, qr_codes=qr_codes)
     _allow_many_files()
@@ -93,29 +102,49 @@ def equipment(
     scenario: Scenario | None,
     runs: Path,
     camera_hosts: tuple[str, ...] = (),
+    *,
     missions: Path = MISSIONS,
+    pilot: Path | None = None,
 ) -> Equipment:
-    """What the monitor, which may not import other rooms' functions, is given of them."""
+    """What the monitor, which may not import other rooms' functions, is given of them.
+
+    Raises:
+        MissionError: the contestant's file, which is executed, cannot be used.
+    """
+    from tempfile import mkdtemp
+
     from framerunner.course.door import CourseDoor
     from framerunner.editing.documents.desk import EditorDesk
     from framerunner.editing.documents.door import DocumentsDoor
+    from framerunner.editing.live import LiveSettings
+    from framerunner.editing.service import EditingSettings
     from framerunner.editing.web import EditingDoor
     from framerunner.flying.plan import FlightPlan
     from framerunner.monitoring.run_library import RunFolders
     from monitor.ports import Equipment
+    from offboard.pilot import Pilot
+    from offboard.pilot_file import read_pilot
     from scenarios.loader import list_scenarios, load_scenario
     from wire.transports.vehicle_link import VehicleLink
 
+    pilot_class = Pilot if pilot is None else read_pilot(pilot).pilot_class()
+    session = Path(mkdtemp(prefix="framerunner-flights-"))
+    atexit.register(shutil.rmtree, session, ignore_errors=True)
+    editing = EditingSettings(pilot, session, live=LiveSettings(drone_url, runs, pilot))
     return Equipment(
         make_referee=lambda flown: FlightPlan(flown).new_referee(),
         open_link=lambda: VehicleLink(drone_url, system_id=SYSTEM_ID, component_id=COMPONENT_ID),
         scenario=scenario,
         list_scenarios=list_scenarios,
         load_scenario=load_scenario,
-        runs=RunFolders(runs),
+        runs=RunFolders(runs, session, pilot),
         start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,
-        extensions=(EditingDoor(), DocumentsDoor(EditorDesk(missions)), CourseDoor(missions)),
+        extensions=(
+            EditingDoor(editing),
+            DocumentsDoor(EditorDesk(missions, pilot_class)),
+            CourseDoor(missions, pilot),
+        ),
     )
 
 

@@ -25,6 +25,7 @@ from framerunner.course.lessons import Lesson, find_lesson, load_lessons
 from framerunner.course.progress import CourseEvent, CourseProgress, EventKind, learner_name
 from framerunner.editing.messages import MAX_TEXT, StartBatch
 from framerunner.editing.service import EditingService, EditingSettings
+from framerunner.editing.words import Language, Said, language_of, reason, say
 
 _CHECKS_AT_ONCE = 2
 _LONGEST_WAIT_S = 120.0
@@ -37,13 +38,14 @@ class CourseDoor:
 
     Args:
         folder: of the pupils' missions; the class's progress is kept there, too.
+        pilot: a contestant's file, which flights execute; None: missions use `Pilot` itself.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, pilot: Path | None = None) -> None:
         self._folder = folder
         self._progress = CourseProgress(folder / "course-progress.jsonl")
         self._lessons = load_lessons()
-        self._service = EditingService(EditingSettings(max_batches=_CHECKS_AT_ONCE, jobs=1))
+        self._service = EditingService(EditingSettings(pilot, max_batches=_CHECKS_AT_ONCE, jobs=1))
         self._places = asyncio.Semaphore(_CHECKS_AT_ONCE)
 
     def router(self, may_act: Callable[[HTTPConnection], bool]) -> APIRouter:
@@ -52,7 +54,7 @@ class CourseDoor:
 
         def demand(request: Request) -> None:
             if not may_act(request):
-                raise HTTPException(403, "only those who logged in may take part")
+                raise HTTPException(403, say(Said("access.course"), language_of(request)))
 
         @router.get("/api/course")
         def lessons() -> dict[str, Any]:
@@ -70,9 +72,9 @@ class CourseDoor:
         async def check(request: Request, learner: _Short, lesson: _Short, text: _Text) -> dict[str, Any]:
             demand(request)
             try:
-                return await self._check(learner, lesson, text)
+                return await self._check(learner, lesson, text, language_of(request))
             except UserError as error:
-                raise HTTPException(400, str(error)) from None
+                raise HTTPException(400, reason(error, language_of(request))) from None
 
         @router.get("/api/course/class")
         async def class_table(request: Request) -> dict[str, Any]:
@@ -106,33 +108,36 @@ class CourseDoor:
             path.write_text(lesson.start, encoding="utf-8")
         return path.name
 
-    async def _check(self, learner: str, name: str, text: str) -> dict[str, Any]:
+    async def _check(self, learner: str, name: str, text: str, language: Language) -> dict[str, Any]:
         lesson, learner = find_lesson(name), learner_name(learner)
         async with self._places:
-            flight = await self._fly(lesson, text)
+            flight = await self._fly(lesson, text, language)
         passed = bool(flight.get("completed"))
-        reason = str(flight["reason"])
+        why = str(flight["reason"])
         if "verdict" in flight:
-            await asyncio.to_thread(self._note, learner, lesson, "passed" if passed else "flown", reason)
-        return {"passed": passed, "reason": reason, "flight": flight}
+            await asyncio.to_thread(self._note, learner, lesson, "passed" if passed else "flown", why)
+        return {"passed": passed, "reason": why, "flight": flight}
 
-    async def _fly(self, lesson: Lesson, text: str) -> dict[str, Any]:
+    async def _fly(self, lesson: Lesson, text: str, language: Language) -> dict[str, Any]:
         """The flight as the editor's page is told it; only a `reason` if there was none."""
-        watcher = _Result()
-        start = StartBatch(do="start_batch", text=text, level=None, scenarios=(lesson.name,))
+        watcher = _Result(language)
+        start = StartBatch(
+            do="start_batch", text=text, level=None, scenarios=(lesson.name,), language=language
+        )
         await self._service.do(start, watcher)
         try:
             async with asyncio.timeout(_LONGEST_WAIT_S):
                 return await watcher.flight
         except TimeoutError:
             self._service.leave(watcher)
-            return {"reason": f"the flight was not over after {_LONGEST_WAIT_S:g} s"}
+            return {"reason": say(Said("lesson.too_long", seconds=_LONGEST_WAIT_S), language)}
 
 
 class _Result:
     """Waits for the one flight of a batch; a watcher of the service."""
 
-    def __init__(self) -> None:
+    def __init__(self, language: Language) -> None:
+        self.language = language
         self.flight: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
 
     def put(self, line: str) -> None:
@@ -145,7 +150,9 @@ class _Result:
         elif message["kind"] == "refused":
             self.flight.set_result({"reason": message["text"]})
         elif message["kind"] == "batch_ended":
-            self.flight.set_result({"reason": message["text"] or "the flight had no result"})
+            self.flight.set_result(
+                {"reason": message["text"] or say(Said("lesson.no_result"), self.language)}
+            )
 
 
 def _told(lesson: Lesson) -> dict[str, Any]:

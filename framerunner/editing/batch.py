@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
 
 from framerunner.editing import messages
 from framerunner.editing.places import find_scenario, level_names
+from framerunner.editing.session_runs import keep_result
 from framerunner.evaluation.backends import Pool
 from framerunner.evaluation.plan import Plan, plan_level
 from framerunner.evaluation.rows import Row
@@ -36,8 +38,11 @@ def fly_batch(task: messages.BatchTask, mission: Mission, tell: Callable[[BaseMo
     ranks: dict[str, float] = {}
     completed = 0
     pool, terms = Pool(jobs=min(task.jobs, len(plan))), Terms(task.processor_s, whole=True)
+    folder = None if task.keep is None else Path(task.keep)
     for row in fly_all(plan.tasks(), pool, terms):
-        flight = _flight(task.batch, row, scenarios[row.scenario])
+        scenario = scenarios[row.scenario]
+        replay = keep_result(folder, scenario, mission, task.start.text, row)
+        flight = _flight(task.batch, row, scenario, replay)
         ranks[row.scenario] = flight.rank
         completed += flight.completed
         tell(flight)
@@ -72,7 +77,7 @@ def rank_of(row: Row) -> float:
     return _RANKS[verdict] + part
 
 
-def _flight(batch: str, row: Row, scenario: Scenario) -> messages.Flight:
+def _flight(batch: str, row: Row, scenario: Scenario, replay: str) -> messages.Flight:
     track = row.track or Track()
     return messages.Flight(
         batch=batch,
@@ -89,6 +94,8 @@ def _flight(batch: str, row: Row, scenario: Scenario) -> messages.Flight:
         counts=dict(row.transitions),
         track=_track(track),
         layout=scenario.model_dump(mode="json"),
+        result=row.as_json(),
+        replay=replay,
     )
 
 

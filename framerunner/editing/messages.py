@@ -7,7 +7,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, TypeAdapter
+from pydantic import BaseModel, Field, StringConstraints, TypeAdapter
+
+from framerunner.editing.words import Language
+from offboard.authoring import StrictModel
 
 MAX_TEXT = 100_000
 """Characters of a mission."""
@@ -29,14 +32,11 @@ _Speed = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None
 Json = dict[str, Any]
 
 
-class _Message(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class _Request(_Message):
-    """`tag` comes back with the answer."""
+class _Request(StrictModel):
+    """`tag` comes back with the answer; the language of its words is that of the page's connection."""
 
     tag: int = 0
+    language: Language = "en"
 
 
 class Start(_Request):
@@ -125,15 +125,42 @@ class Cancel(_Request):
     batch: _Id
 
 
+class StartLive(_Request):
+    """Fly a mission in a real simulator, seen on the live channel."""
+
+    do: Literal["start_live"]
+    text: _Text
+    scenario: _Name = "test-case-1"
+    speed: Annotated[float, Field(ge=0.1, le=20, allow_inf_nan=False)] = 1.0
+
+
+class StopLive(_Request):
+    """End the flight in the real simulator."""
+
+    do: Literal["stop_live"]
+
+
 Request = Annotated[
-    Start | Pause | GoOn | Step | Speed | BreakOn | Change | Stop | Watch | StartBatch | Cancel,
+    Start
+    | Pause
+    | GoOn
+    | Step
+    | Speed
+    | BreakOn
+    | Change
+    | Stop
+    | Watch
+    | StartBatch
+    | Cancel
+    | StartLive
+    | StopLive,
     Field(discriminator="do"),
 ]
 REQUEST: TypeAdapter[Request] = TypeAdapter(Request)
 Order = Pause | GoOn | Step | Speed | BreakOn | Change | Stop | Watch
 
 
-class Guard(_Message):
+class Guard(StrictModel):
     """A transition out of the active states; `holds` is null if its guard cannot be evaluated now."""
 
     id: str
@@ -142,7 +169,7 @@ class Guard(_Message):
     holds: bool | None
 
 
-class Value(_Message):
+class Value(StrictModel):
     """What a guard reads; `unit` is "" if there is none."""
 
     name: str
@@ -150,7 +177,7 @@ class Value(_Message):
     unit: str
 
 
-class Taken(_Message):
+class Taken(StrictModel):
     """A transition that was taken; `ids` has it and each `then` it led to."""
 
     ids: tuple[str, ...]
@@ -162,7 +189,7 @@ class Taken(_Message):
     seconds: float  # in `source`
 
 
-class StateTime(_Message):
+class StateTime(StrictModel):
     """A time in which a state was active."""
 
     state: str
@@ -170,20 +197,29 @@ class StateTime(_Message):
     to_s: float
 
 
-class Started(_Message):
-    """A flight was started."""
+class Contact(StrictModel):
+    """A first contact with a frame (its colour), a `pole` or a `wall`."""
+
+    name: str
+    time_s: float
+
+
+class Started(StrictModel):
+    """A flight was started; `layout` is the scenario, as its file has it."""
 
     kind: Literal["started"] = "started"
     tag: int
     run: str
+    layout: Json
 
 
-class Now(_Message):
+class Now(StrictModel):
     """What the chart does now.
 
     Attributes:
-        full: `taken`, `counts`, `spans` and `trail` hold all so far and replace what was told before;
-            otherwise what is new since the last message, and of `counts` those that changed.
+        full: `taken`, `counts`, `spans`, `contacts` and `trail` hold all so far and replace what was told
+            before; otherwise what is new since the last message, and of `counts` those that changed.
+        began_s: when the motors started, from which the referee counts; null before.
         active: full ids of the active states, outermost first.
         stopped_in: the state whose entry paused the flight; "" if something else did.
         taken: the newest hundred.
@@ -197,6 +233,7 @@ class Now(_Message):
     run: str
     full: bool
     time_s: float
+    began_s: float | None
     state: str
     active: tuple[str, ...]
     seconds_in_state: float
@@ -208,12 +245,13 @@ class Now(_Message):
     taken: tuple[Taken, ...]
     counts: dict[str, int]
     spans: tuple[StateTime, ...]
+    contacts: tuple[Contact, ...]
     pose: tuple[float | None, ...]
     command: tuple[float | None, ...]
     trail: tuple[tuple[float | None, ...], ...]
 
 
-class Changed(_Message):
+class Changed(StrictModel):
     """A changed mission took over; `ids` are the ids that transitions have now, by their ids before."""
 
     kind: Literal["changed"] = "changed"
@@ -222,7 +260,7 @@ class Changed(_Message):
     ids: dict[str, str]
 
 
-class Refused(_Message):
+class Refused(StrictModel):
     """A request was refused; `text` is one line, `lines` are all problems of a mission."""
 
     kind: Literal["refused"] = "refused"
@@ -232,14 +270,14 @@ class Refused(_Message):
     run: str = ""
 
 
-class Done(_Message):
+class Done(StrictModel):
     """A request was carried out."""
 
     kind: Literal["done"] = "done"
     tag: int
 
 
-class Ended(_Message):
+class Ended(StrictModel):
     """A flight is over. `result` is as `result.json`; null if a fault of the program ended it."""
 
     kind: Literal["ended"] = "ended"
@@ -251,7 +289,7 @@ class Ended(_Message):
     spans: tuple[StateTime, ...]
 
 
-class FlownTrack(_Message):
+class FlownTrack(StrictModel):
     """Where a drone was: times since motors on, places, and the index in `states` of each sample's state."""
 
     time_s: tuple[float | None, ...] = ()
@@ -262,7 +300,7 @@ class FlownTrack(_Message):
     states: tuple[str, ...] = ()
 
 
-class BatchStarted(_Message):
+class BatchStarted(StrictModel):
     """A batch was started."""
 
     kind: Literal["batch_started"] = "batch_started"
@@ -271,7 +309,7 @@ class BatchStarted(_Message):
     count: int
 
 
-class Flight(_Message):
+class Flight(StrictModel):
     """A flight of a batch has ended.
 
     Attributes:
@@ -280,6 +318,8 @@ class Flight(_Message):
         cause: what happened, in one line; "" of a clean flight.
         layout: the scenario, as its file has it.
         counts: how often each transition was taken.
+        result: as `result.json`.
+        replay: name by which `/api/runs` has it; "" if it was not kept.
     """
 
     kind: Literal["flight"] = "flight"
@@ -297,9 +337,11 @@ class Flight(_Message):
     counts: dict[str, int]
     track: FlownTrack
     layout: Json
+    result: Json
+    replay: str
 
 
-class BatchEnded(_Message):
+class BatchEnded(StrictModel):
     """A batch is over; `text` says why if not all were flown, `order` names the scenarios, failures first."""
 
     kind: Literal["batch_ended"] = "batch_ended"
@@ -311,6 +353,19 @@ class BatchEnded(_Message):
     order: tuple[str, ...]
 
 
+LiveState = Literal["starting", "flying", "ended", "stopped"]
+
+
+class Live(StrictModel):
+    """The flight in the real simulator; `text` says how it ended, or why it could not begin."""
+
+    kind: Literal["live"] = "live"
+    state: LiveState
+    scenario: str
+    speed: float
+    text: str = ""
+
+
 FromWorker = Annotated[
     Started | Now | Changed | Refused | Done | Ended | BatchStarted | Flight | BatchEnded,
     Field(discriminator="kind"),
@@ -318,16 +373,18 @@ FromWorker = Annotated[
 FROM_WORKER: TypeAdapter[FromWorker] = TypeAdapter(FromWorker)
 
 
-class _WorkerTask(_Message):
+class _WorkerTask(StrictModel):
     """What a worker process is given first.
 
     Attributes:
         pilot: a contestant's file, which is executed; only from the server's command line.
+        keep: folder in which the flight's run folder is made, for replays; None: nowhere.
         processor_s: processor time of one flight.
         memory_bytes: beyond that of the libraries.
     """
 
     pilot: str | None
+    keep: str | None
     processor_s: float
     memory_bytes: int
 

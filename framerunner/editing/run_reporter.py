@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
-from framerunner.editing.messages import Ended, Guard, Now, StateTime, Taken, Value
+from framerunner.editing.messages import Contact, Ended, Guard, Now, StateTime, Taken, Value
 from framerunner.flying.cause import lost_in
 from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.guard_reporter import plain_value
@@ -14,6 +14,7 @@ from framerunner.runs.chart_record import ChartRecord, StateSpan
 from offboard.app import Moment
 from offboard.drone import DroneState
 from offboard.engine import MissionEngine, TransitionTaken
+from scenarios.models import TrueState
 from wire.finite_json import finite
 
 PERIOD_S = 0.04  # wall time between two messages of a flight that is not paused
@@ -24,16 +25,22 @@ Point = tuple[float | None, ...]
 
 
 class RunReporter:
-    """Sees a flight as observer (`see`) and as a control's listener (`hear`).
+    """Sees a flight as observer (`see`, `see_truth`) and as a control's listener (`hear`).
 
     Args:
         run: id of the flight.
         tell: takes the messages.
         clock: seconds that never go back.
+        solids: names of frames and obstacles, to touch which is told.
     """
 
     def __init__(
-        self, run: str, tell: Callable[[Now], None], clock: Callable[[], float] = time.monotonic
+        self,
+        run: str,
+        tell: Callable[[Now], None],
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        solids: Collection[str] = (),
     ) -> None:
         self._run = run
         self._tell = tell
@@ -45,7 +52,10 @@ class RunReporter:
         self._told_s = -PERIOD_S
         self._standing: RunStanding | None = None
         self._full = True
-        self._told = (0, 0, 0)  # transitions, spans and places
+        self._solids = frozenset(solids)
+        self._began_us: int | None = None  # motors on
+        self._contacts: dict[str, int] = {}  # vehicle time of the first one with each
+        self._told = (0, 0, 0, 0)  # transitions, spans, contacts and places
 
     def see(self, moment: Moment) -> None:
         """Take a tick."""
@@ -61,6 +71,14 @@ class RunReporter:
         if state.time_us - self._trail_us >= TRAIL_US:
             self._trail_us = state.time_us
             self._trail.append(_numbers(state.time_us / 1e6, state.x, state.y, state.z))
+
+    def see_truth(self, truth: TrueState) -> None:
+        """Note when the motors start, and the first contact with each frame and obstacle."""
+        if self._began_us is None and truth.motors_on:
+            self._began_us = truth.time_us
+        for name in truth.contacts:
+            if name in self._solids:
+                self._contacts.setdefault(name, truth.time_us)
 
     def rename(self, ids: Mapping[str, str]) -> None:
         """Count on with a changed chart; the next message is a full one."""
@@ -101,14 +119,16 @@ class RunReporter:
     def _now(self, engine: MissionEngine, state: DroneState, standing: RunStanding) -> Now:
         full, self._full = self._full, False
         chart, record = engine.chart_now(), self._record
-        taken_told, spans_told, trail_told = (0, 0, 0) if full else self._told
+        taken_told, spans_told, contacts_told, trail_told = (0, 0, 0, 0) if full else self._told
         taken, spans = record.taken[taken_told:], record.ended(spans_told)
-        self._told = (len(record.taken), spans_told + len(spans), len(self._trail))
+        contacts = [Contact(name=name, time_s=time_us / 1e6) for name, time_us in self._contacts.items()]
+        self._told = (len(record.taken), spans_told + len(spans), len(contacts), len(self._trail))
         changed = record.counts if full else dict.fromkeys(name for each in taken for name in each.ids)
         return Now(
             run=self._run,
             full=full,
             time_s=state.time_us / 1e6,
+            began_s=None if self._began_us is None else self._began_us / 1e6,
             state=chart.state,
             active=chart.active,
             seconds_in_state=chart.seconds_in_state,
@@ -120,6 +140,7 @@ class RunReporter:
             taken=tuple(map(_taken, taken[-MAX_TAKEN:])),
             counts={name: record.counts[name] for name in changed},
             spans=_spans(spans),
+            contacts=tuple(contacts[contacts_told:]),
             pose=_numbers(state.x, state.y, state.z, state.yaw),
             command=_numbers(*self._command),
             trail=tuple(self._trail[trail_told:]),

@@ -15,6 +15,9 @@ from typing import Protocol
 from pydantic import BaseModel, ValidationError
 
 from framerunner.editing import messages
+from framerunner.editing.live import LiveFlight, LiveSettings
+from framerunner.editing.session_runs import forget_old
+from framerunner.editing.words import Language, Said, say
 from framerunner.editing.worker_process import WorkerProcess
 
 _SPARE_S = 2.0  # after a start, until a worker is made ready for the next one
@@ -29,6 +32,7 @@ class EditingSettings:
 
     Attributes:
         pilot: a contestant's Python file, which workers execute; None: missions use `Pilot` itself.
+        keep: folder for the run folders of flights, for replays; None: they are not kept.
         max_runs: flights under control at the same time.
         max_batches: batches at the same time.
         jobs: flights of a batch at the same time.
@@ -36,9 +40,11 @@ class EditingSettings:
         memory_bytes: of each process, beyond that of the libraries.
         silent_s: after which a batch that told nothing is ended.
         unwatched_s: after which a flight or batch that nobody watches is ended.
+        live: how flights in the real simulator are flown; None: there are none.
     """
 
     pilot: Path | None = None
+    keep: Path | None = None
     max_runs: int = 4
     max_batches: int = 1
     jobs: int = field(default_factory=lambda: max(1, (os.cpu_count() or 2) - 1))
@@ -46,10 +52,13 @@ class EditingSettings:
     memory_bytes: int = 512 << 20
     silent_s: float = 300.0
     unwatched_s: float = 30.0
+    live: LiveSettings | None = None
 
 
 class Watcher(Protocol):
-    """A browser's connection."""
+    """A browser's connection; `language` is that of its page."""
+
+    language: Language
 
     def put(self, line: str) -> None:
         """Queue a message, JSON."""
@@ -64,8 +73,9 @@ class _Job:
         refused: it was not even started.
     """
 
-    def __init__(self, name: str, worker: WorkerProcess, *, is_batch: bool) -> None:
+    def __init__(self, name: str, worker: WorkerProcess, *, is_batch: bool, language: Language) -> None:
         self.name = name
+        self.language = language  # of who started it
         self.worker = worker
         self.is_batch = is_batch
         self.watchers: set[Watcher] = set()
@@ -106,10 +116,13 @@ class EditingService:
         self._pages: set[Watcher] = set()
         self._spare: WorkerProcess | None = None
         self._closed = False
+        self._live = None if settings.live is None else LiveFlight(settings.live, self._tell_pages)
 
     def enter(self, watcher: Watcher) -> None:
         """Note a watcher that connected; a worker is made ready for it, as that takes a second."""
         self._pages.add(watcher)
+        if self._live is not None and self._live.latest is not None:
+            _put(watcher, self._live.latest)
         self._prepare()
 
     async def do(self, request: messages.Request, watcher: Watcher) -> None:
@@ -117,11 +130,13 @@ class EditingService:
         if isinstance(request, messages.Start | messages.StartBatch):
             await self._start(request, watcher)
             return
+        if isinstance(request, messages.StartLive | messages.StopLive):
+            await self._do_live(request, watcher)
+            return
         name = request.batch if isinstance(request, messages.Cancel) else request.run
         job = self._jobs.get(name)
         if job is None:
-            text = f"'{name}': there is no such flight or batch; start it again"
-            _put(watcher, messages.Refused(tag=request.tag, text=text))
+            _refuse(watcher, request.tag, Said("flight.unknown", name=name))
         elif isinstance(request, messages.Watch):
             self._watch(job, request, watcher)
         elif isinstance(request, messages.Cancel):
@@ -129,8 +144,8 @@ class EditingService:
             job.worker.kill()
             _put(watcher, messages.Done(tag=request.tag))
         elif job.over or job.is_batch:
-            why = "it is a batch; cancel it" if job.is_batch else "the flight is over"
-            _put(watcher, messages.Refused(tag=request.tag, text=why, run=name))
+            why = Said("flight.is_batch" if job.is_batch else "flight.over")
+            _refuse(watcher, request.tag, why, run=name)
         else:
             job.worker.send(request.model_copy(update={"tag": job.ask(watcher, request.tag)}))
 
@@ -154,18 +169,40 @@ class EditingService:
         for job in self._jobs.values():
             job.cancelled = True
             job.worker.kill()
+        if self._live is not None:
+            await self._live.close()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _do_live(self, request: messages.StartLive | messages.StopLive, watcher: Watcher) -> None:
+        if self._live is None:
+            _refuse(watcher, request.tag, Said("live.none_here"))
+            return
+        refusal: Said | None
+        if isinstance(request, messages.StartLive):
+            refusal = await self._live.start(request)
+        else:
+            refusal = None if self._live.stop() else Said("live.none")
+        if refusal is None:
+            _put(watcher, messages.Done(tag=request.tag))
+        else:
+            _refuse(watcher, request.tag, refusal)
+
+    def _tell_pages(self, message: BaseModel) -> None:
+        line = message.model_dump_json()
+        for page in self._pages:
+            page.put(line)
 
     async def _start(self, request: messages.Start | messages.StartBatch, watcher: Watcher) -> None:
         is_batch = isinstance(request, messages.StartBatch)
         refusal = self._no_room(is_batch=is_batch)
-        if refusal:
-            _put(watcher, messages.Refused(tag=request.tag, text=refusal))
+        if refusal is not None:
+            _refuse(watcher, request.tag, refusal)
             return
         name = secrets.token_urlsafe(9)
         settings = self._settings
         common = {
             "pilot": None if settings.pilot is None else str(settings.pilot),
+            "keep": None if settings.keep is None else str(settings.keep),
             "processor_s": settings.processor_s,
             "memory_bytes": settings.memory_bytes,
         }
@@ -179,7 +216,7 @@ class EditingService:
             task = messages.RunTask.model_validate({**common, "run": name, "start": start})
         spare, self._spare = self._spare, None
         worker = spare if spare is not None and spare.usable else WorkerProcess()
-        job = self._jobs[name] = _Job(name, worker, is_batch=is_batch)
+        job = self._jobs[name] = _Job(name, worker, is_batch=is_batch, language=request.language)
         job.watchers.add(watcher)
         job.ask(watcher, request.tag)
         self._keep(self._follow(job, task))
@@ -205,14 +242,14 @@ class EditingService:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _no_room(self, *, is_batch: bool) -> str:
-        """Why no more can be started; "" if it can."""
+    def _no_room(self, *, is_batch: bool) -> Said | None:
+        """Why no more can be started; None if it can."""
         running = [job for job in self._jobs.values() if not job.over and job.is_batch is is_batch]
         if is_batch and len(running) >= self._settings.max_batches:
-            return "other flights are being flown; wait until they are over, or cancel them"
+            return Said("flight.others")
         if not is_batch and len(running) >= self._settings.max_runs:
-            return f"no more than {len(running)} can be under control at the same time; stop one first"
-        return ""
+            return Said("flight.too_many", count=len(running))
+        return None
 
     def _watch(self, job: _Job, request: messages.Watch, watcher: Watcher) -> None:
         job.watchers.add(watcher)
@@ -225,23 +262,25 @@ class EditingService:
 
     async def _follow(self, job: _Job, task: BaseModel) -> None:
         """Pass on what a worker tells until it ends, and say how it ended if it did not."""
-        how = ""
+        how: Said | None = None
         try:
             try:
                 await job.worker.start()
             except OSError as error:
-                how = f"it cannot be started ({error.strerror or error})"
+                how = Said("flight.not_started", reason=error.strerror or error)
                 return
             job.worker.send(task)
             try:
                 if not job.cancelled:
                     await self._pass_on(job)
             except TimeoutError:
-                how = f"nothing was flown for {self._settings.silent_s:g} s"
+                how = Said("flight.silent", seconds=self._settings.silent_s)
                 job.worker.kill()
             how = await job.worker.ended() or how
         finally:
             job.worker.kill()
+            if self._settings.keep is not None:
+                await asyncio.to_thread(forget_old, self._settings.keep)
             if job.refused:
                 del self._jobs[job.name]
             elif not job.over:
@@ -286,12 +325,14 @@ class EditingService:
                 job.flown.append(message)
                 job.tell(message, keep=True)
 
-    def _end(self, job: _Job, how: str) -> None:
+    def _end(self, job: _Job, how: Said | None) -> None:
         """Tell the end of a job whose process did not."""
         job.over = True
-        text = "cancelled" if job.cancelled else how or "it ended without a result"
+        why = Said("flight.cancelled") if job.cancelled else how or Said("flight.no_result")
+        if not job.is_batch and not job.cancelled:
+            why = Said("flight.ended_process", how=why)
+        text = say(why, job.language)
         if not job.is_batch:
-            text = text if job.cancelled else f"the flight ended its process: {text}"
             ended = messages.Ended(run=job.name, text=text, lost_in="", result=None, counts={}, spans=())
             job.tell(ended, keep=True)
             return
@@ -322,6 +363,10 @@ class EditingService:
         over = [name for name, job in self._jobs.items() if job.over]
         for name in over[: max(0, len(over) - _KEPT_JOBS)]:
             del self._jobs[name]
+
+
+def _refuse(watcher: Watcher, tag: int, why: Said, *, run: str = "") -> None:
+    _put(watcher, messages.Refused(tag=tag, text=say(why, watcher.language), run=run))
 
 
 def _put(watcher: Watcher, message: BaseModel) -> None:

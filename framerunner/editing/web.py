@@ -4,11 +4,12 @@
 characters, "max_count": flights of a batch}`. A `scenario` below is the name of one or of a lesson, whose
 goals then count; random ones are named as level and seed, such as `calm-17`.
 
-The WebSocket is closed with code 4403 if the visitor may not start flights. Each message is a JSON object. A
-request has `do` and may have `tag`, a whole number that comes back with its answer:
+`/ws/editing?language=es` has the server's words in Spanish. It is closed with code 4403 if the visitor may
+not start flights. Each message is a JSON object. A request has `do` and may have `tag`, a whole number that
+comes back with its answer:
 
     {"do": "start", "text": MISSION, "scenario": "test-case-1", "seed": 0, "speed": 1 or null,
-     "paused": false, "break_on": [state ids]}      answer: started {run} or refused
+     "paused": false, "break_on": [state ids]}      answer: started {run, layout} or refused
     {"do": "pause" | "go_on" | "stop", "run"}       answer: done or refused; likewise those that follow
     {"do": "step", "run", "ticks": 1}
     {"do": "speed", "run", "speed": vehicle seconds a second, null: as fast as possible}
@@ -18,20 +19,26 @@ request has `do` and may have `tag`, a whole number that comes back with its ans
     {"do": "start_batch", "text", "level": "calm", "count": 20, "first_seed": 1}
     {"do": "start_batch", "text", "scenarios": [names]}      answer: batch_started {batch, count} or refused
     {"do": "cancel", "batch"}                       its results stay
+    {"do": "start_live", "text", "scenario", "speed": 1.0}   a flight in the real simulator: `framerunner fly`
+    {"do": "stop_live"}                             answer: done or refused
 
 The server tells `{"kind": ...}`:
 
-    now      {run, full, time_s, state, active, seconds_in_state, paused, stopped_in, speed,
+    now      {run, full, time_s, began_s, state, active, seconds_in_state, paused, stopped_in, speed,
               guards: [{id, to, when, holds}], values: [{name, value, unit}],
               taken: [{ids, source, target, when, values: [[name, value]], time_s, seconds}], counts: {id: n},
-              spans: [{state, from_s, to_s}], pose: [x, y, z, yaw], command: [forward, left, up, yaw rate],
+              spans: [{state, from_s, to_s}], contacts: [{name, time_s}], pose: [x, y, z, yaw],
+              command: [forward, left, up, yaw rate],
               trail: [[time_s, x, y, z]]}           at most 25 a second, at once when the flight pauses
     changed  {run, tag, ids: {id before: id now}}
     ended    {run, text, lost_in, result: as result.json or null, counts, spans}
     flight   {batch, scenario, seed, verdict, completed, reason, cause, lost_in, rank, total_time_s,
-              frames_crossed, counts, track: {time_s, x, y, z, state, states}, layout: the scenario}
+              frames_crossed, counts, track: {time_s, x, y, z, state, states}, layout: the scenario,
+              result: as result.json, replay: its name in /api/runs}
+    live     {state: starting | flying | ended | stopped, scenario, speed, text}   the real simulator, to all
     batch_ended {batch, flown, completed, count, text, order}
-    refused  {tag, text, lines, run};  done {tag};  started {tag, run};  batch_started {tag, batch, count}
+    refused  {tag, text, lines, run};  done {tag};  started {tag, run, layout: the scenario};
+    batch_started {tag, batch, count}
 
 Ids of transitions are those of `offboard.chart.spec.transition_id`, such as `red.turning/2`, `red/then` and
 `red/resume`. `framerunner.editing.messages` has all fields. A mission is text, loaded by the checker of
@@ -55,6 +62,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from framerunner.editing import messages
 from framerunner.editing.places import lesson_names, level_names, scenario_names
 from framerunner.editing.service import EditingService, EditingSettings
+from framerunner.editing.words import Language, Said, language_of, say
 from monitor.access import refuse
 from monitor.pilot_channel import Allowance
 from scenarios.result import first_error
@@ -90,11 +98,12 @@ class EditingDoor:
 
         @router.websocket("/ws/editing")
         async def editing(websocket: WebSocket) -> None:
+            language = language_of(websocket)
             if not may_act(websocket):
-                await refuse(websocket, "only those who logged in may start flights")
+                await refuse(websocket, say(Said("access.fly"), language))
                 return
             await websocket.accept()
-            await _Connection(websocket, self._service).serve()
+            await _Connection(websocket, self._service, language).serve()
 
         return router
 
@@ -109,7 +118,8 @@ class EditingDoor:
 class _Connection:
     """One browser's WebSocket; a watcher of the service."""
 
-    def __init__(self, websocket: WebSocket, service: EditingService) -> None:
+    def __init__(self, websocket: WebSocket, service: EditingService, language: Language) -> None:
+        self.language = language
         self._websocket = websocket
         self._service = service
         self._outbox: deque[str] = deque()
@@ -151,14 +161,15 @@ class _Connection:
 
     async def _take(self, text: str) -> None:
         if len(text) > _MAX_MESSAGE:
-            self.put(messages.Refused(tag=0, text="the message is too long").model_dump_json())
+            text = say(Said("message.too_long"), self.language)
+            self.put(messages.Refused(tag=0, text=text).model_dump_json())
             return
         try:
             request = messages.REQUEST.validate_json(text)
         except ValidationError as error:
             self.put(messages.Refused(tag=_tag_in(text), text=first_error(error)).model_dump_json())
             return
-        await self._service.do(request, self)
+        await self._service.do(request.model_copy(update={"language": self.language}), self)
 
     async def _send(self) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):

@@ -23,6 +23,8 @@ from framerunner.editing import messages
 from framerunner.editing.batch import fly_batch
 from framerunner.editing.places import find_scenario
 from framerunner.editing.run_reporter import RunReporter
+from framerunner.editing.session_runs import KeptFlight
+from framerunner.editing.words import Language, Said, SaidError, reasons, say
 from framerunner.evaluation.runner import processor_limit
 from framerunner.flying.lockstep import lockstep_flight
 from framerunner.flying.plan import FlightPlan
@@ -59,18 +61,20 @@ def main() -> int:
             fly_batch(task, mission, tell)
         else:
             _ControlledRun(task, mission, pilot, tell).fly(sys.stdin)
-    except MissionError as error:
-        tell(refusal(tag, error))
     except UserError as error:
-        tell(messages.Refused(tag=tag, text=" ".join(str(error).split())))
+        tell(refusal(tag, error, task.start.language))
     return 0
 
 
-def refusal(tag: int, error: MissionError, run: str = "") -> messages.Refused:
+def refusal(tag: int, error: UserError, language: Language, run: str = "") -> messages.Refused:
     """Why a mission is not flown: its first problem, and all of them."""
-    lines = tuple(str(error).splitlines())
-    more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
-    return messages.Refused(tag=tag, text=f"{lines[0]}{more}", lines=lines, run=run)
+    lines = reasons(error, language)
+    text = lines[0]
+    if len(lines) > 1:
+        text = say(Said("flight.more", first=text, count=len(lines) - 1), language)
+    return messages.Refused(
+        tag=tag, text=text, lines=lines if isinstance(error, MissionError) else (), run=run
+    )
 
 
 class _ControlledRun:
@@ -81,25 +85,33 @@ class _ControlledRun:
         _check_breaks(start.break_on, mission)
         self._task, self._mission, self._pilot, self._tell = task, mission, pilot, tell
         self._plan = FlightPlan(find_scenario(start.scenario), mission, start.seed)
-        self._reporter = RunReporter(task.run, tell)
+        self._reporter = RunReporter(task.run, tell, solids=self._plan.scenario.solid_names)
         self._control = RunControl(
             speed=start.speed, paused=start.paused, break_on=start.break_on, listener=self._reporter.hear
         )
 
     def fly(self, orders: TextIO) -> None:
         """Fly to the end; this process ends when there can be no more orders."""
-        self._tell(messages.Started(tag=self._task.start.tag, run=self._task.run))
+        layout = self._plan.scenario.model_dump(mode="json")
+        self._tell(messages.Started(tag=self._task.start.tag, run=self._task.run, layout=layout))
         threading.Thread(target=self._take_orders, args=(orders,), daemon=True).start()
+        folder = None if self._task.keep is None else Path(self._task.keep)
+        kept = KeptFlight(folder, self._plan, self._task.start.text)
         flight = lockstep_flight(
-            self._plan, observers=(self._reporter.see,), before_tick=self._control.before_tick
+            self._plan,
+            observers=(self._reporter.see, *kept.observers),
+            truth_observers=(self._reporter.see_truth,),
+            before_tick=self._control.before_tick,
         )
         try:
             with processor_limit(self._task.processor_s):
                 flown = asyncio.run(flight)
         except Exception as error:  # a fault of the program, or of a contestant's file
             text = " ".join(str(error).split())
+            kept.finish(None)
             self._tell(self._reporter.failed(f"{type(error).__name__}: {text}"))
         else:
+            kept.finish(flown)
             self._tell(self._reporter.ended(flown))
 
     def _take_orders(self, orders: Iterator[str]) -> None:
@@ -119,7 +131,7 @@ class _ControlledRun:
             if isinstance(order, messages.BreakOn):
                 _check_breaks(order.states, self._mission)
         except UserError as error:
-            self._tell(messages.Refused(tag=order.tag, text=str(error), run=self._task.run))
+            self._tell(refusal(order.tag, error, order.language, self._task.run))
             return
         self._tell(messages.Done(tag=order.tag))
         control = self._control
@@ -145,7 +157,7 @@ class _ControlledRun:
         try:
             mission = mission_from_text(order.text, self._pilot)
         except MissionError as error:
-            self._tell(refusal(order.tag, error, run))
+            self._tell(refusal(order.tag, error, order.language, run))
             return
 
         def changed(why_not: str, ids: Mapping[str, str]) -> None:
@@ -160,14 +172,11 @@ class _ControlledRun:
         self._control.change(mission, changed)
 
 
-class _UnknownStateError(UserError):
-    """A state to stop at is not in the chart."""
-
-
 def _check_breaks(states: tuple[str, ...], mission: Mission) -> None:
+    """Raise `SaidError` if a state to stop at is not in the chart."""
     unknown = next((each for each in states if each not in mission.states), None)
     if unknown is not None:
-        raise _UnknownStateError(f"break_on '{unknown:.60}': is not a state of the mission; take its full id")
+        raise SaidError("flight.no_state", name=unknown[:60])
 
 
 def _teller(output: TextIO) -> Tell:

@@ -12,6 +12,8 @@ from collections.abc import AsyncIterator
 
 from pydantic import BaseModel
 
+from framerunner.editing.words import Said
+
 MAX_LINE_BYTES = 8_000_000
 _MAX_STDERR_BYTES = 20_000
 _GRACE_S = 2.0  # from the end of its output to its own
@@ -64,8 +66,8 @@ class WorkerProcess:
             async for line in self._process.stdout:
                 yield line
 
-    async def ended(self) -> str:
-        """Wait until it has ended and end what it left; returns how it ended, "" if as it should."""
+    async def ended(self) -> Said | None:
+        """Wait until it has ended and end what it left; returns how it ended, None if as it should."""
         process, errors = self._process, self._errors
         assert process is not None
         assert errors is not None
@@ -76,11 +78,11 @@ class WorkerProcess:
         code = await process.wait()
         lines = (await errors).decode(errors="replace").strip().splitlines()
         if code == 0:
-            return ""
+            return None
         if code in (-signal.SIGKILL, -signal.SIGXCPU):
-            return "it was ended, or used too much processor time or memory"
+            return Said("flight.killed")
         how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-        return f"{how}: {lines[-1][:300]}" if lines else how
+        return Said("plain", text=f"{how}: {lines[-1][:300]}" if lines else how)
 
     async def end(self) -> None:
         """Kill it and wait for its end, if it was started."""

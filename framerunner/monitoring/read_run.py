@@ -1,4 +1,4 @@
-"""Reads one run in a separate process: `python -m framerunner.monitoring.read_run FOLDER TARGET`.
+"""Reads one run in a separate process: `python -m framerunner.monitoring.read_run FOLDER TARGET [PILOT]`.
 
 A lockstep flight is flown again, which uses a processor for seconds; the monitor and the flights that it
 shows must not be slowed by that. A damaged run, or one larger than memory, ends only this process. The
@@ -29,6 +29,7 @@ from offboard.chart.spec import enter_state
 from offboard.engine import DONE, TransitionTaken
 from offboard.mission import Mission, MissionError, load_mission, mermaid
 from offboard.navigation.view import NavigationView
+from offboard.pilot_file import PilotFile, read_pilot
 from scenarios.loader import load_scenario
 from scenarios.models import COLOURS, Scenario, ScenarioError
 from vision.types import Detection, Detections
@@ -52,38 +53,41 @@ Clock = Callable[[int], float]
 def main() -> int:
     """Read the run that the command line names; on failure the last line on standard error is the reason."""
     folder, target = Path(sys.argv[1]), Path(sys.argv[2])
+    pilot_file = Path(sys.argv[3]) if len(sys.argv) > 3 else None
     end_with_standard_input(lambda: shutil.rmtree(target, ignore_errors=True))
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)
     cv2.setNumThreads(1)  # each has a stack, and the flight that is shown live needs the processors
     limit_resources(MEMORY_BYTES, MAX_READ_S)
     try:
+        pilot = None if pilot_file is None else read_pilot(pilot_file)
         os.chdir(folder.parent)  # so that no message shows the path of the runs
-        read_run(Path(folder.name), target)
+        read_run(Path(folder.name), target, pilot)
     except MemoryError:
         print(f"it needs more than {MEMORY_BYTES >> 20} MB of memory; it must be damaged", file=sys.stderr)
         return 2
-    except (RecordingError, ScenarioError, OSError) as error:
+    except (RecordingError, ScenarioError, MissionError, OSError) as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         return 2
     return 0
 
 
-def read_run(folder: Path, target: Path) -> None:
+def read_run(folder: Path, target: Path, pilot: PilotFile | None = None) -> None:
     """Write a run as the monitor's replay reads it.
 
     Args:
         folder: of the run.
         target: folder for `recording.json`, a file with all images, and their places in it.
+        pilot: a contestant's file that the monitor was started with; its names may be used.
 
     Raises:
         RecordingError: there is nothing to show, or it is damaged.
     """
     scenario_file = folder / "scenario.yaml"
     scenario = load_scenario(scenario_file) if scenario_file.is_file() else None
-    mission, source = _load_mission(folder / "mission.yaml")
+    mission, source = _load_mission(folder / "mission.yaml", pilot)
     with (target / IMAGES).open("w+b") as file:
-        with recorded_flight(folder) as recorded:
+        with recorded_flight(folder, pilot) as recorded:
             flight = collect(recorded, ImageFile(file))
         recording = _flight_json(folder.name, flight, scenario, mission, source)
         (target / SPANS).write_text(json.dumps(flight.images.spans), encoding="utf-8")
@@ -91,11 +95,11 @@ def read_run(folder: Path, target: Path) -> None:
         (target / RECORDING).write_text(text, encoding="utf-8")
 
 
-def _load_mission(path: Path) -> tuple[Mission | None, str]:
-    """A mission and the text of its file; None if there is none that loads without executing Python."""
+def _load_mission(path: Path, pilot: PilotFile | None) -> tuple[Mission | None, str]:
+    """A mission and the text of its file; None if there is none that loads with no other Python file."""
     try:
         source = path.read_text(encoding="utf-8")
-        return (load_mission(path) if len(source) < _MEGABYTE else None), source
+        return (load_mission(path, pilot) if len(source) < _MEGABYTE else None), source
     except (OSError, ValueError, MissionError):
         return None, ""
 

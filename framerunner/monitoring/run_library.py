@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import signal
@@ -11,7 +12,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -69,10 +70,17 @@ class RunFolders:
     """The run folders in a folder, which need not exist yet; may be used from several threads.
 
     Implements `monitor.ports.RunLibrary`, which says what is returned and raised.
+
+    Args:
+        path: of the folder.
+        session: a second folder, whose flights are kept until the program ends; None: there is none.
+        pilot: a contestant's file that the user named; missions that need it can be shown.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, session: Path | None = None, pilot: Path | None = None) -> None:
         self.path = path
+        self._session = session
+        self._pilot = None if pilot is None else pilot.absolute()
         self._lock = threading.Lock()
         self._seen: dict[str, _Seen] = {}
         self._unpacked: OrderedDict[str, _Unpacked] = OrderedDict()
@@ -119,10 +127,10 @@ class RunFolders:
 
     def _folders(self) -> list[Path]:
         """Folders that may be runs; no links, which could lead anywhere."""
-        try:
-            entries = list(self.path.iterdir())
-        except OSError:
-            return []
+        entries: list[Path] = []
+        for path in (self.path, self._session):
+            with contextlib.suppress(OSError):
+                entries += [] if path is None else path.iterdir()
         return [each for each in entries if _is_text(each.name) and not each.is_symlink() and each.is_dir()]
 
     def _look(self, folder: Path) -> _Seen | None:
@@ -133,7 +141,7 @@ class RunFolders:
         known = self._seen.get(folder.name)
         if known is not None and known.mark == mark:
             return known
-        info = _info(folder)
+        info = replace(_info(folder), session=folder.parent == self._session)
         started_s = _unix_s(info.started)
         return _Seen(mark, info, max(mark) / 1e9 if started_s is None else started_s)
 
@@ -146,7 +154,7 @@ class RunFolders:
         if failed and failed.mark == mark and time.monotonic() - failed.at_s < _FAILURE_KEPT_S:
             raise RunError(failed.message)
         try:
-            run = _unpack(folder, mark, self._readers)
+            run = _unpack(folder, mark, self._readers, self._pilot)
         except RunError as error:
             with self._lock:
                 self._failed[name] = _Failed(mark, time.monotonic(), str(error))
@@ -287,13 +295,14 @@ class Readers:
                 process.kill()
 
 
-def _unpack(folder: Path, mark: Mark, readers: Readers) -> _Unpacked:
+def _unpack(folder: Path, mark: Mark, readers: Readers, pilot: Path | None = None) -> _Unpacked:
     """Read a run in a separate process; RunError if it cannot be shown."""
     linked = [name for name in _FILES if (folder / name).is_symlink()]
     if linked:
         raise RunError(f"run '{folder.name}': its {linked[0]} is a link; linked files are not shown")
     target = TemporaryDirectory(prefix="framerunner-run-", ignore_cleanup_errors=True)
     command = [sys.executable, "-m", "framerunner.monitoring.read_run", str(folder.absolute()), target.name]
+    command += [] if pilot is None else [str(pilot)]
     try:
         code, printed = readers.run(command)
     except OSError:

@@ -27,7 +27,8 @@ holds, `edit_schema()` is their JSON Schema. `kind` is one of
     rename_state {state, name}                                  move_state {state, parent, index?}
     duplicate_state {state, name, parameters?: {name: value}}   delete_state {state, references?}
     add_transition {state, to, when?, actions?, event?, index?} delete_transition {transition}
-    redirect_transition {transition, to}                        move_transition {transition, index}
+    redirect_transition {transition, to}                        set_source {transition, state, to}
+    move_transition {transition, index}
     set_guard {transition, when}                                set_event {transition, event}
     set_transition_actions {transition, actions}                set_actions {state, section, actions}
     set_initial {state?, name}                                  set_final {state, final}
@@ -40,14 +41,15 @@ with `transition` = {state, event?: tick | done | resume, index?}, `section` = e
 an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a path or a full id.
 
 `apply(document, edit)` returns `Edited(document, changes)`; `EditSession(document, layout)` does so with
-`undo()`, `redo()` and a `layout` that follows. A `Change` is {start, removed, inserted}; the changes of one
-edit follow each other, each made for the text after those before it. What cannot be applied raises
-`EditError` with one line, and nothing is changed.
+`undo()`, `redo()` and a `layout` that follows; `place(places)` moves states and is undone likewise. A
+`Change` is {start, removed, inserted}; the changes of one edit follow each other, each made for the text
+after those before it. What cannot be applied raises `EditError` with one line, and nothing is changed; its
+`message.text(EDIT_SPANISH)` says it in Spanish.
 
 **Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
 advice), code, message, file, line, column, start, end, state, event, index, section, nodes.
 `problems_of` has them before they are put into words. `check_document(document, texts=SPANISH)` says them in
-Spanish.
+Spanish; for several languages, `findings_of(document, reported_problems(document))` checks once.
 
 **Catalogue**: `catalogue_of(document, pilot_class)`: `values` (name, type, text, unit, low,
 high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
@@ -74,19 +76,26 @@ from offboard.authoring.apply import Edited, EditSession, apply
 from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue, catalogue_of
 from offboard.authoring.diagram import Diagram, Edge, Node, diagram
 from offboard.authoring.document import Document
-from offboard.authoring.edit_error import EditError
-from offboard.authoring.edits import Edit, ReplaceText, TransitionPath, edit_schema, parse_edit
-from offboard.authoring.findings import Finding, check_document, problems_of
+from offboard.authoring.edits import Edit, ReplaceText, StrictModel, TransitionPath, edit_schema, parse_edit
+from offboard.authoring.findings import (
+    Finding,
+    check_document,
+    findings_of,
+    problems_of,
+    reported_problems,
+)
 from offboard.authoring.layout import (
     Layout,
     LayoutError,
     StateBox,
     follow,
+    known_places,
     layout_path,
     parse_layout,
     read_layout,
     write_layout,
 )
+from offboard.authoring.messages import EDIT_SPANISH, EditError
 from offboard.authoring.outline import Span
 from offboard.authoring.scxml_export import export_scxml
 from offboard.authoring.scxml_import import import_scxml
@@ -100,6 +109,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 __all__ = [
+    "EDIT_SPANISH",
     "ENGLISH",
     "SPANISH",
     "Catalogue",
@@ -120,6 +130,7 @@ __all__ = [
     "ReplaceText",
     "Span",
     "StateBox",
+    "StrictModel",
     "TransitionPath",
     "ValueEntry",
     "XmlError",
@@ -131,14 +142,17 @@ __all__ = [
     "diagram",
     "edit_schema",
     "export_scxml",
+    "findings_of",
     "follow",
     "import_scxml",
+    "known_places",
     "layout_path",
     "mermaid_of",
     "parse_edit",
     "parse_layout",
     "problems_of",
     "read_layout",
+    "reported_problems",
     "write_layout",
 ]
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from offboard.authoring import edits, state_edits, transition_edits
 from offboard.authoring.document import Document
-from offboard.authoring.edit_error import EditError
-from offboard.authoring.layout import Layout, completed, follow
+from offboard.authoring.layout import Layout, StateBox, completed, follow, with_places
+from offboard.authoring.messages import EditError
 from offboard.authoring.text import Change
 from offboard.authoring.work import Work
 from offboard.mission import MAX_FILE_BYTES
@@ -29,6 +29,7 @@ _STEPS: Mapping[type, Callable[[Work, Any], None]] = {
     edits.AddTransition: transition_edits.add_transition,
     edits.DeleteTransition: transition_edits.delete_transition,
     edits.RedirectTransition: transition_edits.redirect_transition,
+    edits.SetSource: transition_edits.set_source,
     edits.MoveTransition: transition_edits.move_transition,
     edits.SetGuard: transition_edits.set_guard,
     edits.SetEvent: transition_edits.set_event,
@@ -57,7 +58,7 @@ def apply(document: Document, edit: edits.Edit) -> Edited:
     work = Work(document)
     _STEPS[type(edit)](work, edit)
     if work.document.unreadable is not None:
-        raise EditError("the text is written in a way that this edit would break; edit the text instead")
+        raise EditError("edit.breaks")
     _refuse_too_long(work.document)
     return Edited(work.document, tuple(work.changes))
 
@@ -65,11 +66,11 @@ def apply(document: Document, edit: edits.Edit) -> Edited:
 def _replace_text(document: Document, edit: edits.ReplaceText) -> Edited:
     length = len(document.text)
     if not edit.start <= edit.end <= length:
-        raise EditError(f"start {edit.start}, end {edit.end}: the text has {length} characters")
+        raise EditError("edit.range", start=edit.start, end=edit.end, length=length)
     try:
         edit.text.encode("utf-8")
     except UnicodeEncodeError:
-        raise EditError("text: half of a surrogate pair cannot be saved; send whole characters") from None
+        raise EditError("edit.half_pair") from None
     change = document.content.change(edit.start, edit.end, edit.text)
     changed = Document(document.content.changed(change), document.path)
     _refuse_too_long(changed)
@@ -78,12 +79,12 @@ def _replace_text(document: Document, edit: edits.ReplaceText) -> Edited:
 
 def _refuse_too_long(document: Document) -> None:
     if len(document.data) > MAX_FILE_BYTES:
-        raise EditError("the mission would be larger than 1 MB; a mission is a page or two")
+        raise EditError("edit.too_large")
 
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """An edit that was done or undone, with the layout before that."""
+    """An edit that was done or undone, with the layout before that; a move of boxes has no changes."""
 
     changes: tuple[Change, ...]
     layout: Layout
@@ -98,8 +99,8 @@ class EditSession:
 
     Attributes:
         document: as it is now.
-        layout: likewise; a page sets it when states were dragged, which is no edit. Renamed and moved states
-            keep their places, and states that an undone edit brings back have the places that they had.
+        layout: likewise. Renamed and moved states keep their places; undoing gives all states the places that
+            they had before the edit.
     """
 
     def __init__(self, document: Document, layout: Layout | None = None) -> None:
@@ -134,10 +135,25 @@ class EditSession:
             self.document = edited.document
         return edited.changes
 
+    def place(self, places: Mapping[str, StateBox | None]) -> None:
+        """Move states in the diagram, by their full ids; None forgets a place. It is undone as edits are."""
+        layout = with_places(self.layout, places)
+        if layout != self.layout:
+            self._done.append(_Step((), self.layout))
+            self._undone.clear()
+            self.layout = layout
+
+    def settle(self, places: Mapping[str, StateBox | None]) -> None:
+        """Note where a page has drawn states that nobody placed; it is no step of its own."""
+        self.layout = with_places(self.layout, places)
+
     def undo(self) -> tuple[Change, ...]:
-        """Take the last edit back and return the changes of the text. Raises `EditError` if there is none."""
+        """Take the last edit back and return the changes of the text. Raises `EditError` if there is none.
+
+        The last one may have been a move of boxes: then the text has no changes.
+        """
         if not self._done:
-            raise EditError("there is nothing to undo")
+            raise EditError("edit.no_undo")
         step = self._done.pop()
         self._undone.append(_Step(step.changes, self.layout))
         return self._change(tuple(change.inverse for change in reversed(step.changes)), step.layout)
@@ -145,7 +161,7 @@ class EditSession:
     def redo(self) -> tuple[Change, ...]:
         """Do again what was undone last. Raises `EditError` if nothing was."""
         if not self._undone:
-            raise EditError("there is nothing to do again")
+            raise EditError("edit.no_redo")
         step = self._undone.pop()
         self._done.append(_Step(step.changes, self.layout))
         return self._change(step.changes, step.layout)
@@ -154,6 +170,8 @@ class EditSession:
         content = self.document.content
         for change in changes:
             content = content.changed(change)
-        self.document = Document(content, self.document.path)
-        self.layout = completed(self.layout, layout, self.document)
+        if changes:
+            self.document = Document(content, self.document.path)
+            layout = completed(layout, self.layout, self.document)
+        self.layout = layout
         return changes

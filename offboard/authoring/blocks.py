@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 
 from offboard.authoring.document import Document
-from offboard.authoring.edit_error import EditError
+from offboard.authoring.messages import EditError
 from offboard.authoring.outline import Span
 from offboard.authoring.yaml_writer import Value, flow, style_of, written
 from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
@@ -65,7 +65,7 @@ class Blocks:
             end = max(node.items[previous].end, node.key_nodes[previous].end)
             return end, end, f", {entry}"
         if isinstance(node, ListNode) or (isinstance(node, Scalar) and node.text):
-            raise EditError("what stands there is no mapping; correct the text first")
+            raise EditError("edit.no_mapping")
         if isinstance(node, MapNode) and node.flow:
             return node.start, node.end, f"{{{key}: {flow(value)}}}"
         if owner.in_braces:
@@ -93,7 +93,7 @@ class Blocks:
             return _without_item(starts, ends, index)
         if not self._lines.is_first_in_line(own.start):
             if index + 1 == len(names):
-                raise EditError(f"'{key}' is all there is here; remove what it belongs to")
+                raise EditError("edit.all_there_is", key=key)
             return own.start, node.key_nodes[names[index + 1]].start, ""
         span = self.entry(node, key)
         return span.start, span.end, ""
@@ -140,7 +140,7 @@ class Blocks:
         """The lines of an item of a list that is not in brackets, with the comments that belong to it."""
         dash = self._dashes(node)[index]
         if not self._lines.is_first_in_line(dash):
-            raise EditError("the list begins within a line; edit the text")
+            raise EditError("edit.list_in_line")
         return self._block(dash, max(dash + 1, node.items[index].end), self._lines.column(dash))
 
     def set_list(self, owner: Owner, key: str, values: Sequence[Value], before: Sequence[str]) -> list[Patch]:
@@ -156,14 +156,14 @@ class Blocks:
             return self._set_items(node, values)
         if isinstance(node, ListNode) and node.flow:
             if "#" in self._text[node.start : node.end]:
-                raise EditError(f"'{key}' is in brackets with comments; edit the text")
+                raise EditError("edit.brackets", key=key)
             return [(node.start, node.end, flow(values))]
         if isinstance(node, Scalar) and not node.text:
             if mapping.flow:
                 return [(node.start, node.start, f" {flow(values)}")]
             lines = self._style.entry(key, values, self._lines.column(mapping.key_nodes[key].start))[1:]
             return [self._insert(self._lines.line_end(mapping.key_nodes[key].end), lines)]
-        raise EditError(f"'{key}' is no list; correct the text first")
+        raise EditError("edit.no_list", key=key)
 
     def _set_items(self, node: ListNode, values: Sequence[Value]) -> list[Patch]:
         old = [item.text.strip() if isinstance(item, Scalar) else None for item in node.items]
@@ -238,7 +238,7 @@ class Blocks:
         for previous in node.items[:-1]:
             after = _DASH.search(self._text, self._lines.line_end(max(previous.end, found[-1] + 1)))
             if after is None:
-                raise EditError("the list has several dashes in a line; edit the text")
+                raise EditError("edit.dashes")
             found.append(after.end() - 1)
         self._known_dashes[node.start] = found
         return found

@@ -7,7 +7,7 @@ edits name.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 
 from offboard.authoring.document import Document
@@ -57,6 +57,8 @@ class Edge:
 
     Attributes:
         id: the id of the state that has it, the event, and the order of priority: "red.turning/tick/0".
+        target: id of the state that it leads to; if there is no such state, what is written.
+        missing: there is no such state.
         event: "tick", "done" (a final substate was reached) or "resume" (after a pause).
         order: 0 is looked at first; only among those of "tick".
         source_state, source_index: where it is written: path and index for a `TransitionPath`; an empty
@@ -67,6 +69,7 @@ class Edge:
     id: str
     source: str
     target: str
+    missing: bool
     event: Event
     order: int
     when: str
@@ -119,16 +122,14 @@ class Diagram:
 
 
 def diagram(document: Document) -> Diagram:
-    """The diagram of a document, as far as it can be understood; targets that are no states are left out."""
+    """The diagram of a document, as far as it can be understood."""
     chart = document.chart
     if chart is None:
         return Diagram("", "", (), (), readable=document.unreadable is None)
     written = _Written(document)
     states = {state.id: state for state in all_states(chart.states)}
     nodes = tuple(_node(state, states, written) for state in states.values())
-    edges = tuple(
-        edge for state in states.values() for edge in _edges(state, written) if edge.target in states
-    )
+    edges = tuple(edge for state in states.values() for edge in _edges(state, written, states))
     outline = document.outline
     return Diagram(
         chart.name,
@@ -185,21 +186,28 @@ def parameters(state: StateOutline) -> tuple[tuple[str, str], ...]:
     return tuple((name.strip(), value.strip()) for name, sign, value in pairs if sign)
 
 
-def _edges(state: State, written: _Written) -> Iterator[Edge]:
-    for order, transition in enumerate(state.transitions):
-        yield _edge(state.id, transition, "tick", order, written)
+def _edges(state: State, written: _Written, states: Container[str]) -> Iterator[Edge]:
+    events: list[tuple[Transition, Event, int]] = [
+        (transition, "tick", order) for order, transition in enumerate(state.transitions)
+    ]
     if state.then:
-        yield _edge(state.id, Transition(state.then_place, state.then), "done", 0, written)
+        events.append((Transition(state.then_place, state.then), "done", 0))
     if state.resume is not None:
-        yield _edge(state.id, state.resume, "resume", 0, written)
+        events.append((state.resume, "resume", 0))
+    for transition, event, order in events:
+        missing = transition.to not in states
+        yield _edge(state.id, transition, event, order, written, missing=missing)
 
 
-def _edge(source: str, transition: Transition, event: Event, order: int, written: _Written) -> Edge:
+def _edge(
+    source: str, transition: Transition, event: Event, order: int, written: _Written, *, missing: bool
+) -> Edge:
     state, own = written.transitions.get(transition.place, (None, None))
     return Edge(
         f"{source}/{event}/{order}",
         source,
         transition.to,
+        missing,
         event,
         order,
         transition.when,

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from offboard.authoring.edit_error import EditError
+from offboard.authoring.messages import EditError
 from offboard.authoring.outline import Event, Section
 
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=60, description="small letters")]
@@ -21,11 +21,13 @@ Actions = Annotated[tuple[Line, ...], Field(max_length=200, description="primiti
 Index = Annotated[int, Field(ge=0, le=10_000)]
 
 
-class _Edit(BaseModel):
+class StrictModel(BaseModel):
+    """Data that comes from outside: it cannot be changed, and has no fields but its own."""
+
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class TransitionPath(_Edit):
+class TransitionPath(StrictModel):
     """Which transition: a state's `index`-th of the event "tick", or its only one of another event."""
 
     state: StatePath
@@ -33,7 +35,7 @@ class TransitionPath(_Edit):
     index: Index = 0
 
 
-class AddState(_Edit):
+class AddState(StrictModel):
     """A new state at the top, in a state or in a template; with `states` it starts in the first of them.
 
     At the top it may have the name of a state of the mission that is extended, and replaces that one.
@@ -48,7 +50,7 @@ class AddState(_Edit):
     states: Annotated[tuple[Name, ...], Field(max_length=100)] = ()
 
 
-class AddTemplate(_Edit):
+class AddTemplate(StrictModel):
     """A new template with states, starting in the first."""
 
     kind: Literal["add_template"] = "add_template"
@@ -56,7 +58,7 @@ class AddTemplate(_Edit):
     states: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
 
 
-class RenameState(_Edit):
+class RenameState(StrictModel):
     """Another name for a state or template, also in all that names it in this document."""
 
     kind: Literal["rename_state"] = "rename_state"
@@ -64,7 +66,7 @@ class RenameState(_Edit):
     name: Name
 
 
-class MoveState(_Edit):
+class MoveState(StrictModel):
     """A state to another place among its siblings, or into or out of a superstate."""
 
     kind: Literal["move_state"] = "move_state"
@@ -73,7 +75,7 @@ class MoveState(_Edit):
     index: Index | None = None
 
 
-class DuplicateState(_Edit):
+class DuplicateState(StrictModel):
     """A copy of a state beside it, with all its states, and with some of its parameters changed."""
 
     kind: Literal["duplicate_state"] = "duplicate_state"
@@ -82,7 +84,7 @@ class DuplicateState(_Edit):
     parameters: Annotated[dict[Line, Line], Field(max_length=50)] = Field(default_factory=dict)
 
 
-class DeleteState(_Edit):
+class DeleteState(StrictModel):
     """A state less; transitions to it are kept, which the checker then reports, or deleted, too."""
 
     kind: Literal["delete_state"] = "delete_state"
@@ -90,7 +92,7 @@ class DeleteState(_Edit):
     references: Literal["keep", "delete"] = "keep"
 
 
-class AddTransition(_Edit):
+class AddTransition(StrictModel):
     """A new transition; only one of the event "tick" has a guard, actions and an order of priority."""
 
     kind: Literal["add_transition"] = "add_transition"
@@ -102,14 +104,14 @@ class AddTransition(_Edit):
     index: Index | None = None  # its order of priority; None: the last
 
 
-class DeleteTransition(_Edit):
+class DeleteTransition(StrictModel):
     """A transition less."""
 
     kind: Literal["delete_transition"] = "delete_transition"
     transition: TransitionPath
 
 
-class RedirectTransition(_Edit):
+class RedirectTransition(StrictModel):
     """Another target for a transition."""
 
     kind: Literal["redirect_transition"] = "redirect_transition"
@@ -117,7 +119,16 @@ class RedirectTransition(_Edit):
     to: StatePath
 
 
-class MoveTransition(_Edit):
+class SetSource(StrictModel):
+    """Another state that has a transition; it comes last there, with its guard and actions."""
+
+    kind: Literal["set_source"] = "set_source"
+    transition: TransitionPath
+    state: StatePath  # that has it from now on
+    to: StatePath  # its target, which stays
+
+
+class MoveTransition(StrictModel):
     """Another order of priority for a transition."""
 
     kind: Literal["move_transition"] = "move_transition"
@@ -125,7 +136,7 @@ class MoveTransition(_Edit):
     index: Index
 
 
-class SetGuard(_Edit):
+class SetGuard(StrictModel):
     """The guard of a transition; empty for "always"."""
 
     kind: Literal["set_guard"] = "set_guard"
@@ -133,7 +144,7 @@ class SetGuard(_Edit):
     when: Line
 
 
-class SetEvent(_Edit):
+class SetEvent(StrictModel):
     """The event of a transition; one with a guard or actions stays one of the event "tick"."""
 
     kind: Literal["set_event"] = "set_event"
@@ -141,7 +152,7 @@ class SetEvent(_Edit):
     event: Event
 
 
-class SetTransitionActions(_Edit):
+class SetTransitionActions(StrictModel):
     """What is done when a transition is taken."""
 
     kind: Literal["set_transition_actions"] = "set_transition_actions"
@@ -149,7 +160,7 @@ class SetTransitionActions(_Edit):
     actions: Actions
 
 
-class SetActions(_Edit):
+class SetActions(StrictModel):
     """What a state does on entry, during or on exit."""
 
     kind: Literal["set_actions"] = "set_actions"
@@ -158,7 +169,7 @@ class SetActions(_Edit):
     actions: Actions
 
 
-class SetInitial(_Edit):
+class SetInitial(StrictModel):
     """The state in which a superstate, a template or, with an empty `state`, the mission starts."""
 
     kind: Literal["set_initial"] = "set_initial"
@@ -166,7 +177,7 @@ class SetInitial(_Edit):
     name: Name
 
 
-class SetFinal(_Edit):
+class SetFinal(StrictModel):
     """Whether a state is final."""
 
     kind: Literal["set_final"] = "set_final"
@@ -174,7 +185,7 @@ class SetFinal(_Edit):
     final: bool
 
 
-class SetUse(_Edit):
+class SetUse(StrictModel):
     """The template whose states a state takes; empty for none."""
 
     kind: Literal["set_use"] = "set_use"
@@ -182,7 +193,7 @@ class SetUse(_Edit):
     template: Annotated[str, Field(pattern=r"^([a-z][a-z0-9_]*)?$", max_length=60)]
 
 
-class SetParameter(_Edit):
+class SetParameter(StrictModel):
     """What a superstate assigns to a name on entry, such as `'green'` to `colour`."""
 
     kind: Literal["set_parameter"] = "set_parameter"
@@ -191,7 +202,7 @@ class SetParameter(_Edit):
     value: Line
 
 
-class SetVariable(_Edit):
+class SetVariable(StrictModel):
     """A variable of the mission with its first value; None removes it."""
 
     kind: Literal["set_variable"] = "set_variable"
@@ -199,7 +210,7 @@ class SetVariable(_Edit):
     value: Line | None
 
 
-class SetMission(_Edit):
+class SetMission(StrictModel):
     """A key of the mission itself; an empty value removes it."""
 
     kind: Literal["set_mission"] = "set_mission"
@@ -207,7 +218,7 @@ class SetMission(_Edit):
     value: Line
 
 
-class ReplaceText(_Edit):
+class ReplaceText(StrictModel):
     """Typed text; offsets count the characters of the document's text, whose lines end with a line feed."""
 
     kind: Literal["replace_text"] = "replace_text"
@@ -226,6 +237,7 @@ Edit = Annotated[
     | AddTransition
     | DeleteTransition
     | RedirectTransition
+    | SetSource
     | MoveTransition
     | SetGuard
     | SetEvent
@@ -252,10 +264,8 @@ def parse_edit(data: object) -> Edit:
         where = ".".join(str(part) for part in first["loc"]) or "edit"
         given = repr(first["input"])[:60]
         if first["type"] == "string_pattern_mismatch" and where.endswith("name"):
-            raise EditError(
-                f"{where} {given}: a name has small letters, digits and _, a letter first"
-            ) from None
-        raise EditError(f"{where} {given}: {first['msg'][:200]}; correct the edit") from None
+            raise EditError("edit.name", where=where, given=given) from None
+        raise EditError("edit.field", where=where, given=given, what=first["msg"][:200]) from None
 
 
 def edit_schema() -> dict[str, object]:

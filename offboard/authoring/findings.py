@@ -6,7 +6,7 @@ It is the checker of `framerunner mission check`; nothing is checked here.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from offboard.authoring.document import Document
@@ -64,10 +64,22 @@ def check_document(
         pilot_class: whose names the mission uses.
         texts: in which language; see `offboard.chart.messages`.
     """
+    return findings_of(document, reported_problems(document, pilot_class), texts)
+
+
+def findings_of(
+    document: Document, problems: Iterable[Problem], texts: Mapping[str, str] = ENGLISH
+) -> tuple[Finding, ...]:
+    """The findings that problems of a document are, in the same order."""
+    return tuple(_finding(document, each, texts) for each in problems)
+
+
+def reported_problems(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[Problem, ...]:
+    """The problems of which `check_document` makes findings, with the same arguments."""
     problems = problems_of(document, pilot_class)
     if len(problems) > _MAX_FINDINGS:
         problems = tuple(sorted(problems, key=lambda each: each.severity != "error"))[:_MAX_FINDINGS]
-    return tuple(_finding(document, each, texts) for each in problems)
+    return problems
 
 
 def problems_of(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[Problem, ...]:

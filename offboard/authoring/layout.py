@@ -6,14 +6,15 @@ The mission itself has no positions. A state without a place in the file is plac
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from errors import UserError
 from offboard.authoring.document import Document
-from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState
+from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState, StrictModel
 from offboard.authoring.references import chart_ids, instances, prefix_change
 
 MAX_LAYOUT_BYTES = 1_000_000
@@ -25,10 +26,8 @@ class LayoutError(UserError):
     """A layout file cannot be used; the message is one line."""
 
 
-class StateBox(BaseModel):
+class StateBox(StrictModel):
     """Where a state is drawn, in pixels of the page; with a width and height of its own if they were set."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     x: Coordinate
     y: Coordinate
@@ -36,10 +35,8 @@ class StateBox(BaseModel):
     height: Size | None = None
 
 
-class Layout(BaseModel):
+class Layout(StrictModel):
     """Places by full id of the state, and the corners of edges by the edge's id."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     version: Literal[1] = 1
     states: dict[str, StateBox] = Field(default_factory=dict, max_length=5000)
@@ -122,6 +119,20 @@ def follow(layout: Layout, before: Document, edit: Edit, after: Document) -> Lay
         states={change(name): box for name, box in layout.states.items() if change(name) in known},
         corners={_edge_id(name, change): points for name, points in layout.corners.items()},
     )
+
+
+def with_places(layout: Layout, places: Mapping[str, StateBox | None]) -> Layout:
+    """A layout with other places of some states; None forgets one."""
+    states = {**layout.states, **{name: box for name, box in places.items() if box is not None}}
+    for name, box in places.items():
+        if box is None:
+            states.pop(name, None)
+    return Layout(states=states, corners=layout.corners)
+
+
+def known_places(layout: Layout, document: Document) -> Layout:
+    """The places of the states that a document has; all, if it cannot be understood."""
+    return layout if document.chart is None else completed(layout, Layout(), document)
 
 
 def completed(layout: Layout, earlier: Layout, document: Document) -> Layout:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from offboard.authoring.blocks import Owner
-from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import (
     AddState,
     AddTemplate,
@@ -17,6 +16,7 @@ from offboard.authoring.edits import (
     SetParameter,
     SetUse,
 )
+from offboard.authoring.messages import EditError, EditMessage
 from offboard.authoring.outline import TEMPLATE, StateOutline
 from offboard.authoring.references import instances, prefix_change, references, relative
 from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, Work, keys_before
@@ -29,7 +29,7 @@ from offboard.chart.yaml_nodes import MapNode, Scalar
 def add_state(work: Work, edit: AddState) -> None:
     """Add a state to the mission, a state or a template."""
     if edit.use and (edit.states or edit.parent.startswith(TEMPLATE)):
-        raise EditError("a state with 'use' has no states of its own, and is not in a template")
+        raise EditError("edit.uses")
     value: dict[str, Value] = {}
     if edit.use:
         value["use"] = edit.use
@@ -58,7 +58,7 @@ def _insert_state(work: Work, parent: str, name: str, value: Value, index: int |
         index = len(container.items) if index is None else min(index, len(container.items))
         if container.flow:
             if index < len(container.items):
-                raise EditError("the states are in braces; a new one is put after the last")
+                raise EditError("edit.braces_last")
             work.patch(
                 work.blocks.add_entry(Owner(None, container, True), name, value, tuple(container.items))
             )
@@ -106,7 +106,7 @@ def _container(work: Work, parent: str) -> tuple[MapNode | None, Owner]:
     else:
         state = work.state(parent)
         if state.text("use"):
-            raise EditError(f"state '{parent}' has the states of a template; edit '@{state.text('use')}'")
+            raise EditError("edit.of_template", state=parent, template=state.text("use"))
         owner, node = work.owner(state), state.entry("states")
     return (node if isinstance(node, MapNode) else None), owner
 
@@ -115,10 +115,10 @@ def _refuse_taken(work: Work, parent: str, name: str, *, replacing: bool = False
     outline = work.document.outline
     siblings = outline.templates if parent == TEMPLATE else outline.states_in(parent)
     if name in [state.name for state in siblings]:
-        what = "template" if parent == TEMPLATE else "state"
-        raise EditError(f"there is a {what} '{name}' already; choose another name")
+        what = EditMessage("edit.what_template" if parent == TEMPLATE else "edit.what_state")
+        raise EditError("edit.taken", what=what, name=name)
     if parent == "" and not replacing and name in _base_names(work):
-        raise EditError(f"'{outline.text('extends')}' has a state '{name}'; choose another name")
+        raise EditError("edit.taken_base", base=outline.text("extends"), name=name)
 
 
 def _base_names(work: Work) -> set[str]:
@@ -153,7 +153,7 @@ def rename_state(work: Work, edit: RenameState) -> None:
     _refuse_taken(work, parent, edit.name)
     if state.path in _base_names(work):
         base = work.document.outline.text("extends")
-        raise EditError(f"'{state.path}' replaces the one of '{base}', so it keeps its name")
+        raise EditError("edit.replaces", state=state.path, base=base)
     new_path = f"{state.parent}.{edit.name}" if state.parent else edit.name
     patches = [work.blocks.set_scalar(state.key, edit.name)]
     if state.is_template:
@@ -208,16 +208,16 @@ def move_state(work: Work, edit: MoveState) -> None:
 
 def _refuse_move(state: StateOutline, edit: MoveState) -> None:
     if state.is_template:
-        raise EditError("a template is not moved; the order of templates means nothing")
+        raise EditError("edit.template_order")
     if f"{edit.parent}.".startswith(f"{state.path}."):
-        raise EditError(f"state '{state.path}' cannot be moved into itself")
+        raise EditError("edit.into_itself", state=state.path)
     templates = [
         path.partition(".")[0] if path.startswith(TEMPLATE) else "" for path in (state.path, edit.parent)
     ]
     if templates[0] != templates[1]:
-        raise EditError("a state is not moved into or out of a template; duplicate and delete it there")
+        raise EditError("edit.template_border")
     if state.container.flow:
-        raise EditError(f"state '{state.path}' is in braces; write it on lines of its own first")
+        raise EditError("edit.braces", state=state.path)
 
 
 def _cut_and_insert(work: Work, state: StateOutline, parent: str, index: int) -> None:
@@ -257,7 +257,7 @@ def _open_braces(work: Work, parent: str) -> None:
     if not any(in_braces):
         return
     if owner.in_braces or not isinstance(node, MapNode) or node.items or owner.key is None:
-        raise EditError(f"'{parent}' is in braces; write it on lines of its own first")
+        raise EditError("edit.braces", state=parent)
     start = len(work.document.text[: node.start].rstrip(" "))
     work.patch((start, node.end, ""))
 
@@ -270,7 +270,7 @@ def duplicate_state(work: Work, edit: DuplicateState) -> None:
     """Copy a state beside it; what its transitions lead to within it is copied, too."""
     state = work.state(edit.state)
     if state.container.flow:
-        raise EditError(f"state '{state.path}' is in braces; write it on lines of its own first")
+        raise EditError("edit.braces", state=state.path)
     _refuse_taken(work, TEMPLATE if state.is_template else state.parent, edit.name)
     before = list(references(work.document).values())
     old_ids = _ids(work, state)
@@ -324,7 +324,7 @@ def _remove_with_key(work: Work, node: MapNode, key: str, state: StateOutline) -
     span = work.blocks.entry(state.container, state.name)
     own, lines = node.key_nodes[key], work.document.positions
     if not lines.is_first_in_line(own.start):
-        raise EditError(f"'{key}' begins within a line; edit the text")
+        raise EditError("edit.key_in_line", key=key)
     work.patch((span.start, span.end, ""), (lines.line_start(own.start), lines.line_end(own.end), ""))
 
 
@@ -362,7 +362,7 @@ def set_actions(work: Work, edit: SetActions) -> None:
 def set_initial(work: Work, edit: SetInitial) -> None:
     """Set where a superstate or the mission starts."""
     if edit.name not in _state_names(work, edit.state):
-        raise EditError(f"there is no state '{edit.name}' there to start in")
+        raise EditError("edit.no_start", name=edit.name)
     if edit.state:
         work.set_text(work.state(edit.state), "initial", edit.name)
     else:
@@ -380,7 +380,7 @@ def set_final(work: Work, edit: SetFinal) -> None:
     """Make a state final, or not."""
     state = work.state(edit.state)
     if state.is_template:
-        raise EditError("a template is not final; one of its states may be")
+        raise EditError("edit.template_final")
     work.set_text(state, "final", "true" if edit.final else "")
 
 
@@ -388,11 +388,11 @@ def set_use(work: Work, edit: SetUse) -> None:
     """Let a state take the states of a template."""
     state = work.state(edit.state)
     if edit.template and (state.states or state.path.startswith(TEMPLATE)):
-        raise EditError("a state with 'use' has no states of its own, and is not in a template")
+        raise EditError("edit.uses")
     known = {each.name for each in work.document.outline.templates}
     known |= {name.removeprefix(TEMPLATE) for name in _base_names(work) if name.startswith(TEMPLATE)}
     if edit.template and edit.template not in known:
-        raise EditError(f"there is no template '{edit.template}'")
+        raise EditError("edit.no_template", name=edit.template)
     work.set_text(state, "use", edit.template)
 
 
@@ -406,4 +406,4 @@ def set_parameter(work: Work, edit: SetParameter) -> None:
             actions[number] = f"{edit.name} = {edit.value}"
             set_actions(work, SetActions(state=edit.state, section="enter", actions=tuple(actions)))
             return
-    raise EditError(f"state '{cut(edit.state)}' does not set '{cut(edit.name)}' under 'enter'")
+    raise EditError("edit.no_parameter", state=cut(edit.state), name=cut(edit.name))

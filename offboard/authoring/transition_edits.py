@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from offboard.authoring.blocks import Owner
-from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import (
     AddTransition,
     DeleteTransition,
@@ -12,9 +11,11 @@ from offboard.authoring.edits import (
     SetEvent,
     SetGuard,
     SetMission,
+    SetSource,
     SetTransitionActions,
     SetVariable,
 )
+from offboard.authoring.messages import EditError
 from offboard.authoring.outline import Event, StateOutline
 from offboard.authoring.state_edits import delete_reference
 from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, TRANSITION_ORDER, Work, keys_before
@@ -32,7 +33,7 @@ def add_transition(work: Work, edit: AddTransition) -> None:
         _add_single(work, state, edit, to)
         return
     if state.text("final").lower() == "true":
-        raise EditError(f"state '{state.path}' is final; no transition leaves it")
+        raise EditError("edit.final", state=state.path)
     value: dict[str, Value] = {"when": edit.when.strip()} if edit.when.strip() else {}
     value["to"] = to
     if edit.actions:
@@ -49,11 +50,11 @@ def add_transition(work: Work, edit: AddTransition) -> None:
 def _add_single(work: Work, state: StateOutline, edit: AddTransition, to: str) -> None:
     key = _KEYS[edit.event]
     if edit.when.strip() or edit.actions:
-        raise EditError(f"a transition of '{edit.event}' has no guard and no actions")
+        raise EditError("edit.plain_event", event=edit.event)
     if state.text(key):
-        raise EditError(f"state '{state.path}' has a transition of '{edit.event}' already; redirect it")
+        raise EditError("edit.event_taken", state=state.path, event=edit.event)
     if state.is_template and edit.event == "done":
-        raise EditError("'then' is written at the state that uses the template")
+        raise EditError("edit.then_of_template")
     work.set_text(state, key, to)
 
 
@@ -73,11 +74,23 @@ def redirect_transition(work: Work, edit: RedirectTransition) -> None:
         work.set_key(Owner(None, transition.node), "to", to, TRANSITION_ORDER)
 
 
+def set_source(work: Work, edit: SetSource) -> None:
+    """Give a transition to another state."""
+    state, transition = work.transition(edit.transition)
+    if edit.state == state.path:
+        return
+    when = "" if transition.when is None else transition.when.text
+    actions = tuple(each.text for each in transition.actions)
+    to, event = edit.to, transition.event
+    add_transition(work, AddTransition(state=edit.state, to=to, when=when, actions=actions, event=event))
+    delete_reference(work, state.path, event, transition.index)
+
+
 def move_transition(work: Work, edit: MoveTransition) -> None:
     """Set the order of priority of a transition."""
     state, transition = work.transition(edit.transition)
     if transition.event != "tick":
-        raise EditError(f"a transition of '{transition.event}' has no order")
+        raise EditError("edit.no_order", event=transition.event)
     node = state.entry("transitions")
     assert isinstance(node, ListNode)
     to = min(edit.index, len(node.items) - 1)
@@ -99,7 +112,7 @@ def set_guard(work: Work, edit: SetGuard) -> None:
     """Set the guard of a transition."""
     _, transition = work.transition(edit.transition)
     if transition.event != "tick":
-        raise EditError(f"a transition of '{transition.event}' has no guard")
+        raise EditError("edit.no_guard", event=transition.event)
     work.set_key(Owner(None, transition.node), "when", edit.when.strip(), TRANSITION_ORDER)
 
 
@@ -107,7 +120,7 @@ def set_transition_actions(work: Work, edit: SetTransitionActions) -> None:
     """Set the actions of a transition."""
     _, transition = work.transition(edit.transition)
     if transition.event != "tick":
-        raise EditError(f"a transition of '{transition.event}' has no actions")
+        raise EditError("edit.no_actions", event=transition.event)
     owner, order = Owner(None, transition.node), keys_before(TRANSITION_ORDER, "do")
     work.patch(*work.blocks.set_list(owner, "do", [each.strip() for each in edit.actions], order))
 
@@ -118,12 +131,12 @@ def set_event(work: Work, edit: SetEvent) -> None:
     if transition.event == edit.event:
         return
     if transition.when is not None or transition.actions:
-        raise EditError("a transition with a guard or actions is one of 'tick'; remove them first")
+        raise EditError("edit.is_tick")
     if transition.to is None:
-        raise EditError("the transition leads nowhere; set its target first")
+        raise EditError("edit.leads_nowhere")
     to = transition.to.text.strip()
     if edit.event != "tick" and state.text(_KEYS[edit.event]):
-        raise EditError(f"state '{state.path}' has a transition of '{edit.event}' already; redirect it")
+        raise EditError("edit.event_taken", state=state.path, event=edit.event)
     delete_reference(work, state.path, transition.event, transition.index)
     state = work.state(state.path)
     if edit.event != "tick":

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable
 
 from offboard.authoring.blocks import Blocks, Owner, Patch
 from offboard.authoring.document import Document
-from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import TransitionPath
+from offboard.authoring.messages import EditError, EditMessage
 from offboard.authoring.outline import TEMPLATE, StateOutline, TransitionOutline
 from offboard.authoring.references import Reference, chart_ids, instances, references, relative, shortest_text
 from offboard.authoring.text import Change
@@ -45,8 +45,9 @@ class Work:
     def __init__(self, document: Document) -> None:
         if document.unreadable is not None:
             problem = document.unreadable.problems[0]
-            place = f"line {problem.place.line}" if problem.place.line else "the text"
-            raise EditError(f"the text cannot be read as YAML ({place}: {problem.message}); correct it first")
+            line = problem.place.line
+            place = EditMessage("edit.line", line=line) if line else EditMessage("edit.the_text")
+            raise EditError("edit.unreadable", place=place, reason=problem.message)
         self.document = document
         self.changes: list[Change] = []
 
@@ -74,12 +75,11 @@ class Work:
         if top is not None and top.text("use") and "." in path:
             inner = f"{TEMPLATE}{top.text('use')}.{path.partition('.')[2]}"
             if self.document.outline.get(inner) is not None:
-                text = f"'{cut(path)}' is written in a template; edit '{cut(inner)}', for all that use it"
-                raise EditError(text)
+                raise EditError("edit.in_template", state=cut(path), inner=cut(inner))
         if path.partition(".")[0] in {each.partition(".")[0] for each in chart_ids(self.document)}:
-            base = self.document.outline.text("extends") or "a template of another file"
-            raise EditError(f"'{cut(path)}' is not written in this file but in '{base}'; edit that one")
-        raise EditError(f"there is no state '{cut(path)}' in this document")
+            base = self.document.outline.text("extends") or EditMessage("edit.other_template")
+            raise EditError("edit.in_other_file", state=cut(path), base=base)
+        raise EditError("edit.no_state", state=cut(path))
 
     def transition(self, path: TransitionPath) -> tuple[StateOutline, TransitionOutline]:
         """A transition with the state that has it. Raises `EditError`."""
@@ -88,8 +88,10 @@ class Work:
             if (each.event, each.index) == (path.event, path.index):
                 return state, each
         own = [each.index for each in state.transitions if each.event == path.event]
-        known = f"it has {len(own)}" if own else "it has none"
-        raise EditError(f"state '{path.state}' has no transition {path.index} of '{path.event}'; {known}")
+        known = EditMessage("edit.has", count=len(own)) if own else EditMessage("edit.has_none")
+        raise EditError(
+            "edit.no_transition", state=path.state, index=path.index, event=path.event, known=known
+        )
 
     def owner(self, state: StateOutline) -> Owner:
         """A state as a mapping to which entries are added."""
@@ -115,7 +117,7 @@ class Work:
         if not text:
             self.patch(self.blocks.remove_entry(owner.node, key))
         elif not isinstance(node, Scalar):
-            raise EditError(f"'{key}' is not one line of text; correct the text first")
+            raise EditError("edit.no_line", key=key)
         elif node.text.strip() != text:
             self.patch(self.blocks.set_scalar(node, text, in_braces=owner.node.flow))
 
@@ -129,7 +131,7 @@ class Work:
         ids, sources = chart_ids(document), instances(document, state)
         target = document.outline.get(to)
         if target is not None and target.is_template:
-            raise EditError(f"'{cut(to)}' is a template; lead to a state that uses it")
+            raise EditError("edit.to_template", to=cut(to))
         if not sources:  # of a template that nothing uses yet
             return self._text_in_template(state, target, to)
         targets = (to,) if target is None else instances(document, target)
@@ -137,19 +139,17 @@ class Work:
             targets = targets * len(sources) if len(targets) == 1 else ()
         leads = frozenset(zip(sources, targets, strict=True)) if targets else frozenset()
         if not leads or any(each not in ids for each in targets):
-            raise EditError(f"state '{cut(source)}' cannot lead to '{cut(to)}': there is no such state")
+            raise EditError("edit.no_way", state=cut(source), to=cut(to))
         name = shortest_text(leads, ids)
         if name is None:
-            raise EditError(
-                f"state '{cut(source)}' cannot name '{cut(to)}'; a state nearer has the same name"
-            )
+            raise EditError("edit.no_name", state=cut(source), to=cut(to))
         return name
 
     @staticmethod
     def _text_in_template(state: StateOutline, target: StateOutline | None, to: str) -> str:
         tops = {path.partition(".")[0] for path in (state.path, to) if path.startswith(TEMPLATE)}
         if target is None or len(tops) > 1:
-            raise EditError(f"state '{cut(state.path)}' cannot lead to '{cut(to)}': there is no such state")
+            raise EditError("edit.no_way", state=cut(state.path), to=cut(to))
         return relative(to)
 
     def keep_references(
@@ -189,7 +189,6 @@ class Work:
             ]
             name = shortest_text(leads, ids)
             if name is None or not targets or targets[0] is None or state is None:
-                text = "a transition would then lead to another state of the same name; choose another name"
-                raise EditError(f"state '{cut(reference.state)}': {text}")
+                raise EditError("edit.other_target", state=cut(reference.state))
             patches.append(self.blocks.set_scalar(targets[0], name, in_braces=state.container.flow))
         self.patch(*patches)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import yaml
 
-from offboard.authoring.edit_error import EditError
+from offboard.authoring.messages import EditError
 from offboard.chart.yaml_nodes import ListNode, MapNode
 
 Value = str | Sequence["Value"] | Mapping[str, "Value"]
@@ -54,7 +54,7 @@ def written(text: str, *, in_braces: bool = False) -> str:
     """A text as YAML reads it back: plain if possible, otherwise in quotation marks. Raises `EditError`."""
     text = text.strip()
     if not text.isprintable():
-        raise EditError(f"{text[:40]!r} has a line end or a control character; write one line of text")
+        raise EditError("edit.control", text=repr(text[:40]))
     around = "[{}]\n" if in_braces else "- {}\n- a: {}\n"
     try:
         events = list(yaml.parse(around.replace("{}", text), Loader=yaml.SafeLoader))

@@ -7,6 +7,7 @@ same codes, such as `spanish.SPANISH`: `Message.text(table)`.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 
 class Message:
@@ -15,11 +16,13 @@ class Message:
     Attributes:
         code: key of the table, such as "state.no_way_out".
         values: of the names in braces.
+        english: texts of a subclass that has a table of its own; they come before those of `ENGLISH`.
     """
 
     __slots__ = ("code", "values")
+    english: ClassVar[Mapping[str, str]] = {}
 
-    def __init__(self, code: str, **values: object) -> None:
+    def __init__(self, code: str, /, **values: object) -> None:
         self.code = code
         self.values = values
 
@@ -29,7 +32,7 @@ class Message:
             name: value.text(table) if isinstance(value, Message) else value
             for name, value in self.values.items()
         }
-        return (table.get(self.code) or ENGLISH[self.code]).format(**values)
+        return (table.get(self.code) or self.english.get(self.code) or ENGLISH[self.code]).format(**values)
 
     def __str__(self) -> str:
         return self.text(ENGLISH)

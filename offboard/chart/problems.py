@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from typing import Literal
 
 from errors import UserError
-from offboard.chart.messages import Message, as_message
+from offboard.chart.messages import ENGLISH, Message, as_message
 
 MAX_REPORTED = 50
 MAX_NOTED = 500
@@ -48,8 +48,12 @@ class Problem:
     severity: Severity = "error"
 
     def __str__(self) -> str:
+        return self.line(ENGLISH)
+
+    def line(self, texts: Mapping[str, str]) -> str:
+        """Place and words, by a table of texts."""
         kind = "" if self.severity == "error" else f"{self.severity}: "
-        line = f"{self.place}: {kind}{self.message}"
+        line = f"{self.place}: {kind}{self.message.text(texts)}"
         # A file may hold anything; printed text of it must not move the terminal's cursor.
         return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
 

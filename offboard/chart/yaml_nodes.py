@@ -17,7 +17,7 @@ from offboard.chart.messages import Message
 from offboard.chart.problems import Place, ProblemList, mission_error
 
 MAX_DEPTH = 40
-MAX_NODES = 40_000
+MAX_NODES = 20_000
 MAX_EXPLAINED_CHARACTERS = 100_000
 _FAST_LOADER: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _KEY = re.compile(r"\s*(?:-\s+)?([\w.]+)\s*:(?:\s|$)")

@@ -18,10 +18,9 @@ from av.video.stream import VideoStream
 
 from scenarios.models import Camera
 from sitl.video import Image, VideoError
+from wire.h264_rtp import RTP_CLOCK_HZ, describe_h264_rtp
 from wire.transports.sockets import Address, resolved_ipv4
 
-PAYLOAD_TYPE = 96  # the first of the dynamic types
-_CLOCK_HZ = 90_000  # RTP's, for video
 _PACKET_BYTES = 1200
 _BITS_PER_PIXEL = 0.8  # of each image: thin coloured bars stay recognisable
 _PRESET = {
@@ -64,17 +63,7 @@ class RtpSender:
 
     def description(self) -> str:
         """The stream in SDP (RFC 8866), for `ffplay`, VLC and PyAV: `/video.sdp`."""
-        lines = (
-            "v=0",
-            f"o=- 0 0 IN IP4 {self._host}",
-            "s=framerunner camera",
-            f"c=IN IP4 {self._host}",
-            "t=0 0",
-            f"m=video {self._port} RTP/AVP {PAYLOAD_TYPE}",
-            f"a=rtpmap:{PAYLOAD_TYPE} H264/{_CLOCK_HZ}",
-            f"a=fmtp:{PAYLOAD_TYPE} packetization-mode=1",
-        )
-        return "\r\n".join(lines) + "\r\n"
+        return describe_h264_rtp(self._host, self._port)
 
     def send(self, image: Image, time_us: int) -> None:
         """Pass an image and its time of exposure (vehicle time) to the encoder; never blocks.
@@ -99,7 +88,7 @@ class RtpSender:
         stream.pix_fmt = "yuv420p"
         stream.bit_rate = int(self._width_px * self._height_px * rate_hz * _BITS_PER_PIXEL)
         context = stream.codec_context
-        context.time_base = Fraction(1, _CLOCK_HZ)
+        context.time_base = Fraction(1, RTP_CLOCK_HZ)
         context.gop_size = max(1, round(rate_hz))
         context.max_b_frames = 0
         context.thread_count = 1
@@ -122,8 +111,8 @@ class RtpSender:
     def _frame(self, image: Image, time_us: int) -> av.VideoFrame:
         cut = np.ascontiguousarray(image[: self._height_px, : self._width_px])
         frame = av.VideoFrame.from_ndarray(cut, format="bgr24")
-        frame.pts = round(time_us * _CLOCK_HZ / 1e6 / self._speed)
-        frame.time_base = Fraction(1, _CLOCK_HZ)
+        frame.pts = round(time_us * RTP_CLOCK_HZ / 1e6 / self._speed)
+        frame.time_base = Fraction(1, RTP_CLOCK_HZ)
         frame.pict_type = PictureType.NONE
         return frame
 

@@ -158,7 +158,7 @@ def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
 def test_the_explorer_is_quick_enough_for_a_drone_whose_time_does_not_wait(tmp_path, instance, busy):
     """Late ticks and images cost precision, not the flight."""
     (tmp_path / "app").mkdir()
-    drone = ("--drone", f"udpin://127.0.0.1:{14540 + instance}")
+    drone = ("--simulated", "--drone", f"udpin://127.0.0.1:{14540 + instance}")
     camera = ("--camera", f"http://127.0.0.1:{8100 + instance}/video")
     arguments = ("fly", "test-case-1", "--mission", "explorer", *drone, *camera)
     with (

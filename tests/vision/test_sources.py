@@ -3,6 +3,7 @@
 import asyncio
 import os
 import struct
+import time
 import zlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
@@ -13,6 +14,9 @@ import numpy as np
 import pytest
 from aiohttp import web
 
+from scenarios.models import Camera
+from sitl.streaming.rtp import RtpSender
+from tests.free_ports import free_port
 from vision.http_source import HttpSource, Latest
 from vision.sources import CaptureSource, FolderSource, open_source
 from vision.types import CameraError, CameraFrame, Image, shown_url
@@ -404,6 +408,10 @@ def test_open_source_chooses(tmp_path: Path, clip: Path) -> None:
     assert isinstance(open_source("http://127.0.0.1/film.mp4"), CaptureSource)
     assert isinstance(open_source("rtsp://127.0.0.1/live"), CaptureSource)
     assert isinstance(open_source("udp://127.0.0.1:5600"), CaptureSource)
+    assert isinstance(open_source("rtp://0.0.0.0:5600"), CaptureSource)
+    for wrong in ("rtp://0.0.0.0", "rtp://0.0.0.0:x", "rtp://a:5600\nm=audio"):
+        with pytest.raises(CameraError, match="write rtp://HOST:PORT"):
+            open_source(wrong)
     assert isinstance(open_source("0"), CaptureSource)
     assert isinstance(open_source(2), CaptureSource)
     assert isinstance(open_source(tmp_path), FolderSource)
@@ -437,3 +445,24 @@ async def test_latest_keeps_one_item_and_ends() -> None:
     assert await latest.get() == 4
     with pytest.raises(CameraError, match="gone"):
         await latest.get()
+
+
+async def test_h264_over_rtp_is_received() -> None:
+    port = free_port()
+    sender = RtpSender(("127.0.0.1", port), Camera())
+
+    async def send() -> None:
+        for number in range(10**6):
+            sender.send(np.full((240, 320, 3), number % 25 * 10, np.uint8), time.monotonic_ns() // 1000)
+            await asyncio.sleep(0.05)
+
+    sending = asyncio.create_task(send())
+    try:
+        frames = await take(CaptureSource(f"rtp://127.0.0.1:{port}", 8.0), 12)
+    finally:
+        sending.cancel()
+        await asyncio.to_thread(sender.close)
+    assert {frame.image.shape for frame in frames} == {(240, 320, 3)}
+    times_s = [frame.received_s for frame in frames]
+    assert times_s == sorted(times_s)
+    assert all(0.0 <= time.monotonic() - at_s < 5.0 for at_s in times_s)

@@ -11,6 +11,9 @@ from errors import UserError
 from geometry.lens import Coefficients
 
 Coefficient = Annotated[float, Field(ge=-100, le=100)]
+_Weight = Annotated[float, Field(ge=-10, le=10)]
+_Weights = tuple[_Weight, _Weight, _Weight]
+ColourMatrix = tuple[_Weights, _Weights, _Weights]
 
 
 class CalibrationError(UserError):
@@ -34,6 +37,10 @@ class Calibration(BaseModel):
     )
     readout_s: float = Field(
         0.0, ge=0, le=0.1, description="of a rolling shutter, from the first to the last row; 0 if not known"
+    )
+    colour_matrix: ColourMatrix | None = Field(
+        None,
+        description="by which blue, green and red are multiplied, from `camera colours`",
     )
     rms_px: float | None = Field(
         None, ge=0, description="root mean square of what is left of the corners' errors"

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import re
+import time
+from collections import OrderedDict
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol, TypeVar
 
-from errors import UserError
-from framerunner.editing.documents.open_document import OpenDocument
+from framerunner.editing.documents.open_document import OpenDocument, write_problem
+from framerunner.editing.words import Language, Said, SaidError
 from offboard.mission import MISSIONS, list_missions, new_mission
+from offboard.pilot import Pilot
 
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,80}\.ya?ml")
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 _MAX_LISTED = 500
 _MAX_OPEN = 50
+_MAX_CLIENTS = 200
+_THREADS = 4
+_LINGERS_S = 120.0  # after the last page has left: it may only have lost its connection
 
 EMPTY_CHART = """\
 name: {name}
@@ -24,10 +34,23 @@ initial: start
 states:
   start:
 """
+T = TypeVar("T")
 
 
-class DeskError(UserError):
-    """A file that cannot be opened or made; the message is one line for people."""
+class DeskError(SaidError):
+    """A file that cannot be opened or made."""
+
+
+class Viewer(Protocol):
+    """A page that shows a document; `language` is that of its words."""
+
+    language: Language
+
+    def put(self, line: str) -> None:
+        """Queue a message, JSON."""
+
+    def warn(self, what: Said) -> None:
+        """Tell the person something."""
 
 
 @dataclass(slots=True)
@@ -35,24 +58,59 @@ class SharedDocument:
     """An open document and the pages that show it.
 
     Attributes:
-        opened: the document.
-        viewers: called with each message for all pages.
+        opened: the document; used only with the lock.
+        viewers: take each message for all pages.
+        lock: held while the document is read or changed, which is done in a thread.
+        users: who has it open, viewers included.
+        answered: number of the last message that was carried out, by page.
     """
 
     opened: OpenDocument
-    viewers: list[Callable[[dict[str, object]], None]] = field(default_factory=list)
+    viewers: list[Viewer] = field(default_factory=list)
+    lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+    users: int = 0
+    answered: OrderedDict[str, int] = field(default_factory=OrderedDict)
+    _left_s: float = 0.0
+
+    def leave(self) -> None:
+        """One user less; it stays open for a while, with its history, for a page that connects again."""
+        self.users -= 1
+        self._left_s = time.monotonic()
+
+    def lingers(self) -> bool:
+        """Whether it is still in use, or may be again."""
+        return self.users > 0 or time.monotonic() - self._left_s < _LINGERS_S
+
+    def note(self, client: str, number: int) -> None:
+        """A page's message was carried out."""
+        if client:
+            self.answered[client] = number
+            self.answered.move_to_end(client)
+            while len(self.answered) > _MAX_CLIENTS:
+                self.answered.popitem(last=False)
 
 
 class EditorDesk:
     """Opens and makes missions in a folder. Pages name files, never paths.
 
+    Reading and checking a mission may take a second, so `work` does it in threads, which share the
+    interpreter with the server's loop.
+
     Args:
         folder: with the missions.
+        pilot_class: whose names missions use: `Pilot` or a contestant's.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, pilot_class: type[Pilot] = Pilot) -> None:
         self.folder = folder
+        self._pilot_class = pilot_class
         self._open: dict[str, SharedDocument] = {}
+        self._opening = asyncio.Lock()
+        self._threads = ThreadPoolExecutor(_THREADS, "editor")
+
+    async def work(self, what: Callable[[], T]) -> T:
+        """Do something in a thread."""
+        return await asyncio.get_running_loop().run_in_executor(self._threads, what)
 
     def files(self) -> list[str]:
         """Names of the YAML files in the folder, sorted."""
@@ -62,28 +120,43 @@ class EditorDesk:
             return []
         return sorted(name for name in names if _FILE.fullmatch(name))[:_MAX_LISTED]
 
-    def open(self, name: str) -> SharedDocument:
-        """A file's document. Raises `DeskError` or `MissionError`."""
-        shared = self._open.get(name)
-        if shared is None:
-            if not _FILE.fullmatch(name):
-                raise DeskError(f"'{name[:80]}' is no mission file of this folder; choose one from the list")
-            if len(self._open) >= _MAX_OPEN:
-                raise DeskError(f"{_MAX_OPEN} missions are open; close some pages first")
-            shared = self._open[name] = SharedDocument(OpenDocument.open(self.folder / name))
+    async def open(self, name: str) -> SharedDocument:
+        """A file's document; call its `leave` at the end. Raises `DeskError` or `MissionError`."""
+        if not _FILE.fullmatch(name):
+            raise DeskError("desk.not_here", name=name[:80])
+        async with self._opening:
+            shared = self._open.get(name)
+            if shared is not None and shared.users == 0 and await self.work(shared.opened.is_outdated):
+                del self._open[name]
+                shared = None
+            if shared is None:
+                await self._forget()
+                if len(self._open) >= _MAX_OPEN:
+                    raise DeskError("desk.too_many_open", limit=_MAX_OPEN)
+                path = self.folder / name
+                opened = await self.work(lambda: OpenDocument.open(path, self._pilot_class))
+                shared = self._open[name] = SharedDocument(opened)
+            shared.users += 1
         return shared
 
-    def close(self, name: str) -> None:
-        """A page has left; the last one closes the document, whose unsaved text is kept in its journal."""
-        shared = self._open.get(name)
-        if shared is not None and not shared.viewers:
-            shared.opened.keep()
-            del self._open[name]
+    async def keep(self) -> None:
+        """Write the journals of all documents, warn their pages if that fails, close those left long ago."""
+        for shared in list(self._open.values()):
+            async with shared.lock:
+                problem = await self.work(shared.opened.keep)
+            if problem is not None:
+                for viewer in shared.viewers:
+                    viewer.warn(problem)
+        async with self._opening:
+            await self._forget()
 
-    def keep(self) -> None:
-        """Write the journals of all documents."""
-        for shared in self._open.values():
-            shared.opened.keep()
+    async def _forget(self) -> None:
+        for name, shared in list(self._open.items()):
+            is_full = len(self._open) >= _MAX_OPEN and shared.users == 0
+            if is_full or not shared.lingers():
+                async with shared.lock:
+                    await self.work(shared.opened.keep)
+                del self._open[name]
 
     def create(self, name: str, source: str) -> str:
         """Make a mission file.
@@ -104,7 +177,7 @@ class EditorDesk:
             text = (MISSIONS / f"{source}.yaml").read_text(encoding="utf-8")
             text = re.sub(rf"(?m)^name: {source}$", f"name: {name}", text, count=1)
         else:
-            raise DeskError(f"unknown source '{source[:80]}'; use empty, example or a mission of the package")
+            raise DeskError("desk.source", name=source[:80])
         return self.write(name, text)
 
     def write(self, name: str, text: str) -> str:
@@ -114,14 +187,20 @@ class EditorDesk:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with path.open("x", encoding="utf-8", newline="") as file:
-                file.write(text)
+                try:
+                    file.write(text)
+                    file.flush()
+                except OSError:
+                    with contextlib.suppress(OSError):
+                        path.unlink()  # half a mission
+                    raise
         except FileExistsError:
-            raise DeskError(f"{path.name} is there already; choose another name") from None
+            raise DeskError("desk.taken", name=path.name) from None
         except OSError as error:
-            raise DeskError(f"{path.name}: cannot be written ({error.strerror})") from None
+            raise DeskError("desk.not_written", name=path.name, **write_problem(error)) from None
         return path.name
 
 
 def _check_name(name: str) -> None:
     if not _NAME.fullmatch(name):
-        raise DeskError(f"'{name[:80]}': use small letters, digits and _, a letter first")
+        raise DeskError("desk.name", name=name[:80])

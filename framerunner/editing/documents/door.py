@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -28,10 +29,12 @@ from framerunner.editing.documents.messages import (
     catalogue_message,
     changed_message,
     document_message,
+    places_message,
     read_message,
     status_message,
 )
 from framerunner.editing.documents.open_document import OpenDocument
+from framerunner.editing.words import Language, Said, SaidError, language_of, reason, say
 from monitor.access import refuse
 from offboard.authoring import Change, Edit, export_scxml, import_scxml, mermaid_of, parse_edit
 from offboard.mission import MAX_FILE_BYTES, list_missions
@@ -41,10 +44,8 @@ _Scxml = Annotated[str, Body(max_length=1_000_000)]
 _JOURNAL_PERIOD_S = 2.0
 _BAD_MESSAGE_CODE = 4400  # as HTTP's
 _MAX_QUEUE = 200
+_MAX_CLIENT = 40  # characters
 _MAX_REASON_BYTES = 120  # WebSockets allow 123
-_CHANGED_ELSEWHERE = (
-    "the text was changed in another window at the same time; what you typed last is left out"
-)
 
 logger = logging.getLogger(__name__)
 
@@ -65,28 +66,32 @@ class DocumentsDoor:
 
         def demand(request: Request) -> None:
             if not may_act(request):
-                raise HTTPException(403, "only those who logged in may edit")
+                raise HTTPException(403, say(Said("access.edit"), language_of(request)))
 
         _add_files(router, desk, demand)
 
         @router.get("/api/edit/export")
         async def export(request: Request, file: str, kind: Literal["scxml", "mermaid"]) -> Response:
             demand(request)
-            return _export(desk, file, kind)
+            return await _export(desk, file, kind, language_of(request))
 
         @router.websocket("/ws/edit")
-        async def edit(websocket: WebSocket, file: str, language: str = "en") -> None:
+        async def edit(websocket: WebSocket, file: str, client: str = "") -> None:
+            language = language_of(websocket)
             if not may_act(websocket):
-                await refuse(websocket, "only those who logged in may edit")
+                await refuse(websocket, say(Said("access.edit"), language))
                 return
             try:
-                shared = desk.open(file)
+                shared = await desk.open(file)
             except UserError as error:
-                await refuse(websocket, str(error).partition("\n")[0])
+                await refuse(websocket, reason(error, language))
                 return
-            shared.opened.speaks_spanish |= language == "es"
-            await websocket.accept()
-            await _Window(websocket, desk, file, shared).serve()
+            try:
+                shared.opened.speaks_spanish |= language == "es"
+                await websocket.accept()
+                await _Window(websocket, desk, shared, client[:_MAX_CLIENT]).serve()
+            finally:
+                shared.leave()
 
         return router
 
@@ -95,9 +100,9 @@ class DocumentsDoor:
         try:
             while True:
                 await asyncio.sleep(_JOURNAL_PERIOD_S)
-                self._desk.keep()
+                await self._desk.keep()
         finally:
-            self._desk.keep()
+            await self._desk.keep()
 
 
 def _add_files(router: APIRouter, desk: EditorDesk, demand: Callable[[Request], None]) -> None:
@@ -106,79 +111,110 @@ def _add_files(router: APIRouter, desk: EditorDesk, demand: Callable[[Request], 
     @router.get("/api/edit/files")
     async def files(request: Request) -> dict[str, object]:
         demand(request)
-        return {"files": await asyncio.to_thread(desk.files), "missions": list_missions()}
+        return {"files": await desk.work(desk.files), "missions": list_missions()}
 
     @router.post("/api/edit/files")
     async def create(request: Request, name: _Text, source: _Text) -> dict[str, str]:
         demand(request)
-        return {"file": await _made(lambda: desk.create(name, source))}
+        return await made(request, lambda: desk.create(name, source))
 
     @router.post("/api/edit/import")
     async def import_(request: Request, name: _Text, scxml: _Scxml) -> dict[str, str]:
         demand(request)
-        return {"file": await _made(lambda: desk.write(name, import_scxml(scxml.encode(), name)))}
+        return await made(request, lambda: desk.write(name, import_scxml(scxml.encode(), name)))
+
+    async def made(request: Request, make: Callable[[], str]) -> dict[str, str]:
+        try:
+            return {"file": await desk.work(make)}
+        except UserError as error:
+            raise HTTPException(400, reason(error, language_of(request))) from None
 
 
-async def _made(make: Callable[[], str]) -> str:
+async def _export(
+    desk: EditorDesk, file: str, kind: Literal["scxml", "mermaid"], language: Language
+) -> Response:
+    def export(opened: OpenDocument) -> str:
+        chart = opened.document.chart
+        if chart is None:
+            raise SaidError("export.mistakes")
+        return export_scxml(chart) if kind == "scxml" else mermaid_of(chart)
+
     try:
-        return await asyncio.to_thread(make)
+        shared = await desk.open(file)
+        try:
+            async with shared.lock:
+                text = await desk.work(lambda: export(shared.opened))
+        finally:
+            shared.leave()
     except UserError as error:
-        raise HTTPException(400, str(error)) from None
-
-
-def _export(desk: EditorDesk, file: str, kind: Literal["scxml", "mermaid"]) -> Response:
-    try:
-        chart = desk.open(file).opened.document.chart
-        desk.close(file)
-    except UserError as error:
-        raise HTTPException(400, str(error)) from None
-    if chart is None:
-        raise HTTPException(400, "the mission has mistakes; mend them, then export it")
-    text = export_scxml(chart) if kind == "scxml" else mermaid_of(chart)
+        raise HTTPException(400, reason(error, language)) from None
     name = f"{Path(file).stem}.{'scxml' if kind == 'scxml' else 'mmd'}"
     return PlainTextResponse(text, headers={"Content-Disposition": f'attachment; filename="{name}"'})
 
 
-class _Window:
-    """A page's WebSocket."""
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What is told after a message: the page that sent it, and the others; None: nothing."""
 
-    def __init__(self, websocket: WebSocket, desk: EditorDesk, file: str, shared: SharedDocument) -> None:
+    own: str
+    others: str | None = None
+    warning: Said | None = None
+
+
+class _Window:
+    """A page's WebSocket; a viewer of its document."""
+
+    def __init__(self, websocket: WebSocket, desk: EditorDesk, shared: SharedDocument, client: str) -> None:
+        self.language = language_of(websocket)
         self._websocket = websocket
         self._desk = desk
-        self._file = file
         self._shared = shared
-        self._outbox: asyncio.Queue[dict[str, object]] = asyncio.Queue(_MAX_QUEUE)
+        self._client = client
+        self._outbox: asyncio.Queue[str] = asyncio.Queue(_MAX_QUEUE)
         self._is_slow = asyncio.Event()
 
     async def serve(self) -> None:
         """Receive and send until the page leaves."""
-        self._shared.viewers.append(self._queue)
-        opened = self._shared.opened
-        self._queue({**document_message(opened), "catalogue": catalogue_message(opened)})
+        shared = self._shared
+        async with shared.lock:
+            self.put(await self._desk.work(self._first))
+            shared.viewers.append(self)
         self._tell_others()
         tasks = [asyncio.create_task(each) for each in (self._receive(), self._send(), self._is_slow.wait())]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            self._shared.viewers.remove(self._queue)
+            shared.viewers.remove(self)
             self._tell_others()
-            self._desk.close(self._file)
             for task in tasks:
                 task.cancel()
             for failure in await asyncio.gather(*tasks, return_exceptions=True):
                 if isinstance(failure, Exception):
                     logger.error("an editor's WebSocket failed", exc_info=failure)
 
-    def _queue(self, message: dict[str, object]) -> None:
+    def put(self, line: str) -> None:
+        """Queue a message; a page that does not keep up is disconnected, and connects again."""
         try:
-            self._outbox.put_nowait(message)
+            self._outbox.put_nowait(line)
         except asyncio.QueueFull:
             self._is_slow.set()
 
+    def warn(self, what: Said) -> None:
+        """Tell the person something."""
+        self.put(_json({"type": "status", "warning": say(what, self.language)}))
+
+    def _first(self) -> str:
+        """The whole document. A new page is told of what is not saved; one that was here knows."""
+        shared, opened = self._shared, self._shared.opened
+        answered = shared.answered.get(self._client, 0)
+        message = document_message(opened)
+        if not answered:
+            message["restored"] = not opened.is_saved and not shared.viewers
+        return _json({**message, "answered": answered, "catalogue": catalogue_message(opened)})
+
     async def _send(self) -> None:
         while True:
-            message = await self._outbox.get()
-            await self._websocket.send_text(json.dumps(message, ensure_ascii=False))
+            await self._websocket.send_text(await self._outbox.get())
 
     async def _receive(self) -> None:
         while True:
@@ -188,41 +224,64 @@ class _Window:
             try:
                 message = read_message(received.get("text") or received.get("bytes") or "")
             except PageMessageError as error:
-                reason = str(error).encode()[:_MAX_REASON_BYTES].decode(errors="ignore")
-                await self._websocket.close(_BAD_MESSAGE_CODE, reason)
+                why = str(error).encode()[:_MAX_REASON_BYTES].decode(errors="ignore")
+                await self._websocket.close(_BAD_MESSAGE_CODE, why)
                 return
-            self._take(message)
-            await asyncio.sleep(0)
+            await asyncio.shield(self._take(message))  # what has begun is carried out, whatever the page does
 
-    def _take(self, message: PageMessage) -> None:
+    async def _take(self, message: PageMessage) -> None:
         """Do what a page asks for, tell all pages, and answer."""
-        opened = self._shared.opened
-        before = opened.document.text
+        shared = self._shared
+        async with shared.lock:
+            others = [each for each in shared.viewers if each is not self]
+            told = await self._desk.work(lambda: self._do(message, tells_others=bool(others)))
+            self.put(told.own)
+            if told.others is not None:
+                for viewer in others:
+                    viewer.put(told.others)
+            if told.warning is not None:
+                self.warn(told.warning)
+
+    def _do(self, message: PageMessage, *, tells_others: bool) -> _Told:
+        """In a thread, with the lock: carry out a message."""
+        shared, opened = self._shared, self._shared.opened
         answer: dict[str, object] = {"answers": message.number}
+        if self._client and message.number <= shared.answered.get(self._client, 0):
+            return _Told(_json({**status_message(opened), **answer}))
+        before, layout = opened.document.text, opened.layout
+        warning: Said | None = None
+        changes: Sequence[Change] = ()
         try:
-            changes = _carry_out(opened, message)
+            if isinstance(message, SaveMessage):
+                warning = opened.save(force=message.force)
+            else:
+                changes = _carry_out(opened, message)
         except UserError as error:
-            answer["refused"] = str(error).partition("\n")[0]
-            if isinstance(message, TypeMessage):  # the page has the typed text: it gets the right one
-                answer = {**document_message(opened), **answer}
-            self._queue({**status_message(opened), **answer})
-            return
-        if changes:
-            told = changed_message(opened, before, changes)
-            for viewer in self._shared.viewers:
-                if viewer != self._queue:
-                    viewer(told)
-            own = {**told, "changes": []} if isinstance(message, TypeMessage) else told
-            self._queue({**own, **answer, "catalogue": catalogue_message(opened)})
-            return
-        for viewer in self._shared.viewers:
+            shared.note(self._client, message.number)
+            answer["refused"] = reason(error, self.language)
+            answer["code"] = error.message.code if isinstance(error, SaidError) else ""
+            # The page has the typed text: it gets the right one.
+            whole = document_message(opened) if isinstance(message, TypeMessage) else status_message(opened)
+            return _Told(_json({**whole, **answer}))
+        shared.note(self._client, message.number)
+        if not changes:
             status = status_message(opened)
-            viewer({**status, **answer} if viewer == self._queue else status)
+            if opened.layout is not layout:
+                status["layout"] = places_message(opened)
+            return _Told(_json({**status, **answer}), _json(status), warning)
+        told = changed_message(opened, before, changes)
+        own = {**told, "changes": []} if isinstance(message, TypeMessage) else told
+        own = {**own, **answer, "catalogue": catalogue_message(opened)}
+        return _Told(_json(own), _json(told) if tells_others else None)
 
     def _tell_others(self) -> None:
         others = len(self._shared.viewers) - 1
         for viewer in self._shared.viewers:
-            viewer({"type": "status", "others": others})
+            viewer.put(_json({"type": "status", "others": others}))
+
+
+def _json(message: dict[str, object]) -> str:
+    return json.dumps(message, ensure_ascii=False)
 
 
 def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[Change]:
@@ -233,16 +292,14 @@ def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[Change]:
         return _type(opened, message)
     if isinstance(message, StepMessage):
         return opened.undo() if message.type == "undo" else opened.redo()
-    if isinstance(message, SaveMessage):
-        opened.save(force=message.force)
-    elif isinstance(message, LayoutMessage):
-        opened.place(dict(message.places))
+    if isinstance(message, LayoutMessage):
+        opened.place(dict(message.places), settled=message.settled)
     return ()
 
 
 def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[Change]:
     if message.revision != opened.revision:
-        raise PageMessageError(_CHANGED_ELSEWHERE)
+        raise SaidError("typed.elsewhere")
     changes: list[Change] = []
     try:
         for typed in message.changes:
@@ -257,8 +314,8 @@ def _replacement(opened: OpenDocument, typed: TypedChange) -> Edit:
     text, positions = opened.document.text, opened.document.positions
     last = typed.start + typed.removed
     if len(typed.inserted) > MAX_FILE_BYTES:
-        raise PageMessageError("the mission would be larger than 1 MB; a mission is a page or two")
+        raise SaidError("typed.too_large")
     if last > positions.to_utf16(len(text)):
-        raise PageMessageError(f"typed text: {last} is after the end of the text; load the page again")
+        raise SaidError("typed.beyond", place=last)
     start, end = positions.from_utf16(typed.start), positions.from_utf16(last)
     return parse_edit({"kind": "replace_text", "start": start, "end": end, "text": typed.inserted})

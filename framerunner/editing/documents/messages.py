@@ -1,14 +1,19 @@
 """What is said between the editor's page and its program: JSON, offsets counted as JavaScript does.
 
-From a page, each with a `number` that the answer repeats as `answers`:
+From a page, each with a `number`, counted upwards, that the answer repeats as `answers`:
 
     {"type": "edit", "edit": {...}}            an edit of `offboard.authoring.edits`
     {"type": "type", "revision": 3, "changes": [{"start", "removed", "inserted"}]}     typed text
     {"type": "undo"}, {"type": "redo"}, {"type": "save", "force": false}
-    {"type": "layout", "places": {"red": {"x": 1, "y": 2}, "green": null}}
+    {"type": "layout", "places": {"red": {"x": 1, "y": 2}, "green": null}, "settled": false}
 
 To a page: `document` with the whole text, `changed` with the changes of it, each made for the text after
-those before it, `status`, and `{"refused": reason}` in an answer.
+those before it, `status`, with the `layout` if only that has changed, `{"warning": words}`, and in an answer
+`{"refused": reason, "code"}`.
+
+A page whose connection was lost connects again with the `client` that it has made up. `answered` in
+`document` is the number of its last message that was carried out, which it must not send again; `session` is
+another one if the program was started anew and knows only what was journalled.
 """
 
 from __future__ import annotations
@@ -16,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from errors import UserError
 from framerunner.editing.documents.open_document import OpenDocument
@@ -29,10 +34,12 @@ from offboard.authoring import (
     Positions,
     Span,
     StateBox,
+    StrictModel,
     as_json,
     catalogue,
-    check_document,
     diagram,
+    findings_of,
+    reported_problems,
 )
 
 _Number = Annotated[int, Field(ge=0, le=2**53)]
@@ -42,16 +49,12 @@ class PageMessageError(UserError):
     """A message that the editor's page does not send; its text is one line."""
 
 
-class _FromPage(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
+class _FromPage(StrictModel):
     number: _Number
 
 
-class TypedChange(BaseModel):
+class TypedChange(StrictModel):
     """Some characters replaced by typed ones; offsets count UTF-16 code units."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     start: _Number
     removed: _Number
@@ -87,10 +90,11 @@ class SaveMessage(_FromPage):
 
 
 class LayoutMessage(_FromPage):
-    """Where states are drawn."""
+    """Where states are drawn; `settled`: by the page, which is nothing to undo."""
 
     type: Literal["layout"]
     places: Annotated[dict[str, StateBox | None], Field(max_length=5000)]
+    settled: bool = False
 
 
 PageMessage = EditMessage | TypeMessage | StepMessage | SaveMessage | LayoutMessage
@@ -133,6 +137,11 @@ def status_message(opened: OpenDocument) -> dict[str, object]:
     }
 
 
+def places_message(opened: OpenDocument) -> dict[str, object]:
+    """Where the states are drawn."""
+    return {name: {"x": box.x, "y": box.y} for name, box in opened.layout.states.items()}
+
+
 def _fields(each: Node | Edge | Finding) -> dict[str, object]:
     """As `dataclasses.asdict`, which copies all texts and takes a quarter of the answer's time."""
     return {name: getattr(each, name) for name in each.__slots__}
@@ -149,10 +158,12 @@ def _state(opened: OpenDocument) -> dict[str, object]:
         return [positions.to_utf16(each) if wide else each for each in (span.start, span.end)]
 
     drawn = diagram(document)
-    found = [{**_fields(each), "span": at(Span(each.start, each.end))} for each in check_document(document)]
+    problems = reported_problems(document, opened.pilot_class)
+    findings = findings_of(document, problems)
+    found = [{**_fields(each), "span": at(Span(each.start, each.end))} for each in findings]
     if opened.speaks_spanish:
-        for each, spanish in zip(found, check_document(document, texts=SPANISH), strict=True):
-            each["spanish"] = spanish.message
+        for shown, problem in zip(found, problems, strict=True):
+            shown["spanish"] = problem.message.text(SPANISH)
     nodes = [
         {**_fields(node), "span": at(node.span), "name_span": at(node.name_span)} for node in drawn.nodes
     ]
@@ -166,6 +177,7 @@ def _state(opened: OpenDocument) -> dict[str, object]:
         **status_message(opened),
         "name": opened.path.name,
         "revision": opened.revision,
+        "session": opened.name,
         "restored": opened.restored,
         "problem": opened.problem,
         "diagram": {"initial": drawn.initial, "readable": drawn.readable, "nodes": nodes, "edges": edges},
@@ -173,7 +185,7 @@ def _state(opened: OpenDocument) -> dict[str, object]:
         "variables": {name: value.text for name, value in outline.variables.items()},
         "templates": [state.name for state in outline.templates],
         "findings": found,
-        "layout": {name: {"x": box.x, "y": box.y} for name, box in opened.layout.states.items()},
+        "layout": places_message(opened),
     }
 
 
@@ -181,4 +193,5 @@ def catalogue_message(opened: OpenDocument) -> dict[str, object]:
     """The names that the mission can use."""
     outline = opened.document.outline
     variables = dict.fromkeys(outline.variables, 0.0)
-    return as_json(catalogue(variables=variables, contest=outline.text("class") != "open"))
+    contest = outline.text("class") != "open"
+    return as_json(catalogue(opened.pilot_class, variables, contest=contest))

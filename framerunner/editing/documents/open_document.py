@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from secrets import token_urlsafe
 
-from errors import UserError
+from errors import UserError, is_disk_full
+from framerunner.editing.words import Said, SaidError
 from offboard.authoring import (
     Change,
     Document,
@@ -17,16 +20,40 @@ from offboard.authoring import (
     LayoutError,
     ReplaceText,
     StateBox,
+    known_places,
     layout_path,
     read_layout,
     write_layout,
 )
+from offboard.pilot import Pilot
 
 _JOURNAL_SUFFIX = ".unsaved"
 
 
-class SaveRefusedError(UserError):
-    """The file was not saved; the message is one line for people."""
+class SaveRefusedError(SaidError):
+    """The file was not saved."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Typed:
+    """Letters that were typed or deleted.
+
+    Attributes:
+        start, end: offsets of what was replaced, before that.
+        cursor: where it was afterwards.
+    """
+
+    start: int
+    end: int
+    cursor: int
+    is_deletion: bool
+
+    def follows(self, before: _Typed) -> bool:
+        """Whether the same was done before, next to this."""
+        if self.is_deletion != before.is_deletion:
+            return False
+        # Letters are added and deleted forwards from the cursor, and deleted backwards towards it.
+        return self.start == before.cursor or (self.is_deletion and self.end == before.cursor)
 
 
 @dataclass(slots=True)
@@ -40,6 +67,8 @@ class OpenDocument:
         restored: what a killed program had not saved was found and is shown.
         speaks_spanish: a page wants findings in Spanish, too.
         problem: what else went wrong at opening, in one line; empty: nothing.
+        pilot_class: whose names the mission uses.
+        name: of this opening; after the program was started again it is another.
     """
 
     path: Path
@@ -48,19 +77,23 @@ class OpenDocument:
     restored: bool = False
     problem: str = ""
     speaks_spanish: bool = False
+    pilot_class: type[Pilot] = Pilot
+    name: str = field(default_factory=lambda: token_urlsafe(9))
     _saved: bytes = b""
     _is_kept: bool = True  # the journal has the present text
-    _typed_to: int = -1  # where the last edit ended, if it was typed letters
+    _typed: _Typed | None = None  # the last edit, if it was typed letters
+    _journal_fails: bool = False
 
     @classmethod
-    def open(cls, path: Path) -> OpenDocument:
+    def open(cls, path: Path, pilot_class: type[Pilot] = Pilot) -> OpenDocument:
         """Open a file. Raises `MissionError` if it cannot be read."""
         document = Document.open(path)
         try:
             layout, problem = read_layout(path), ""
         except LayoutError as error:
             layout, problem = Layout(), str(error)
-        opened = cls(path, EditSession(document, layout), problem=problem, _saved=document.data)
+        session = EditSession(document, layout)
+        opened = cls(path, session, problem=problem, pilot_class=pilot_class, _saved=document.data)
         opened._restore()
         return opened
 
@@ -98,13 +131,12 @@ class OpenDocument:
     def apply(self, edit: Edit) -> tuple[Change, ...]:
         """Apply an edit; see `EditSession.apply`.
 
-        Letters typed one after the other are undone together, a line at most.
+        Letters typed one after the other are undone together, a line at most; deleted ones likewise.
         """
-        typed = edit if isinstance(edit, ReplaceText) and _is_typed(edit) else None
-        goes_on = typed is not None and typed.start == self._typed_to
+        typed = _typed(self.document.text, edit) if isinstance(edit, ReplaceText) else None
+        goes_on = typed is not None and self._typed is not None and typed.follows(self._typed)
         changes = self._changed(self.session.apply(edit, goes_on=goes_on))
-        if typed is not None:
-            self._typed_to = typed.start + len(typed.text)
+        self._typed = typed
         return changes
 
     def take_back(self, changes: Sequence[Change]) -> None:
@@ -118,49 +150,91 @@ class OpenDocument:
             )
 
     def undo(self) -> tuple[Change, ...]:
-        """Take the last edit back; see `EditSession.undo`."""
-        return self._changed(self.session.undo())
+        """Take the last edit or move of boxes back; see `EditSession.undo`."""
+        return self._stepped(self.session.undo)
 
     def redo(self) -> tuple[Change, ...]:
         """Do again what was undone last; see `EditSession.redo`."""
-        return self._changed(self.session.redo())
+        return self._stepped(self.session.redo)
+
+    def _stepped(self, step: Callable[[], tuple[Change, ...]]) -> tuple[Change, ...]:
+        before = self.layout
+        changes = self._changed(step())
+        self._typed = None
+        if self.layout != before:
+            self._write_layout()
+        return changes
 
     def _changed(self, changes: tuple[Change, ...]) -> tuple[Change, ...]:
         if changes:
             self.revision += 1
-            self._typed_to = -1
+            self._typed = None
             self._is_kept = False
         return changes
 
-    def place(self, places: dict[str, StateBox | None]) -> None:
-        """Keep where states are drawn, by their full ids; None forgets one. Raises `LayoutError`."""
-        states = {**self.layout.states, **{name: box for name, box in places.items() if box is not None}}
-        for name, box in places.items():
-            if box is None:
-                states.pop(name, None)
-        self.session.layout = Layout(states=states, corners=self.layout.corners)
-        write_layout(self.path, self.layout)
+    def place(self, places: dict[str, StateBox | None], *, settled: bool = False) -> None:
+        """Keep where states are drawn, by their full ids; None forgets one.
 
-    def keep(self) -> None:
-        """Write the journal, if the text has changed since; a disk that refuses it is no reason to stop."""
+        Args:
+            places: of some states.
+            settled: by the page, of states that nobody placed: nothing to undo.
+
+        Raises:
+            SaidError: the file of places cannot be written.
+        """
+        if settled:
+            self.session.settle(places)
+        else:
+            self.session.place(places)
+            self._typed = None
+        self._write_layout()
+
+    def _write_layout(self) -> None:
+        try:
+            write_layout(self.path, known_places(self.layout, self.document))
+        except LayoutError as error:
+            raise SaidError("places.not_written", reason=error) from None
+
+    def is_outdated(self) -> bool:
+        """Whether the file has another text, and nothing here is to be saved."""
+        try:
+            return self.is_saved and self.path.read_bytes() != self._saved
+        except OSError:
+            return False
+
+    def keep(self) -> Said | None:
+        """Write the journal, if the text has changed since.
+
+        A disk that refuses it is no reason to stop: it is tried again at the next call.
+
+        Returns:
+            What to tell the person, once for each time that writing begins to fail; None if it is written.
+        """
         if self._is_kept:
-            return
-        self._is_kept = True
-        if self.is_saved:
-            self.journal.unlink(missing_ok=True)
-            return
+            return None
         part = self.journal.with_suffix(".part")
         try:
-            part.write_bytes(self.document.data)
-            os.replace(part, self.journal)
-        except OSError:
-            part.unlink(missing_ok=True)
+            if self.is_saved:
+                self.journal.unlink(missing_ok=True)
+            else:
+                part.write_bytes(self.document.data)
+                os.replace(part, self.journal)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            known, self._journal_fails = self._journal_fails, True
+            return None if known else Said("journal.not_written", reason=_words(error))
+        self._is_kept, self._journal_fails = True, False
+        return None
 
-    def save(self, *, force: bool = False) -> None:
+    def save(self, *, force: bool = False) -> Said | None:
         """Write the file.
 
         Args:
             force: also if another program has changed it meanwhile.
+
+        Returns:
+            What else to tell the person; None: nothing.
 
         Raises:
             SaveRefusedError: it cannot be written, or another program has changed it.
@@ -170,20 +244,40 @@ class OpenDocument:
         part = file.with_name(f".{file.name}.part")
         try:
             if not force and file.exists() and file.read_bytes() != self._saved:
-                raise SaveRefusedError(f"{name} was changed by another program since it was opened")
+                raise SaveRefusedError("desk.changed", name=name)
             part.write_bytes(self.document.data)
             if file.exists():
                 part.chmod(file.stat().st_mode & 0o777)
             os.replace(part, file)
-            if layout_path(self.path).exists() or self.layout.states:
-                write_layout(self.path, self.layout)
         except OSError as error:
-            part.unlink(missing_ok=True)
-            raise SaveRefusedError(f"{name}: cannot be written ({error.strerror})") from None
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            raise SaveRefusedError("desk.not_written", name=name, **write_problem(error)) from None
         self._saved = self.document.data
         self._is_kept = True
-        self.journal.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            self.journal.unlink(missing_ok=True)
+        try:
+            if layout_path(self.path).exists() or self.layout.states:
+                self._write_layout()
+        except SaidError as error:
+            return error.message
+        return None
 
 
-def _is_typed(edit: ReplaceText) -> bool:
-    return edit.start == edit.end and "\n" not in edit.text
+def write_problem(error: OSError) -> dict[str, object]:
+    """Reason and advice of a file that cannot be written, for `desk.not_written`."""
+    advice = "advice.space" if is_disk_full(error) else "advice.again"
+    return {"reason": _words(error), "advice": Said(advice)}
+
+
+def _words(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()
+
+
+def _typed(text: str, edit: ReplaceText) -> _Typed | None:
+    """What was typed with an edit of a text: letters of one line, added or deleted; None if it was more."""
+    is_addition, is_deletion = edit.start == edit.end, edit.text == ""
+    if is_addition == is_deletion or "\n" in edit.text or "\n" in text[edit.start : edit.end]:
+        return None
+    return _Typed(edit.start, edit.end, edit.start + len(edit.text), is_deletion)

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
+import resource
 import time
-from concurrent.futures import CancelledError
-from contextlib import contextmanager, suppress
-from types import SimpleNamespace
+from contextlib import contextmanager
+from string import Formatter
 
 import pytest
-from fastapi import FastAPI
-from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
+from framerunner.editing import words
 from framerunner.editing.documents.desk import DeskError, EditorDesk
-from framerunner.editing.documents.door import DocumentsDoor
+from framerunner.editing.documents.messages import catalogue_message, document_message
 from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
+from offboard.authoring import read_layout
 from offboard.authoring.edits import AddState, ReplaceText
+from offboard.authoring.messages import EDIT_ENGLISH, EDIT_SPANISH
+from offboard.chart.messages import ENGLISH
 from offboard.mission import MISSIONS, list_missions
+from offboard.pilot import Pilot
+from offboard.pilot_file import PilotFile
+from tests.framerunner.editing.page_socket import served
 
 HOVER = "name: hover\ninitial: up\nstates:\n  up:\n    enter: [hover]\n    final: true  # ü 😀\n"
 CRLF = HOVER.replace("\n", "\r\n").encode()
@@ -27,52 +33,6 @@ def path(tmp_path):
     made = tmp_path / "hover.yaml"
     made.write_text(HOVER, encoding="utf-8")
     return made
-
-
-class Socket:
-    """A page's end of a document's WebSocket."""
-
-    def __init__(self, socket):
-        self._socket = socket
-        self._number = 0
-        self.document = self.receive("document")
-
-    def receive(self, kind):
-        """The next message of a type."""
-        while (message := self._socket.receive_json())["type"] != kind:
-            pass
-        return message
-
-    def ask(self, kind, **fields):
-        """Ask for something; the answer."""
-        self._number += 1
-        self._socket.send_json({"type": kind, "number": self._number, **fields})
-        while (message := self._socket.receive_json()).get("answers") != self._number:
-            pass
-        return message
-
-    def edit(self, kind, **fields):
-        return self.ask("edit", edit={"kind": kind, **fields})
-
-    def type(self, start, inserted, *, revision, removed=0):
-        change = {"start": start, "removed": removed, "inserted": inserted}
-        return self.ask("type", revision=revision, changes=[change])
-
-
-@contextmanager
-def served(folder, *, may_act=True):
-    """A client of a server with the documents' door."""
-    web = FastAPI()
-    web.include_router(DocumentsDoor(EditorDesk(folder)).router(lambda _: may_act))
-    with TestClient(web) as client:
-
-        @contextmanager
-        def window(name):
-            # The test client cancels what the server still does when a page has left.
-            with suppress(CancelledError), client.websocket_connect(f"/ws/edit?file={name}") as socket:
-                yield Socket(socket)
-
-        yield SimpleNamespace(http=client, window=window)
 
 
 def test_what_is_not_saved_is_found_again_after_a_kill(path):
@@ -144,7 +104,7 @@ def test_pages_name_files_of_the_folder_and_no_others(tmp_path, name):
     folder.mkdir()
     (tmp_path / "x.yaml").write_text(HOVER)
     with pytest.raises(DeskError, match="is no mission file of this folder"):
-        EditorDesk(folder).open(name)
+        asyncio.run(EditorDesk(folder).open(name))
 
 
 @pytest.mark.parametrize("name", ["../x", "X", "", "a b", "a" * 61, "x.yaml", "ü"])
@@ -163,7 +123,7 @@ def test_new_missions_are_made_from_an_empty_chart_an_example_or_a_copy(tmp_path
     copied = (desk.folder / "mine.yaml").read_text()
     assert copied == shipped.replace("name: frame_challenge\n", "name: mine\n")
     for file in desk.files():
-        assert desk.open(file).opened.document.text
+        assert OpenDocument.open(desk.folder / file).document.text
     with pytest.raises(DeskError, match="is there already"):
         desk.create("mine", "empty")
     with pytest.raises(DeskError, match="unknown source"):
@@ -305,6 +265,44 @@ def test_typed_letters_are_undone_together_a_line_at_most(path):
     assert texts == [HOVER + "# ab\n# c", HOVER + "# ab\n", HOVER + "# ab", HOVER]
 
 
+def test_deleted_letters_are_undone_together(path):
+    opened = OpenDocument.open(path)
+    end = HOVER.index("\n")
+    for number in range(5):  # backwards
+        opened.apply(ReplaceText(start=end - number - 1, end=end - number, text=""))
+    for _ in range(3):  # forwards
+        opened.apply(ReplaceText(start=0, end=1, text=""))
+    opened.undo()
+    assert opened.document.text == HOVER.replace("hover", "", 1)
+    opened.undo()
+    assert opened.document.text == HOVER
+
+
+def test_a_move_of_boxes_is_undone_in_the_side_file_and_told_to_all_windows(path):
+    side = path.with_name("hover.layout.json")
+    with (
+        served(path.parent) as server,
+        server.window("hover.yaml") as one,
+        server.window("hover.yaml") as two,
+    ):
+        assert not one.ask("layout", places={"up": {"x": 1, "y": 1}}, settled=True)["can_undo"]
+        one.type(0, "#", revision=0)
+        one.ask("layout", places={"up": {"x": 2, "y": 2}})
+        assert read_layout(path).states["up"].x == 2
+        undone = one.ask("undo")
+        assert undone["layout"] == {"up": {"x": 1, "y": 1}}
+        assert undone["can_undo"]  # the typed letter
+        assert read_layout(path).states["up"].x == 1
+        while two.receive("status").get("layout") != {"up": {"x": 1, "y": 1}}:
+            pass
+        assert one.ask("redo")["layout"] == {"up": {"x": 2, "y": 2}}
+        assert one.ask("undo")["layout"] == {"up": {"x": 1, "y": 1}}
+        assert one.ask("undo")["changes"] == [{"start": 0, "removed": 1, "inserted": ""}]
+        assert not one.ask("layout", places={"gone": {"x": 1, "y": 1}}, settled=True)["can_undo"]
+    assert list(read_layout(path).states) == ["up"]
+    assert side.exists()
+
+
 def test_a_page_that_left_finds_its_text_again(path):
     with served(path.parent) as server:
         with server.window("hover.yaml") as window:
@@ -361,3 +359,108 @@ def test_hostile_text_is_answered_within_a_second_and_does_nothing(path, hostile
         with server.window("hover.yaml") as other:  # the server lives
             assert "refused" not in other.ask("undo") or answer.get("refused")
     assert not list(path.parent.glob("hacked*"))
+
+
+@contextmanager
+def no_space():
+    """Files cannot grow beyond some bytes, as on a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_on_a_full_disk_nothing_is_lost_and_it_is_told_in_one_line(path):
+    opened = OpenDocument.open(path)
+    opened.apply(AddState(name="down"))
+    assert opened.keep() is None
+    journal = opened.journal.read_bytes()
+    opened.apply(AddState(name="other"))
+    with no_space():
+        assert opened.keep().code == "journal.not_written"
+        assert opened.keep() is None  # told once
+        with pytest.raises(SaveRefusedError, match=r"cannot be written .*; .* save again"):
+            opened.save()
+    assert path.read_text() == HOVER
+    assert opened.journal.read_bytes() == journal  # the last that fitted
+    assert sorted(each.name for each in path.parent.iterdir()) == [opened.journal.name, path.name]
+    assert opened.keep() is None
+    assert opened.journal.read_bytes() == opened.document.data
+    opened.save()
+    assert path.read_bytes() == opened.document.data
+
+
+def test_a_mission_that_cannot_be_written_is_not_half_made(tmp_path):
+    with no_space(), pytest.raises(DeskError, match="cannot be written"):
+        EditorDesk(tmp_path).create("mine", "frame_challenge")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_is_told_to_the_page_in_its_language(path):
+    with served(path.parent) as server, server.window("hover.yaml", "&language=es") as window:
+        window.edit("add_state", name="down")
+        with no_space():
+            refused = window.ask("save")
+        assert refused["refused"].startswith("hover.yaml: no se puede escribir")
+        assert refused["code"] == "desk.not_written"
+        refused = window.edit("delete_state", state="nowhere")["refused"]
+        assert refused == "no hay ningún estado 'nowhere' en este documento"
+
+
+def test_what_a_lost_connection_took_can_be_sent_again_and_is_done_once(path):
+    with served(path.parent) as server:
+        with server.window("hover.yaml", "&client=me") as window:
+            session = window.document["session"]
+            window.edit("add_state", name="down")
+        with server.window("hover.yaml", "&client=me") as window:
+            assert (window.document["answered"], window.document["revision"]) == (1, 1)
+            assert window.document["session"] == session
+            assert not window.document["restored"]
+            window.edit("add_state", name="other")  # has the number 1 again: it was done already
+            assert window.ask("undo")["can_redo"]  # the history is kept, too
+            assert window.ask("save")["saved"]
+    assert path.read_text() == HOVER
+
+
+def test_a_file_that_changed_while_nobody_had_it_open_is_read_again(path):
+    with served(path.parent) as server:
+        with server.window("hover.yaml"):
+            pass
+        path.write_text("name: other\n")
+        with server.window("hover.yaml") as window:
+            assert window.document["text"] == "name: other\n"
+
+
+def test_every_text_of_the_server_is_in_both_languages():
+    for english, spanish in ((words._ENGLISH, words._SPANISH), (EDIT_ENGLISH, EDIT_SPANISH)):
+        assert set(english) == set(spanish)
+        names = [
+            {code: {part[1] for part in Formatter().parse(text)} for code, text in table.items()}
+            for table in (english, spanish)
+        ]
+        assert names[0] == names[1]
+    own = [set(words._ENGLISH) - {"plain"}, set(EDIT_ENGLISH), set(ENGLISH)]
+    assert sum(map(len, own)) == len(set().union(*own))
+
+
+PILOT = """
+from offboard.pilot import Pilot
+class Mine(Pilot):
+    @property
+    def my_answer(self) -> float:
+        "The answer."
+        return 42.0
+"""
+
+
+def test_a_contestants_names_are_offered_and_checked(path):
+    kind = PilotFile("mine.py", PILOT).pilot_class()
+    path.write_text(HOVER.replace("final: true", "transitions: [{when: my_answer > 1, to: up}]"))
+    for pilot_class, errors in ((kind, 0), (Pilot, 1)):
+        opened = OpenDocument.open(path, pilot_class)
+        values = [each["name"] for each in catalogue_message(opened)["values"]]
+        assert ("my_answer" in values) is (pilot_class is kind)
+        found = [each["code"] for each in document_message(opened)["findings"]]
+        assert found.count("name.unknown") == errors

@@ -11,7 +11,7 @@ from playwright.async_api import expect
 from benchmarks.editor import drag, large_mission
 from tests.chromium import chromium
 from tests.framerunner.editing.editor_program import editor, free_port
-from tests.framerunner.editing.editor_user import SIZE, EditorUser
+from tests.framerunner.editing.editor_user import SIZE, EditorUser, box_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 HOVER = """\
@@ -224,6 +224,117 @@ async def test_a_field_that_is_being_filled_in_is_kept_when_another_window_edits
     await expect(one.page.locator(".cm-line").nth(7)).to_contain_text("# typed")
     await one.page.keyboard.press("Enter")
     await expect(one.form.get_by_label("Remove: land")).to_have_count(1)
+
+
+async def move(user, start, end):
+    """Drag from one point of the window to another."""
+    await user.page.mouse.move(*start)
+    await user.page.mouse.down()
+    await user.page.mouse.move(*end, steps=4)
+    await user.page.mouse.up()
+
+
+async def corner(user, name, dx=12, dy=10):
+    """A point in a state, beside its corner."""
+    box = await box_of(user.state(name).locator("> rect").first)
+    return box["x"] + dx, box["y"] + dy
+
+
+async def test_a_move_of_a_box_is_undone_in_order_with_typed_text(windows):
+    user = await windows.open()
+    side = windows.path.with_suffix(".layout.json")
+    place = await user.state("wait").get_attribute("transform")
+    await user.type_at(1, "!")
+    await expect(user.page.locator(".e-saved")).to_contain_text("not saved")
+    x, y = await corner(user, "wait")
+    await move(user, (x, y), (x + 90, y + 50))
+    await expect(user.state("wait")).not_to_have_attribute("transform", place)
+    moved = side.read_text()
+    await user.page.keyboard.press("ControlOrMeta+z")
+    await expect(user.state("wait")).to_have_attribute("transform", place)
+    assert side.read_text() != moved
+    assert "a comment!" in await user.text()
+    # A field of a form that nothing was typed into takes the document's last edit back, too.
+    await user.form.get_by_label("Name", exact=True).click()
+    await user.page.keyboard.press("ControlOrMeta+z")
+    await expect(user.page.locator(".cm-line").first).to_have_text(HOVER.splitlines()[0])
+
+
+async def test_what_is_drawn_stays_where_it_is_when_states_are_added(windows):
+    user = await windows.open()
+    names = ("up", "wait", "down")
+    before = [await user.state(name).get_attribute("transform") for name in names]
+    for name in ("one", "two", "three"):
+        await user.add("New state", name)
+    await user.page.reload()
+    await expect(user.state("three")).to_be_attached()
+    assert [await user.state(name).get_attribute("transform") for name in names] == before
+    boxes = [
+        await box_of(user.state(name).locator("> rect").first) for name in (*names, "one", "two", "three")
+    ]
+    for number, one in enumerate(boxes):
+        for other in boxes[:number]:
+            assert (
+                one["x"] >= other["x"] + other["width"]
+                or other["x"] >= one["x"] + one["width"]
+                or one["y"] >= other["y"] + other["height"]
+                or other["y"] >= one["y"] + one["height"]
+            )
+
+
+async def test_the_ends_of_a_transition_are_dragged_to_other_states(windows):
+    user = await windows.open()
+    await user.transition("up/tick/0").click()
+    end = await box_of(user.page.locator(".e-end").last)
+    await move(user, (end["x"] + 4, end["y"] + 4), await corner(user, "down"))
+    await expect(user.form.locator("h2")).to_have_text("Transition up → down")
+    start = await box_of(user.page.locator(".e-end").first)
+    await move(user, (start["x"] + 4, start["y"] + 4), await corner(user, "wait"))
+    await expect(user.form.locator("h2")).to_have_text("Transition wait → down")
+    added = "      - when: imu.z > 1\n        to: down\n"
+    assert added in await user.text()
+    await user.page.keyboard.press("ControlOrMeta+z")
+    await expect(user.transition("up/tick/0")).to_be_attached()
+
+
+async def test_a_transition_to_no_state_is_shown_as_an_error(windows):
+    user = await windows.open()
+    await user.type_at(11, "ing")
+    await expect(user.page.locator(".e-missing")).to_have_text("waiting ?")
+    await expect(user.page.locator('[data-transition="up/tick/0"].e-transition')).to_have_attribute(
+        "data-finding", "error"
+    )
+    await expect(user.form.locator("h2")).to_have_text("Transition up → waiting")  # follows the cursor
+
+
+async def test_a_new_transition_of_the_form_and_a_copy_open_at_their_top(windows):
+    user = await windows.open()
+    await user.select("wait")
+    await user.choose("Add a transition", "up")
+    await expect(user.form.locator("h2")).to_have_text("Transition wait → up")
+    await user.page.keyboard.type("imu.z > 9")  # the cursor is in the guard's field
+    await user.page.keyboard.press("Enter")
+    await expect(user.transition("wait/tick/1")).to_have_text("2: imu.z > 9")
+    await user.select("wait")
+    await user.press("Duplicate", user.form)
+    await expect(user.form.locator("h2")).to_have_text("State wait_2")
+    await user.page.keyboard.type("copy")
+    await user.page.keyboard.press("Enter")
+    await expect(user.state("copy")).to_be_attached()
+
+
+async def test_enter_indents_as_yaml_wants(windows):
+    user = await windows.open()
+    await user.page.locator(".cm-line").nth(19).click()  # final: true
+    await user.page.keyboard.press("End")
+    for line in ("transitions:", "- when: imu.z > 5", "to: up", "do:", "- hover", "- land"):
+        await user.page.keyboard.press("Enter")
+        await user.page.keyboard.type(line)
+    written = (
+        "    final: true\n    transitions:\n      - when: imu.z > 5\n        to: up\n"
+        "        do:\n          - hover\n          - land\n# the end"
+    )
+    assert written in await user.text()
 
 
 async def test_a_large_mission_is_drawn_typed_in_and_dragged(windows):

@@ -15,6 +15,7 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
+from framerunner.course.lessons import find_lesson
 from framerunner.editing.service import EditingSettings
 from framerunner.editing.web import EditingDoor
 from framerunner.evaluation.runner import fly_task
@@ -140,7 +141,7 @@ def test_a_flight_is_told_from_start_to_end_and_is_that_of_lockstep():
     plan = FlightPlan(load_scenario("test-case-1"), load_mission("frame_challenge"), 0)
     with page() as browser:
         started = browser.answer("start", text=PAPER, speed=None)
-        assert started["kind"] == "started"
+        assert (started["kind"], started["layout"]["name"]) == ("started", "test-case-1")
         ended = browser.until("ended")
     assert ended["result"]["state_sha256"] == fly_task(plan).state_sha256
     assert (ended["lost_in"], ended["result"]["verdict"]) == ("", "clean")
@@ -154,6 +155,24 @@ def test_a_flight_is_told_from_start_to_end_and_is_that_of_lockstep():
     assert ended["spans"][-1]["state"] == "landing.stop"
     assert ended["counts"]["red/then"] == 1
     assert len([point for message in told for point in message["trail"]]) > 300
+
+
+def test_a_contact_is_told_when_it_happens():
+    lesson = find_lesson("4")
+    careless = lesson.solution.replace(
+        "- cmd.vel_x = 0.3\n    during:\n      - look_to_frame", "- cmd.vel_x = 0.3"
+    )
+    assert careless != lesson.solution
+    with page() as browser:
+        browser.answer("start", text=careless, scenario=lesson.name, speed=None)
+        touched = browser.until("now", holds=lambda message: message["contacts"])
+        (contact,) = touched["contacts"]
+        assert contact["name"] == "red"
+        assert contact["time_s"] <= touched["time_s"] and touched["state"] == "crossing"
+        browser.ask("stop", run=touched["run"])
+        result = browser.until("ended")["result"]
+    since_s = contact["time_s"] - touched["began_s"]
+    assert result["contact_times_s"][0] == pytest.approx(since_s, abs=0.001)
 
 
 def test_a_flight_stops_at_a_state_is_stepped_changed_and_goes_on():
@@ -235,7 +254,7 @@ def test_a_batch_of_layouts_is_told_flight_by_flight_failures_first():
     track = lost["track"]
     assert len(track["time_s"]) == len(track["x"]) == len(track["state"]) > 100
     assert track["states"][track["state"][-1]] == "blue.turning"
-    assert lost["layout"]["name"] == "calm-2"
+    assert (lost["layout"]["name"], lost["result"]["verdict"]) == ("calm-2", lost["verdict"])
 
 
 def test_a_broken_mission_ends_in_words():

@@ -272,7 +272,7 @@ def test_a_contestant_s_file_is_never_executed(tmp_path, flown):
 
 
 def test_no_more_than_a_few_runs_are_kept_unpacked(tmp_path, monkeypatch):
-    def unpack(folder, mark, readers):
+    def unpack(folder, mark, readers, pilot):
         target = TemporaryDirectory()
         return run_library._Unpacked(mark, target, {"name": folder.name}, [])
 

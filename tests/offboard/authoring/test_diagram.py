@@ -12,6 +12,7 @@ from pydantic import Field
 
 from offboard.authoring import (
     Document,
+    EditError,
     EditSession,
     Layout,
     LayoutError,
@@ -131,14 +132,64 @@ def test_places_come_back_with_what_is_undone():
     session.apply(parse_edit({"kind": "rename_state", "state": "landing", "name": "home"}))
     session.apply(parse_edit({"kind": "delete_state", "state": "home"}))
     assert "home" not in session.layout.states
-    dragged = {**session.layout.states, "red": StateBox(x=1, y=2)}
-    session.layout = Layout(states=dragged)
     session.undo()
     assert session.layout.states["home.stop"] == boxes["landing.stop"]
     session.undo()
-    assert session.layout.states == {**boxes, "red": StateBox(x=1, y=2)}
+    assert session.layout.states == boxes
     session.redo()
     assert session.layout.states["home.stop"] == boxes["landing.stop"]
+
+
+def test_moves_of_boxes_are_undone_in_their_order_with_edits():
+    session = EditSession(opened("frame_challenge"))
+    text = session.document.text
+    session.settle({"red": StateBox(x=0, y=0), "blue": StateBox(x=9, y=9)})
+    assert not session.can_undo
+    session.place({"red": StateBox(x=1, y=1)})
+    session.apply(parse_edit({"kind": "rename_state", "state": "landing", "name": "home"}))
+    session.settle({"home": StateBox(x=3, y=3), "blue": StateBox(x=10, y=9)})
+    session.place({"red": StateBox(x=2, y=2)})
+    places = []
+    while session.can_undo:
+        changes = session.undo()
+        places.append((bool(changes), {name: box.x for name, box in session.layout.states.items()}))
+    assert places == [
+        (False, {"red": 1, "blue": 10, "home": 3}),
+        (True, {"red": 1, "blue": 9}),
+        (False, {"red": 0, "blue": 9}),
+    ]
+    assert session.document.text == text
+    while session.can_redo:
+        session.redo()
+    assert {name: box.x for name, box in session.layout.states.items()} == {"red": 2, "blue": 10, "home": 3}
+    assert "home" in session.document.text
+
+
+def test_a_transition_to_no_state_is_there_and_says_so():
+    document = Document.from_text(
+        "name: x\ninitial: a\nstates:\n  a:\n    transitions:\n      - to: gone\n      - to: a\n"
+    )
+    drawn = diagram(document)
+    assert [(edge.id, edge.target, edge.missing) for edge in drawn.edges] == [
+        ("a/tick/0", "gone", True),
+        ("a/tick/1", "a", False),
+    ]
+
+
+def test_a_transition_is_given_to_another_state_with_all_it_has():
+    text = (
+        "name: x\ninitial: a\nstates:\n  a:\n    transitions:\n      - when: imu.z > 1\n        to: b\n"
+        "        do: [hover]\n  b:  # kept\n    enter: [hover]\n  c:\n    final: true\n"
+    )
+    session = EditSession(Document.from_text(text))
+    edit = {"kind": "set_source", "transition": {"state": "a"}, "to": "b"}
+    with pytest.raises(EditError, match="final"):
+        session.apply(parse_edit({**edit, "state": "c"}))
+    session.apply(parse_edit({**edit, "state": "b"}))
+    (edge,) = diagram(session.document).edges
+    assert (edge.source, edge.target, edge.when, edge.actions) == ("b", "b", "imu.z > 1", ("hover",))
+    session.undo()
+    assert session.document.text == text
 
 
 @pytest.mark.parametrize(

@@ -384,7 +384,7 @@ def test_a_mission_is_built_from_nothing():
 
 
 def test_the_schema_of_edits_names_all_kinds():
-    assert len(edit_schema()["oneOf"]) == 21
+    assert len(edit_schema()["oneOf"]) == 22
 
 
 def building(shipped: Document) -> list[dict[str, object]]:

@@ -2,18 +2,19 @@
 import "./course.css";
 import { askCourse, inLanguage, learner, loadLessons, setLearner } from "../lib/course.js";
 import { make, number, setText } from "../lib/dom.js";
-import { changeLanguage, language, translator } from "../lib/language.js";
+import { changeLanguage, translator } from "../lib/language.js";
+import { translateHeader } from "../lib/navigation.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 
 const word = translator({
   en: {
-    course: "Course", name: "Your name", language: "Español", start: "Begin", again: "Go on", done: "passed", minutes: "about {minutes} minutes",
-    need_name: "Write your name first.", class: "The class", pupil: "Pupil", flights: "{flights} flights", after: "passed after {minutes} min, {flights} flights",
+    course: "Course", name: "Your name", language: "Español", start: "Begin", again: "Go on", done: "passed", minutes: "about {minutes} {minutes:minute|minutes}",
+    need_name: "Write your name first.", class: "The class", pupil: "Pupil", flights: "{flights} {flights:flight|flights}", after: "passed after {minutes} min, {flights} {flights:flight|flights}",
     log_in: "Log in to take part.", nobody: "Nobody has begun yet.",
   },
   es: {
-    course: "Curso", name: "Tu nombre", language: "English", start: "Empezar", again: "Seguir", done: "conseguida", minutes: "unos {minutes} minutos",
-    need_name: "Escribe antes tu nombre.", class: "La clase", pupil: "Alumno", flights: "{flights} vuelos", after: "conseguida tras {minutes} min, {flights} vuelos",
+    course: "Curso", name: "Tu nombre", language: "English", start: "Empezar", again: "Seguir", done: "conseguida", minutes: "unos {minutes} {minutes:minuto|minutos}",
+    need_name: "Escribe antes tu nombre.", class: "La clase", pupil: "Alumno", flights: "{flights} {flights:vuelo|vuelos}", after: "conseguida tras {minutes} min, {flights} {flights:vuelo|vuelos}",
     log_in: "Inicia sesión para participar.", nobody: "Nadie ha empezado aún.",
   },
 });
@@ -21,7 +22,7 @@ const REFRESH_MS = 5000;
 
 const root = pageRoot("course");
 const { mayAct } = pageData();
-document.documentElement.lang = language();
+translateHeader();
 
 const input = /** @type {HTMLInputElement} */ (make("input", { id: "learner", type: "text", maxlength: "40", autocomplete: "name" }));
 input.value = learner();
@@ -31,7 +32,7 @@ input.addEventListener("input", () => {
 });
 const other = make("button", { type: "button" }, word("language"));
 other.addEventListener("click", changeLanguage);
-const problem = make("p", { class: "problem", role: "alert", hidden: true });
+const problem = make("p", { class: "c-problem", role: "alert" });
 const list = make("ol", { class: "c-lessons" });
 const table = make("table", { class: "c-class" });
 root.append(
@@ -47,7 +48,6 @@ let learners = [];
 
 function tell(text) {
   setText(problem, text);
-  problem.hidden = text === "";
 }
 
 async function open(lesson) {

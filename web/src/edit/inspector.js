@@ -41,13 +41,14 @@ export class Inspector {
     this.#isStale = isSame && this.#isFillingIn();
     this.#shown = selection;
     if (this.#isStale) return;
-    const focused = this.#root.contains(document.activeElement) ? document.activeElement?.getAttribute("data-key") : null;
+    const focused = isSame && this.#root.contains(document.activeElement) ? document.activeElement?.getAttribute("data-key") : null;
     const { nodes, edges } = this.#session.diagram;
     const state = selection.kind === "state" ? nodes.find(({ id }) => id === selection.id) : undefined;
     const edge = selection.kind === "transition" ? edges.find(({ id }) => id === selection.id) : undefined;
     const form = state ? this.#state(state) : edge ? this.#transition(edge) : this.#mission();
     this.#root.replaceChildren(...form, this.#suggestions());
     this.#root.querySelectorAll("input, select, button").forEach((each, index) => each.setAttribute("data-key", `${selection.kind}${index}`));
+    if (!isSame) this.#root.scrollTop = 0;
     if (focused) /** @type {HTMLElement|null} */ (this.#root.querySelector(`[data-key="${focused}"]`))?.focus();
   }
 
@@ -109,7 +110,11 @@ export class Inspector {
     const isTop = !path.startsWith("@") || path.includes(".");
     const start = state.parent === "" ? diagram.initial : diagram.nodes.find(({ id }) => id === state.parent)?.initial;
     const initial = (value) => value && this.#edit({ kind: "set_initial", state: path.includes(".") ? path.replace(/\.[^.]+$/, "") : "", name: state.name });
-    const actions = (section) => lineList(word(section), state[section], (list) => this.#edit({ kind: "set_actions", state: path, section, actions: list }), ACTIONS);
+    const actions = (section) => {
+      const above = section === "enter" ? this.#parametersFirst(state) : [];
+      return lineList(word(section), state[section].slice(above.length),
+        (list) => this.#edit({ kind: "set_actions", state: path, section, actions: [...above, ...list] }), ACTIONS);
+    };
     const own = diagram.edges.filter(({ source }) => source === state.id);
     return [
       title,
@@ -133,10 +138,19 @@ export class Inspector {
     ];
   }
 
+  /** The actions on entry that are shown as parameters, if all others follow them. @param {StateNode} state @returns {string[]} */
+  #parametersFirst({ template, parameters, enter }) {
+    const first = template ? enter.slice(0, parameters.length) : [];
+    return first.every((action, index) => action.split("=")[0].trim() === parameters[index][0]) ? first : [];
+  }
+
   /** @param {StateNode} state */
   #parameters(state) {
-    const rows = state.parameters.map(([name, value]) => make("li", {},
-      textField(name, value, (next) => this.#edit({ kind: "set_parameter", state: state.source, name, value: next }))));
+    const first = this.#parametersFirst(state);
+    const rows = state.parameters.map(([name, value], index) => make("li", {},
+      textField(name, value, (next) => this.#edit({ kind: "set_parameter", state: state.source, name, value: next })),
+      first.length > 0 ? button("×", () => this.#edit({ kind: "set_actions", state: state.source, section: "enter", actions: state.enter.filter((_, at) => at !== index) }),
+        { class: "e-small", "aria-label": `${word("remove")}: ${first[index]}` }) : null));
     return rows.length > 0 ? [make("fieldset", { class: "e-lines" }, make("legend", {}, word("parameters")), make("ul", {}, ...rows))] : [];
   }
 
@@ -148,8 +162,17 @@ export class Inspector {
         () => this.#select({ kind: "transition", id: edge.id }), { class: "e-link" })));
     const targets = this.#targets(state.id);
     const add = choice(word("add_transition"), [["", "…"], ...targets], "",
-      (to) => to && this.#edit({ kind: "add_transition", state: state.source, to: this.#session.target(state.id, to) }));
+      (to) => to && this.#addTransition(state, to));
     return make("fieldset", { class: "e-lines" }, make("legend", {}, word("transitions")), make("ul", {}, ...rows), add);
+  }
+
+  /** @param {StateNode} state @param {string} to */
+  async #addTransition(state, to) {
+    const count = this.#session.diagram.edges.filter(({ source, event }) => source === state.id && event === "tick").length;
+    if (await this.#edit({ kind: "add_transition", state: state.source, to: this.#session.target(state.id, to) })) {
+      this.#select({ kind: "transition", id: `${state.id}/tick/${count}` });
+      this.focus();
+    }
   }
 
   /** The states to which a transition can lead. @param {string} _from @returns {[string, string][]} */
@@ -171,7 +194,7 @@ export class Inspector {
       title,
       ...(edge.source_state.startsWith("@") ? [make("p", { class: "hint" }, word("template_note", { name: edge.source_state.slice(1).split(".")[0] }))] : []),
       ...(isTick ? [textField(word("guard"), edge.when, (when) => this.#edit({ kind: "set_guard", transition, when }), { list: VALUES })] : []),
-      choice(word("to"), this.#targets(edge.source), edge.target, (to) => this.#edit({ kind: "redirect_transition", transition, to: this.#session.target(edge.source, to) })),
+      choice(word("to"), edge.missing ? [[edge.target, `${edge.target} ?`], ...this.#targets(edge.source)] : this.#targets(edge.source), edge.target, (to) => this.#edit({ kind: "redirect_transition", transition, to: this.#session.target(edge.source, to) })),
       choice(word("event"), events, edge.event, async (event) => {
         if (await this.#edit({ kind: "set_event", transition, event })) follow(event, event === "tick" ? siblings : 0);
       }),

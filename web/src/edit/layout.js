@@ -1,41 +1,74 @@
-/** Where the diagram's states are drawn: kept places, and automatic ones for the rest, level by level. */
-import dagre from "@dagrejs/dagre";
+/** Where the diagram's states are drawn: what has a place keeps it, what is new gets a free one, level by level. */
+import { arrange } from "./arrange.js";
+import { freePlace, makeRoom } from "./free_place.js";
+import { overlap } from "./geometry.js";
 
 /**
  * @typedef {import("./session.js").Diagram} Diagram
- * @typedef {import("./session.js").Point} Point
- * @typedef {{x: number, y: number, width: number, height: number}} Box in the drawing's units, from its upper left
- * @typedef {{from: string, to: string, width: number}} Join a transition between two states of a level, with its label's width
+ * @typedef {import("./geometry.js").Point} Point
+ * @typedef {import("./geometry.js").Box} Box
+ * @typedef {import("./arrange.js").Join} Join
+ * @typedef {{places: (id: string) => Point|undefined, boxes: Map<string, Box>, view: Box|null}} Before places: of
+ *   a state within its superstate; boxes: as they were drawn last; view: the part of the drawing that is seen
  */
 
 const LETTER = 7.2; // mean width of a letter
 const LEAF = { width: 110, height: 44 };
 const HEADER = 30; // of a superstate, with its name
 const PADDING = 18;
-const LABEL = { letter: 6, height: 16, longest: 34, words: 84 };
-const GAP = { nodesep: 36, ranksep: 34, edgesep: 16 };
-const ROW_GAP = 56;
-const MOST_FOR_DAGRE = 80; // states and transitions of a level: it takes long if there are many
-const MOST_KEPT = 100;
-/** @type {Map<string, Map<string, Point>>} automatic places that were found before: most edits leave them as they are */
-const arranged = new Map();
+const LABEL = { letter: 6, longest: 34, words: 84 };
+const MOST_SINGLE = 8; // new states of a level that get a place one by one; more are arranged together
 
 /** The room for a transition's label. @param {string} event @param {string} when */
 const labelWidth = (event, when) => (event === "tick" ? (Math.min(when.length, LABEL.longest) + 3) * LABEL.letter : LABEL.words);
 
 /** The width of a state's name. @param {string} text */
-const textWidth = (text) => Math.max(LEAF.width, Math.ceil(text.length * LETTER) + 34);
+export const textWidth = (text) => Math.max(LEAF.width, Math.ceil(text.length * LETTER) + 34);
 
 /**
  * Place all states.
  * @param {Diagram} diagram
- * @param {Object<string, Point>} kept places within the parent, by id of the state
+ * @param {Before} before
  * @returns {Map<string, Box>} by id
  */
-export function layOut(diagram, kept) {
+export function layOut(diagram, before) {
+  const { children, parents, names } = family(diagram);
+  const levels = joinsOfLevels(diagram, parents);
+  /** @type {Map<string, Box>} */
+  const boxes = new Map();
+  /** @param {string} path */
+  const measure = (path) => {
+    const inner = children.get(path) ?? [];
+    for (const child of inner) measure(child);
+    const size = inner.length > 0 ? placeLevel(path, inner, levels.get(path) ?? [], boxes, before) : null;
+    if (path === "") return;
+    const width = textWidth(names.get(path) ?? "");
+    boxes.set(path, size === null ? { x: 0, y: 0, width, height: LEAF.height } : {
+      x: 0, y: 0, width: Math.max(width, size.width + 2 * PADDING), height: size.height + HEADER + PADDING,
+    });
+  };
+  measure("");
+  /** @param {string} path @param {number} x @param {number} y */
+  const shift = (path, x, y) => {
+    const box = boxes.get(path);
+    if (box) {
+      box.x += x;
+      box.y += y;
+      ({ x, y } = originOf(box));
+    }
+    for (const child of children.get(path) ?? []) shift(child, x, y);
+  };
+  shift("", PADDING, PADDING);
+  return boxes;
+}
+
+/** @param {Diagram} diagram */
+function family(diagram) {
   /** @type {Map<string, string[]>} */
   const children = new Map();
+  /** @type {Map<string, string>} */
   const parents = new Map();
+  /** @type {Map<string, string>} */
   const names = new Map();
   for (const { id: path, name, parent, template } of diagram.nodes) {
     parents.set(path, parent);
@@ -44,15 +77,20 @@ export function layOut(diagram, kept) {
     if (siblings) siblings.push(path);
     else children.set(parent, [path]);
   }
+  return { children, parents, names };
+}
+
+/** The transitions of each level, between its states. @param {Diagram} diagram @param {Map<string, string>} parents @returns {Map<string, Join[]>} */
+function joinsOfLevels(diagram, parents) {
   const chain = (path) => {
     const found = [];
-    for (let at = path; at; at = parents.get(at)) found.unshift(at);
+    for (let at = path; at; at = parents.get(at) ?? "") found.unshift(at);
     return found;
   };
-  /** @type {Map<string, Join[]>} the transitions of each level, between its states */
+  /** @type {Map<string, Join[]>} */
   const levels = new Map();
-  for (const { source, target, event, when } of diagram.edges) {
-    if (source === target) continue;
+  for (const { source, target, event, when, missing } of diagram.edges) {
+    if (source === target || missing) continue;
     const from = chain(source), into = chain(target);
     let depth = 0;
     while (depth < from.length - 1 && depth < into.length - 1 && from[depth] === into[depth]) depth += 1;
@@ -63,122 +101,91 @@ export function layOut(diagram, kept) {
     if (joins) joins.push(join);
     else levels.set(level, [join]);
   }
-  /** @type {Map<string, Box>} */
-  const boxes = new Map();
-  const measure = (path) => {
-    const inner = children.get(path) ?? [];
-    for (const child of inner) measure(child);
-    const size = inner.length > 0 ? arrange(inner, levels.get(path) ?? [], boxes, kept) : null;
-    if (path === "") return;
-    const width = textWidth(names.get(path));
-    boxes.set(path, size === null ? { x: 0, y: 0, width, height: LEAF.height } : {
-      x: 0, y: 0, width: Math.max(width, size.width + 2 * PADDING), height: size.height + HEADER + PADDING,
-    });
-  };
-  measure("");
-  const shift = (path, x, y) => {
-    const box = boxes.get(path);
-    if (box) {
-      box.x += x;
-      box.y += y;
-      [x, y] = [box.x + PADDING, box.y + HEADER];
-    }
-    for (const child of children.get(path) ?? []) shift(child, x, y);
-  };
-  shift("", PADDING, PADDING);
-  return boxes;
+  return levels;
 }
 
 /**
  * Place the states of one level.
+ * @param {string} parent
  * @param {string[]} paths
  * @param {Join[]} joins
  * @param {Map<string, Box>} boxes with the states' sizes; their places are set
- * @param {Object<string, Point>} kept
+ * @param {Before} before
  * @returns {{width: number, height: number}} what they need
  */
-function arrange(paths, joins, boxes, kept) {
-  const isPlaced = (path) => kept[path] !== undefined;
-  if (!paths.every(isPlaced)) {
-    const key = JSON.stringify([paths.map((path) => [path, boxes.get(path).width, boxes.get(path).height]), joins]);
-    const found = arranged.get(key) ?? (paths.length + joins.length > MOST_FOR_DAGRE ? inRows : byDagre)(paths, joins, boxes);
-    arranged.delete(key); // what is used last is kept longest
-    arranged.set(key, found);
-    if (arranged.size > MOST_KEPT) arranged.delete(arranged.keys().next().value ?? "");
-    for (const [path, point] of found) Object.assign(boxes.get(path), point);
+function placeLevel(parent, paths, joins, boxes, before) {
+  const level = new Map(paths.map((path) => [path, /** @type {Box} */ (boxes.get(path))]));
+  const hasSuper = [...level.values()].some(({ height }) => height > LEAF.height);
+  const fresh = [];
+  /** @type {Map<string, Box>} */
+  const placed = new Map();
+  for (const [path, box] of level) {
+    const point = before.places(path);
+    if (point) {
+      Object.assign(box, { x: point.x, y: point.y });
+      placed.set(path, box);
+    } else fresh.push(path);
   }
-  let width = 0, height = 0;
-  for (const path of paths) {
-    const box = boxes.get(path);
-    if (isPlaced(path)) Object.assign(box, { x: kept[path].x, y: kept[path].y });
-    width = Math.max(width, box.x + box.width);
-    height = Math.max(height, box.y + box.height);
+  for (const [path, box] of placed) {
+    // One that comes back has its place again, unless that has been taken.
+    const isBack = before.boxes.size > 0 && !before.boxes.has(path);
+    if (!isBack || ![...placed].some(([other, its]) => other !== path && overlap(box, its) > 0)) continue;
+    placed.delete(path);
+    fresh.push(path);
   }
-  return { width, height };
-}
-
-/**
- * Automatic places of the states of one level, by dagre.
- * @param {string[]} paths
- * @param {Join[]} joins
- * @param {Map<string, Box>} boxes
- * @returns {Map<string, Point>}
- */
-function byDagre(paths, joins, boxes) {
-  const graph = new dagre.graphlib.Graph();
-  // Superstates follow each other to the right, so that a wide page is used.
-  const hasSuper = paths.some((path) => boxes.get(path).height > LEAF.height);
-  graph.setGraph({ rankdir: hasSuper ? "LR" : "TB", ranker: "network-simplex", ...GAP });
-  graph.setDefaultEdgeLabel(() => ({}));
-  for (const path of paths) graph.setNode(path, { ...boxes.get(path) });
-  for (const { from, to, width } of joins) graph.setEdge(from, to, { width, height: LABEL.height, labelpos: "c" });
-  dagre.layout(graph);
-  return new Map(paths.map((path) => {
-    const { x, y, width, height } = graph.node(path);
-    return [path, { x: x - width / 2, y: y - height / 2 }];
-  }));
-}
-
-/**
- * Automatic places of many states, in linear time: rows by distance from the first state, from above.
- * @param {string[]} paths
- * @param {Join[]} joins
- * @param {Map<string, Box>} boxes
- * @returns {Map<string, Point>}
- */
-function inRows(paths, joins, boxes) {
-  /** @type {Map<string, string[]>} */
-  const next = new Map(paths.map((path) => [path, []]));
-  for (const { from, to } of joins) next.get(from)?.push(to);
-  const order = [], seen = new Set();
-  for (const start of paths) { // those that the first one does not reach follow
-    const queue = seen.has(start) ? [] : [start];
-    seen.add(start);
-    for (let head = 0; head < queue.length; head += 1) {
-      order.push(queue[head]);
-      for (const to of next.get(queue[head]) ?? []) {
-        if (!seen.has(to)) queue.push(to);
-        seen.add(to);
-      }
+  makeRoom(placed, before.boxes);
+  if (fresh.length === paths.length || fresh.length > MOST_SINGLE) {
+    const below = Math.max(0, ...[...placed.values()].map(({ y, height }) => y + height + 40));
+    for (const [path, { x, y }] of arrange(fresh, joins.filter(({ from, to }) => fresh.includes(from) && fresh.includes(to)), boxes, hasSuper)) {
+      Object.assign(/** @type {Box} */ (boxes.get(path)), { x, y: y + below });
+    }
+  } else {
+    const outer = before.boxes.get(parent);
+    const origin = outer ? originOf(outer) : { x: PADDING, y: PADDING };
+    const view = before.view && { ...before.view, x: before.view.x - origin.x, y: before.view.y - origin.y };
+    for (const path of fresh) {
+      const box = /** @type {Box} */ (boxes.get(path));
+      const near = joins.flatMap(({ from, to }) => (from === path ? [to] : to === path ? [from] : []))
+        .flatMap((each) => placed.get(each) ?? []);
+      Object.assign(box, freePlace({ width: box.width, height: box.height }, [...placed.values()], near, view, parent !== ""));
+      placed.set(path, box);
     }
   }
-  const columns = Math.ceil(Math.sqrt(paths.length));
-  const places = new Map();
-  for (let row = 0, y = 0; row < order.length; row += columns) {
-    let x = 0, height = 0;
-    for (const path of order.slice(row, row + columns)) {
-      const box = boxes.get(path);
-      places.set(path, { x, y });
-      x += box.width + GAP.nodesep;
-      height = Math.max(height, box.height);
-    }
-    y += height + ROW_GAP;
-  }
-  return places;
+  const all = [...level.values()];
+  return { width: Math.max(...all.map(({ x, width }) => x + width)), height: Math.max(...all.map(({ y, height }) => y + height)) };
 }
 
-/** The place of a state within its parent, as it is kept. @param {Box} box @param {Box|null} parent @returns {Point} */
+/** Where a superstate's own states begin. @param {Box} box @returns {Point} */
+const originOf = (box) => ({ x: box.x + PADDING, y: box.y + HEADER });
+
+/** The place of a state within its parent, as it is kept. @param {Box} box @param {Box|null|undefined} parent @returns {Point} */
 export function placeWithin(box, parent) {
-  const origin = parent ? { x: parent.x + PADDING, y: parent.y + HEADER } : { x: PADDING, y: PADDING };
+  const origin = parent ? originOf(parent) : { x: PADDING, y: PADDING };
   return { x: Math.max(0, Math.round(box.x - origin.x)), y: Math.max(0, Math.round(box.y - origin.y)) };
+}
+
+/**
+ * States that were renamed in the text: one of a level is gone and another one is there in its place.
+ * @param {Diagram} before
+ * @param {Diagram} after
+ * @returns {Map<string, string>} ids as they were, by the ids now, those of inner states included
+ */
+export function renamed(before, after) {
+  const old = new Map(before.nodes.map(({ id, parent }) => [id, parent])), now = new Set(after.nodes.map(({ id }) => id));
+  /** @type {Map<string, string[]>} */
+  const gone = new Map();
+  /** @type {Map<string, string[]>} */
+  const come = new Map();
+  const add = (map, key, value) => map.set(key, [...(map.get(key) ?? []), value]);
+  for (const [id, parent] of old) if (!now.has(id) && (parent === "" || now.has(parent))) add(gone, parent, id);
+  for (const { id, parent } of after.nodes) if (!old.has(id) && (parent === "" || old.has(parent))) add(come, parent, id);
+  const found = new Map();
+  for (const [parent, ids] of come) {
+    const left = gone.get(parent) ?? [];
+    if (ids.length !== 1 || left.length !== 1) continue;
+    for (const { id } of after.nodes) {
+      if (id === ids[0] || id.startsWith(`${ids[0]}.`)) found.set(id, left[0] + id.slice(ids[0].length));
+    }
+  }
+  return found;
 }

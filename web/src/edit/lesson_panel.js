@@ -10,12 +10,13 @@ export class LessonPanel {
   #listener;
   /** @type {import("../lib/course.js").Lesson|null} */
   #next = null;
-  #line = make("p", { role: "status", class: "e-run-line" });
+  #line = make("p", { role: "status", class: "e-lesson-line" }, word("check_hint"));
 
   /**
    * @param {HTMLElement} root
    * @param {string} name of the lesson
-   * @param {{text: () => Promise<string>, save: () => Promise<void>, scenario: (name: string) => void, flown: (flight: any) => void}} listener
+   * @param {{text: () => Promise<string>, save: () => Promise<void>, mistake: () => string,
+   *   scenario: (name: string, isLast: boolean) => void, flown: (flight: any) => string}} listener flown: shows a flight and says what it was worth
    */
   constructor(root, name, listener) {
     this.#root = root;
@@ -30,14 +31,13 @@ export class LessonPanel {
     if (!lesson) return;
     this.#next = lessons.find(({ number }) => number === lesson.number + 1) ?? null;
     const { title, goal, steps, hints } = lesson;
-    this.#listener.scenario(lesson.name);
+    this.#listener.scenario(lesson.name, this.#next === null);
     const items = (list) => list.map((each) => make("li", {}, inLanguage(each)));
     this.#root.append(
-      make("h2", {}, `${lesson.number}. ${inLanguage(title)}`),
+      make("div", { class: "e-lesson-head" },
+        make("h2", {}, `${lesson.number}. ${inLanguage(title)}`, make("a", { href: "/course" }, word("next_lesson"))),
+        make("div", { class: "e-verdict" }, button(word("check_lesson"), () => this.#check(), { class: "e-first" }), this.#line)),
       make("p", { class: "e-goal" }, inLanguage(goal)),
-      make("div", { class: "e-row" }, button(word("check_lesson"), () => this.#check(), { class: "e-first" }),
-        make("a", { href: "/course" }, word("next_lesson"))),
-      this.#line,
       make("ol", {}, ...items(steps)),
       make("details", {}, make("summary", {}, word("hints")), make("ul", {}, ...items(hints))));
   }
@@ -53,17 +53,23 @@ export class LessonPanel {
   async #check() {
     this.#line.removeAttribute("data-passed");
     setText(this.#line, word("checking"));
-    const told = await askCourse("check", { learner: learner(), lesson: this.#name, text: await this.#listener.text() });
+    const text = await this.#listener.text();
+    const mistake = this.#listener.mistake();
+    if (mistake) {
+      setText(this.#line, word("mistake", { mistake }));
+      return;
+    }
+    const told = await askCourse("check", { learner: learner(), lesson: this.#name, text });
     if (told.detail) {
       setText(this.#line, told.detail);
       return;
     }
     this.#line.setAttribute("data-passed", String(told.passed));
-    setText(this.#line, told.passed ? word("passed") : `${word("not_yet")}: ${told.reason}`);
+    const worth = told.flight?.result ? this.#listener.flown(told.flight) : told.reason;
+    setText(this.#line, `${word(told.passed ? "passed" : "not_yet")} ${worth}`);
     if (told.passed && this.#next) {
       const { name } = this.#next;
       this.#line.append(" ", button(word("next_one"), () => this.#open(name), { class: "e-first" }));
     }
-    if (told.flight?.track) this.#listener.flown(told.flight);
   }
 }

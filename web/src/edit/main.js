@@ -3,6 +3,7 @@ import "./edit.css";
 import { isTyping, make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 import { DiagramView } from "./diagram_view.js";
+import { divider } from "./divider.js";
 import { button, choice, textField } from "./fields.js";
 import { flownId } from "./flights.js";
 import { Inspector } from "./inspector.js";
@@ -11,9 +12,12 @@ import { EditSession } from "./session.js";
 import { Tabs } from "./tabs.js";
 import { TextView } from "./text_view.js";
 import { changeLanguage, language } from "../lib/language.js";
+import { translateHeader } from "../lib/navigation.js";
 import { savePicture } from "./picture.js";
 import { showNames } from "./names.js";
 import { watchFlights } from "./live_light.js";
+import { LivePanel } from "./live_panel.js";
+import { ReplayPanel } from "./replay_panel.js";
 import { LessonPanel } from "./lesson_panel.js";
 import { word } from "./words.js";
 
@@ -21,7 +25,7 @@ import { word } from "./words.js";
 
 const root = pageRoot("edit");
 const file = new URLSearchParams(location.search).get("file");
-document.documentElement.lang = language();
+translateHeader();
 
 if (file) edit(file);
 else chooseFile();
@@ -32,7 +36,7 @@ async function chooseFile() {
   const problem = make("p", { class: "problem", role: "alert", hidden: true });
   const list = make("ul", { class: "e-files" });
   root.append(make("h1", {}, word("open")), problem, list);
-  const answer = await fetch("/api/edit/files");
+  const answer = await fetch(`/api/edit/files?language=${language()}`);
   const told = await answer.json();
   if (!answer.ok) {
     problem.hidden = false;
@@ -49,7 +53,7 @@ async function chooseFile() {
     textField(word("name"), name, (value) => { name = value; }),
     choice(word("from"), /** @type {[string, string][]} */ (sources), source, (value) => { source = value; }),
     button(word("create"), async () => {
-      const made = await fetch("/api/edit/files", {
+      const made = await fetch(`/api/edit/files?language=${language()}`, {
         method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ name, source }),
       });
       const { file: created, detail } = await made.json();
@@ -58,7 +62,7 @@ async function chooseFile() {
       problem.textContent = typeof detail === "string" ? detail : made.statusText;
     }),
     importField(async (text, wanted) => {
-      const made = await fetch("/api/edit/import", {
+      const made = await fetch(`/api/edit/import?language=${language()}`, {
         method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ name: wanted, scxml: text }),
       });
       const { file: created, detail } = await made.json();
@@ -66,6 +70,12 @@ async function chooseFile() {
       problem.hidden = made.ok;
       problem.textContent = typeof detail === "string" ? detail : made.statusText;
     })));
+}
+
+/** Whether something was typed into a field, which the browser undoes. @param {EventTarget|null} field */
+function isFilledIn(field) {
+  return (field instanceof HTMLInputElement && field.type === "text" && field.value !== field.defaultValue)
+    || (field instanceof HTMLElement && field.isContentEditable);
 }
 
 /** A field for an SCXML file. @param {(text: string, name: string) => void} chosen */
@@ -83,6 +93,7 @@ function importField(chosen) {
 function edit(name) {
   /** @type {Selection} */
   let selection = { kind: "mission", id: "" };
+  let refusal = ""; // code of the last one
   const stem = name.replace(/\.ya?ml$/, "");
   const line = make("p", { class: "e-message", role: "status", hidden: true });
   const state = make("span", { class: "e-saved", role: "status" });
@@ -93,10 +104,13 @@ function edit(name) {
   const flying = make("div");
   const lesson = new URLSearchParams(location.search).get("lesson");
   const teaching = make("div");
+  const replaying = make("div");
+  const living = make("div");
   const names = make("div", { class: "e-names" });
   const tabs = new Tabs([
     ...(lesson ? [/** @type {[string, string, HTMLElement]} */ (["lesson", word("lesson"), teaching])] : []),
-    ["findings", word("checker"), findings], ["fly", word("fly"), flying], ["names", word("names"), names],
+    ["findings", word("checker"), findings], ["fly", word("fly"), flying], ["live", word("live"), living],
+    ["replay", word("replay"), replaying], ["names", word("names"), names],
   ]);
   const undo = button(word("undo"), () => session.undo(), { "aria-keyshortcuts": "Control+Z" });
   const redo = button(word("redo"), () => session.redo(), { "aria-keyshortcuts": "Control+Y" });
@@ -110,23 +124,35 @@ function edit(name) {
     button(word("arrange"), arrange),
     make("details", { class: "e-export" }, make("summary", {}, word("export")),
       button("PNG", () => savePicture(drawing, stem, "png")), button("SVG", () => savePicture(drawing, stem, "svg")),
-      ...["mermaid", "scxml"].map((kind) => make("a", { href: `/api/edit/export?kind=${kind}&file=${encodeURIComponent(name)}`, download: true }, kind === "scxml" ? "SCXML" : "Mermaid"))),
+      ...["mermaid", "scxml"].map((kind) => make("a", { href: `/api/edit/export?kind=${kind}&language=${language()}&file=${encodeURIComponent(name)}`, download: true }, kind === "scxml" ? "SCXML" : "Mermaid"))),
     button(word("language"), changeLanguage));
-  root.replaceChildren(tools, line, make("div", { class: "e-panes" }, drawing, form, writing, tabs.root));
+  const panes = make("div", { class: "e-panes" }, drawing, form, writing, tabs.root);
+  root.replaceChildren(tools, line, panes);
+  panes.append(
+    divider(panes, { name: "tabs", part: tabs.root, label: word("divide_rows"), isRow: true, least: 120, space: 100 }),
+    divider(panes, { name: "form", part: form, label: word("divide_form"), isRow: false, least: 180, space: 480 }),
+    divider(panes, { name: "writing", part: writing, label: word("divide_text"), isRow: false, least: 120, space: 480 }));
 
-  const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}&language=${language()}`, {
-    changed(changes, all) {
+  const session = new EditSession(name, {
+    changed(changes, all, isOwn) {
       if (all !== null) text.setText(all);
-      else text.change(changes);
+      else text.change(changes, isOwn);
       tell(""); // what was said before concerned the mission as it was
       refresh();
+      if (isOwn) settle();
+      if (text.cursor !== null) follow(text.cursor);
     },
+    placed: refresh,
     connected(connection, reason) {
       text.setReadOnly(connection !== "open"); // what is typed without a connection would be lost
       if (connection === "open") tell("");
       else tell(connection === "refused" ? reason : word("away"));
     },
-    refused: tell,
+    refused: (reason, code) => {
+      refusal = code;
+      tell(reason);
+    },
+    text: () => text.text,
     note: (note) => tell(word(/** @type {any} */ (note))),
     status: showStatus,
   });
@@ -134,19 +160,18 @@ function edit(name) {
     typed: (take) => session.type(take),
     undo: () => session.undo(),
     redo: () => session.redo(),
-    moved: (offset) => {
-      const around = session.diagram.nodes.filter(({ span }) => span && span[0] <= offset && offset <= span[1]);
-      const at = session.diagram.edges.find(({ span }) => span && span[0] <= offset && offset <= span[1]);
-      if (at) select({ kind: "transition", id: at.id }, false);
-      else if (around.length > 0) select({ kind: "state", id: innermost(around).id }, false);
-      else select({ kind: "mission", id: "" }, false);
-    },
+    moved: follow,
   });
   const diagram = new DiagramView(drawing, {
-    selected: (chosen) => select(chosen, true),
-    placed: (places) => session.place(places),
+    selected: (chosen) => select(chosen, true, false),
+    placed(places) {
+      settle();
+      session.place(places);
+      refresh();
+    },
     joined: (from, to) => join(from, to),
-    moved: (moved, parent) => move(moved, parent),
+    moved: (moved, parent, place) => move(moved, parent, place),
+    led: (id, end, to) => lead(id, end, to),
     opened: (chosen) => {
       select(chosen, true);
       inspector.focus();
@@ -168,12 +193,32 @@ function edit(name) {
       await session.flush();
       return text.text;
     },
+    mistake,
     lit: light,
     lost: (id) => diagram.markLost(id),
     selected: () => (selection.kind === "state" ? selection.id : ""),
+    live: (message) => live.hear(message),
+  }, lesson !== null);
+  const live = new LivePanel(living, {
+    ask: (request) => runs.ask(request),
+    async text() {
+      await session.flush();
+      return text.text;
+    },
   });
+  const replay = new ReplayPanel(replaying, {
+    lit: light, lost: (id) => diagram.markLost(id), mission: () => session.mission.name ?? "",
+  });
+  tabs.onShow = (key) => {
+    if (key === "replay") replay.load();
+    else replay.pause();
+  };
 
-  watchFlights(() => session.mission.name ?? "", (active, counts) => light(active, counts, []));
+  watchFlights(() => session.mission.name ?? "", {
+    light: (active, counts) => light(active, counts, []),
+    moved: (place, t, state) => live.move(place, t, state),
+    world: (scenario) => live.setWorld(scenario),
+  });
   if (lesson) {
     new LessonPanel(teaching, lesson, {
       async text() {
@@ -181,16 +226,30 @@ function edit(name) {
         return text.text;
       },
       save: store,
-      scenario: (name) => runs.choose(name),
+      mistake,
+      scenario: (name, isLast) => runs.choose(name, !isLast),
       flown(flight) {
-        runs.showFlight(flight);
         diagram.markLost(flight.lost_in);
+        return runs.showFlight(flight);
       },
     });
   }
 
-  function innermost(nodes) {
-    return nodes.reduce((best, each) => (each.span[0] >= best.span[0] && each.span[1] <= best.span[1] ? each : best));
+  /** Select what is written at the cursor; of the uses of a template, the one that was selected stays. @param {number} offset */
+  function follow(offset) {
+    const { nodes, edges } = session.diagram;
+    const isAt = ({ span }) => span && span[0] <= offset && offset <= span[1];
+    const kept = (found) => found.find(({ id }) => selection.id.startsWith(id.replace(/\/.*/, ""))) ?? found[0];
+    const around = nodes.filter(isAt), at = edges.filter(isAt);
+    const inmost = around.filter(({ span }) => around.every((other) => other.span[0] <= span[0] && span[1] <= other.span[1]));
+    if (at.length > 0) select({ kind: "transition", id: (at.find(({ id }) => id === selection.id) ?? kept(at)).id }, false);
+    else if (inmost.length > 0) select({ kind: "state", id: (inmost.find(({ id }) => id === selection.id) ?? kept(inmost)).id }, false);
+    else select({ kind: "mission", id: "" }, false);
+  }
+
+  /** Keep where new states are drawn: they stay there. */
+  function settle() {
+    if (session.isReadable) session.place(diagram.unkept, true);
   }
 
   function tell(words) {
@@ -204,14 +263,16 @@ function edit(name) {
     redo.toggleAttribute("disabled", !session.canRedo);
   }
 
-  /** @param {Selection} chosen @param {boolean} showText */
-  function select(chosen, showText) {
+  /** @param {Selection} chosen @param {boolean} showText @param {boolean} [showDiagram] */
+  function select(chosen, showText, showDiagram = true) {
+    const isOther = chosen.kind !== selection.kind || chosen.id !== selection.id;
     selection = chosen;
     diagram.select(chosen);
+    if (showDiagram && isOther) diagram.reveal(chosen);
     inspector.show(chosen);
     const { nodes, edges } = session.diagram;
     const { span } = (chosen.kind === "state" ? nodes : edges).find(({ id }) => id === chosen.id) ?? {};
-    if (showText && span && !text.hasFocus) text.show(span[0], span[1]);
+    if (showText && span) text.show(span[0], span[1]);
   }
 
   function refresh() {
@@ -225,17 +286,27 @@ function edit(name) {
     else if (line.textContent === word("unreadable")) tell("");
   }
 
+  /** What keeps the mission from flying, in a line; "" if nothing does. */
+  function mistake() {
+    const [error] = session.findings.filter(({ severity }) => severity === "error");
+    return error ? `${error.line ? `${error.line}: ` : ""}${error.message}` : "";
+  }
+
   function showFindings() {
-    const rows = session.findings.map((finding) => make("li", { "data-severity": finding.severity },
+    const row = (finding) => make("li", { "data-severity": finding.severity },
       button(`${finding.line ? `${finding.line}: ` : ""}${finding.message}`, () => {
         const [node] = finding.nodes;
         if (node) select(finding.event === null ? { kind: "state", id: node } : { kind: "transition", id: `${node}/${finding.event}/${finding.index}` }, false);
         if (finding.span) text.show(finding.span[0], finding.span[1]);
-      }, { class: "e-link" })));
-    const errors = session.findings.filter(({ severity }) => severity === "error").length;
-    tabs.mark("findings", errors > 0 ? `${errors} ✗` : rows.length > 0 ? `${rows.length} !` : "✓");
+      }, { class: "e-link" }));
+    const faults = session.findings.filter(({ severity }) => severity !== "advice");
+    const advice = session.findings.filter(({ severity }) => severity === "advice");
+    const errors = faults.filter(({ severity }) => severity === "error").length;
+    tabs.mark("findings", errors > 0 ? `${errors} ✗` : faults.length > 0 ? `${faults.length} !` : "✓");
+    const isOpen = findings.querySelector("details")?.open ?? false;
     findings.replaceChildren(
-      rows.length > 0 ? make("ul", {}, ...rows) : make("p", { class: "e-good" }, word("none")));
+      faults.length > 0 ? make("ul", {}, ...faults.map(row)) : make("p", { class: "e-good" }, word("none")),
+      ...(advice.length > 0 ? [make("details", { open: isOpen }, make("summary", {}, word("advice", { count: String(advice.length) })), make("ul", {}, ...advice.map(row)))] : []));
   }
 
   /** @param {string} from @param {string} to */
@@ -250,24 +321,52 @@ function edit(name) {
     return undefined;
   }
 
-  /** @param {string} moved @param {string} parent */
-  async function move(moved, parent) {
+  /**
+   * Lead a transition to another state, or let it come from another one.
+   * @param {string} id @param {"source"|"target"} end @param {string} to
+   */
+  async function lead(id, end, to) {
+    const { nodes, edges } = session.diagram;
+    const edge = edges.find((each) => each.id === id);
+    if (!edge || to === edge[end]) return undefined;
+    if (!edge.source_state) return tell(word("foreign_note"));
+    const transition = { state: edge.source_state, event: edge.event, index: edge.source_index };
+    if (end === "target") {
+      if (await session.edit({ kind: "redirect_transition", transition, to: session.target(edge.source, to) })) select({ kind: "transition", id }, true);
+      return undefined;
+    }
+    const source = nodes.find((node) => node.id === to)?.source;
+    if (!source) return tell(word("foreign_note"));
+    const count = edge.event === "tick" ? edges.filter(({ source: from, event }) => from === to && event === "tick").length : 0;
+    if (await session.edit({ kind: "set_source", transition, state: source, to: session.target(to, edge.target) })) {
+      select({ kind: "transition", id: `${to}/${edge.event}/${count}` }, true);
+    }
+    return undefined;
+  }
+
+  /** @param {string} moved @param {string} parent @param {{x: number, y: number}} place in the new superstate */
+  async function move(moved, parent, place) {
     const { nodes } = session.diagram;
     const source = (id) => nodes.find((node) => node.id === id)?.source ?? "";
     if (await session.edit({ kind: "move_state", state: source(moved), parent: source(parent) })) {
-      select({ kind: "state", id: [parent, moved.split(".").at(-1)].filter(Boolean).join(".") }, true);
+      const id = [parent, moved.split(".").at(-1)].filter(Boolean).join(".");
+      session.place({ [id]: place }, true);
+      refresh();
+      select({ kind: "state", id }, true);
     } else refresh();
   }
 
   function arrange() {
-    session.place(Object.fromEntries(Object.keys(session.layout).map((id) => [id, null])));
-    refresh();
+    settle(); // so that it can be undone
+    diagram.forget();
+    diagram.draw(session.diagram, {}, session.findings);
+    session.place(diagram.unkept);
     diagram.fit();
   }
 
   async function store() {
     if (await session.save()) tell("");
-    else if (line.textContent?.includes("another program") && confirm(word("overwrite"))) await session.save(true);
+    else if (refusal === "desk.changed" && confirm(word("overwrite"))) await session.save(true);
   }
 
   addEventListener("beforeunload", (event) => {
@@ -280,7 +379,7 @@ function edit(name) {
     if (isCommand && key === "s") {
       event.preventDefault();
       store();
-    } else if (isCommand && (key === "z" || key === "y") && !isTyping(event)) {
+    } else if (isCommand && (key === "z" || key === "y") && !isFilledIn(event.target)) {
       event.preventDefault();
       if (key === "y" || event.shiftKey) session.redo();
       else session.undo();

@@ -2,12 +2,14 @@
 import { make, number, setText } from "../lib/dom.js";
 import { button, choice, textField } from "./fields.js";
 import { Flights } from "./flights.js";
+import { drawStrip } from "./state_strip.js";
 import { TopView } from "./top_view.js";
+import { contactsOf, hitWords, shortVerdict, verdictWords } from "./verdict.js";
 import { word } from "./words.js";
 
 /** @typedef {import("./flights.js").Now} Now @typedef {import("./flights.js").Flight} Flight */
 
-const SPEEDS = /** @type {[string, string][]} */ ([["0.2", "0.2 ×"], ["1", "1 ×"], ["5", "5 ×"], ["", "max"]]);
+const SPEEDS = /** @type {[string, string][]} */ ([["0.2", "0.2 ×"], ["1", "1 ×"], ["5", "5 ×"], ["", word("fastest")]]);
 const BATCH = 20;
 
 export class RunPanel {
@@ -19,52 +21,64 @@ export class RunPanel {
   #scenario = "test-case-1";
   #level = "calm";
   #speed = "1";
+  #isStopped = false; // by the button
+  #layout = null;
   /** @type {Set<string>} */
   #breaks = new Set();
   /** @type {Object<string, number>} */
   #counts = {};
   /** @type {{state: string, from_s: number, to_s: number}[]} */
   #spans = [];
+  /** @type {{name: string, time_s: number}[]} since the motors started */
+  #contacts = [];
   /** @type {Flight[]} */
   #rows = [];
-  #line;
-  #strip;
-  #guards;
-  #values;
-  #table;
-  #choices;
+  #line = make("p", { role: "status", class: "e-run-line" }, word("not_flying"));
+  #hit = make("p", { role: "status", class: "e-touched" });
+  #strip = make("div", { class: "e-strip", role: "img", "aria-label": word("time_line") });
+  #guards = make("ul", { class: "e-guards" });
+  #values = make("dl", { class: "e-read" });
+  #table = make("table", { class: "e-batch" });
+  #choices = make("div", { class: "e-row" });
   #pause;
+  #stop;
   #view;
 
   /**
    * @param {HTMLElement} root
-   * @param {{text: () => Promise<string>, lit: (active: string[], counts: Object<string, number>, taken: string[]) => void,
-   *   lost: (state: string) => void, selected: () => string}} listener text: of the mission; selected: id of the selected state
+   * @param {{text: () => Promise<string>, mistake: () => string, lit: (active: string[], counts: Object<string, number>, taken: string[]) => void,
+   *   lost: (state: string) => void, selected: () => string, live: (message: any) => void}} listener text: of the mission; mistake: that
+   *   keeps it from flying, "" if there is none, asked after the text; selected: id of the selected state; live: told how the flight in
+   *   the real simulator stands
+   * @param {boolean} isSimple without what a beginner does not need
    */
-  constructor(root, listener) {
+  constructor(root, listener, isSimple) {
     this.#root = root;
     this.#listener = listener;
-    this.#line = make("p", { role: "status", class: "e-run-line" }, word("not_flying"));
-    this.#strip = make("div", { class: "e-strip", role: "img", "aria-label": word("time_line") });
-    this.#guards = make("ul", { class: "e-guards" });
-    this.#values = make("dl", { class: "e-read" });
-    this.#table = make("table", { class: "e-batch" });
-    this.#choices = make("div", { class: "e-row" });
-    this.#pause = button(word("pause"), () => this.#togglePause());
+    this.#pause = button(word("pause"), () => this.#togglePause(), { disabled: true });
+    this.#stop = button(word("stop"), () => this.#stopFlight(), { disabled: true });
     const drawing = make("div", { class: "e-top-view" });
     this.#view = new TopView(drawing);
+    const speed = choice(word("speed"), SPEEDS, this.#speed, (value) => {
+      this.#speed = value;
+      if (this.#run) this.#order({ do: "speed", speed: value ? Number(value) : null });
+    });
     root.classList.add("e-fly");
-    root.append(drawing, make("div", {},
-      this.#choices,
-      make("div", { class: "e-row" },
-        button(word("fly_once"), () => this.#start(false), { class: "e-first" }),
-        button(word("fly_paused"), () => this.#start(true)),
-        this.#pause, button(word("step"), () => this.#order({ do: "step", ticks: 1 })),
-        button(word("break_here"), () => this.#toggleBreak()),
-        button(word("take_changes"), () => this.#change()),
-        button(word("stop"), () => this.#order({ do: "stop" })),
-        button(word("fly_many", { count: String(BATCH) }), () => this.#startBatch())),
-      this.#line, this.#strip, make("div", { class: "e-run-columns" }, this.#guards, this.#values), this.#table));
+    root.classList.toggle("e-simple", isSimple);
+    root.append(drawing, make("div", { class: "e-flying" },
+      make("div", { class: "e-controls" },
+        make("div", { class: "e-row" },
+          button(word("fly_once"), () => this.#start(false), { class: "e-first", title: word("fly_hint") }),
+          this.#pause, button(word("step"), () => this.#step(), { title: word("step_hint") }), this.#stop, speed),
+        this.#line, this.#hit),
+      this.#strip,
+      make("div", { class: "e-run-columns" },
+        make("section", {}, make("h3", {}, word("goes_on")), this.#guards), make("section", {}, make("h3", {}, word("reads")), this.#values)),
+      make("section", { class: "e-more" }, make("h3", {}, word("more")), this.#choices,
+        make("div", { class: "e-row" },
+          button(word("fly_many", { count: String(BATCH) }), () => this.#startBatch()),
+          button(word("break_here"), () => this.#toggleBreak()), button(word("take_changes"), () => this.#change()))),
+      this.#table));
     this.#flights = new Flights({ heard: (message) => this.#hear(message), lost: () => this.#forget() });
     this.#loadChoices();
   }
@@ -77,40 +91,72 @@ export class RunPanel {
     this.#choices.replaceChildren(
       choice(word("scenario"), words([...scenarios, ...lessons]), this.#scenario, (value) => { this.#scenario = value; }),
       textField(word("or_layout"), "", (value) => { this.#scenario = value || "test-case-1"; }, { placeholder: "calm-17" }),
-      choice(word("speed"), SPEEDS, this.#speed, (value) => {
-        this.#speed = value;
-        if (this.#run) this.#order({ do: "speed", speed: value ? Number(value) : null });
-      }),
       choice(word("level"), words(levels), this.#level, (value) => { this.#level = value; }));
   }
 
-  /** Fly in a scenario from now on. @param {string} scenario */
-  choose(scenario) {
+  /** Fly in a scenario from now on. @param {string} scenario @param {boolean} isSimple without what a beginner does not need */
+  choose(scenario, isSimple) {
     this.#scenario = scenario;
+    this.#root.classList.toggle("e-simple", isSimple);
     this.#loadChoices();
   }
 
-  /** Show a flight that is over. @param {Flight} flight */
+  /** Show a flight that is over; what it was worth, in words. @param {Flight} flight @returns {string} */
   showFlight(flight) {
-    this.#view.show(flight.layout, flight.track);
+    const contacts = contactsOf(flight.result);
+    this.#view.show(flight.layout, flight.track, contacts);
     this.#listener.lit([], flight.counts, []);
-    setText(this.#line, flight.reason);
+    const words = verdictWords(flight.result, flight.layout, this.#view.places);
+    setText(this.#line, words);
+    setText(this.#hit, hitWords(contacts));
+    return [words, hitWords(contacts)].filter(Boolean).join(" ");
+  }
+
+  #setRun(run) {
+    this.#run = run;
+    this.#pause.toggleAttribute("disabled", !run);
+    this.#stop.toggleAttribute("disabled", !run);
+    if (run) return;
+    this.#root.classList.remove("e-paused");
+    setText(this.#pause, word("pause"));
+  }
+
+  /** The mission's text, if it can fly; otherwise says why not. @returns {Promise<string>} */
+  async #text() {
+    const text = await this.#listener.text();
+    const mistake = this.#listener.mistake();
+    setText(this.#line, mistake ? word("mistake", { mistake }) : word("starting"));
+    setText(this.#hit, "");
+    return mistake ? "" : text;
   }
 
   async #start(paused) {
     setText(this.#line, word("starting"));
-    const text = await this.#listener.text();
+    const text = await this.#text();
+    if (!text) return;
     if (this.#run) await this.#flights.ask({ do: "stop", run: this.#run });
     this.#counts = {};
     this.#spans = [];
-    this.#view.clear();
+    this.#contacts = [];
+    this.#isStopped = false;
     const answer = await this.#flights.ask({
       do: "start", text, scenario: this.#scenario, seed: 0, speed: this.#speed ? Number(this.#speed) : null, paused, break_on: [...this.#breaks],
     });
     if (answer.kind === "started") {
-      this.#run = answer.run;
-      setText(this.#line, word("starting"));
+      this.#setRun(answer.run);
+      this.#layout = answer.layout;
+      this.#view.setWorld(answer.layout);
     } else setText(this.#line, answer.text);
+  }
+
+  /** Let one tick pass; a flight that is not yet there begins with a pause. */
+  #step() {
+    return this.#run ? this.#order({ do: "step", ticks: 1 }) : this.#start(true);
+  }
+
+  #stopFlight() {
+    this.#isStopped = true;
+    return this.#order({ do: "stop" });
   }
 
   async #order(request) {
@@ -143,8 +189,8 @@ export class RunPanel {
   }
 
   async #startBatch() {
-    setText(this.#line, word("starting"));
-    const text = await this.#listener.text();
+    const text = await this.#text();
+    if (!text) return;
     this.#rows = [];
     this.#table.replaceChildren();
     const answer = await this.#flights.ask({ do: "start_batch", text, level: this.#level, count: BATCH, first_seed: 1 });
@@ -155,51 +201,62 @@ export class RunPanel {
   }
 
   #forget() {
-    this.#run = "";
+    this.#setRun("");
     this.#batch = "";
-    this.#root.classList.remove("e-paused");
+  }
+
+  /** Ask for something that is no flight of this panel. @param {object} request @returns {Promise<any>} the answer */
+  ask(request) {
+    return this.#flights.ask(request);
   }
 
   #hear(message) {
+    if (message.kind === "live") this.#listener.live(message);
     if (message.kind === "now" && message.run === this.#run) this.#showNow(message);
     else if (message.kind === "ended" && message.run === this.#run) {
-      this.#run = "";
-      this.#root.classList.remove("e-paused");
-      setText(this.#line, message.text);
+      this.#setRun("");
+      this.#showEnd(message);
       this.#listener.lit([], message.counts, []);
       this.#listener.lost(message.lost_in);
     } else if (message.kind === "flight" && message.batch === this.#batch) this.#showFlight(message);
     else if (message.kind === "batch_ended" && message.batch === this.#batch && message.text) setText(this.#line, message.text);
   }
 
+  /** @param {{text: string, result: import("./verdict.js").Result|null, spans: {state: string, from_s: number, to_s: number}[]}} ended */
+  #showEnd({ text, result, spans }) {
+    this.#showStrip(spans);
+    if (this.#isStopped) setText(this.#line, word("stopped"));
+    else setText(this.#line, result ? verdictWords(result, this.#layout, this.#view.places) : word("fault", { text }));
+    if (result) setText(this.#hit, hitWords(contactsOf(result)));
+  }
+
   /** @param {Now} now */
   #showNow(now) {
+    const began_s = now.began_s ?? now.time_s;
+    const contacts = now.contacts.map(({ name, time_s }) => ({ name, time_s: time_s - began_s }));
+    this.#contacts = now.full ? contacts : [...this.#contacts, ...contacts];
     this.#counts = now.full ? now.counts : { ...this.#counts, ...now.counts };
     this.#spans = now.full ? now.spans : [...this.#spans, ...now.spans];
     this.#root.classList.toggle("e-paused", now.paused);
     setText(this.#pause, word(now.paused ? "go_on" : "pause"));
-    const where = `${number(now.time_s, 1)} s: ${now.state} (${number(now.seconds_in_state, 1)} s)`;
-    setText(this.#line, now.paused ? word("paused_in", { where }) : where);
+    const seconds = { time: number(now.time_s - began_s, 1), state: now.state, since: number(now.seconds_in_state, 1) };
+    setText(this.#line, word(!now.state ? "starting" : now.paused ? "paused_in" : "flying_in", seconds));
+    setText(this.#hit, hitWords(this.#contacts));
     this.#listener.lit(now.active, this.#counts, now.taken.flatMap(({ ids }) => ids));
-    this.#view.add(now.full, now.trail, now.pose);
+    this.#view.add(now.full, now.trail, now.pose, now.contacts);
     const sign = { true: "✓", false: "✗", null: "?" };
     this.#guards.replaceChildren(...now.guards.map(({ to, when, holds }) => make("li", { "data-holds": String(holds) },
       `${sign[String(holds)]} ${when || word("always")} → ${to}`)));
     this.#values.replaceChildren(...now.values.flatMap(({ name, value, unit }) => [
-      make("dt", {}, name), make("dd", {}, typeof value === "number" ? `${number(value, 2)} ${unit}` : String(value))]));
-    this.#showStrip(now);
+      make("dt", {}, name), make("dd", {}, typeof value === "number" ? `${number(value, 2)} ${unit}` : said(value))]));
+    if (now.state) {
+      this.#showStrip([...this.#spans, { state: now.state, from_s: this.#spans.at(-1)?.to_s ?? now.time_s - now.seconds_in_state, to_s: now.time_s }]);
+    }
   }
 
-  /** @param {Now} now */
-  #showStrip(now) {
-    const all = [...this.#spans, { state: now.state, from_s: now.time_s - now.seconds_in_state, to_s: now.time_s }];
-    const start = all[0].from_s;
-    const whole = Math.max(now.time_s - start, 0.001);
-    this.#strip.replaceChildren(...all.map(({ state, from_s, to_s }) => {
-      const part = make("span", { title: `${state}: ${number(from_s - start, 1)}–${number(to_s - start, 1)} s` }, state.split(".").at(-1) ?? "");
-      part.style.width = `${100 * Math.max(to_s - from_s, 0) / whole}%`;
-      return part;
-    }));
+  /** @param {{state: string, from_s: number, to_s: number}[]} all */
+  #showStrip(all) {
+    if (all.length > 0) drawStrip(this.#strip, all, { end_s: all[all.length - 1].to_s });
   }
 
   /** @param {Flight} flight */
@@ -213,10 +270,16 @@ export class RunPanel {
         this.#listener.lost(each.lost_in);
       }, { class: "e-link" });
       return make("tr", { "data-completed": String(each.completed) },
-        make("td", {}, show), make("td", {}, each.verdict), make("td", {}, each.lost_in), make("td", {}, number(each.total_time_s, 1)));
+        make("td", {}, show), make("td", {}, shortVerdict(each.verdict)), make("td", {}, each.lost_in), make("td", {}, number(each.total_time_s, 1)));
     }));
     setText(this.#line, word("flown_many", {
       flown: String(this.#rows.length), completed: String(this.#rows.filter(({ completed }) => completed).length),
     }));
   }
+}
+
+/** A value that is no number, in words. @param {any} value */
+function said(value) {
+  if (value === null) return "–";
+  return typeof value === "boolean" ? word(value ? "yes" : "no") : String(value);
 }

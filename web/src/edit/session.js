@@ -1,6 +1,7 @@
 /** The connection to the document that is edited; the server applies all edits, this page shows what comes back. */
 import { language } from "../lib/language.js";
 import { ReconnectingSocket } from "../lib/reconnecting_socket.js";
+import { word } from "./words.js";
 
 const TYPING_PAUSE_MS = 80; // after which typed text is sent
 
@@ -11,7 +12,7 @@ const TYPING_PAUSE_MS = 80; // after which typed text is sent
  *   state: string, event: string|null, index: number|null, nodes: string[]}} Finding
  * @typedef {{id: string, name: string, parent: string, initial: string, final: boolean, finish: boolean, enter: string[],
  *   during: string[], exit: string[], parameters: [string, string][], template: string, source: string, span: Span}} StateNode
- * @typedef {{id: string, source: string, target: string, event: "tick"|"done"|"resume", order: number, when: string,
+ * @typedef {{id: string, source: string, target: string, missing: boolean, event: "tick"|"done"|"resume", order: number, when: string,
  *   actions: string[], source_state: string, source_index: number, span: Span}} Edge
  * @typedef {{initial: string, readable: boolean, nodes: StateNode[], edges: Edge[]}} Diagram the chart as it is flown
  * @typedef {{x: number, y: number}} Point
@@ -24,8 +25,11 @@ export class EditSession {
   #socket;
   #listener;
   #number = 0;
-  /** @type {Map<number, (reply: any) => void>} */
+  /** What was sent and is not answered yet, in order. @type {Map<number, {message: any, answer: (reply: any) => void}>} */
   #waiting = new Map();
+  #client = Array.from({ length: 4 }, () => Math.random().toString(36).slice(2, 10)).join("");
+  #session = ""; // of the program that has the document
+  #isReady = false; // connected, and the document is known
   /** @type {(() => TextChange[])|null} */
   #typed = null;
   #timer = 0;
@@ -55,22 +59,67 @@ export class EditSession {
   others = 0;
 
   /**
-   * @param {string} address of the document's WebSocket
-   * @param {{changed: (changes: TextChange[], text: string|null) => void,
-   *   connected: (state: string, reason: string) => void, refused: (reason: string) => void, status: () => void,
-   *   note: (text: string) => void}} listener changed: told after each change of the document; with a text that is
-   *   not null, all of it is new
+   * @param {string} file name of the mission's file
+   * @param {{changed: (changes: TextChange[], text: string|null, isOwn: boolean) => void, placed: () => void,
+   *   connected: (state: string, reason: string) => void, refused: (reason: string, code: string) => void, status: () => void,
+   *   note: (text: string) => void, text: () => string}} listener changed: told after each change of the document; with a
+   *   text that is not null, all of it is new; isOwn: this page asked for it. placed: told when states were moved. text: as
+   *   it is shown
    */
-  constructor(address, listener) {
+  constructor(file, listener) {
     this.#listener = listener;
+    const address = `/ws/edit?file=${encodeURIComponent(file)}&language=${language()}&client=${this.#client}`;
     this.#socket = new ReconnectingSocket(address, {
       message: (message) => this.#receive(message),
       state: (state, reason) => {
-        if (state !== "open") for (const answer of this.#waiting.values()) answer({ refused: "the connection was lost" });
-        this.#waiting.clear();
+        this.#isReady = false;
+        // What is not answered waits for the next connection.
+        if (state === "refused") this.#drop(reason);
         listener.connected(state, reason);
       },
     });
+  }
+
+  /** @param {string} reason */
+  #drop(reason) {
+    for (const { answer } of this.#waiting.values()) answer({ refused: reason });
+    this.#waiting.clear();
+  }
+
+  /**
+   * The document was sent, first or after a lost connection. What the program does not have is sent again.
+   * @param {any} message
+   * @returns {boolean} whether the text that is shown stays
+   */
+  #meet(message) {
+    const isOther = this.#session !== "" && message.session !== this.#session; // the program was started anew
+    this.#session = message.session;
+    this.#isReady = true;
+    const text = this.#listener.text();
+    if (isOther) {
+      const edits = [...this.#waiting].filter(([, { message: sent }]) => sent.type !== "type");
+      for (const [number, { message: sent, answer }] of this.#waiting) {
+        if (sent.type !== "type") continue;
+        this.#waiting.delete(number);
+        answer({});
+      }
+      const isNewer = !this.isSaved && text !== message.text;
+      if (isNewer) {
+        this.#typed = null; // it is in the text
+        this.#ask({ type: "type", revision: message.revision, changes: [difference(message.text, text)] });
+        this.#listener.note("sent_again");
+      }
+      for (const [, { message: sent }] of edits) this.#socket.send(sent);
+      return isNewer;
+    }
+    for (const [number, { message: sent, answer }] of this.#waiting) {
+      if (number <= message.answered) {
+        this.#waiting.delete(number);
+        answer({});
+      } else this.#socket.send(sent);
+    }
+    const isTyped = [...this.#waiting.values()].some(({ message: sent }) => sent.type === "type") || this.#typed !== null;
+    return isTyped; // the program has the text without it; the answer has the right one if it cannot be applied
   }
 
   /**
@@ -98,13 +147,19 @@ export class EditSession {
     return this.#ask({ type: "save", force });
   }
 
-  /** Keep where states are drawn. @param {Object<string, Point|null>} places null forgets one */
-  place(places) {
+  /**
+   * Keep where states are drawn.
+   * @param {Object<string, Point|null>} places null forgets one
+   * @param {boolean} [settled] the page has found these places: nothing to undo
+   */
+  async place(places, settled = false) {
+    if (Object.keys(places).length === 0) return true;
+    await this.flush();
     for (const [path, point] of Object.entries(places)) {
       if (point) this.layout[path] = point;
       else delete this.layout[path];
     }
-    return this.#ask({ type: "layout", places });
+    return this.#ask({ type: "layout", places, settled });
   }
 
   /**
@@ -130,6 +185,7 @@ export class EditSession {
   /** Send what was typed now; resolves when the server has it. */
   async flush() {
     clearTimeout(this.#timer);
+    if (!this.#isReady && this.#session !== "") return this.#sending; // it is sent with the next connection
     const before = this.#sending;
     this.#sending = (async () => {
       await before; // its answer has the revision for which the next changes are made
@@ -145,23 +201,26 @@ export class EditSession {
 
   /** @param {object} message @returns {Promise<boolean>} */
   #ask(message) {
-    this.#number += 1;
-    const number = this.#number;
-    if (!this.#socket.send({ ...message, number })) {
-      this.#listener.refused("there is no connection to the editor's program; nothing was changed");
+    const sent = { ...message, number: this.#number + 1 };
+    if (!this.#isReady || !this.#socket.send(sent)) {
+      this.#listener.refused(word("no_connection"), "");
       return Promise.resolve(false);
     }
+    this.#number += 1;
     return new Promise((resolve) => {
-      this.#waiting.set(number, (reply) => {
-        if (reply.refused) this.#listener.refused(reply.refused);
+      const answer = (reply) => {
+        if (reply.refused) this.#listener.refused(reply.refused, reply.code ?? "");
         resolve(!reply.refused);
-      });
+      };
+      this.#waiting.set(sent.number, { message: sent, answer });
     });
   }
 
   /** @param {any} message */
   #receive(message) {
+    if (message.warning) this.#listener.refused(message.warning, "");
     if (message.type === "document" || message.type === "changed") {
+      const stays = message.type === "document" && message.answered !== undefined && this.#meet(message);
       this.revision = message.revision;
       for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) this[key] = message[key];
       if (language() === "es") for (const finding of this.findings) finding.message = finding.spanish ?? finding.message;
@@ -172,16 +231,22 @@ export class EditSession {
       this.#setStatus(message);
       // A change that overtakes typed text makes the server refuse that and send the whole text.
       const isOvertaken = this.#isTypedUnderWay && message.answers === undefined;
-      this.#listener.changed(isOvertaken ? [] : message.changes ?? [], message.text ?? null);
+      const isOwn = message.answers !== undefined && message.text === undefined;
+      this.#listener.changed(isOvertaken ? [] : message.changes ?? [], stays ? null : message.text ?? null, isOwn);
       if (message.text !== undefined && message.restored) this.#listener.note("restored");
-      if (message.text !== undefined && message.problem) this.#listener.refused(message.problem);
+      if (message.text !== undefined && message.problem) this.#listener.refused(message.problem, "");
+      if (stays) this.flush();
     } else {
       this.#setStatus(message);
+      if (message.layout && !isSame(message.layout, this.layout)) {
+        this.layout = message.layout;
+        this.#listener.placed();
+      }
     }
-    const answer = this.#waiting.get(message.answers);
-    if (answer) {
+    const asked = this.#waiting.get(message.answers);
+    if (asked) {
       this.#waiting.delete(message.answers);
-      answer(message);
+      asked.answer(message);
     }
     this.#listener.status();
   }
@@ -193,4 +258,20 @@ export class EditSession {
     this.canRedo = message.can_redo ?? this.canRedo;
     this.others = message.others ?? this.others;
   }
+}
+
+/** Whether two layouts are the same. @param {Object<string, Point>} one @param {Object<string, Point>} other */
+function isSame(one, other) {
+  const names = Object.keys(one);
+  return names.length === Object.keys(other).length && names.every((name) => one[name].x === other[name]?.x && one[name].y === other[name]?.y);
+}
+
+/** The one change that makes a text another one. @param {string} from @param {string} to @returns {TextChange} */
+function difference(from, to) {
+  let start = 0;
+  while (start < from.length && start < to.length && from[start] === to[start]) start += 1;
+  let same = 0; // characters at the end
+  const most = Math.min(from.length, to.length) - start;
+  while (same < most && from[from.length - 1 - same] === to[to.length - 1 - same]) same += 1;
+  return { start, removed: from.length - start - same, inserted: to.slice(start, to.length - same) };
 }

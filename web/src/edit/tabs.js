@@ -4,6 +4,8 @@ import { button } from "./fields.js";
 
 export class Tabs {
   root;
+  /** Told the key of the tab that is shown. @type {(key: string) => void} */
+  onShow = () => {};
   /** @type {Map<string, {label: string, tab: HTMLElement, panel: HTMLElement}>} */
   #parts = new Map();
 
@@ -27,6 +29,7 @@ export class Tabs {
       tab.setAttribute("aria-selected", String(each === key));
       panel.hidden = each !== key;
     }
+    this.onShow(key);
   }
 
   /** Write something behind a tab's label. @param {string} key @param {string} sign */

@@ -1,13 +1,28 @@
 /** The mission's text: CodeMirror, in a shadow tree so that its style sheets need no exception in the page's policy. */
 import { basicSetup } from "codemirror";
 import { yaml } from "@codemirror/lang-yaml";
+import { completionStatus } from "@codemirror/autocomplete";
 import { setDiagnostics } from "@codemirror/lint";
-import { Annotation, ChangeSet, Compartment, EditorSelection, EditorState, Prec } from "@codemirror/state";
-import { EditorView, keymap } from "@codemirror/view";
+import { Annotation, ChangeSet, Compartment, EditorState, Prec, StateEffect, StateField } from "@codemirror/state";
+import { Decoration, EditorView, keymap } from "@codemirror/view";
+import { newLine } from "./yaml_enter.js";
 
 /** @typedef {import("./session.js").TextChange} TextChange */
 
 const remote = Annotation.define(); // a change that the server has made
+/** @type {import("@codemirror/state").StateEffectType<[number, number]>} a part to be marked */
+const mark = StateEffect.define();
+/** The part of the text that is selected in the diagram; until something is typed or the cursor moves. */
+const marked = StateField.define({
+  create: () => Decoration.none,
+  update(before, transaction) {
+    const shown = transaction.effects.find((effect) => effect.is(mark));
+    if (shown) return Decoration.set(shown.value[0] < shown.value[1] ? [Decoration.mark({ class: "e-shown" }).range(...shown.value)] : []);
+    const isByHand = transaction.selection !== undefined || (transaction.docChanged && !transaction.annotation(remote));
+    return isByHand ? Decoration.none : before.map(transaction.changes);
+  },
+  provide: (field) => EditorView.decorations.from(field),
+});
 const SEVERITY = { error: "error", warning: "warning", advice: "info" };
 
 export class TextView {
@@ -38,10 +53,12 @@ export class TextView {
           { key: "Mod-z", run: step(listener.undo), preventDefault: true },
           { key: "Mod-y", run: step(listener.redo), preventDefault: true },
           { key: "Mod-Shift-z", run: step(listener.redo), preventDefault: true },
+          { key: "Enter", run: (view) => completionStatus(view.state) !== "active" && newLine(view) },
         ])),
         this.#writable.of([]),
         basicSetup,
         yaml(),
+        marked,
         EditorView.lineWrapping,
         EditorView.theme({
           "&": { height: "100%", fontSize: "13px" }, ".cm-scroller": { overflow: "auto" },
@@ -49,6 +66,7 @@ export class TextView {
           ".cm-lintRange": { backgroundImage: "none", textDecoration: "underline wavy #888" },
           ".cm-lintRange-error": { backgroundImage: "none", textDecoration: "underline wavy #b3171b" },
           ".cm-lintRange-warning": { backgroundImage: "none", textDecoration: "underline wavy #8f5a00" },
+          ".e-shown": { backgroundColor: "#dbe9ff" },
           ".cm-lintRange-info": { backgroundImage: "none" }, ".cm-lintRange-active": { backgroundColor: "#fff3c4" },
         }),
         EditorView.contentAttributes.of({ "aria-label": "mission, YAML" }),
@@ -57,7 +75,8 @@ export class TextView {
             this.#typed = this.#typed ? this.#typed.compose(update.changes) : update.changes;
             listener.typed(() => this.#take());
           }
-          if (update.selectionSet && !this.#isMoving) listener.moved(update.state.selection.main.head);
+          // While something is typed, what it means is not known yet: see `cursor`.
+          if (update.selectionSet && !update.docChanged && !this.#isMoving) listener.moved(update.state.selection.main.head);
         }),
       ],
     });
@@ -87,8 +106,17 @@ export class TextView {
     });
   }
 
-  /** Make changes that the server has made to the text without what is typed here and not sent. @param {TextChange[]} changes */
-  change(changes) {
+  /** Where the cursor is, if the text has the focus and all that was typed is sent; otherwise null. @returns {number|null} */
+  get cursor() {
+    return this.hasFocus && this.#typed === null ? this.#view.state.selection.main.head : null;
+  }
+
+  /**
+   * Make changes that the server has made to the text without what is typed here and not sent.
+   * @param {TextChange[]} changes
+   * @param {boolean} isShown move the cursor to the last one: it was asked for here
+   */
+  change(changes, isShown) {
     for (const { start, removed, inserted } of changes) {
       const typed = this.#typed;
       const length = typed ? typed.length : this.#view.state.doc.length;
@@ -97,7 +125,11 @@ export class TextView {
         this.#typed = typed.map(change);
         change = change.map(typed, true);
       }
-      this.#view.dispatch({ changes: change, annotations: remote.of(true) });
+      const isLast = isShown && this.hasFocus && !typed && changes.at(-1)?.start === start;
+      const cursor = isLast ? { selection: { anchor: start + inserted.length }, scrollIntoView: true } : {};
+      this.#isMoving = true;
+      this.#view.dispatch({ changes: change, annotations: remote.of(true), ...cursor });
+      this.#isMoving = false;
     }
   }
 
@@ -116,13 +148,16 @@ export class TextView {
     this.#view.dispatch(setDiagnostics(this.#view.state, /** @type {any} */ (diagnostics)));
   }
 
-  /** Select a part of the text and scroll to it, without taking the focus. @param {number} start @param {number} end */
+  /** Mark a part of the text, put the cursor before it and scroll to it, without taking the focus. @param {number} start @param {number} end */
   show(start, end) {
     const { length } = this.#view.state.doc;
     this.#isMoving = true;
     this.#view.dispatch({
-      selection: EditorSelection.single(Math.min(start, length), Math.min(end, length)),
-      effects: EditorView.scrollIntoView(Math.min(start, length), { y: "center" }),
+      selection: { anchor: Math.min(start, length) },
+      effects: [
+        mark.of([Math.min(start, length), Math.min(end, length)]),
+        EditorView.scrollIntoView(Math.min(start, length), { y: end - start > 600 ? "start" : "center", yMargin: 40 }),
+      ],
     });
     this.#isMoving = false;
   }

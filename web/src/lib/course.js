@@ -26,7 +26,7 @@ export async function loadLessons() {
 
 /** Ask the course for something. @param {string} what @param {object} content @returns {Promise<any>} `detail` says why not */
 export async function askCourse(what, content) {
-  const answer = await fetch(`/api/course/${what}`, {
+  const answer = await fetch(`/api/course/${what}?language=${language()}`, {
     method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(content),
   });
   const told = await answer.json();

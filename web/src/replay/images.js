@@ -1,5 +1,5 @@
 /** Brings the images of a run to a view: the one that is wanted, and while it plays those that come next. */
-import { addressOf } from "./run.js";
+import { addressOf } from "../lib/replay/run.js";
 
 const AHEAD = 12;
 const KEPT = 60;

@@ -2,10 +2,10 @@
 import "../lib/flight/flight.css";
 import "./replay.css";
 import { make, setText } from "../lib/dom.js";
-import { Bar } from "./bar.js";
-import { Clock } from "./clock.js";
+import { Bar } from "../lib/replay/bar.js";
+import { Clock } from "../lib/replay/clock.js";
 import { pageOf, RunList } from "./list.js";
-import { fetchJson, Run } from "./run.js";
+import { fetchJson, Run } from "../lib/replay/run.js";
 import { Side } from "./side.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 

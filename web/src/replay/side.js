@@ -5,7 +5,7 @@ import { make, number, setAttribute, setText } from "../lib/dom.js";
 import { Figures } from "../lib/flight/figures.js";
 import { Plots } from "../lib/flight/plots.js";
 import { Images } from "./images.js";
-import { addressOf } from "./run.js";
+import { addressOf } from "../lib/replay/run.js";
 import { Statechart } from "../lib/chart/statechart.js";
 
 let count = 0;
@@ -25,7 +25,7 @@ export class Side {
 
   /**
    * @param {HTMLElement} element where it goes
-   * @param {import("./run.js").Run} run
+   * @param {import("../lib/replay/run.js").Run} run
    * @param {string} letter "A" or "B"; "" if there is only one
    */
   constructor(element, run, letter) {

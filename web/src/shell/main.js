@@ -28,13 +28,16 @@ async function reloadIfRestarted() {
   if (document.dispatchEvent(new Event("monitor-restarted", { cancelable: true }))) location.reload();
 }
 
+const SPANISH = { "no drone": "sin dron", "flight over": "vuelo acabado", "live": "en vivo", "link lost": "enlace perdido", "reconnecting": "conectando de nuevo" };
+
 /** Shows the link; a change is told to screen readers, the same again is not. */
 function show([state, words]) {
   const place = document.getElementById("link"); // a page for a projector has no header
   if (!place) return;
   const element = place.querySelector(".words");
   place.dataset.state = state;
-  if (element.textContent !== words) element.textContent = words;
+  const said = document.documentElement.lang === "es" ? SPANISH[words] ?? words : words; // few pages have two languages
+  if (element.textContent !== said) element.textContent = said;
 }
 
 // On a phone the navigation is a row that is moved sideways: begin where we are.

@@ -3,6 +3,7 @@ import { drawMap } from "./map.js";
 import { FRAME_COLOURS } from "../colours.js";
 import { make } from "../dom.js";
 import { allFrames, PRISM, prismsOf } from "./obstacles.js";
+import { yawOf } from "../yaw.js";
 
 /** Does what `ArenaScene` does, as far as a plain canvas can. */
 export class TopView {
@@ -120,10 +121,10 @@ export class TopView {
     }
   }
 
-  #drawDrone(pen, { id = 1, p, q: [w, x, y, z], fresh = true }) {
+  #drawDrone(pen, { id = 1, p, q, fresh = true }) {
     pen.save();
     pen.translate(p[0], p[1]);
-    pen.rotate(Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)));
+    pen.rotate(yawOf(q));
     pen.globalAlpha = fresh ? 1 : 0.4;
     pen.beginPath();
     for (const [px, py] of [[0.35, 0], [-0.22, 0.2], [-0.12, 0], [-0.22, -0.2]]) pen.lineTo(px, py);

@@ -2,6 +2,7 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { onBeat } from "../beat.js";
 import { make, number, onTheme, setText, themeColour } from "../dom.js";
+import { yawOf } from "../yaw.js";
 
 const WINDOW_S = 60;
 const LINES_S = 15;
@@ -68,8 +69,7 @@ export class Plots {
     const last = this.#samples.at(-1);
     if (last && t < last[0]) this.#samples = [];
     else if (last && t === last[0]) return;
-    const [w, x, y, z] = q;
-    const yaw = Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
+    const yaw = yawOf(q);
     this.#samples.push([t, ...p, yaw, ...(v ?? [NaN, NaN, NaN]), r ?? NaN, ...(c ?? [NaN, NaN, NaN, NaN])]);
     if (this.#samples.length > MOST) this.#samples.splice(0, MOST / 2);
     this.#dirty = true;

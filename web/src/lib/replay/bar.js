@@ -1,5 +1,6 @@
 /** The controls of time: play, step, speed, and a slider with the crossings on it. */
-import { make, number, setAttribute, setText } from "../lib/dom.js";
+import "./bar.css";
+import { make, number, setAttribute, setText } from "../dom.js";
 import { SPEEDS } from "./clock.js";
 
 const STEP_S = 0.1;
@@ -18,8 +19,9 @@ export class Bar {
    * @param {HTMLElement} element where it goes
    * @param {import("./clock.js").Clock} clock
    * @param {import("./run.js").Run[]} runs one or two
+   * @param {{keys?: boolean}} [options] keys: it hears keys wherever the focus is (default)
    */
-  constructor(element, clock, runs) {
+  constructor(element, clock, runs, { keys = true } = {}) {
     this.#clock = clock;
     this.#runs = runs;
     const button = (words, label, act, keys = null) => {
@@ -27,12 +29,12 @@ export class Bar {
       made.addEventListener("click", act);
       return made;
     };
-    this.#play = button("▶", "play", () => clock.toggle(), "space");
+    this.#play = button("▶", "play", () => clock.toggle(), keys ? "space" : null);
     this.#play.classList.add("r-play");
-    const back = button("◂", "a step back", () => this.#step(-STEP_S), ",");
-    const on = button("▸", "a step on", () => this.#step(STEP_S), ".");
+    const back = button("◂", "a step back", () => this.#step(-STEP_S), keys ? "," : null);
+    const on = button("▸", "a step on", () => this.#step(STEP_S), keys ? "." : null);
     this.#time = make("output", { class: "r-time", "aria-live": "off" });
-    this.#speed = make("select", { "aria-label": "speed", title: "speed (− and +)" });
+    this.#speed = make("select", { "aria-label": "speed", title: keys ? "speed (− and +)" : "speed" });
     for (const speed of SPEEDS) this.#speed.append(make("option", { value: String(speed), selected: speed === 1 }, `${speed}×`));
     this.#speed.addEventListener("change", () => clock.setSpeed(Number(this.#speed.value)));
     this.#slider = make("input", {
@@ -46,7 +48,7 @@ export class Bar {
     const buttons = make("div", { class: "r-buttons" }, this.#play, back, on, this.#time, this.#speed);
     this.root = make("div", { class: "r-bar m-panel", role: "group", "aria-label": "time" }, buttons, track);
     element.append(this.root);
-    document.addEventListener("keydown", (event) => this.#key(event));
+    if (keys) document.addEventListener("keydown", (event) => this.#key(event));
     clock.listen(() => this.#show());
     this.#show();
   }

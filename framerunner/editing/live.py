@@ -1,0 +1,182 @@
+"""The real flight that pages may start: `framerunner fly` with its simulator, seen on the live channel.
+
+There is one at a time. It is a child process, whose simulator is a child of its own; both end when this
+program does, however that ends. Its files are in the folder of runs, so it can be replayed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pydantic import BaseModel
+
+from errors import UserError
+from framerunner.child_process import ChildProcess
+from framerunner.editing import messages
+from framerunner.editing.places import find_scenario
+from framerunner.editing.words import Said, reason
+from scenarios.loader import dump_yaml
+from wire.transports.urls import parse_url
+
+INSTANCES = 10
+GROUND_PORT = 14550  # to which simulators always send
+_UDP_PORTS = (14540, 14580, 18570)  # of instance 0: the app's, and the simulator's two
+_VIDEO_PORT = 8100
+_HERE = "127.0.0.1"
+_MAX_REASON = 500
+
+
+@dataclass(frozen=True, slots=True)
+class LiveSettings:
+    """How real flights are flown.
+
+    Attributes:
+        drone_url: where the monitor listens for drones.
+        runs: folder of runs.
+        pilot: a contestant's file; None: there is none.
+    """
+
+    drone_url: str
+    runs: Path
+    pilot: Path | None = None
+
+
+class LiveFlight:
+    """The flight, started and stopped by pages; call `close` at the end.
+
+    Args:
+        settings: how it is flown.
+        tell: takes what all pages are told.
+
+    Attributes:
+        latest: what was told last; None before the first flight.
+    """
+
+    def __init__(self, settings: LiveSettings, tell: Callable[[BaseModel], None]) -> None:
+        self._settings = settings
+        self._tell = tell
+        self._flying: asyncio.Task[None] | None = None
+        self._last_line = ""
+        self.latest: messages.Live | None = None
+
+    async def start(self, request: messages.StartLive) -> Said | None:
+        """Start a flight; returns why not, or None."""
+        if self._flying is not None and not self._flying.done():
+            return Said("live.busy")
+        url = parse_url(self._settings.drone_url)
+        if url.scheme != "udpin":
+            return Said("live.no_link", url=url.text)
+        instance = await asyncio.to_thread(free_instance)
+        if instance is None:
+            return Said("live.no_ports")
+        link = () if url.number == GROUND_PORT else (f"udpout://{_HERE}:{url.number}",)
+        self._show(request, "starting")
+        self._flying = asyncio.create_task(self._fly(request, instance, link))
+        return None
+
+    def stop(self) -> bool:
+        """Stop the flight; returns whether there is one."""
+        if self._flying is None or self._flying.done():
+            return False
+        self._flying.cancel()
+        return True
+
+    async def close(self) -> None:
+        """Stop the flight and wait for the end of its processes."""
+        if self.stop() and self._flying is not None:
+            await asyncio.gather(self._flying, return_exceptions=True)
+
+    async def _fly(self, request: messages.StartLive, instance: int, links: tuple[str, ...]) -> None:
+        text, stopped = "", False
+        with TemporaryDirectory(prefix="framerunner-live-", ignore_cleanup_errors=True) as folder:
+            try:
+                before = await asyncio.to_thread(self._runs)
+                arguments = await asyncio.to_thread(self._arguments, request, Path(folder), instance, links)
+                text = await self._run(request, arguments)
+                text = await asyncio.to_thread(self._reason, before) or text
+            except asyncio.CancelledError:
+                stopped = True
+            except (UserError, OSError) as error:
+                text = reason(error, request.language) if isinstance(error, UserError) else str(error)
+            finally:
+                self._show(request, "stopped" if stopped else "ended", text[:_MAX_REASON])
+
+    async def _run(self, request: messages.StartLive, arguments: list[str]) -> str:
+        """Fly to the end; returns the program's error, "" if it flew."""
+        problem = ""
+
+        def hear(line: str) -> None:
+            nonlocal problem
+            if line.startswith("error: "):
+                problem = problem or line.removeprefix("error: ")
+            elif self.latest is not None and self.latest.state == "starting":
+                self._show(request, "flying")
+
+        async with ChildProcess("the flight", arguments, hear) as child:
+            how = await child.failed()
+        return problem or how
+
+    def _arguments(
+        self, request: messages.StartLive, folder: Path, instance: int, links: tuple[str, ...]
+    ) -> list[str]:
+        """Write what is flown to files, so that it is what was checked; returns the command's words."""
+        scenario, mission = folder / "scenario.yaml", folder / "mission.yaml"
+        scenario.write_text(dump_yaml(find_scenario(request.scenario)), encoding="utf-8")
+        mission.write_text(request.text, encoding="utf-8")
+        pilot = self._settings.pilot
+        return [
+            *("fly", str(scenario), "--mission", str(mission), "--speed", f"{request.speed:g}"),
+            *("--instance", str(instance), "--out", str(self._settings.runs), "--lifeline"),
+            *(word for link in links for word in ("--monitor-link", link)),
+            *(() if pilot is None else ("--pilot", str(pilot.absolute()))),
+        ]
+
+    def _runs(self) -> set[str]:
+        try:
+            return {each.name for each in self._settings.runs.iterdir()}
+        except OSError:
+            return set()
+
+    def _reason(self, before: set[str]) -> str:
+        """The verdict's reason of the run that is new; "" if there is none."""
+        for name in sorted(self._runs() - before, reverse=True):
+            try:
+                result = json.loads((self._settings.runs / name / "result.json").read_bytes())
+                return str(result["reason"])
+            except (OSError, ValueError, KeyError, TypeError):
+                continue
+        return ""
+
+    def _show(self, request: messages.StartLive, state: messages.LiveState, text: str = "") -> None:
+        shown = messages.Live(state=state, scenario=request.scenario, speed=request.speed, text=text)
+        self.latest = shown
+        self._tell(shown)
+
+
+def free_instance() -> int | None:
+    """The first instance of the simulated drone whose ports nothing uses; None if there is none."""
+    for instance in range(INSTANCES):
+        udp = (port + instance for port in _UDP_PORTS)
+        if all(is_free(port, socket.SOCK_DGRAM) for port in udp) and is_free(
+            _VIDEO_PORT + instance, socket.SOCK_STREAM
+        ):
+            return instance
+    return None
+
+
+def is_free(port: int, kind: socket.SocketKind) -> bool:
+    """Whether a port of this machine can be listened on now; 0 stands for any free one."""
+    with socket.socket(socket.AF_INET, kind) as probe:
+        if kind == socket.SOCK_STREAM:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((_HERE, port))
+        except OSError:
+            return False
+        return True

@@ -1,0 +1,38 @@
+"""A vehicle's state in arena axes, as its telemetry reported it at a tick."""
+
+from __future__ import annotations
+
+from geometry.axes import Alignment, Pose
+from geometry.rotations import quaternion_from_euler
+from offboard.drone import DroneState
+from offboard.link.telemetry import Sample, TelemetryFeed
+
+
+def reported_state(
+    sample: Sample, feed: TelemetryFeed, alignment: Alignment, missed: tuple[DroneState, ...] = ()
+) -> DroneState:
+    """The state at a tick.
+
+    Args:
+        sample: of the tick.
+        feed: for mode, arming and landing, which have no time stamps.
+        alignment: from the vehicle's local axes to the arena's.
+        missed: states at the ticks that were skipped before this one, oldest first.
+    """
+    pose = alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
+    attitude_ned = quaternion_from_euler(sample.roll_rad, sample.pitch_rad, sample.yaw_ned_rad)
+    return DroneState(
+        time_us=sample.time_us,
+        x=pose.position_m[0],
+        y=pose.position_m[1],
+        z=pose.position_m[2],
+        yaw=pose.yaw_rad,
+        velocity_arena_m_s=alignment.vector(sample.velocity_ned_m_s),
+        armed=feed.arming.is_armed(sample.time_us),
+        offboard=feed.mode == "OFFBOARD",
+        mode=feed.mode,
+        landed=feed.landed,
+        position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
+        attitude_arena=alignment.attitude(attitude_ned),
+        missed=missed,
+    )

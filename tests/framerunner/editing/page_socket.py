@@ -1,0 +1,59 @@
+"""A page's end of a document's WebSocket, and a server with the documents' door, without a browser."""
+
+from __future__ import annotations
+
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from types import SimpleNamespace
+
+from fastapi import FastAPI
+from starlette.testclient import TestClient
+
+from framerunner.editing.documents.desk import EditorDesk
+from framerunner.editing.documents.door import DocumentsDoor
+
+
+class Socket:
+    """A page's end of a document's WebSocket."""
+
+    def __init__(self, socket):
+        self._socket = socket
+        self._number = 0
+        self.document = self.receive("document")
+
+    def receive(self, kind):
+        """The next message of a type."""
+        while (message := self._socket.receive_json())["type"] != kind:
+            pass
+        return message
+
+    def ask(self, kind, **fields):
+        """Ask for something; the answer."""
+        self._number += 1
+        self._socket.send_json({"type": kind, "number": self._number, **fields})
+        while (message := self._socket.receive_json()).get("answers") != self._number:
+            pass
+        return message
+
+    def edit(self, kind, **fields):
+        return self.ask("edit", edit={"kind": kind, **fields})
+
+    def type(self, start, inserted, *, revision, removed=0):
+        change = {"start": start, "removed": removed, "inserted": inserted}
+        return self.ask("type", revision=revision, changes=[change])
+
+
+@contextmanager
+def served(folder, *, may_act=True):
+    """A client of a server with the documents' door."""
+    web = FastAPI()
+    web.include_router(DocumentsDoor(EditorDesk(folder)).router(lambda _: may_act))
+    with TestClient(web) as client:
+
+        @contextmanager
+        def window(name, query=""):
+            # The test client cancels what the server still does when a page has left.
+            with suppress(CancelledError), client.websocket_connect(f"/ws/edit?file={name}{query}") as socket:
+                yield Socket(socket)
+
+        yield SimpleNamespace(http=client, window=window)

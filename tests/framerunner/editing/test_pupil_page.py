@@ -1,0 +1,101 @@
+"""The tab Fly and the lessons' words, as a pupil meets them."""
+
+from __future__ import annotations
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import expect
+
+from framerunner.course.lessons import find_lesson
+from tests.chromium import chromium
+from tests.framerunner.editing.editor_program import editor
+from tests.framerunner.editing.editor_user import EditorUser
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+SMALL = {"width": 1024, "height": 720}
+LESSON_4 = find_lesson("4")
+CARELESS = LESSON_4.solution.replace(
+    "- cmd.vel_x = 0.3\n    during:\n      - look_to_frame", "- cmd.vel_x = 0.3"
+)
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser():
+    async with chromium() as opened:
+        yield opened
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def program(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("missions")
+    (folder / "careless.yaml").write_text(CARELESS)
+    (folder / "start.yaml").write_text(find_lesson("1").start)
+    async with editor(folder / "careless.yaml") as running:
+        yield running
+
+
+async def pupil(browser, program, file, lesson, locale="en-GB"):
+    """A pupil at a lesson, with the tab Fly open."""
+    context = await browser.new_context(viewport=SMALL, locale=locale)
+    user = EditorUser(await context.new_page())
+    user.page.set_default_timeout(10_000)
+    await user.open(f"{program.page(file)}&lesson={lesson}")
+    await user.page.locator("#e-tab-fly").click()
+    await user.page.locator(".e-controls select").select_option("")
+    return user
+
+
+async def test_a_frame_that_is_hit_is_named_and_marked(browser, program):
+    user = await pupil(browser, program, "careless.yaml", LESSON_4.name)
+    await user.press("Fly", user.page.locator(".e-controls"))
+    await expect(user.page.locator(".e-touched")).to_have_text(
+        "The drone hit the red frame at 16 s.", timeout=30_000
+    )
+    await expect(user.page.locator(".t-hit")).to_have_count(1)
+    await expect(user.page.locator('.t-frame[data-colour="red"]')).to_have_count(
+        2
+    )  # from above and its height
+    await expect(user.page.locator(".e-tabs .e-tab:not([hidden]) .e-run-line")).to_contain_text(
+        "The time was up after 120 s", timeout=60_000
+    )
+    assert not user.complaints
+    await user.page.context.close()
+
+
+async def test_a_beginner_sees_the_goal_and_only_what_is_needed_without_scrolling(browser, program):
+    user = await pupil(browser, program, "start.yaml", "1_take_off", locale="es-ES")
+    for name in ("Volar", "Pausa", "Un paso", "Parar"):
+        await expect(
+            user.page.locator(".e-controls").get_by_role("button", name=name, exact=True)
+        ).to_be_in_viewport()
+    await expect(user.page.locator(".e-more")).to_be_hidden()
+    await user.press("Volar", user.page.locator(".e-controls"))
+    line = user.page.locator(".e-tabs .e-tab:not([hidden]) .e-run-line")
+    told = "El dron aterrizó, pero no estuvo 3 s en el punto (0, 0, 1.5). Lo más cerca"
+    await expect(line).to_contain_text(told, timeout=30_000)
+    await expect(line).to_be_in_viewport()
+    await expect(user.page.locator("circle.t-goal")).to_have_count(1)
+    await user.page.goto(f"{program.page('start.yaml')}&lesson=5_the_challenge")
+    await user.page.locator("#e-tab-fly").click()
+    await expect(user.page.locator(".e-more")).to_be_visible()
+    await user.page.context.close()
+
+
+async def test_a_divider_is_dragged_moved_by_keys_and_remembered(browser, program):
+    user = await pupil(browser, program, "start.yaml", "1_take_off")
+    drawing = user.page.locator(".e-drawing")
+    height = (await drawing.bounding_box())["height"]
+    bar = await user.page.locator(".e-divider-tabs").bounding_box()
+    middle = (bar["x"] + bar["width"] / 2, bar["y"] + bar["height"] / 2)
+    await user.page.mouse.move(*middle)
+    await user.page.mouse.down()
+    await user.page.mouse.move(middle[0], middle[1] - 100, steps=4)
+    await user.page.mouse.up()
+    assert (await drawing.bounding_box())["height"] == pytest.approx(height - 100, abs=2)
+    await user.page.keyboard.press("ArrowDown")
+    assert (await drawing.bounding_box())["height"] == pytest.approx(height - 76, abs=2)
+    await user.page.reload()
+    await expect(user.page.locator(".e-saved")).not_to_be_empty()
+    assert (await drawing.bounding_box())["height"] == pytest.approx(height - 76, abs=2)
+    assert not user.complaints
+    await user.page.context.close()
