@@ -82,6 +82,10 @@ test-realtime-pairs: setup
 test-realtime-alone: setup
 	$(BIN)/pytest -m alone tests/realtime
 
+.PHONY: test-px4
+test-px4: $(VENV)/installed-dev ## fly a genuine PX4 in the simulated world: make test-px4 PX4_DIR=../PX4-Autopilot
+	FRAMERUNNER_PX4_DIR="$(PX4_DIR)" $(BIN)/pytest -rs tests/sitl/px4/test_genuine.py
+
 .PHONY: bench
 bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt; options in BENCH="--peers none"
 	$(BIN)/python -m benchmarks $(BENCH)

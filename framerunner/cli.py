@@ -38,6 +38,7 @@ def build_app() -> App:
         mocap,
         monitor,
         preflight,
+        px4,
         replay,
         scenario,
         sim,
@@ -62,6 +63,7 @@ def build_app() -> App:
     app.command(evaluate.evaluate)
     app.command(bound.bound)
     app.command(monitor.monitor)
+    app.command(px4.app)
     app.command(replay.replay)
     app.command(film.film)
     app.command(mission.app)

@@ -254,7 +254,7 @@ class MavsdkDrone:
     async def _hold_on_ground(self) -> None:
         """Leave offboard when there will be no flight."""
         with contextlib.suppress(MavsdkError, asyncio.CancelledError):
-            await self._requests.wait(self._stream.request_hold())
+            await self._ticks.until_done(self._requests.wait(self._stream.request_hold()))
 
     async def motors_off(self) -> None:
         """Stop the motors at once (forced disarm), in the air too."""
@@ -263,7 +263,7 @@ class MavsdkDrone:
         await self._request("stopping the motors", self._action.kill(), lambda: self._feed.armed is False)
         self._watchdog.stop()
         with contextlib.suppress(MavsdkError):
-            await self._requests.wait(self._stream.request_hold())
+            await self._ticks.until_done(self._requests.wait(self._stream.request_hold()))
 
     async def land(self) -> None:
         """Let the vehicle land and wait until it has disarmed itself."""
@@ -439,7 +439,7 @@ class MavsdkDrone:
         """
         feed = self._feed
         try:
-            await self._requests.wait(request)
+            await self._ticks.until_done(self._requests.wait(request))
         except MavsdkError as error:
             result = getattr(getattr(error, "result", None), "name", str(error))
             raise DroneError(f"{what} was refused: {result}{feed.recent_texts()}") from None

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import socket
-from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
+from collections.abc import Callable, Sequence
 from math import degrees
-from typing import TYPE_CHECKING
 
 from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from geometry.solids import Solid
-from scenarios.result import LocalFrame, Standing
 from sitl.drone_files import flight_recorder
 from sitl.link_hub import LinkHub
 from sitl.parameter_file import ParameterKeeper, open_parameters
@@ -20,17 +16,12 @@ from sitl.payload.album import CameraAlbum
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.storage import open_storage
+from sitl.streaming.drone_video import DroneVideo
 from sitl.time_grants import TimeGrants, Velocity
 from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink
-from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH, VIDEO_PATH
+from wire.simulator_api import VIDEO_PATH
 from wire.transports.urls import is_loopback
-
-if TYPE_CHECKING:
-    from sitl.camera import CameraFeed
-    from sitl.faults.images import FaultyFeed
-    from sitl.rtp import RtpSender
-    from sitl.video import VideoServer
 
 
 class ServedDrone:
@@ -89,11 +80,7 @@ class ServedDrone:
         )
         self._notice = simulation.faults.notice = notice
         self._hub = LinkHub(self.node, self._warn, lambda: simulation.faults.link)
-        self._camera: CameraFeed | FaultyFeed | None = None
-        self._video: VideoServer | None = None
-        self._rtp: RtpSender | None = None
-        self._rtp_sends = True
-        self._image_us = -1
+        self._video = DroneVideo(simulation, settings)
 
     async def open_links(self) -> None:
         """Open the links and send at once.
@@ -112,7 +99,7 @@ class ServedDrone:
             await self._hub.open(link)
 
     async def open_video(self, others: Callable[[], Sequence[Solid]] = tuple) -> None:
-        """Import large libraries in a thread, as telemetry must not wait, then serve the camera's images.
+        """Serve the camera's images.
 
         Args:
             others: called at each exposure for the boxes of other drones.
@@ -120,29 +107,10 @@ class ServedDrone:
         Raises:
             VideoError: a port is in use or an address is wrong.
         """
-        for module in ("sitl.camera", "aiohttp.web", "sitl.video"):
-            await asyncio.to_thread(import_module, module)
-        from sitl.faults.images import new_feed
-        from sitl.video import VideoServer
-
-        simulation, scenario = self.simulation, self.simulation.scenario
-        video = VideoServer(
-            self._settings.bind, self._settings.http_port, options="--instance (sim also: --video-port)"
-        )
-        video.add_json(REFEREE_PATH, self._referee_answer)
-        video.add_json(SCENARIO_PATH, lambda _query: scenario.model_dump(mode="json"))
-        if self._settings.video_rtp is not None:
-            await asyncio.to_thread(import_module, "sitl.rtp")
-            from sitl.rtp import RtpSender
-
-            self._rtp = RtpSender(self._settings.video_rtp, scenario.camera, self._settings.speed)
-            video.add_text("/video.sdp", "application/sdp", self._rtp.description())
-        self._video = video
-        await video.start()
-        self._camera = new_feed(scenario, simulation.faults, simulation.seed, others)
+        await self._video.open(others)
 
     def _switch_rtp(self, on: bool) -> None:  # the interface's
-        self._rtp_sends = on
+        self._video.sends_rtp = on
 
     def _warn(self, line: str) -> None:
         """Show a line at the terminal and at ground stations."""
@@ -157,16 +125,9 @@ class ServedDrone:
         simulation.tick()
         self._recorder.update(simulation.autopilot)
         self._hub.update(sampled_us)
-        if self._camera is None or self._video is None:
-            return
-        arrived = self._camera.step(simulation.truth)
-        if arrived is not None:
-            time_us, image = arrived
-            self._image_us = time_us
-            self._video.publish(image, time_us)
-            self._album.show(image, time_us)
-            if self._rtp is not None and self._rtp_sends:
-                self._rtp.send(image, time_us)
+        image = self._video.step()
+        if image is not None:
+            self._album.show(image, self._video.image_us)
 
     async def hold(self, grants: TimeGrants) -> None:
         """Wait until simulated time may advance."""
@@ -175,7 +136,7 @@ class ServedDrone:
             self._hub.read()  # on a flooded link, a setpoint may still wait
             return self.simulation.autopilot.setpoints.newest_velocity()
 
-        await grants.hold(self.simulation.time_us - CONTROL_PERIOD_US, self._image_us, received)
+        await grants.hold(self.simulation.time_us - CONTROL_PERIOD_US, self._video.image_us, received)
 
     async def close(self) -> None:
         """Finish the log, save the parameters, stop the video and close the links."""
@@ -183,10 +144,7 @@ class ServedDrone:
         self._album.stop_video()
         if self._keeper is not None:
             await self._keeper.close()
-        if self._video is not None:
-            await self._video.close()
-        if self._rtp is not None:
-            await asyncio.to_thread(self._rtp.close)
+        await self._video.close()
         self._hub.close()
 
     def greeting(self) -> str:
@@ -210,22 +168,6 @@ class ServedDrone:
         if settings.video_rtp is None:
             return (page,)
         return (VideoStream(str(settings.video_rtp[1]), VideoEncoding.H264_RTP, *common), page)
-
-    def _referee_answer(self, query: Mapping[str, str]) -> object:
-        """`/referee.json?state=…&ended=…`: how the try stands, and the report if it ended now."""
-        simulation = self.simulation
-        referee = simulation.referee
-        origin_arena_m = simulation.local_origin_arena_m
-        standing = Standing(
-            scenario=simulation.scenario.name,
-            source="truth",
-            time_us=simulation.time_us,
-            local_frame=None if origin_arena_m is None else LocalFrame(origin_arena_m=origin_arena_m),
-            snapshot=referee.snapshot(),
-            report=referee.report(query.get("state", ""), query.get("ended")),
-            faults=simulation.fault_facts(),
-        )
-        return standing.model_dump(mode="json")
 
 
 def _public_address(settings: ServerSettings) -> str:

@@ -14,7 +14,7 @@ from sitl.simulation import Simulation
 from sitl.time_grants import FREE_US, TimeGrants
 from sitl.world import CONTROL_PERIOD_US
 
-_BURST_TICKS = 5  # at most 0.02 s of simulated time before links and video are served
+BURST_TICKS = 5  # at most 0.02 s of simulated time before links and video are served
 _MAX_CAUGHT_UP_S = 0.05  # shorter delays are caught up; longer ones slow simulated time down
 _NOTICE_PERIOD_S = 5.0
 
@@ -121,12 +121,12 @@ class SimulatorServer:
         drones, fleet = self._drones, self._fleet
         simulation = drones[0].simulation
         pacer = Pacer(self._settings.speed, time.monotonic(), simulation.time_us)
-        notices = _Notices(self._notice, self._settings.speed)
+        notices = LagNotices(self._notice, self._settings.speed)
         while True:
             if video_task.done():
                 video_task.result()  # a busy port ends the simulator
             target_us = pacer.target_us(time.monotonic())
-            for _ in range(_BURST_TICKS):
+            for _ in range(BURST_TICKS):
                 if simulation.time_us + CONTROL_PERIOD_US > target_us or simulation.time_us > self._until_us:
                     break
                 for drone in drones:
@@ -146,7 +146,7 @@ class SimulatorServer:
         return FREE_US if self._grants is None else self._grants.until_us
 
 
-class _Notices:
+class LagNotices:
     """Reports that the machine cannot keep up, at most once a period."""
 
     def __init__(self, notice: Callable[[str], None], speed: float) -> None:

@@ -1,58 +1,23 @@
-"""World, autopilot, battery, faults and referee joined into one simulation that advances by ticks.
+"""A simulated drone with our own autopilot, advanced by ticks.
 
 No clock, socket or thread: the real-time server and lockstep flights both drive it.
 """
 
 from __future__ import annotations
 
-from firmware_py.airframe import Airframe, load_airframe
+from firmware_py.airframe import Airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.estimation.earth_field import earth_field_ned_gauss
 from firmware_py.estimation.inertial_estimator import InertialEstimator
 from firmware_py.geodesy import LocalProjection
-from firmware_py.measurements import ExternalPose, Readings
-from firmware_py.parameters import Parameters
-from firmware_py.types import GeodeticPoint, Sensors
+from firmware_py.types import GeodeticPoint
 from geometry.axes import flip_vector
 from geometry.vectors import ZERO3, Vec3
-from scenarios.models import CameraMotion, Scenario, ground_height
-from scenarios.referee import Referee
-from scenarios.result import BegunFault, FailsafeText, FaultFacts
-from sitl.battery import Battery
-from sitl.faults.faults import Faults
-from sitl.payload.gimbal import SimulatedGimbal
-from sitl.sensors.assumptions import estimator_settings, parameter_defaults
+from scenarios.models import Scenario
+from sitl.sensors.assumptions import estimator_settings
 from sitl.sensors.specs import SuiteSpec
-from sitl.sensors.suite import SensorSuite, load_suite
-from sitl.sensors.truth import MotionTracker
-from sitl.world import CONTROL_PERIOD_US, World
-
-_BATTERY_PERIOD_US = 100_000
-
-
-class _Sensing:
-    """The sensors of a suite, in a world."""
-
-    def __init__(self, suite: SuiteSpec, world: World, origin: GeodeticPoint, seed: int) -> None:
-        airframe = world.airframe
-        self._world = world
-        self._suite = SensorSuite(suite, airframe, origin, seed)
-        self._tracker = MotionTracker(CONTROL_PERIOD_US, airframe.motor.max_speed_rad_s)
-
-    def read(self, true: Sensors) -> tuple[Readings, ExternalPose | None]:
-        """What the sensors deliver in the tick of a true state."""
-        world = self._world
-        x_m, y_m, _ = world.position_arena_m
-        motion = self._tracker.update(
-            true.time_us,
-            true.position_ned_m,
-            true.velocity_ned_m_s,
-            true.attitude,
-            motor_speeds_rad_s=world.dynamics.motor_speeds_rad_s(),
-            ground_z_m=ground_height(world.scenario, x_m, y_m),
-        )
-        readings = self._suite.read(motion, true.battery_voltage_v, true.battery_current_a)
-        return readings, self._suite.external_pose()
+from sitl.vehicle import SimulatedVehicle
+from sitl.world import CONTROL_PERIOD_US
 
 
 def new_estimator(suite: SuiteSpec, origin: GeodeticPoint) -> InertialEstimator:
@@ -70,57 +35,23 @@ def new_estimator(suite: SuiteSpec, origin: GeodeticPoint) -> InertialEstimator:
     )
 
 
-class Simulation:
-    """One drone in one scenario.
-
-    Args:
-        scenario: the simulated one.
-        airframe: the drone; by default the one that the scenario names.
-        seed: of everything random.
-
-    Raises:
-        SuiteError: the scenario's sensor suite cannot be used.
-        FaultError: a fault of the scenario is one of a part that the drone does not have.
+class Simulation(SimulatedVehicle):
+    """One drone in one scenario, flown by our own autopilot; see `SimulatedVehicle`.
 
     Attributes:
-        scenario: as given.
-        seed: as given.
-        world: the physics.
         autopilot: fed with the world's sensors; its motor speeds drive the world.
-        faults: declared in the scenario and injected over MAVLink.
-        referee: sees the true state of every control tick; a new one for each try.
-        battery: of the drone.
-        gimbal: of the camera; None: it is fixed to the drone.
-        truth: the true state now.
     """
 
     def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
-        self.scenario, self.seed = scenario, seed
-        airframe = airframe or load_airframe(scenario.airframe)
-        self.world = World(scenario, airframe, seed)
-        origin = scenario.origin
-        place = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
-        self._place = place
-        suite = load_suite(scenario.sensors)
-        self._sensing = None if suite.ideal else _Sensing(suite, self.world, place, seed)
+        super().__init__(scenario, airframe, seed)
+        suite, place = self._suite, self._place
         self.autopilot = Autopilot(
-            airframe,
+            self.world.airframe,
             place,
-            Parameters(defaults={**airframe.parameters, **parameter_defaults(suite)}),
+            self.parameters,
             control_period_s=CONTROL_PERIOD_US / 1e6,
             estimator=None if suite.ideal else new_estimator(suite, self._frame_place(suite, place)),
         )
-        self.referee = Referee(scenario, airframe.envelope_m)
-        self.battery = Battery(airframe, self.autopilot.parameters)
-        self.faults = Faults(scenario.faults, suite, self.world, self.battery, seed)
-        settings = scenario.camera.gimbal
-        self.gimbal = None if settings is None else SimulatedGimbal(settings)
-        self._battery_due_us = 0
-        self._sensors = self.world.sensors()
-        self.truth = self.world.truth(self._sensors, motors_on=False)
-        if self.gimbal is not None:
-            self._turn_camera(self.gimbal)
-        self.referee.update(self.truth)
 
     def _frame_place(self, suite: SuiteSpec, place: GeodeticPoint) -> GeodeticPoint:
         """Where the frame of motion capture is: at the scenario's origin or, received, at the start."""
@@ -130,9 +61,14 @@ class Simulation:
         return LocalProjection(place).to_geodetic(self.world.sensors().position_ned_m)
 
     @property
-    def time_us(self) -> int:
-        """Simulated time, microseconds since the drone was switched on."""
-        return self.world.time_us
+    def armed(self) -> bool:
+        """Whether the autopilot is armed."""
+        return self.autopilot.status.armed
+
+    @property
+    def failsafes(self) -> tuple[tuple[int, str], ...]:
+        """The autopilot's failsafes of the present or last try: vehicle time and text."""
+        return self.autopilot.flight.failsafes
 
     @property
     def local_origin_arena_m(self) -> Vec3 | None:
@@ -143,32 +79,9 @@ class Simulation:
         arena = GeodeticPoint(place.latitude_deg, place.longitude_deg, place.altitude_m)
         return flip_vector(LocalProjection(arena).to_local(origin))
 
-    def fault_facts(self) -> FaultFacts:
-        """The faults of the present or last try, and the autopilot's failsafes."""
-        return FaultFacts(
-            begun=tuple(
-                BegunFault(fault=str(each.fault), began_us=each.time_us, ended_us=each.ended_us)
-                for each in self.faults.begun
-            ),
-            failsafes=tuple(
-                FailsafeText(time_us=time_us, text=text) for time_us, text in self.autopilot.flight.failsafes
-            ),
-        )
-
-    def true_state(self) -> tuple[Sensors, GeodeticPoint]:
-        """The true state, positions from the scenario's origin, and its place on Earth."""
-        place = LocalProjection(self._place).to_geodetic(self._sensors.position_ned_m)
-        return self._sensors, place
-
     def tick(self) -> None:
         """Advance by one control period: sense, control, move, judge."""
-        faults, sensors = self.faults, self._sensors
-        if sensors.time_us >= faults.next_us:
-            faults.update(sensors.time_us)
-        if sensors.time_us >= self._battery_due_us:
-            self._discharge(sensors.time_us)
-        sensors.battery_voltage_v, sensors.battery_current_a = self.battery.voltage_v, self.battery.current_a
-        faulty = faults.sensors
+        sensors, faulty = self._begin_tick(), self.faults.sensors
         if self._sensing is None:
             motors = self.autopilot.step(sensors if faulty is None else faulty.change_ideal(sensors))
         else:
@@ -178,30 +91,4 @@ class Simulation:
             if pose is not None:
                 self.autopilot.estimator.take_external_pose(pose)
             motors = self.autopilot.step(readings)
-        self.world.step(motors)
-        self._sensors = self.world.sensors()
-        armed = self.autopilot.status.armed
-        if armed is not self.truth.motors_on:
-            self._change_arming(armed)
-        self.truth = self.world.truth(self._sensors, motors_on=armed)
-        if self.gimbal is not None:
-            self._turn_camera(self.gimbal)
-        self.referee.update(self.truth)
-
-    def _turn_camera(self, gimbal: SimulatedGimbal) -> None:
-        gimbal.step(CONTROL_PERIOD_US / 1e6, self._sensors.attitude)
-        self.truth.camera = CameraMotion(gimbal.attitude_arena, gimbal.rate_frd_rad_s)
-
-    def _change_arming(self, armed: bool) -> None:
-        if not armed:
-            self.faults.disarmed(self.time_us)
-            return
-        self.faults.armed(self.time_us)
-        if self.referee.over:
-            self.referee = Referee(self.scenario, self.world.airframe.envelope_m)  # a new try
-
-    def _discharge(self, time_us: int) -> None:
-        period_us = _BATTERY_PERIOD_US if self._battery_due_us else 0
-        self._battery_due_us = time_us + _BATTERY_PERIOD_US
-        armed = self.autopilot.status.armed
-        self.battery.step(period_us / 1e6, self.world.dynamics.motor_speeds_rad_s(), armed=armed)
+        self._end_tick(motors)

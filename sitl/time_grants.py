@@ -82,6 +82,11 @@ class TimeGrants:
         self._task: asyncio.Task[None] | None = None
         self._missed = False
 
+    @property
+    def setpoint(self) -> Velocity | None:
+        """The setpoint of the last grant, which was sent before it; None: there was none."""
+        return self._setpoint
+
     async def open(self) -> None:
         """Report that the simulator is up, and receive grants from now on."""
         reader, self._writer = await asyncio.open_connection(sock=self._channel)

@@ -70,8 +70,12 @@ def test_documented_commands_are_understood(words):
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=name_of)
 def test_documented_make_targets_exist(document):
-    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
-    used = set(re.findall(r"(?:^ {4}|`)make ([a-z-]+)", document.read_text(encoding="utf-8"), re.MULTILINE))
+    targets = set(
+        re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    used = set(
+        re.findall(r"(?:^ {4}|`)make ([a-z0-9-]+)", document.read_text(encoding="utf-8"), re.MULTILINE)
+    )
     assert used <= targets
 
 

@@ -11,5 +11,5 @@ def simulator_uid(system_id: int) -> int:
 
 
 def is_simulator(uid: int, system_id: int) -> bool:
-    """Whether a vehicle is framerunner's simulated drone; hardware has its processor's serial number there."""
+    """Whether a vehicle is framerunner's simulated drone; hardware has a processor's serial number."""
     return uid == simulator_uid(system_id)

@@ -21,6 +21,7 @@ from framerunner.commands import (
     with_sensors,
 )
 from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
+from framerunner.commands.px4 import check_px4_flight, for_px4
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -51,7 +52,12 @@ _Lockstep = Annotated[
     bool, Parameter(help="in simulated time, as fast as the machine can, the same each time; no log")
 ]
 _Seed = Annotated[
-    WholeNumber | None, Parameter(help="of everything random in a lockstep flight; 0 if not given")
+    WholeNumber | None,
+    Parameter(help="of everything random in a lockstep flight, or with --px4; 0 if not given"),
+]
+_Px4 = Annotated[
+    Path | None,
+    Parameter(help="folder of a PX4 built for SITL: it flies the simulated drone instead of our autopilot"),
 ]
 _Record = Annotated[bool, Parameter(help="write flight.mcap as well, for `framerunner replay` and Foxglove")]
 _Video = Annotated[
@@ -90,6 +96,7 @@ def fly(
     simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
+    px4: _Px4 = None,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
     sensors: Sensors = None,
@@ -114,9 +121,9 @@ def fly(
 
     **Examples**
 
-        framerunner fly test-case-1
-
         framerunner fly test-case-1 --lockstep --record --sensors mocap
+
+        framerunner fly test-case-1 --px4 ../PX4-Autopilot --speed 3
 
         framerunner fly --dry-run --drone serial:///dev/ttyUSB0:57600 --camera 0
 
@@ -125,17 +132,17 @@ def fly(
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    _check(drone, camera, speed, instance, lockstep=lockstep)
-    seed, procedure = _checked_seed(seed, monitor, lockstep), hardware_of(hardware, drone)
+    _check(drone, camera, speed, instance, lockstep=lockstep, px4=px4)
+    seed, procedure = _checked_seed(seed, monitor, lockstep, px4), hardware_of(hardware, drone)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
 
     loaded = load_mission_with(mission, pilot)
-    chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep)
+    chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep, px4=px4)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
-    real_time = RealTimeSettings(drone, camera, api, speed, instance, camera_delay, procedure)
+    real_time = RealTimeSettings(drone, camera, api, speed, instance, px4, camera_delay, procedure)
     ends = (plan, None if lockstep else real_time, out, record, video, monitor, monitor_link)
     return _run(FlightSettings(*ends), lifeline=lifeline)
 
@@ -156,6 +163,7 @@ def _scenario(
     *,
     starts: bool,
     lockstep: bool,
+    px4: Path | None,
 ) -> Scenario:
     """The scenario that the options describe; `starts`: a simulated drone is started."""
     from scenarios.loader import load_scenario
@@ -172,7 +180,7 @@ def _scenario(
             f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
             "add --lockstep, or start framerunner sim and fly it with --drone"
         )
-    return scenario
+    return scenario if px4 is None else for_px4(scenario)
 
 
 def _calibrated(plan: FlightPlan, path: Path | None, drone: str | None) -> FlightPlan:
@@ -241,8 +249,11 @@ def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
         raise SettingError(f"--simulator {error}") from None
 
 
-def _check(drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool) -> None:
+def _check(
+    drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool, px4: Path | None
+) -> None:
     """Refuse options that do not go together."""
+    check_px4_flight(px4, drone=drone, lockstep=lockstep)
     if drone is not None and camera is None:
         raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")
     if drone is None and camera is not None:
@@ -259,13 +270,13 @@ def _check(drone: str | None, camera: str | None, speed: float, instance: int, *
     check_range("--instance", instance, 0, 9)
 
 
-def _checked_seed(seed: int | None, monitor: bool, lockstep: bool) -> int | None:
-    """The seed of a flight in lockstep; None in real time."""
+def _checked_seed(seed: int | None, monitor: bool, lockstep: bool, px4: Path | None) -> int | None:
+    """The seed of a flight in lockstep or of one with PX4; None in real time."""
     if monitor and lockstep:
         raise SettingError("--monitor: shows flights in real time; leave it out with --lockstep")
     if seed is None:
-        return 0 if lockstep else None
-    if not lockstep:
+        return 0 if lockstep or px4 is not None else None
+    if not lockstep and px4 is None:
         raise SettingError(
             f"--seed {seed}: only a flight in lockstep repeats; add --lockstep or leave it out"
         )

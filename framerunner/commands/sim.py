@@ -6,16 +6,18 @@ import asyncio
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from errors import SettingError
 from framerunner.commands import Faults, Sensors, WholeNumber, check_range, say, with_faults, with_sensors
+from framerunner.commands.px4 import check_options, px4_server
 from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
+    from sitl.px4.server import Px4Server
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
@@ -28,8 +30,17 @@ _MAX_COUNT = 20
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Onboard:
-    """What the drone has besides flying."""
+    """What the drone has."""
 
+    autopilot: Annotated[
+        Literal["own", "px4"], Parameter(help="what flies: this project's autopilot, or a genuine PX4")
+    ] = "own"
+    px4: Annotated[
+        Path | None,
+        Parameter(
+            help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
+        ),
+    ] = None
     storage: Annotated[
         Path | None,
         Parameter(help="folder for its files and flight logs, DIR/0 for instance 0; else kept in memory"),
@@ -119,25 +130,43 @@ def sim(
 
         framerunner sim --storage drone-files --parameters drone.params
 
-        framerunner sim --link tcpin://127.0.0.1:5760
-
         framerunner sim --link serial:///dev/ttyUSB0:57600
+
+        framerunner sim --autopilot px4 --px4 ../PX4-Autopilot
     """
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
+    check_range("--seed", seed, 0, 2**63 - 1)
     chosen, onboard = connections or Connections(), onboard or Onboard()
-    watcher = _monitor(chosen.video_port, count) if monitor else None
+    watcher = _monitor(chosen.video_port, count) if monitor and onboard.autopilot == "own" else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
+    check_options(onboard, settings, count=count, monitor=monitor)
+    given = (scenario, settings, onboard, fault)
+    server = _server(*given, count=count, seed=seed, grants=_grants(time_grants))
+    asyncio.run(_run(server, watcher, lifeline=lifeline))
+    return 0
+
+
+def _server(
+    scenario: str,
+    settings: ServerSettings,
+    onboard: Onboard,
+    fault: tuple[str, ...],
+    *,
+    count: int,
+    seed: int,
+    grants: TimeGrants | None,
+) -> SimulatorServer | Px4Server:
+    if onboard.autopilot == "px4":
+        return px4_server(scenario, settings, onboard, fault, seed=seed, grants=grants)
 
     from sitl.server import SimulatorServer
 
     simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
-    server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
-    asyncio.run(_run(server, watcher, lifeline=lifeline))
-    return 0
+    return SimulatorServer(simulations, settings, notice=say, grants=grants)
 
 
 def _grants(descriptor: int | None) -> TimeGrants | None:
@@ -202,7 +231,6 @@ def _simulations(
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
-    check_range("--seed", seed, 0, 2**63 - 1)
     scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
     if count == 1:
         return [Simulation(scenario, seed=seed)]
@@ -232,7 +260,9 @@ def _read_key(path: Path | None) -> SigningKey | None:
         raise SettingError(f"--signing-key {path}: {error}") from None
 
 
-async def _run(server: SimulatorServer, monitor: MonitorProcess | None, *, lifeline: bool) -> None:
+async def _run(
+    server: SimulatorServer | Px4Server, monitor: MonitorProcess | None, *, lifeline: bool
+) -> None:
     from framerunner.child_process import until_standard_input_ends
 
     async with AsyncExitStack() as stack:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from pathlib import Path
 from typing import Self
 
 from errors import SettingError
@@ -26,10 +27,14 @@ _LAST_LINE_S = 3.0
 IMAGE_S = 2.0  # wall time for an image to arrive and be processed
 _ANSWER_US = CONTROL_PERIOD_US + TELEMETRY_DELAY_US - 1
 """From a multiple of 50 ms to the last control tick before the one that applies the answer."""
+_PX4_ANSWER_US = 20_000  # likewise; PX4 sends an attitude each 10 ms, when it comes to it
 
 
 class SitlProcess(ChildProcess):
-    """`framerunner sim` as a child process, with its options."""
+    """`framerunner sim` as a child process, with its options.
+
+    `px4` is the folder of a PX4 that flies instead of our own autopilot, `storage` that of the drone's files.
+    """
 
     def __init__(
         self,
@@ -38,6 +43,9 @@ class SitlProcess(ChildProcess):
         instance: int = 0,
         links: tuple[str, ...] = (),
         seed: int = 0,
+        *,
+        px4: Path | None = None,
+        storage: Path | None = None,
     ) -> None:
         here, there = socket.socketpair()
         arguments = [
@@ -45,9 +53,11 @@ class SitlProcess(ChildProcess):
             *("--speed", f"{speed:g}", "--instance", str(instance), "--video-rtp", "off"),
             *("--time-grants", str(there.fileno())),
             *(word for link in links for word in ("--link", link)),
+            *(() if px4 is None else ("--autopilot", "px4", "--px4", str(px4))),
+            *(() if storage is None else ("--storage", str(storage))),
         ]
         super().__init__("the simulator", arguments, inherited=there)
-        self.clock = SimulatorClock(here)
+        self.clock = SimulatorClock(here, _PX4_ANSWER_US if px4 else _ANSWER_US, answers_take_time=bool(px4))
         self.system_id = instance + 1  # MAVLink id of its drone
         self.drone_url = f"udpin://127.0.0.1:{14540 + instance}"
         self.api = SimulatorApi(f"http://127.0.0.1:{VIDEO_PORT + instance}")
@@ -69,9 +79,19 @@ class SitlProcess(ChildProcess):
 
 
 class SimulatorClock:
-    """This program's end of the simulator's time grants; DroneError: the simulator has ended."""
+    """This program's end of the simulator's time grants; DroneError: the simulator has ended.
 
-    def __init__(self, channel: socket.socket) -> None:
+    Args:
+        channel: to the simulator.
+        answer_us: simulated time from a tick until the telemetry of the tick has been sent.
+        answers_take_time: the autopilot answers requests only while simulated time goes on.
+    """
+
+    def __init__(
+        self, channel: socket.socket, answer_us: int = _ANSWER_US, *, answers_take_time: bool = False
+    ) -> None:
+        self.answers_take_time = answers_take_time
+        self._answer_us = answer_us
         self.images_missed = 0  # ticks whose image did not arrive in time
         self.setpoints_missed = 0  # setpoints that did not arrive in time
         self._channel = channel
@@ -105,7 +125,9 @@ class SimulatorClock:
             tick_us: multiple of 50 ms.
             command: must be received first; None: time does not wait for a command.
         """
-        held = await self._granted(Grant(tick_us + _ANSWER_US, None if command is None else _sent(command)))
+        held = await self._granted(
+            Grant(tick_us + self._answer_us, None if command is None else _sent(command))
+        )
         if held.setpoint_missed:
             self.setpoints_missed += 1
         if self._perception is not None and not await self._perception.seen(held.image_us, IMAGE_S):

@@ -101,6 +101,8 @@ class RunFolder:
         If the flight was stopped before its first tick, all is removed, also `out` if it was made for it.
         """
         for path in self.path.iterdir():
+            if path.is_dir():  # of PX4, with its log
+                continue
             if path.stat().st_size == 0 or self.stopped_before_start:
                 path.unlink()
         if not any(path.exists() for path in (self.result, self.tlog, self.recording)):

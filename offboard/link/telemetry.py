@@ -15,7 +15,7 @@ import contextlib
 import json
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from math import nan, radians
 from typing import Any, Protocol
@@ -286,7 +286,13 @@ async def request_rates(feed: TelemetryFeed, plugin: Any) -> None:  # noqa: ANN4
 
 
 class VehicleClock(Protocol):
-    """The time of a vehicle that can wait. Its coroutines raise `DroneError` when the vehicle is gone."""
+    """The time of a vehicle that can wait. Its coroutines raise `DroneError` when the vehicle is gone.
+
+    Attributes:
+        answers_take_time: the vehicle answers requests only while its time goes on, as PX4 does.
+    """
+
+    answers_take_time: bool
 
     async def stop(self) -> int:
         """Stop time; returns the time of the last telemetry, microseconds."""
@@ -351,6 +357,21 @@ class TickSource:
                 return True
             self.late += 1
         return False
+
+    async def until_done(self, work: Awaitable[None]) -> None:
+        """Wait for a request's answer, with vehicle time going on if the answer takes time."""
+        clock = self._clock
+        if clock is None or not self.waits or not clock.answers_take_time:
+            await work
+            return
+        task = asyncio.ensure_future(work)
+        try:
+            while not task.done():
+                await self.next(TICK_LOST_S)
+        except BaseException:
+            task.cancel()
+            raise
+        await task
 
     def release(self) -> None:
         """Let vehicle time run freely."""

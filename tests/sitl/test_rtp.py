@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scenarios.models import Camera
-from sitl.rtp import RtpSender
+from sitl.streaming.rtp import RtpSender
 from tests.free_ports import free_port
 from wire.transports.urls import LinkError
 

@@ -11,7 +11,7 @@ import pytest
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 from sitl.fleet import side_by_side
-from sitl.server import SimulatorServer, _Notices
+from sitl.server import LagNotices, SimulatorServer
 from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
 from sitl.video import VideoError
@@ -241,7 +241,7 @@ def test_instances_shift_every_port():
 
 def test_notices_come_once_a_period_and_only_with_cause():
     lines = []
-    lag_notices = _Notices(lines.append, 2.0)
+    lag_notices = LagNotices(lines.append, 2.0)
     start_s = lag_notices._since_s
     lag_notices.lag(0.0, start_s + 6.0)
     assert lines == []

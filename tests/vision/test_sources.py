@@ -15,7 +15,7 @@ import pytest
 from aiohttp import web
 
 from scenarios.models import Camera
-from sitl.rtp import RtpSender
+from sitl.streaming.rtp import RtpSender
 from tests.free_ports import free_port
 from vision.http_source import HttpSource, Latest
 from vision.sources import CaptureSource, FolderSource, open_source

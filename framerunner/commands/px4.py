@@ -1,0 +1,149 @@
+"""`framerunner px4`, and the simulator whose autopilot is PX4."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from errors import SettingError
+from framerunner.commands import say, with_faults, with_sensors
+
+if TYPE_CHECKING:
+    from framerunner.commands.sim import Onboard
+    from scenarios.models import Scenario
+    from sitl.px4.server import Px4Server, Px4Settings
+    from sitl.px4.simulation import Px4Simulation
+    from sitl.server_settings import ServerSettings
+    from sitl.time_grants import TimeGrants
+
+app = App(name="px4", help="What a genuine PX4 needs to fly in the simulated world.")
+
+
+@app.command
+def params(
+    airframe: Annotated[str, Parameter(help="name or file of the airframe")] = "x500",
+    *,
+    sensors: Annotated[
+        str, Parameter(help="sensor suite for which PX4's estimator is set up: mocap, outdoor, …, or a file")
+    ] = "mocap",
+    speed: Annotated[float, Parameter(help="of the simulation, by which PX4's time-outs grow")] = 1.0,
+    env: Annotated[
+        bool, Parameter(help="as environment variables, by which PX4 takes them at its start")
+    ] = False,
+) -> int:
+    """Print the parameters by which PX4 flies an airframe here: one `NAME VALUE` a line.
+
+    **Examples**
+
+        framerunner px4 params x500
+
+        framerunner px4 params abejorro --sensors outdoor --env
+    """
+    from firmware_py.airframe import load_airframe
+    from sitl.px4.build import environment
+    from sitl.px4.parameters import all_parameters, text_of
+    from sitl.sensors.suite import load_suite
+
+    values = all_parameters(load_airframe(airframe), load_suite(sensors), speed)
+    lines = (
+        [f"{name}={text}" for name, text in environment(values).items()]
+        if env
+        else [f"{name} {text_of(value)}" for name, value in sorted(values.items())]
+    )
+    print("\n".join(lines))
+    return 0
+
+
+def for_px4(scenario: Scenario) -> Scenario:
+    """A scenario with sensors from which PX4 can estimate its state; says so if they are others."""
+    from sitl.px4.simulation import with_sensors_for_px4
+
+    chosen = with_sensors_for_px4(scenario)
+    if chosen is not scenario:
+        say(f"PX4 takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
+    return chosen
+
+
+def check_px4_flight(px4: Path | None, *, drone: str | None, lockstep: bool) -> None:
+    """Refuse options of `framerunner fly` that do not go with PX4.
+
+    Raises:
+        SettingError: one of them.
+    """
+    if px4 is None:
+        return
+    if drone is not None:
+        raise SettingError(f"--px4 {px4}: flies a simulator that is started; leave it out with --drone")
+    if lockstep:
+        raise SettingError(f"--px4 {px4}: PX4 is another process; leave out --lockstep")
+    from sitl.px4.build import find_build
+
+    find_build(px4)
+
+
+def px4_server(
+    scenario: str,
+    settings: ServerSettings,
+    onboard: Onboard,
+    fault: tuple[str, ...],
+    *,
+    seed: int,
+    grants: TimeGrants | None,
+) -> Px4Server:
+    """The simulator with PX4, by the options of `framerunner sim`."""
+    from scenarios.loader import load_scenario
+    from sitl.px4.server import Px4Server
+    from sitl.px4.simulation import Px4Simulation
+
+    chosen = with_faults(for_px4(with_sensors(load_scenario(scenario), onboard.sensors)), fault)
+
+    def new_simulation() -> Px4Simulation:
+        return Px4Simulation(chosen, seed=seed)
+
+    simulation = new_simulation()  # so that what is wrong with it is said first
+    start = _px4_settings(simulation, settings, onboard.px4)
+    return Px4Server(new_simulation, settings, start, notice=say, grants=grants)
+
+
+def _px4_settings(simulation: Px4Simulation, settings: ServerSettings, px4: Path | None) -> Px4Settings:
+    from sitl.px4.build import Px4Process, find_build
+    from sitl.px4.parameters import all_parameters
+    from sitl.px4.server import Px4Settings
+    from sitl.sensors.suite import load_suite
+
+    scenario = simulation.scenario
+    command = (
+        f"env $(framerunner px4 params {scenario.airframe} --sensors {scenario.sensors} --speed "
+        f"{settings.speed:g} --env) build/px4_sitl_default/bin/px4 -i {settings.instance}"
+    )
+    if px4 is None:
+        return Px4Settings(None, command)
+    build = find_build(px4)
+    values = all_parameters(simulation.world.airframe, load_suite(scenario.sensors), settings.speed)
+    folder = None if settings.storage is None else settings.storage / f"px4-{settings.instance}"
+    return Px4Settings(Px4Process(build, settings.instance, folder, values), command)
+
+
+def check_options(onboard: Onboard, settings: ServerSettings, *, count: int, monitor: bool) -> None:
+    """Refuse options of `framerunner sim` that PX4 does not have, or that only it has.
+
+    Raises:
+        SettingError: one of them.
+    """
+    if onboard.autopilot != "px4":
+        if onboard.px4 is not None:
+            raise SettingError(f"--px4 {onboard.px4}: is for PX4; add --autopilot px4")
+        return
+    refused = [
+        ("--count", count != 1, "PX4 flies one drone; start another simulator with --instance 1"),
+        ("--monitor", monitor, "run framerunner monitor beside it, which listens to PX4 on UDP 14550"),
+        ("--link", bool(settings.links), "MAVLink is PX4's own"),
+        ("--signing-key", settings.signing_key is not None, "MAVLink is PX4's own"),
+        ("--parameters", settings.parameters is not None, "PX4 keeps its own, with --storage DIR"),
+        ("--shell", settings.shell, "MAVLink is PX4's own"),
+    ]
+    for option, given, why in refused:
+        if given:
+            raise SettingError(f"{option}: {why}; leave it out with --autopilot px4")

@@ -1,0 +1,1 @@
+"""PX4's own autopilot in the simulated world, over its simulator interface."""

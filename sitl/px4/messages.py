@@ -1,0 +1,129 @@
+"""Messages of PX4's simulator interface, packed and read in microseconds: MAVLink 2 over a TCP connection.
+
+Formats and checksum seeds are those of pymavlink's definitions; only its slow packing is replaced.
+"""
+
+from __future__ import annotations
+
+import binascii
+from collections.abc import Iterator
+from dataclasses import dataclass
+from struct import Struct
+
+from wire.dialect import mavlink
+from wire.framing import CHECKSUM_BYTES, CRC_EXTRA, HEADER_BYTES_V2, MARKER_V2, SIGNATURE_BYTES, SIGNED
+
+_HEADER = Struct("<BBBBBBBHB")
+_CHECKSUM = Struct("<H")
+_REVERSED = bytes(int(f"{value:08b}"[::-1], 2) for value in range(256))
+SIMULATOR_SYSTEM_ID = 1
+SIMULATOR_COMPONENT_ID = 200  # the component PX4's own simulators use
+LOCKSTEP_FLAG = 1  # of HIL_ACTUATOR_CONTROLS
+ARMED_FLAG = int(mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+ACTUATORS = 16
+
+
+def checksum(data: bytes, seed: int) -> int:
+    """MAVLink's checksum of a packet without its marker: CRC-16/MCRF4XX over the data and the seed.
+
+    It is the CRC that `binascii.crc_hqx` computes, with the bits of each byte and of the result reversed.
+    """
+    crc = binascii.crc_hqx(data.translate(_REVERSED) + _REVERSED[seed : seed + 1], 0xFFFF)
+    return _REVERSED[crc & 0xFF] << 8 | _REVERSED[crc >> 8]
+
+
+class Packer:
+    """Packs one kind of message.
+
+    Args:
+        message_id: MAVLink's number.
+    """
+
+    __slots__ = ("_crc_extra", "_message_id", "_pack", "_sequence")
+
+    def __init__(self, message_id: int) -> None:
+        kind = mavlink.mavlink_map[message_id]
+        self._message_id, self._crc_extra = message_id, kind.crc_extra
+        self._pack = kind.unpacker.pack
+        self._sequence = 0
+
+    def pack(self, *fields: float) -> bytes:
+        """A packet; the fields in their order on the wire, which MAVLink sorts by size."""
+        payload = self._pack(*fields).rstrip(b"\0") or b"\0"
+        self._sequence = (self._sequence + 1) & 0xFF
+        low, high = self._message_id & 0xFFFF, self._message_id >> 16
+        head = _HEADER.pack(
+            *(MARKER_V2, len(payload), 0, 0, self._sequence),
+            *(SIMULATOR_SYSTEM_ID, SIMULATOR_COMPONENT_ID, low, high),
+        )
+        body = head + payload
+        return body + _CHECKSUM.pack(checksum(body[1:], self._crc_extra))
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorControls:
+    """HIL_ACTUATOR_CONTROLS: what PX4 commands.
+
+    Attributes:
+        time_us: PX4's clock, that of the sensors it answers.
+        controls: of its outputs, shape (16,); of motors 0..1, all zero while disarmed.
+        armed: whether PX4 is armed.
+        lockstep: whether PX4's time waits for each HIL_SENSOR.
+    """
+
+    time_us: int
+    controls: tuple[float, ...]
+    armed: bool
+    lockstep: bool
+
+
+class ControlsReader:
+    """Reads HIL_ACTUATOR_CONTROLS from PX4's stream; other messages are left out. Never raises.
+
+    Attributes:
+        skipped_bytes: that were no part of a valid packet.
+    """
+
+    def __init__(self) -> None:
+        kind = mavlink.mavlink_map[mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS]
+        self._unpacker = kind.unpacker
+        self._buffer = b""
+        self.skipped_bytes = 0
+
+    def feed(self, data: bytes) -> Iterator[ActuatorControls]:
+        """Take bytes; yields the messages that are now complete."""
+        buffer = self._buffer + data
+        position = 0
+        while True:
+            start = buffer.find(MARKER_V2, position)
+            if start < 0:
+                self.skipped_bytes += len(buffer) - position
+                position = len(buffer)
+                break
+            self.skipped_bytes += start - position
+            position = start
+            if len(buffer) - start < HEADER_BYTES_V2:
+                break
+            _, length, flags, *_, low, high = _HEADER.unpack_from(buffer, start)
+            end = start + HEADER_BYTES_V2 + length
+            packet_end = end + CHECKSUM_BYTES + (SIGNATURE_BYTES if flags & SIGNED else 0)
+            if len(buffer) < packet_end:
+                break
+            seed = CRC_EXTRA.get(high << 16 | low)
+            (sent,) = _CHECKSUM.unpack_from(buffer, end)
+            if seed is None or checksum(buffer[start + 1 : end], seed) != sent:
+                self.skipped_bytes += 1
+                position = start + 1  # the next packet may begin in it
+                continue
+            if low == mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
+                yield self._read(buffer[start + HEADER_BYTES_V2 : end])
+            position = packet_end
+        self._buffer = buffer[position:]
+
+    def _read(self, payload: bytes) -> ActuatorControls:
+        size = self._unpacker.size
+        time_us, flags, *rest = self._unpacker.unpack(payload[:size].ljust(size, b"\0"))
+        *controls, mode = rest
+        return ActuatorControls(
+            time_us, tuple(controls), bool(mode & ARMED_FLAG), bool(flags & LOCKSTEP_FLAG)
+        )

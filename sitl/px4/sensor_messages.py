@@ -1,0 +1,176 @@
+"""Sensor readings as PX4's simulator interface takes them."""
+
+from __future__ import annotations
+
+from math import atan2, degrees, hypot, isnan, nan, sqrt
+
+from firmware_py.atmosphere import pressure_altitude_m
+from firmware_py.measurements import (
+    ExternalPose,
+    FlowSample,
+    GpsSample,
+    ImuSample,
+    RangeSample,
+    Readings,
+)
+from firmware_py.types import GeodeticPoint, Sensors
+from sitl.px4.messages import Packer
+from sitl.sensors.specs import RangeFinderSpec
+from wire.dialect import mavlink
+
+_ACCELEROMETER_AND_GYROSCOPE = 0b111_111
+_MAGNETOMETER = 0b111 << 6
+_BAROMETER = 1 << 9 | 1 << 11 | 1 << 12  # absolute pressure, pressure altitude, temperature
+_TRUTH_PERIOD_US = 20_000
+_STANDARD_GRAVITY_M_S2 = 9.80665
+_NO_COVARIANCE = (nan,) * 21
+_MAX_INT16 = 32767
+_MAX_UINT16 = 65535
+
+
+class SensorMessages:
+    """Makes the messages of each control tick.
+
+    PX4 stamps GPS, poses, ranges and flow with its clock on their arrival, so they are sent before the
+    HIL_SENSOR that advances the clock: the same part of PX4 then takes them in the same step each time.
+    The first message is a HIL_SENSOR, by which PX4 sets its clock.
+
+    Args:
+        range_finder: of the drone; None: it has none.
+    """
+
+    def __init__(self, range_finder: RangeFinderSpec | None) -> None:
+        self._range_finder = range_finder
+        self._sensor = Packer(mavlink.MAVLINK_MSG_ID_HIL_SENSOR)
+        self._gps = Packer(mavlink.MAVLINK_MSG_ID_HIL_GPS)
+        self._truth = Packer(mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION)
+        self._odometry = Packer(mavlink.MAVLINK_MSG_ID_ODOMETRY)
+        self._distance = Packer(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
+        self._flow = Packer(mavlink.MAVLINK_MSG_ID_HIL_OPTICAL_FLOW)
+        self._imu: ImuSample | None = None
+        self._started = False
+
+    def pack(
+        self, readings: Readings, pose: ExternalPose | None, true: Sensors, place: GeodeticPoint
+    ) -> bytes:
+        """All messages of a tick; the last one is its HIL_SENSOR.
+
+        Args:
+            readings: what the sensors deliver.
+            pose: of motion capture, if one has arrived.
+            true: the true state, for PX4's log.
+            place: the true place on Earth.
+        """
+        sensor = self._pack_sensor(readings)
+        if not self._started:
+            self._started = True
+            return sensor
+        packets = b""
+        if pose is not None:
+            packets += self._pack_pose(pose)
+        if readings.gps is not None:
+            packets += self._pack_gps(readings.gps)
+        if readings.range_finder is not None and self._range_finder is not None:
+            packets += self._pack_range(readings.range_finder, self._range_finder)
+        if readings.optical_flow is not None:
+            packets += self._pack_flow(readings.optical_flow)
+        if readings.time_us % _TRUTH_PERIOD_US == 0:
+            packets += self._pack_truth(true, place)
+        return packets + sensor
+
+    def _pack_sensor(self, readings: Readings) -> bytes:
+        """HIL_SENSOR; an IMU that delivers nothing is not flagged as updated, but PX4's clock advances."""
+        flags = 0
+        imu = readings.imu
+        if imu is not None:
+            self._imu = imu
+            flags = _ACCELEROMETER_AND_GYROSCOPE
+        acceleration = rates = field = (0.0, 0.0, 0.0)
+        if self._imu is not None:
+            acceleration, rates = self._imu.specific_force_frd_m_s2, self._imu.angular_rate_frd_rad_s
+        if readings.magnetometer is not None:
+            field = readings.magnetometer.field_frd_gauss
+            flags |= _MAGNETOMETER
+        pressure_hpa = altitude_m = temperature_c = 0.0
+        barometer = readings.barometer
+        if barometer is not None and barometer.pressure_pa > 0.0:
+            pressure_hpa = barometer.pressure_pa * 0.01
+            altitude_m = pressure_altitude_m(barometer.pressure_pa)
+            temperature_c = barometer.temperature_k - 273.15
+            flags |= _BAROMETER
+        return self._sensor.pack(
+            *(readings.time_us, *acceleration, *rates, *field),
+            *(pressure_hpa, 0.0, altitude_m, temperature_c, flags, 0),
+        )
+
+    def _pack_gps(self, gps: GpsSample) -> bytes:
+        north, east, down = gps.velocity_ned_m_s
+        course_deg = degrees(atan2(east, north)) % 360.0
+        return self._gps.pack(
+            *(gps.time_us, _scaled(gps.latitude_deg, 1e7), _scaled(gps.longitude_deg, 1e7)),
+            _scaled(gps.altitude_m, 1e3),
+            *(_unsigned(gps.horizontal_accuracy_m * 100), _unsigned(gps.vertical_accuracy_m * 100)),
+            _unsigned(hypot(north, east) * 100),
+            *(_signed(north * 100), _signed(east * 100), _signed(down * 100)),
+            *(min(_unsigned(course_deg * 100), 35999), int(gps.fix_type), gps.satellites, 0, 0),
+        )
+
+    def _pack_pose(self, pose: ExternalPose) -> bytes:
+        velocity = pose.velocity_ned_m_s or (nan, nan, nan)
+        return self._odometry.pack(
+            *(pose.time_us, *pose.position_ned_m, *(pose.attitude or (nan, nan, nan, nan))),
+            *(*velocity, nan, nan, nan),
+            *_covariance(pose.position_variance_m2, pose.attitude_variance_rad2),
+            *_covariance(pose.velocity_variance_m2_s2, (nan, nan, nan)),
+            *(mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_LOCAL_NED, pose.reset_counter & 0xFF),
+            *(mavlink.MAV_ESTIMATOR_TYPE_VISION, 100),
+        )
+
+    def _pack_range(self, sample: RangeSample, spec: RangeFinderSpec) -> bytes:
+        measured = not isnan(sample.distance_m)
+        distance_m = sample.distance_m if measured else spec.max_distance_m
+        return self._distance.pack(
+            *(sample.time_us // 1000, _unsigned(spec.min_distance_m * 100)),
+            *(_unsigned(spec.max_distance_m * 100), _unsigned(distance_m * 100)),
+            *(mavlink.MAV_DISTANCE_SENSOR_LASER, 0, mavlink.MAV_SENSOR_ROTATION_PITCH_270),
+            min(round((spec.noise_m * 100) ** 2), 254),
+            *(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            100 if measured else 1,
+        )
+
+    def _pack_flow(self, flow: FlowSample) -> bytes:
+        return self._flow.pack(
+            *(flow.time_us, flow.integration_us, *flow.flow_rad, *flow.gyro_rad, nan),
+            *(0, -1.0, 0, 0, flow.quality),
+        )
+
+    def _pack_truth(self, true: Sensors, place: GeodeticPoint) -> bytes:
+        force = [_signed(each / _STANDARD_GRAVITY_M_S2 * 1000) for each in true.specific_force_frd_m_s2]
+        velocity = [_signed(each * 100) for each in true.velocity_ned_m_s]
+        speed = _unsigned(sqrt(sum(each * each for each in true.velocity_ned_m_s)) * 100)
+        return self._truth.pack(
+            *(true.time_us, *true.attitude, *true.angular_rate_frd_rad_s),
+            *(_scaled(place.latitude_deg, 1e7), _scaled(place.longitude_deg, 1e7)),
+            *(_scaled(place.altitude_m, 1e3), *velocity, speed, speed, *force),
+        )
+
+
+def _covariance(position: tuple[float, float, float], turn: tuple[float, float, float]) -> tuple[float, ...]:
+    """Upper right triangle of a 6 x 6 matrix with these variances on its diagonal, row by row."""
+    if isnan(position[0]):
+        return _NO_COVARIANCE
+    x, y, z = position
+    roll, pitch, yaw = turn
+    return (x, 0, 0, 0, 0, 0, y, 0, 0, 0, 0, z, 0, 0, 0, roll, 0, 0, pitch, 0, yaw)
+
+
+def _scaled(value: float, factor: float) -> int:
+    return round(value * factor)
+
+
+def _signed(value: float) -> int:
+    return max(-_MAX_INT16, min(_MAX_INT16, round(value)))
+
+
+def _unsigned(value: float) -> int:
+    return max(0, min(_MAX_UINT16, round(value)))

@@ -1,0 +1,200 @@
+"""The simulator with PX4 as its autopilot: sensors to PX4, its motor commands to the world, video as ever."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from sitl.px4.build import Px4EndedError, Px4Process
+from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
+from sitl.px4.simulation import Px4Simulation
+from sitl.server import BURST_TICKS, LagNotices, Pacer
+from sitl.server_settings import ServerSettings
+from sitl.streaming.drone_video import DroneVideo
+from sitl.time_grants import FREE_US, TimeGrants
+from sitl.world import CONTROL_PERIOD_US
+
+_FALL_US = 3_000_000  # for which a drone without its autopilot is simulated on
+_SETPOINT_S = 0.002  # wall time in which PX4 takes a setpoint that was sent before time was granted
+_RESTART_S = 1.0  # before a PX4 that has ended is started again
+
+
+@dataclass(frozen=True, slots=True)
+class Px4Settings:
+    """How PX4 is started; without a process the user starts it."""
+
+    process: Px4Process | None
+    command: str  # by which a user starts it
+
+
+class Px4Server:
+    """Runs a drone that PX4 flies, until cancelled.
+
+    When PX4 has gone, the drone falls and the try ends. A PX4 that connects then gets a new drone on its
+    start, at time zero.
+
+    Args:
+        new_simulation: makes the simulation anew.
+        settings: ports and speed; MAVLink is PX4's own.
+        px4: how it is started.
+        notice: called with lines for people.
+        grants: how far simulated time may advance; None: without a limit. With them the end of PX4 ends the
+            server.
+
+    Attributes:
+        link: to PX4; None before `run`.
+    """
+
+    def __init__(
+        self,
+        new_simulation: Callable[[], Px4Simulation],
+        settings: ServerSettings,
+        px4: Px4Settings,
+        notice: Callable[[str], None] = lambda line: None,
+        grants: TimeGrants | None = None,
+    ) -> None:
+        self._new_simulation = new_simulation
+        self._simulation = new_simulation()
+        self._settings, self._px4, self._notice, self._grants = settings, px4, notice, grants
+        self._video = DroneVideo(self._simulation, settings)
+        self.link: Px4Link | None = None
+        self._simulation.faults.notice = notice
+
+    async def run(self) -> None:
+        """Open the ports, then run until cancelled.
+
+        Raises:
+            LinkError: PX4's port is in use.
+            VideoError: the port of the video is in use.
+            SettingError: PX4 cannot be started.
+            Px4EndedError: it ended, and time is granted by another program.
+        """
+        settings = self._settings
+        self.link = Px4Link((settings.bind, FIRST_PORT + settings.instance), self._notice)
+        try:
+            await self._video.open()
+            self._notice(self._greeting())
+            await self._serve(self.link)
+        finally:
+            self.link.close()
+            if self._px4.process is not None:
+                await self._px4.process.stop()
+            if self._grants is not None:
+                await self._grants.close()
+            await self._video.close()
+
+    def _greeting(self) -> str:
+        scenario, settings = self._simulation.scenario, self._settings
+        page = f"http://{settings.bind}:{settings.http_port}/"
+        return (
+            f"{scenario.airframe} with PX4 and sensors {scenario.sensors} in {scenario.name}: "
+            f"PX4's MAVLink on UDP {14540 + settings.instance} and 14550, video on {page} (Ctrl-C stops)"
+        )
+
+    async def _serve(self, link: Px4Link) -> None:
+        while True:
+            await self._start(link)
+            self._notice("PX4 is connected")
+            with contextlib.suppress(Px4GoneError):
+                await self._run_paced(link)
+            reason = await self._reason()
+            self._notice(f"{reason}; at {self._simulation.time_us / 1e6:.1f} s the motors stop")
+            if self._grants is not None:
+                raise Px4EndedError(f"{reason} at {self._simulation.time_us / 1e6:.1f} s of simulated time")
+            await self._fall(link)
+            self._simulation = self._new_simulation()
+            self._simulation.faults.notice = self._notice
+            self._video.show(self._simulation)
+
+    async def _start(self, link: Px4Link) -> None:
+        """Start PX4, or say how, and wait until it has connected."""
+        process = self._px4.process
+        if process is None:
+            if not link.is_connected:
+                port = FIRST_PORT + self._settings.instance
+                self._notice(f"waiting for PX4 on TCP {port}; start it: {self._px4.command}")
+                await link.connected()
+            return
+        await process.stop()
+        await process.start()
+        ended = asyncio.create_task(process.ended())
+        connected = asyncio.create_task(link.connected())
+        done, _ = await asyncio.wait({ended, connected}, return_when=asyncio.FIRST_COMPLETED)
+        for task in (ended, connected):
+            task.cancel()
+        await asyncio.gather(ended, connected, return_exceptions=True)
+        if connected not in done:
+            raise Px4EndedError(f"{ended.result()} (its output: {process.log})")
+
+    async def _reason(self) -> str:
+        """Why PX4 is no longer connected."""
+        process = self._px4.process
+        if process is not None:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_RESTART_S):
+                    return await process.ended()
+        return "PX4 has closed the connection"
+
+    async def _run_paced(self, link: Px4Link) -> None:
+        settings, simulation = self._settings, self._simulation
+        pacer = Pacer(1.0, time.monotonic(), simulation.time_us)
+        notices = LagNotices(self._notice, settings.speed)
+        started = False
+        while True:
+            if link.in_lockstep and not started:
+                started = True
+                pacer = Pacer(settings.speed, time.monotonic(), simulation.time_us)
+                if self._grants is not None:
+                    await self._grants.open()
+            target_us = pacer.target_us(time.monotonic())
+            for _ in range(BURST_TICKS):
+                if simulation.time_us + CONTROL_PERIOD_US > target_us or simulation.time_us > self._until_us:
+                    break
+                await self._tick(link)
+            now_s = time.monotonic()
+            lost_s = pacer.give_up_lag(now_s, simulation.time_us)
+            if started:
+                notices.lag(lost_s, now_s)
+            if self._grants is not None and simulation.time_us > self._until_us:
+                await self._hold(self._grants)
+                continue
+            await asyncio.sleep(pacer.wait_s(now_s, simulation.time_us + CONTROL_PERIOD_US))
+
+    async def _tick(self, link: Px4Link) -> None:
+        simulation = self._simulation
+        time_us = simulation.time_us
+        link.send(simulation.sense())
+        self._video.step()  # while PX4 computes
+        controls = link.answer(time_us)
+        if controls is None and link.in_lockstep:
+            controls = await link.late_answer(time_us)
+        simulation.move(controls)
+
+    async def _hold(self, grants: TimeGrants) -> None:
+        """Wait until simulated time may advance."""
+        held_us = self._simulation.time_us - CONTROL_PERIOD_US
+        await grants.hold(held_us, self._video.image_us, lambda: grants.setpoint)
+        if grants.setpoint is not None:
+            await asyncio.sleep(_SETPOINT_S)
+
+    async def _fall(self, link: Px4Link) -> None:
+        """Simulate on without an autopilot, until a new PX4 connects or three seconds have passed."""
+        simulation = self._simulation
+        pacer = Pacer(self._settings.speed, time.monotonic(), simulation.time_us)
+        end_us = simulation.time_us + _FALL_US
+        while simulation.time_us < end_us and not link.try_connect():
+            target_us = pacer.target_us(time.monotonic())
+            for _ in range(BURST_TICKS):
+                if simulation.time_us + CONTROL_PERIOD_US > target_us:
+                    break
+                simulation.sense()
+                self._video.step()
+                simulation.move(None)
+            await asyncio.sleep(pacer.wait_s(time.monotonic(), simulation.time_us + CONTROL_PERIOD_US))
+
+    @property
+    def _until_us(self) -> int:
+        return FREE_US if self._grants is None else self._grants.until_us

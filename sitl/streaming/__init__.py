@@ -1,0 +1,1 @@
+"""What is streamed of a drone: camera images, referee, RTP."""

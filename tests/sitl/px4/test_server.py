@@ -1,0 +1,171 @@
+"""The simulator with a fake PX4 at its simulator interface."""
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from scenarios.loader import load_scenario
+from sitl.px4.build import Px4Process, find_build
+from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
+from sitl.px4.server import Px4Server, Px4Settings
+from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
+from sitl.server_settings import ServerSettings
+from tests.processes import free_instance
+from tests.sitl.px4.fake_px4 import FakePx4
+
+FAKE = Path(__file__).with_name("fake_px4.py")
+
+
+def new_simulation():
+    return Px4Simulation(with_sensors_for_px4(load_scenario("test-case-1")))
+
+
+def serving(lines, speed=20.0):
+    instance = free_instance()
+    made = []
+
+    def make():
+        made.append(new_simulation())
+        return made[-1]
+
+    settings = ServerSettings(instance=instance, speed=speed)
+    server = Px4Server(make, settings, Px4Settings(None, "px4"), notice=lines.append)
+    return server, FIRST_PORT + instance, made
+
+
+async def until(condition, limit_s=20.0):
+    async with asyncio.timeout(limit_s):
+        while not condition():  # noqa: ASYNC110 - what is awaited has no event
+            await asyncio.sleep(0.01)
+
+
+async def stopped(task):
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+def run_fake(port, fakes, **options):
+    def run():
+        fakes.append(FakePx4(port, **options))
+        fakes[-1].serve()
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    return thread
+
+
+async def test_every_sensor_is_answered_once_and_the_answers_fly_the_drone():
+    lines, fakes = [], []
+    server, port, made = serving(lines)
+    task = asyncio.create_task(server.run())
+    run_fake(port, fakes, armed_from_us=2_000_000, output=0.35)
+    await until(lambda: made[-1].truth.position_arena_m[2] > 1.5)
+    fake, simulation = fakes[-1], made[-1]
+    assert simulation.referee.snapshot().motors_on
+    times_us = list(fake.times_us)
+    assert times_us == list(range(times_us[0], times_us[-1] + 1, 4000))  # none lost, none doubled
+    assert server.link.in_lockstep
+    assert server.link.unexpected == 0
+    assert {"ODOMETRY", "HIL_STATE_QUATERNION"} <= set(fake.others)
+    assert any("waiting for PX4 on TCP" in line for line in lines)
+    await stopped(task)
+
+
+async def test_a_px4_that_is_killed_ends_the_try_and_a_new_one_gets_a_new_drone():
+    lines, fakes = [], []
+    server, port, made = serving(lines)
+    task = asyncio.create_task(server.run())
+    run_fake(port, fakes, armed_from_us=1_000_000, output=0.35)
+    await until(lambda: made[-1].truth.position_arena_m[2] > 1.5)
+    flown = made[-1]
+    fakes[-1].connection.shutdown(2)
+    await until(lambda: not flown.truth.motors_on)
+    began_s = time.monotonic()
+    run_fake(port, fakes)
+    await until(lambda: len(made) == 2 and made[-1].time_us > 1_000_000)
+    assert time.monotonic() - began_s < 5.0
+    assert any("PX4 has closed the connection; at" in line for line in lines)
+    await stopped(task)
+
+
+async def test_a_px4_that_stands_still_changes_nothing():
+    lines = []
+    server, port, made = serving(lines)
+    task = asyncio.create_task(server.run())
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, str(FAKE), str(port)]
+    with subprocess.Popen(command, env=environment) as fake:  # noqa: ASYNC220 - it starts at once
+        try:
+            await until(lambda: made[-1].time_us > 1_000_000)
+            fake.send_signal(signal.SIGSTOP)
+            await asyncio.sleep(0.1)
+            standing_us = made[-1].time_us
+            await asyncio.sleep(2.5)
+            assert made[-1].time_us == standing_us
+            fake.send_signal(signal.SIGCONT)
+            await until(lambda: made[-1].time_us > standing_us + 200_000)
+            assert server.link.unexpected == 0
+            assert any("PX4 has not answered for 2 s" in line for line in lines)
+            assert any("PX4 answers again" in line for line in lines)
+        finally:
+            fake.kill()
+    await stopped(task)
+
+
+async def test_an_answer_to_another_sensor_is_counted():
+    place = ("127.0.0.1", FIRST_PORT + free_instance())
+    link = Px4Link(place, print)
+    waiting = asyncio.create_task(link.connected())
+    fake = await asyncio.to_thread(FakePx4, place[1])
+    await waiting
+    link.in_lockstep = True
+    for time_us in (4000, 4000, 8000):
+        fake.send(fake.mav.hil_actuator_controls_encode(time_us, [0.0] * 16, 1, 1))
+    answer = await link.late_answer(8000)
+    assert (answer.time_us, link.unexpected) == (8000, 2)
+    fake.close()
+    with pytest.raises(Px4GoneError):
+        await link.late_answer(12_000)
+    link.close()
+
+
+def build_of(tmp_path, script):
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "etc").mkdir()
+    program = tmp_path / "bin" / "px4"
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
+    return find_build(tmp_path)
+
+
+async def test_a_px4_that_ends_at_once_is_reported_with_its_error(tmp_path):
+    build = build_of(tmp_path, "env | grep PX4_; echo 'ERROR [init] no airframe'; exit 3")
+    process = Px4Process(build, 2, tmp_path / "files", {"MPC_THR_HOVER": 0.5})
+    await process.start()
+    assert await process.ended() == "PX4 ended with code 3: ERROR [init] no airframe"
+    assert "PX4_PARAM_MPC_THR_HOVER=0.5" in process.log.read_text()
+    assert "PX4_SIM_MODEL=none_iris" in process.log.read_text()
+
+
+def is_gone(child):
+    """Whether a process has ended; one that nobody has waited for is a zombie."""
+    try:
+        return Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+async def test_a_px4_is_ended_with_its_script(tmp_path):
+    process = Px4Process(build_of(tmp_path, "sleep 100 & echo $!; wait"), 2, tmp_path / "files", {})
+    await process.start()
+    await until(lambda: process.log.read_text().strip())
+    child = int(process.log.read_text())
+    await process.stop()
+    await until(lambda: is_gone(child))
