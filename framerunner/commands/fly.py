@@ -115,9 +115,8 @@ def fly(
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
     A drone given by --drone is taken for a real one, unless it is `framerunner sim` or --simulated: it is
-    checked, and the operator holds G to arm; SPACE lands, SPACE again stops the motors. In lockstep there is
-    no log, and a video only with --video. Exit code 0: completed, 1: flown but not completed, 2: bad input or
-    failed check.
+    checked, and the operator holds G to arm; SPACE lands, SPACE again stops the motors. Exit code 0: completed,
+    1: flown but not completed, 2: bad input or failed check.
 
     **Examples**
 

@@ -89,8 +89,7 @@ async def fly_in_real_time(
         vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
         named = settings.simulator is not None
         judge, plan = await choose_judge(plan, vehicle.api, session, named=named)
-        settings, plan = await _without_procedure(settings, plan)
-        safety = await _safety(plan, settings, records, stack)
+        plan, safety = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)
         source = records.folder.mission.read_text(encoding="utf-8")
@@ -123,28 +122,20 @@ async def fly_in_real_time(
     return flown
 
 
-async def _without_procedure(
-    settings: RealTimeSettings, plan: FlightPlan
-) -> tuple[RealTimeSettings, FlightPlan]:
-    """The same without what a real drone needs, if it says that it is framerunner's simulated one."""
-    hardware, drone_url = settings.hardware, settings.drone_url
-    if hardware is None or drone_url is None or not hardware.asks_nothing:
-        return settings, plan
-    from framerunner.preflight.prepare import is_own_simulator
-
-    if not await is_own_simulator(drone_url):
-        return settings, plan
-    caps = plan.caps if hardware.capped else None
-    return replace(settings, hardware=None), replace(plan, caps=caps)
-
-
 async def _safety(
     plan: FlightPlan, settings: RealTimeSettings, records: RunRecords, stack: AsyncExitStack
-) -> SafetyRules:
-    """Let a drone that may be a real one be checked, and read its operator's keys until the flight's end."""
+) -> tuple[FlightPlan, SafetyRules]:
+    """Let a drone that may be a real one be checked, and read its operator's keys until the flight's end.
+
+    A drone that says that it is framerunner's simulated one needs neither, nor caps that nobody asked for.
+    """
     hardware, drone_url = settings.hardware, settings.drone_url
     if hardware is None or drone_url is None:
-        return SIMULATED
+        return plan, SIMULATED
+    from framerunner.preflight.prepare import is_own_simulator
+
+    if hardware.asks_nothing and await is_own_simulator(drone_url):
+        return replace(plan, caps=plan.caps if hardware.capped else None), SIMULATED
     from framerunner.preflight.keys import TerminalKeys
     from framerunner.preflight.prepare import prepare
     from framerunner.preflight.run import PreflightSettings
@@ -160,7 +151,7 @@ async def _safety(
     safety = await prepare(plan, checks, hardware)
     if safety.operator is not None:
         await stack.enter_async_context(TerminalKeys(safety.operator))
-    return safety
+    return plan, safety
 
 
 async def _vehicle(
