@@ -115,14 +115,14 @@ def fly(
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
     A drone given by --drone is taken for a real one, unless it is `framerunner sim` or --simulated: it is
-    checked, and the operator holds G to arm; SPACE lands, SPACE again stops the motors. Exit code 0: completed,
-    1: flown but not completed, 2: bad input or failed check.
+    checked, and the operator holds G to arm; SPACE lands, SPACE again stops the motors. Exit code 0:
+    completed, 1: flown but not completed, 2: bad input or failed check.
 
     **Examples**
 
-        framerunner fly test-case-1 --lockstep --record --sensors mocap
+        framerunner fly test-case-1 --monitor
 
-        framerunner fly test-case-1 --px4 ../PX4-Autopilot --speed 3
+        framerunner fly test-case-1 --lockstep --record --sensors mocap
 
         framerunner fly --dry-run --drone serial:///dev/ttyUSB0:57600 --camera 0
 
