@@ -99,6 +99,10 @@ bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt;
 parameters: $(VENV)/installed-dev ## write docs/parameters.md from the declarations
 	$(BIN)/python -m firmware_py.parameters.reference > docs/parameters.md
 
+.PHONY: failsafes
+failsafes: $(VENV)/installed-dev ## write the table of failsafes in docs/real-drone.md from its data
+	$(BIN)/python -m offboard.safety.failsafes docs/real-drone.md
+
 .PHONY: messages
 messages: $(VENV)/installed-dev ## generate wire/extra_messages.py again from wire/extra_messages.xml
 	$(BIN)/python -m tests.wire.generate_messages

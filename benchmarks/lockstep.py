@@ -13,8 +13,10 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
+from math import pi, remainder
 
 from benchmarks.peers.job import SINGLE_THREADS, Stopwatch, pin_to_one_core
 
@@ -26,18 +28,21 @@ from firmware_py.status import FlightMode
 from framerunner.flying.detector import plan_detector
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
-from geometry.rotations import quaternion_from_yaw
+from geometry.solids import Solid
+from geometry.vectors import Quaternion, Vec3
 from offboard.app import Moment
+from offboard.drone import DroneState
 from offboard.mission import MissionError, load_mission
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario, ScenarioError
-from sitl.camera import Camera
+from sitl.camera import Camera, Motion
 from sitl.simulation import Simulation
 from sitl.world import PHYSICS_RATE_HZ, STEPS_PER_CONTROL
 from vision.types import Image
 
 REPEATS = 5
-Pose = tuple[tuple[float, float, float], tuple[float, float, float, float]]
+Pose = tuple[Vec3, Quaternion, Sequence[Solid], Motion]
+"""Of the camera: what `Camera.render` needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +57,8 @@ class Parts:
     simulated_s: float  # length of the whole flight
     raw_s: float  # one `run()` of JSBSim with this drone's model
     step_s: float  # one step of physics with autopilot, referee and the rest of a control tick
-    render_s: float  # one image painted, the mean over the flight
-    detect_s: float  # the same image searched for frames
+    render_s: float  # one of them painted, the mean over the flight
+    detect_s: float  # the same searched
     flight_s: float  # the whole flight with everything
     flight_wall_s: float  # the same by the wall clock
 
@@ -98,8 +103,8 @@ def measure(plan: FlightPlan) -> Parts:
     step_s = best(simulation.tick, 5_000) / STEPS_PER_CONTROL
     images: list[Image] = []
     poses: list[Pose] = []
-    searched, flight_s, wall_s, simulated_s = fly(plan, images, poses)
-    camera = Camera(scenario)
+    flight_s, wall_s, simulated_s = fly(plan, images, poses)
+    searched, camera = len(poses), Camera(scenario)
     render_s = best(lambda: [camera.render(*pose) for pose in poses], 1) / len(poses)
     detect = plan_detector(plan, rendered=True)
     detect_s = best(lambda: [detect(image, 0) for image in images], 1) / len(images)
@@ -132,20 +137,32 @@ def hovering(scenario: Scenario) -> Simulation:
     return simulation
 
 
-def fly(plan: FlightPlan, images: list[Image], poses: list[Pose]) -> tuple[int, float, float, float]:
-    """Fly the plan; how many images were searched; processor, wall and simulated time, seconds.
+def fly(plan: FlightPlan, images: list[Image], poses: list[Pose]) -> tuple[float, float, float]:
+    """Fly the plan; processor, wall and simulated time, seconds.
 
-    The first flight warms up. It takes all images of the camera, the others only those that are searched.
+    The first flight warms up. It takes all images of the camera, the others only those that are searched:
+    these are kept, and where the camera was and how it moved then, as telemetry tells.
     """
     moments: list[Moment] = []
-    fly_lockstep(plan, observers=(moments.append,), on_image=lambda _time_us, image: images.append(image))
-    for moment in moments[:: max(1, len(moments) // 500)]:
-        state = moment.state
-        poses.append(((state.x, state.y, state.z), quaternion_from_yaw(state.yaw)))
-    simulated_s = moments[-1].state.time_us / 1e6
-    searched = len({moment.detections.time_us for moment in moments})
+    taken: dict[int, Image] = {}
+    fly_lockstep(plan, observers=(moments.append,), on_image=taken.__setitem__)
+    last_us = None
+    for before, moment in pairwise(moments):
+        time_us = moment.detections.time_us
+        if time_us in taken and time_us != last_us:
+            last_us = time_us
+            images.append(taken[time_us])
+            poses.append(_pose(before.state, moment.state))
     timed = [timed_flight(plan) for _ in range(REPEATS)]
-    return searched, min(cpu_s for cpu_s, _ in timed), min(wall_s for _, wall_s in timed), simulated_s
+    simulated_s = moments[-1].state.time_us / 1e6
+    return min(cpu_s for cpu_s, _ in timed), min(wall_s for _, wall_s in timed), simulated_s
+
+
+def _pose(before: DroneState, state: DroneState) -> Pose:
+    """Pose and motion at a tick; of the turn only that of the heading, since the tick before."""
+    turn_rad_s = remainder(state.yaw - before.yaw, 2 * pi) / max((state.time_us - before.time_us) / 1e6, 1e-3)
+    motion = Motion(state.time_us, state.velocity_arena_m_s, (0.0, 0.0, -turn_rad_s))
+    return (state.x, state.y, state.z), state.attitude_arena, (), motion
 
 
 def timed_flight(plan: FlightPlan) -> tuple[float, float]:

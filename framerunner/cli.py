@@ -38,6 +38,7 @@ def build_app() -> App:
         mission,
         mocap,
         monitor,
+        preflight,
         px4,
         replay,
         scenario,
@@ -59,6 +60,7 @@ def build_app() -> App:
     app.command(camera.app)
     app.command(mocap.mocap)
     app.command(doctor.doctor)
+    app.command(preflight.preflight)
     app.command(evaluate.evaluate)
     app.command(bound.bound)
     app.command(monitor.monitor)

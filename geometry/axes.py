@@ -75,6 +75,11 @@ class Alignment:
         dx, dy, dz = self._shift
         return (x + dx, y + dy, z + dz)
 
+    def to_ned(self, position_arena_m: Vec3) -> Vec3:
+        """An arena position in the vehicle's local NED frame; the inverse of `position`."""
+        x, y, z = (at - shift for at, shift in zip(position_arena_m, self._shift, strict=True))
+        return flip_vector((self._cos * x + self._sin * y, self._cos * y - self._sin * x, z))
+
     def vector(self, vector_ned: Vec3) -> Vec3:
         """A local NED velocity in arena axes."""
         x, y, z = flip_vector(vector_ned)

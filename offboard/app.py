@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
 
+from offboard.abort import FlightAbort, uncancel
 from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
 from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError
@@ -18,6 +19,8 @@ from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.view import NavigationView
 from offboard.perception import CameraLostError, CameraSilentError, Perception
 from offboard.pilot import Imu
+from offboard.safety.operator import GO_WORDS, STOPPED
+from offboard.safety.rules import SIMULATED, SafetyRules
 from vision.types import Detections
 
 INTERRUPTED = "interrupted"
@@ -26,6 +29,7 @@ STILL = VelocityCommand()
 NAVIGATION_US = 200_000  # vehicle time between two views of the navigator's map
 CAMERA_WAIT_US = 4 * MICROSECONDS  # for which a mission with a map hovers when there are no images
 REST_US = 3 * MICROSECONDS  # time to fall onto the base, and for telemetry to show the drone at rest
+GO_LIMIT_US = 600 * MICROSECONDS  # vehicle time for which an operator's go is waited for
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +90,13 @@ async def fly_mission(
     limits: CommandLimits = CONTEST,
     surroundings: Surroundings | None = None,
     before_tick: TickHook | None = None,
+    safety: SafetyRules = SIMULATED,
 ) -> MissionEnd:
     """Connect, fly the mission, disconnect.
 
-    If anything fails after the start (drone, camera, mission, time limit, Ctrl-C), commanding stops, hold is
-    requested, and the outcome says why. A pilot who takes the drone pauses the mission; it continues when he
-    gives the drone back where that is safe.
+    If anything fails after the start (drone, camera, mission, time limit, Ctrl-C, the operator's stop),
+    commanding stops, hold or a landing is requested, as the rules say, and the outcome says why. A pilot who
+    takes the drone pauses the mission; it continues when he gives the drone back where that is safe.
 
     Args:
         drone: not yet connected; closed at the end.
@@ -103,6 +108,7 @@ async def fly_mission(
         limits: of the mission's commands.
         surroundings: what is known of the arena; a mission with `vision: frames` needs it.
         before_tick: see `TickHook`; None costs nothing.
+        safety: how the flight ends if it is aborted, and the operator who gives the go and may stop it.
 
     Raises:
         DroneError: the drone cannot be reached or is not ready.
@@ -110,7 +116,9 @@ async def fly_mission(
     """
     keeper = None if box is None else KeepInBox(box)
     engine = MissionEngine(mission, surroundings=surroundings, limits=limits)
-    flight = _Flight(drone, perception, engine, limit_s, observer, keeper=keeper, before_tick=before_tick)
+    flight = _Flight(
+        drone, perception, engine, limit_s, observer, keeper=keeper, before_tick=before_tick, safety=safety
+    )
     try:
         await drone.connect()
         await perception.open()
@@ -134,7 +142,10 @@ class _Flight:
         *,
         keeper: KeepInBox | None,
         before_tick: TickHook | None,
+        safety: SafetyRules,
     ) -> None:
+        self._safety = safety
+        self._operator = safety.operator
         self._drone = drone
         self._perception = perception
         self._engine = engine
@@ -159,13 +170,27 @@ class _Flight:
 
     async def run(self) -> MissionEnd:
         """Fly until the flight ends, for whatever reason."""
+        operator, task = self._operator, asyncio.current_task()
+        if operator is None or task is None:
+            return await self._run()
+        operator.on_stop(task.cancel)
         try:
+            if operator.stops:
+                return self._outcome("aborted", STOPPED)
+            return await self._run()
+        finally:
+            operator.on_stop(None)
+
+    async def _run(self) -> MissionEnd:
+        try:
+            await self._wait_for_go()
             timed_out = await self._fly()
         except (DroneError, CameraLostError, MissionRunError, OutsideBoxError) as error:
             return await self._stop("aborted", str(error))
         except asyncio.CancelledError:
-            _uncancel()  # the outcome reports it
-            return await self._stop("aborted", INTERRUPTED)
+            uncancel()  # the outcome reports it
+            is_operator = self._operator is not None and self._operator.stops > 0
+            return await self._stop("aborted", STOPPED if is_operator else INTERRUPTED)
         except BaseException:
             await self._stop("aborted", "unexpected error")
             raise
@@ -174,9 +199,31 @@ class _Flight:
         try:
             await self._observe_rest()
         except asyncio.CancelledError:  # what was flown is not lost; the motors are off already
-            _uncancel()
+            uncancel()
             return self._outcome("aborted", INTERRUPTED)
         return self._outcome("finished", "")
+
+    async def _wait_for_go(self) -> None:
+        """Wait for the operator's go, while link and camera are watched."""
+        operator = self._operator
+        if operator is None or operator.has_go:
+            return
+        ticks, began_us = self._drone.ticks(), None
+        try:
+            async for state in ticks:
+                if self._before_tick is not None:
+                    await self._before_tick(self._engine, state)
+                if operator.has_go:
+                    return
+                began_us = state.time_us if began_us is None else began_us
+                if state.time_us - began_us > GO_LIMIT_US:
+                    minutes = GO_LIMIT_US / MICROSECONDS / 60
+                    raise DroneError(f"no go within {minutes:g} min; the checks are too old, so start again")
+                self._remark = f"{GO_WORDS}: {operator.hint}"
+                self._observe(state, STILL, self._perception.latest(state.time_us))
+        finally:
+            self._remark = ""
+            await _close(ticks)
 
     async def _fly(self) -> bool:
         """Tick until the mission is finished; True if the time limit ended before."""
@@ -249,7 +296,7 @@ class _Flight:
         if self._observer is None:
             return
         engine, flight_time_s, remark = self._engine, self._flight_time_s(), self._remark
-        if not self._paused and self._silent_us is None:
+        if self._flying and not self._paused and self._silent_us is None:
             remark = "" if self._keeper is None else self._keeper.remark
         what = (state, command, detections, engine.state, flight_time_s, engine.transition)
         self._observer(Moment(*what, self._paused, remark, self._navigation_at(state.time_us)))
@@ -351,13 +398,15 @@ class _Flight:
             await _close(ticks)
 
     async def _stop(self, ended: Literal["timed out", "aborted"], reason: str) -> MissionEnd:
-        """Stop commanding and request hold."""
+        """Stop commanding, and hold or land."""
         if self._motors_requested:
             self._flying = False
-            try:
-                await self._drone.hold()
-            except DroneError as error:
-                reason = f"{reason}; hold: {error}"
+
+            def see(state: DroneState) -> None:
+                self._observe(state, STILL, Detections())
+
+            more = await FlightAbort(self._drone, self._safety, see).bring_down()
+            reason = f"{reason}; {more}" if more else reason
         return self._outcome(ended, reason)
 
     def _outcome(self, ended: Literal["finished", "timed out", "aborted"], reason: str) -> MissionEnd:
@@ -376,12 +425,6 @@ def _why_not_continued(state: DroneState) -> str:
     if not all(map(isfinite, (state.x, state.y, state.z, state.yaw))):
         return "its position is not finite"
     return ""
-
-
-def _uncancel() -> None:
-    task = asyncio.current_task()
-    if task is not None:
-        task.uncancel()
 
 
 async def _close(ticks: AsyncIterator[DroneState]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, isnan
 from typing import Protocol
 
 from errors import UserError
@@ -34,6 +34,7 @@ class DroneState:
     landed: bool = True  # on the ground or on the base
     position_age_s: float = 0.0  # how much older the position and the velocity are than `time_us`
     attitude_arena: Quaternion = (1.0, 0.0, 0.0, 0.0)  # body FLU to arena, with the heading `yaw`
+    camera_attitude_arena: Quaternion | None = None  # of a camera on a gimbal, forward-left-up to arena
     missed: tuple[DroneState, ...] = ()  # at the ticks that were skipped before this one, oldest first
 
     @property
@@ -51,6 +52,11 @@ class VelocityCommand:
     left_m_s: float = 0.0
     up_m_s: float = 0.0
     yaw_rate_rad_s: float = 0.0
+
+    @property
+    def is_number(self) -> bool:
+        """No component is NaN."""
+        return not isnan(self.forward_m_s + self.left_m_s + self.up_m_s + self.yaw_rate_rad_s)
 
 
 class Drone(Protocol):
@@ -96,6 +102,17 @@ class Drone(Protocol):
 
     async def hold(self) -> None:
         """Stop commanding permanently and request hold, unless a pilot or a failsafe has the vehicle."""
+
+    async def land_now(self, *, demanded: bool = False) -> None:
+        """Stop commanding permanently and let the vehicle land where it is; returns when it is disarmed.
+
+        A vehicle that a pilot or a failsafe has is left to them, and this returns at once, unless it lands
+        already. A vehicle that cannot be brought to land gets a request for hold, as by `hold`; then its own
+        failsafe acts.
+
+        Args:
+            demanded: by the operator, who overrules a failsafe that does not land; a pilot keeps the vehicle.
+        """
 
     async def refuse(self) -> None:
         """Let the vehicle that a pilot gave back hold, and wait until it is given back again."""

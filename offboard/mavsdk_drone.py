@@ -6,11 +6,10 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
-from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
-from mavsdk.asyncio import Configuration, ForwardingOption, Mavsdk, MavsdkError
+from mavsdk.asyncio import Configuration, Mavsdk, MavsdkError
 from mavsdk.asyncio.component_type import ComponentType
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
@@ -22,12 +21,14 @@ from offboard.keep_in_box import Box, confine
 from offboard.link.autopilots import open_dialect
 from offboard.link.commands import PendingRequests, synchronous
 from offboard.link.companion import Companion
+from offboard.link.connections import open_connections
 from offboard.link.dialect import Dialect
-from offboard.link.states import drone_state
+from offboard.link.reported_state import reported_state
 from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, request_rates
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
+from offboard.safety.caps import CapKeeper, Caps
 from wire.transports.sockets import check_free
 from wire.transports.urls import LinkError, parse_url
 
@@ -67,6 +68,7 @@ class MavsdkDrone:
         hang_report: a real file for the stack of a hung app; by default standard error.
         box: commands that were corrected here do not leave it; None: there is none.
         corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
+        caps: no command exceeds them, and none leads out of the box; None: there are none.
 
     Attributes:
         recording_problem: why recording ended before the flight; set by `disconnect`.
@@ -85,6 +87,7 @@ class MavsdkDrone:
         hang_report: TextIO | None = None,
         box: Box | None = None,
         corrects: bool = True,
+        caps: Caps | None = None,
     ) -> None:
         self.recording_problem = ""
         self._url = parse_url(url)
@@ -112,6 +115,7 @@ class MavsdkDrone:
         self._watchdog = Watchdog(self._stand_still, self._stop_from_watchdog, hang_report)
         self._shared_with: list[str] = []
         self._box = box
+        self._caps = None if caps is None else CapKeeper(caps, box)
 
     def record_to(self, path: Path) -> None:
         """Record all MAVLink traffic as a tlog from `connect` to `close`."""
@@ -150,7 +154,9 @@ class MavsdkDrone:
         log_subscribe(_log)
         # As a ground station: PX4 sends the reasons of its refusals (STATUSTEXT) only to ground stations.
         self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
-        await self._open_connections(self._mavsdk)
+        self._recorder = await open_connections(
+            self._mavsdk, (*self._shared_with, self._url.text), self._tlog_path, self._companion
+        )
         system: Any = await self._mavsdk.first_autopilot(self._connect_limit_s)
         if system is None:
             raise DroneError(
@@ -172,25 +178,6 @@ class MavsdkDrone:
         telemetry = synchronous(self._telemetry)
         self._feed.subscribe(telemetry, synchronous(self._direct), self._dialect.numbered_modes)
         await self._requests.wait(self._dialect.request_streams())
-
-    async def _open_connections(self, mavsdk: Mavsdk) -> None:
-        """To recorder, companion, ground stations and vehicle; MAVSDK forwards between them."""
-        if self._tlog_path is not None:
-            try:
-                self._recorder = TlogRecorder(self._tlog_path)
-                await mavsdk.add_any_connection(await self._recorder.listen(), ForwardingOption.ON)
-            except (OSError, MavsdkError) as error:
-                raise DroneError(f"cannot record to {self._tlog_path}: {error}") from None
-        if self._companion is not None:
-            try:
-                await mavsdk.add_any_connection(self._companion.listen(), ForwardingOption.ON)
-            except (OSError, MavsdkError) as error:  # the mission can be flown without
-                logger.warning("the mission cannot be reported: %s", error)
-        try:
-            for url in (*self._shared_with, self._url.text):
-                await mavsdk.add_any_connection(url, ForwardingOption.ON)
-        except MavsdkError as error:
-            raise DroneError(f"cannot open {self._url.text}: {error}") from None
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then determine the axes."""
@@ -307,6 +294,23 @@ class MavsdkDrone:
             if feed.time_us > limit_us:
                 raise DroneError(f"still not landed after {LAND_LIMIT_S:g} s{feed.recent_texts()}")
 
+    async def land_now(self, *, demanded: bool = False) -> None:
+        """Stop commanding permanently and let the vehicle land; see `Drone.land_now`."""
+        self._stand_still()  # repeated until the vehicle leaves offboard
+        self._commanding = self._pilot_has_it = False
+        if self._dialect is None:
+            await self.hold()
+            return
+        modes, mode = self._dialect.modes, self._feed.mode
+        if mode not in (modes.offboard, modes.land) and not (demanded and mode not in modes.pilot):
+            await self.hold()
+            return
+        try:
+            await self.land()
+        except DroneError as error:
+            await self.hold()
+            raise DroneError(f"{error}; hold was requested instead") from None
+
     async def hold(self) -> None:
         """Stop commanding permanently and request hold, unless the vehicle has left offboard already."""
         self._commanding = self._pilot_has_it = False
@@ -360,7 +364,7 @@ class MavsdkDrone:
             command = self._tracker.correct(command, latest)
             if self._box is not None:
                 command, _ = confine(command, latest, self._box)
-        self._send(command)
+        self._send(command if self._caps is None else self._caps.limit(command, latest))
 
     async def close(self) -> None:
         """End all commanding and, without a companion, disconnect."""
@@ -405,11 +409,12 @@ class MavsdkDrone:
 
     def _newest_state(self) -> DroneState:
         """The state at the last tick; it holds those of the ticks that were skipped before it."""
+        assert self._alignment is not None, "ready() comes first"
         sample = self._feed.sample
         missed = [before for before in self._feed.take_samples() if before.time_us < sample.time_us]
-        assert self._alignment is not None, "ready() comes first"
-        state_at = partial(drone_state, self._feed, self._alignment, self._stream.modes.offboard)
-        return state_at(sample, tuple(map(state_at, missed)))
+        mode = self._stream.modes.offboard
+        states = tuple(reported_state(before, self._feed, self._alignment, mode) for before in missed)
+        return reported_state(sample, self._feed, self._alignment, mode, states)
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s

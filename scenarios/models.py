@@ -15,6 +15,7 @@ from geometry.solids import Solid
 from geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.air import Wind
 from scenarios.faults.declaration import Fault
+from scenarios.gimbal import Gimbal
 from scenarios.goals import Goal
 from scenarios.imaging.clutter import Hall, Patch
 from scenarios.imaging.effects import CameraEffects
@@ -27,7 +28,18 @@ MissionClass = Literal["contest", "open"]
 DecoyColour = Literal["cyan", "magenta"]
 DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
-_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors", "wind", "faults", "hall", "patches", "goals")
+_OFTEN_UNUSED = (
+    "decoys",
+    "poles",
+    "walls",
+    "sensors",
+    "wind",
+    "faults",
+    "hall",
+    "patches",
+    "gripper",
+    "goals",
+)
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
@@ -201,7 +213,7 @@ def _standing(name: str, place_m: tuple[float, float], yaw_rad: float, size_m: V
 
 
 class Camera(Part):
-    """A pinhole camera fixed to the drone, looking along its x axis."""
+    """A pinhole camera that looks along the drone's x axis, fixed to it or on a gimbal."""
 
     width_px: int = Field(320, ge=16, le=4096, description="columns of the image")
     height_px: int = Field(240, ge=16, le=4096, description="rows of the image")
@@ -214,6 +226,8 @@ class Camera(Part):
     effects: CameraEffects | None = Field(
         None, description="what a real camera does to images; by default they are ideal"
     )
+
+    gimbal: Gimbal | None = Field(None, description="carries the camera; by default it is fixed to the drone")
 
     @property
     def focal_px(self) -> float:
@@ -233,7 +247,7 @@ class Camera(Part):
 
     @model_serializer(mode="wrap")
     def _without_unused_effects(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return _without_defaults(self, write(self), ("effects",))
+        return _without_defaults(self, write(self), ("effects", "gimbal"))
 
 
 class Light(Part):
@@ -300,6 +314,7 @@ class Scenario(Part):
     try_limit_s: float = Field(180.0, gt=0, le=36000, description="longest try, motors on to motors off")
     airframe: str = Field("abejorro", description="name of the drone to fly")
     origin: Origin = Field(Origin(), description="where on Earth the arena is")
+    gripper: bool = Field(False, description="whether the drone has one; what it holds has no mass")
     sensors: str = Field("ideal", description="name of the drone's sensor suite, or a file of one")
     wind: Wind = Field(Wind(), description="how the air moves; by default it is still")
     faults: tuple[Fault, ...] = Field((), max_length=20, description="what fails, and when")
@@ -408,6 +423,14 @@ class Scenario(Part):
                 yield part, (name, index)
 
 
+@dataclass(frozen=True, slots=True)
+class CameraMotion:
+    """How a camera on a gimbal looks and turns."""
+
+    attitude_arena: Quaternion  # forward-left-up of the camera to arena
+    rate_frd_rad_s: Vec3  # angular velocity in the camera's axes forward, right, down
+
+
 @dataclass(slots=True)
 class TrueState:
     """State of the drone at one instant, simulated or from a real drone's telemetry."""
@@ -419,6 +442,7 @@ class TrueState:
     motors_on: bool
     contacts: tuple[str, ...] = ()  # what it touches: colours of frames, "pole", "wall", "base" or "floor"
     rate_frd_rad_s: Vec3 = ZERO3  # angular velocity, body axes forward, right, down; 0 if not known
+    camera: CameraMotion | None = None  # of a camera on a gimbal; None: it is fixed to the drone
 
 
 def is_over_base(base: Base, x_m: float, y_m: float) -> bool:

@@ -103,6 +103,20 @@ class Camera:
         light = self._exposed(position_arena_m, attitude_arena, drones, motion)
         return self._sensor.develop(light, motion.time_us)
 
+    def place_on(self, position_arena_m: Vec3, attitude_arena: Quaternion) -> Vec3:
+        """Where the camera is on a drone with this pose, arena axes: the centre of a gimbal's axes."""
+        return self._eye(position_arena_m, _rows(attitude_arena))
+
+    def render_from(
+        self, eye_arena_m: Vec3, attitude_arena: Quaternion, drones: Sequence[Solid], motion: Motion
+    ) -> Image:
+        """As `render`, from a place and an attitude of the camera itself, such as one on a gimbal."""
+        x, y, z = self._settings.position_flu_m
+        rows = _rows(attitude_arena)
+        centre = (e - r[0] * x - r[1] * y - r[2] * z for e, r in zip(eye_arena_m, rows, strict=True))
+        cx, cy, cz = centre
+        return self.render((cx, cy, cz), attitude_arena, drones, motion)
+
     def _exposed(
         self, position: Vec3, attitude: Quaternion, drones: Sequence[Solid], motion: Motion
     ) -> Image:
@@ -190,9 +204,13 @@ class Exposure:
     @cached_property
     def image(self) -> Image:
         """BGR, shape (height, width, 3), uint8."""
-        truth = self._truth
-        motion = Motion(truth.time_us, truth.velocity_arena_m_s, truth.rate_frd_rad_s)
-        return self._camera.render(truth.position_arena_m, truth.attitude_arena, self._drones, motion)
+        truth, camera = self._truth, self._truth.camera
+        if camera is None:
+            motion = Motion(truth.time_us, truth.velocity_arena_m_s, truth.rate_frd_rad_s)
+            return self._camera.render(truth.position_arena_m, truth.attitude_arena, self._drones, motion)
+        motion = Motion(truth.time_us, truth.velocity_arena_m_s, camera.rate_frd_rad_s)
+        eye = self._camera.place_on(truth.position_arena_m, truth.attitude_arena)
+        return self._camera.render_from(eye, camera.attitude_arena, self._drones, motion)
 
 
 class CameraFeed:

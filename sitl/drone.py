@@ -9,9 +9,10 @@ from math import degrees
 from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from geometry.solids import Solid
-from sitl.drone_files import PictureAlbum, flight_recorder
+from sitl.drone_files import flight_recorder
 from sitl.link_hub import LinkHub
 from sitl.parameter_file import ParameterKeeper, open_parameters
+from sitl.payload.album import CameraAlbum
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.storage import open_storage
@@ -56,7 +57,7 @@ class ServedDrone:
         storage = open_storage(settings.storage, settings.instance)
         camera = simulation.scenario.camera
         model = CameraModel(camera.width_px, camera.height_px, camera.horizontal_fov_rad, camera.rate_hz)
-        self._album = PictureAlbum(storage, boot_unix_us)
+        self._album = CameraAlbum(storage, boot_unix_us, camera.rate_hz)
         self._recorder = flight_recorder(storage, boot_unix_us)
         self.node = MavlinkNode(
             simulation.autopilot,
@@ -70,6 +71,9 @@ class ServedDrone:
                 log_text=self._recorder.hear_text,
                 camera=model if settings.camera else None,
                 captures=self._album,
+                switch_video=self._switch_rtp,
+                gimbal=simulation.gimbal,
+                gripper=simulation.scenario.gripper,
                 failures=simulation.faults,
                 truth=simulation.true_state,
             ),
@@ -86,6 +90,8 @@ class ServedDrone:
         """
         for profile, addresses in self._settings.default_links:
             await self._hub.open_udp(profile, addresses)
+        if self._settings.payload is not None:
+            await self._hub.open_payload(*self._settings.payload)
         self._hub.update(0)
         if self._keeper is not None:
             self._keeper.start()
@@ -103,6 +109,9 @@ class ServedDrone:
         """
         await self._video.open(others)
 
+    def _switch_rtp(self, on: bool) -> None:  # the interface's
+        self._video.sends_rtp = on
+
     def _warn(self, line: str) -> None:
         """Show a line at the terminal and at ground stations."""
         self._notice(line)
@@ -118,7 +127,7 @@ class ServedDrone:
         self._hub.update(sampled_us)
         image = self._video.step()
         if image is not None:
-            self._album.show(image)
+            self._album.show(image, self._video.image_us)
 
     async def hold(self, grants: TimeGrants) -> None:
         """Wait until simulated time may advance."""
@@ -132,6 +141,7 @@ class ServedDrone:
     async def close(self) -> None:
         """Finish the log, save the parameters, stop the video and close the links."""
         self._recorder.finish(self.simulation.autopilot)
+        self._album.stop_video()
         if self._keeper is not None:
             await self._keeper.close()
         await self._video.close()

@@ -22,6 +22,7 @@ from sitl.links import (
     connect_tcp_async,
     open_udp,
 )
+from sitl.payload.link import PayloadLink, open_payload
 from sitl.server_settings import RequestedLink
 from wire.link import LinkProfile
 from wire.transports.sockets import Stream, open_serial
@@ -51,8 +52,8 @@ class LinkHub:
         self._node = node
         self._input = LinkInput(node, notice)
         self._faulty = _FaultyLink(fault)
-        self._carriers: dict[str, UdpLink | StreamLink] = {}
-        self._opened: list[UdpLink | StreamLinks] = []
+        self._carriers: dict[str, UdpLink | PayloadLink | StreamLink] = {}
+        self._opened: list[UdpLink | PayloadLink | StreamLinks] = []
         self._joined = 0
 
     async def open_udp(self, profile: LinkProfile, addresses: UdpAddresses) -> None:
@@ -61,7 +62,17 @@ class LinkHub:
         Raises:
             LinkError: the local port is in use or an address is wrong.
         """
-        link = await open_udp(addresses, self._receiver(profile.name))
+        self._add(profile, await open_udp(addresses, self._receiver(profile.name)))
+
+    async def open_payload(self, profile: LinkProfile, addresses: UdpAddresses) -> None:
+        """Open the payload link and send on it from now on.
+
+        Raises:
+            LinkError: the local port is in use or an address is wrong.
+        """
+        self._add(profile, await open_payload(addresses, self._receiver(profile.name)))
+
+    def _add(self, profile: LinkProfile, link: UdpLink | PayloadLink) -> None:
         self._opened.append(link)
         self._node.add_link(profile)
         self._carriers[profile.name] = link

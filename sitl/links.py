@@ -52,6 +52,7 @@ class UdpLink:
         remote: always sent to, if given.
         receive: called with each datagram.
         clock: monotonic seconds.
+        accepts: whether a sender is listened to; by default all are.
     """
 
     def __init__(
@@ -60,12 +61,14 @@ class UdpLink:
         remote: Address | None,
         receive: Receive,
         clock: Callable[[], float] = time.monotonic,
+        accepts: Callable[[Address], bool] = lambda sender: True,
     ) -> None:
         self._transport = transport
         self._remote = remote
         self._heard_s: dict[Address, float] = {}
         self._receive = receive
         self._clock = clock
+        self._accepts = accepts
         self._is_open = True
         asyncio.get_running_loop().add_reader(transport, self._read)
 
@@ -93,7 +96,7 @@ class UdpLink:
         except OSError:
             return  # no route now: go on sending, as a radio would
         peer = self._transport.peer
-        if not data or peer is None:
+        if not data or peer is None or not self._accepts(peer):
             return
         if peer != self._remote and data[0] in MARKERS:  # a sender of anything else is no peer
             now_s = self._clock()

@@ -104,6 +104,18 @@ class ServerSettings:
         return UdpAddresses((self._from(remote[0]), 18570 + self.instance), remote)
 
     @property
+    def payload(self) -> tuple[LinkProfile, UdpAddresses] | None:
+        """The link of the camera and other devices: PX4's 14280 to 14030; None without a camera.
+
+        It has the streams of a radio, as few as PX4's link of 4 kB/s.
+        """
+        if not self.camera:
+            return None
+        here = "127.0.0.1"
+        addresses = UdpAddresses((self.bind, 14280 + self.instance), (here, 14030 + self.instance))
+        return replace(NORMAL, name="payload", trusted=is_loopback(self.bind)), addresses
+
+    @property
     def default_links(self) -> tuple[tuple[LinkProfile, UdpAddresses], ...]:
         """The onboard and the ground link."""
         return tuple(

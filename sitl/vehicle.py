@@ -13,11 +13,12 @@ from firmware_py.measurements import ExternalPose, Readings
 from firmware_py.parameters import Parameters
 from firmware_py.types import GeodeticPoint, MotorSpeeds, Sensors
 from geometry.vectors import Vec3
-from scenarios.models import Scenario, ground_height
+from scenarios.models import CameraMotion, Scenario, ground_height
 from scenarios.referee import Referee
 from scenarios.result import BegunFault, FailsafeText, FaultFacts
 from sitl.battery import Battery
 from sitl.faults.faults import Faults
+from sitl.payload.gimbal import SimulatedGimbal
 from sitl.sensors.assumptions import parameter_defaults
 from sitl.sensors.specs import SuiteSpec
 from sitl.sensors.suite import SensorSuite, load_suite
@@ -79,6 +80,7 @@ class SimulatedVehicle(ABC):
         faults: declared in the scenario and injected over MAVLink.
         referee: sees the true state of every control tick; a new one for each try.
         battery: of the drone.
+        gimbal: of the camera; None: it is fixed to the drone.
         truth: the true state now.
     """
 
@@ -94,9 +96,13 @@ class SimulatedVehicle(ABC):
         self.referee = Referee(scenario, airframe.envelope_m)
         self.battery = Battery(airframe, self.parameters)
         self.faults = Faults(scenario.faults, suite, self.world, self.battery, seed)
+        settings = scenario.camera.gimbal
+        self.gimbal = None if settings is None else SimulatedGimbal(settings)
         self._battery_due_us = 0
         self._sensors = self.world.sensors()
         self.truth = self.world.truth(self._sensors, motors_on=False)
+        if self.gimbal is not None:
+            self._turn_camera(self.gimbal)
         self.referee.update(self.truth)
 
     @property
@@ -156,7 +162,13 @@ class SimulatedVehicle(ABC):
         if armed is not self.truth.motors_on:
             self._change_arming(armed)
         self.truth = self.world.truth(self._sensors, motors_on=armed)
+        if self.gimbal is not None:
+            self._turn_camera(self.gimbal)
         self.referee.update(self.truth)
+
+    def _turn_camera(self, gimbal: SimulatedGimbal) -> None:
+        gimbal.step(CONTROL_PERIOD_US / 1e6, self._sensors.attitude)
+        self.truth.camera = CameraMotion(gimbal.attitude_arena, gimbal.rate_frd_rad_s)
 
     def _change_arming(self, armed: bool) -> None:
         if not armed:

@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-UDP_PORTS = (14540, 14550, 14580, 18570)
+UDP_PORTS = (14540, 14550, 14580, 18570, 14030, 14280)
 HTTP_PORT = 8100
 
 

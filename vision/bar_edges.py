@@ -14,6 +14,8 @@ from vision.patch import BACKGROUND, OWN, Labels, Patch
 
 Flags = npt.NDArray[np.bool_]
 
+_NO_SIDE = ((0.0, 0.0), (0.0, 0.0))
+
 _OUTSIDE_PX, _INSIDE_PX = 3, 2  # how far from a first estimate of a side its outer edge is looked for
 _MAX_SAMPLES = 40  # per side
 _SLACK_PX, _SLACK_SHARE = 2.5, 1.5  # a bar may look wider than expected by this or this share of its half
@@ -125,23 +127,20 @@ def find_edges(patch: Patch, sides: Sides, half_px: Widths) -> BarEdges:
 
 def _as_seen(sides: Sides, lens: Lens) -> tuple[Sides, list[float]]:
     """The chords of sides in the image, and how far the middle of each is from its chord: columns or rows."""
+    ends = [_NO_SIDE if side is None else side for side in sides]
+    places = np.array(ends)
+    places = lens.all_seen(np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1))
     chords: list[Segment | None] = []
     bows = []
-    for side in sides:
+    for side, ((x0, y0), (x1, y1), (x, y)) in zip(sides, places.tolist(), strict=True):
+        dx, dy = x1 - x0, y1 - y0
         if side is None:
-            chords.append(None)
             bows.append(0.0)
-            continue
-        (x0, y0), (x1, y1) = side
-        start, end = lens.seen(x0, y0), lens.seen(x1, y1)
-        x, y = lens.seen(0.5 * (x0 + x1), 0.5 * (y0 + y1))
-        dx, dy = end[0] - start[0], end[1] - start[1]
-        # Where the chord is in the row (if it is steep) or column of the middle.
-        if abs(dy) > abs(dx):
-            bows.append(x - start[0] - dx * (y - start[1]) / dy)
+        elif abs(dy) > abs(dx):  # where the chord is in the row (if it is steep) or column of the middle
+            bows.append(x - x0 - dx * (y - y0) / dy)
         else:
-            bows.append(y - start[1] - dy * (x - start[0]) / dx if dx else 0.0)
-        chords.append((start, end))
+            bows.append(y - y0 - dy * (x - x0) / dx if dx else 0.0)
+        chords.append(None if side is None else ((x0, y0), (x1, y1)))
     return (chords[0], chords[1], chords[2], chords[3]), bows
 
 

@@ -19,10 +19,12 @@ Box = tuple[int, int, int, int]  # column, row, columns, rows
 BACKGROUND, OWN, FOREIGN, OUTSIDE = 0, 1, 2, 4
 """Values of pixels: none of the others, of the region, what may hide a part of it, and not in the image."""
 
-_PLACES = tuple((place + 0.5) / 16.0 for place in range(16))  # along a bar, as shares of its length
+_PLACES = (np.arange(16.0)[:, None] + 0.5) / 16.0  # along a bar, as shares of its length, shape (16, 1)
 _OPENING_PX = 6.0  # between the axes of opposite bars: an opening of this size is seen
 _AROUND = np.ones((5, 5), np.uint8)
-_BESIDE = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+# A pixel and its four neighbours, shape (5, 1, 1).
+_BESIDE_ROWS = np.array([0, -1, 1, 0, 0])[:, None, None]
+_BESIDE_COLUMNS = np.array([0, 0, 0, -1, 1])[:, None, None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,27 +81,22 @@ class Patch:
 
     def support(self, starts: Sequence[Point], ends: Sequence[Point]) -> Support:
         """Look along straight bars, given by the ends of their axes, pixels from the optical axis."""
-        # A thin bar may be a pixel beside its axis.
-        own = cv2.dilate(np.bitwise_and(self.labels, np.uint8(OWN)), _BESIDE).tobytes()
-        near = cv2.dilate(self.labels, _BESIDE).tobytes()
+        begin, end = np.array(starts)[:, None], np.array(ends)[:, None]
+        places = begin + (end - begin) * _PLACES
+        if self.lens is not None:
+            places = self.lens.all_seen(places)
         rows, columns = self.labels.shape
-        (reach_x, reach_y), (column, row) = self.reach_px, self.origin
-        owns, empties = [], []
-        for (x0, y0), (x1, y1) in zip(starts, ends, strict=True):
-            seen, empty = 0, 0
-            # So few that NumPy takes longer.
-            along = [(x0 + (x1 - x0) * place, y0 + (y1 - y0) * place) for place in _PLACES]
-            for x, y in along if self.lens is None else self.lens.all_seen(np.array(along)).tolist():
-                i, j = round(x + column), round(y + row)
-                known = 0 <= i < columns and 0 <= j < rows
-                at = j * columns + i
-                if known and own[at]:
-                    seen += 1
-                elif not (abs(x) > reach_x or abs(y) > reach_y or (known and near[at] > OWN)):
-                    empty += 1
-            owns.append(seen / len(_PLACES))
-            empties.append(empty / len(_PLACES))
-        return Support(owns, empties)
+        at = np.rint(places + self.origin).astype(np.intp)
+        column, row = at[..., 0], at[..., 1]
+        known = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        # A thin bar may be a pixel beside its axis.
+        beside_rows = np.minimum(np.maximum(row + _BESIDE_ROWS, 0), rows - 1)
+        beside_columns = np.minimum(np.maximum(column + _BESIDE_COLUMNS, 0), columns - 1)
+        around = self.labels[beside_rows, beside_columns]
+        own = known & (around & OWN).any(axis=0)
+        hidden = (np.abs(places) > self.reach_px).any(axis=-1) | (known & (around > OWN).any(axis=0))
+        empty = ~(own | hidden)
+        return Support(own.mean(axis=1).tolist(), empty.mean(axis=1).tolist())
 
 
 @dataclass(frozen=True, slots=True)

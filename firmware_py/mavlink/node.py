@@ -8,10 +8,15 @@ from dataclasses import dataclass
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera.component import CameraComponent
 from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink, VideoStream
+from firmware_py.mavlink.camera.streaming import Streaming
 from firmware_py.mavlink.commands.flight import FlightCommands
+from firmware_py.mavlink.commands.gripper import GripperService
 from firmware_py.mavlink.commands.maintenance import FailureSink, MaintenanceCommands
 from firmware_py.mavlink.commands.protocol import CommandService
 from firmware_py.mavlink.external_pose import ExternalPoseService
+from firmware_py.mavlink.gimbal.device import GimbalComponent
+from firmware_py.mavlink.gimbal.manager import GimbalManager
+from firmware_py.mavlink.gimbal.model import GIMBAL_COMPONENT_ID, GimbalDevice
 from firmware_py.mavlink.ground_station.events import EventService
 from firmware_py.mavlink.ground_station.file_transfer import FileTransferService
 from firmware_py.mavlink.ground_station.log_transfer import LogTransferService
@@ -59,24 +64,65 @@ class NodeOptions:
     shell: bool = False  # whether SERIAL_CONTROL is answered
     log_text: Callable[[int, StatusText], None] | None = None  # called with vehicle time and each text
     camera: CameraModel | None = None
-    captures: CaptureSink | None = None  # takes and keeps pictures; by default they are only counted
+    captures: CaptureSink | None = None  # keeps pictures and records video; by default they are only counted
+    switch_video: Callable[[bool], None] | None = None  # starts and stops the streams in RTP
+    gimbal: GimbalDevice | None = None  # carries the camera
+    gripper: bool = False
     failures: FailureSink | None = None  # breaks parts on purpose
     truth: Truth | None = None  # the true state, of a simulated vehicle whose sensors have errors
 
 
+@dataclass(frozen=True, slots=True)
+class _Devices:
+    """What the vehicle carries, those that it has."""
+
+    camera: CameraComponent | None = None
+    manager: GimbalManager | None = None
+    gimbal: GimbalComponent | None = None
+    gripper: GripperService | None = None
+
+    @classmethod
+    def of(cls, autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> _Devices:
+        """The devices of a vehicle's options."""
+        camera = manager = gimbal = None
+        if options.camera is not None:
+            streaming = Streaming(tuple(options.video), options.switch_video)
+            camera = CameraComponent(autopilot, exchange, options.camera, streaming, options.captures)
+        if options.gimbal is not None:
+            manager = GimbalManager(autopilot, exchange, options.gimbal)
+            gimbal = GimbalComponent(autopilot, exchange, options.gimbal)
+        return cls(camera, manager, gimbal, GripperService(autopilot) if options.gripper else None)
+
+    @property
+    def services(self) -> tuple[Service, ...]:
+        """Of those that there are."""
+        services = (self.camera, self.manager, self.gimbal, self.gripper)
+        return tuple(service for service in services if service is not None)
+
+    def command_services(self, exchange: Exchange) -> tuple[CommandService, ...]:
+        """The commands of those that are components of their own."""
+        camera, gimbal, services = self.camera, self.gimbal, []
+        if camera is not None:
+            services.append(
+                CommandService(exchange, CAMERA_COMPONENT_ID, camera.commands, camera.takes_broadcast)
+            )
+        if gimbal is not None:
+            services.append(
+                CommandService(exchange, GIMBAL_COMPONENT_ID, gimbal.commands, lambda _command: False)
+            )
+        return tuple(services)
+
+
 def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
     """All services of the vehicle, in the order in which they are updated."""
-    camera = None
-    if options.camera is not None:
-        camera = CameraComponent(
-            autopilot, exchange, options.camera, tuple(options.video), sink=options.captures
-        )
+    devices = _Devices.of(autopilot, exchange, options)
+    camera, manager = devices.camera, devices.manager
     files = options.firmware_files
     if files is None:
         files = ExtraFiles(autopilot.parameters)
     events = EventService(autopilot, exchange)
     clocks = Clocks()
-    mission = MissionExecution(autopilot, exchange, camera)
+    mission = MissionExecution(autopilot, exchange, camera, manager, devices.gripper)
     others: dict[int, AutopilotSource] = {
         mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
         mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: lambda autopilot: hil_state_quaternion(
@@ -95,14 +141,14 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         MissionService(autopilot, exchange, mission),
         mission,
         *((ShellService(autopilot, exchange),) if options.shell else ()),
-        *((camera,) if camera is not None else ()),
+        *devices.services,
         # The others have no `update`.
         ConnectionService(autopilot, exchange, clocks),
         ExternalPoseService(autopilot, exchange, clocks),
         AutopilotTelemetry(autopilot, state_messages),
         OffboardService(autopilot, exchange),
         ManualControlService(autopilot, exchange),
-        FlightCommands(autopilot),
+        FlightCommands(autopilot) if manager is None else FlightCommands(autopilot, manager.look_at),
         MaintenanceCommands(autopilot, options.failures),
         MetadataService(autopilot, exchange),
         RemoteIdService(autopilot, exchange),
@@ -112,17 +158,14 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         merged(service.sources for service in services),
         merged(service.replies for service in services),
     )
-    own = [service for service in (streams, *services) if service is not camera]
+    own = [service for service in (streams, *services) if service.component_id == AUTOPILOT_COMPONENT_ID]
     commands = CommandService(
         exchange,
         AUTOPILOT_COMPONENT_ID,
         merged(service.commands for service in own),
         lambda command: camera is None or not camera.takes_broadcast(command),
     )
-    if camera is None:
-        return (streams, *services, commands)
-    camera_commands = CommandService(exchange, CAMERA_COMPONENT_ID, camera.commands, camera.takes_broadcast)
-    return (streams, *services, commands, camera_commands)
+    return (streams, *services, commands, *devices.command_services(exchange))
 
 
 class MavlinkNode:
@@ -151,6 +194,8 @@ class MavlinkNode:
         component_ids = {AUTOPILOT_COMPONENT_ID}
         if options.camera is not None:
             component_ids.add(CAMERA_COMPONENT_ID)
+        if options.gimbal is not None:
+            component_ids.add(GIMBAL_COMPONENT_ID)
         signing = Signing(options.signing_key, options.boot_unix_us)
         self._autopilot = autopilot
         self._exchange = Exchange(options.system_id, frozenset(component_ids), signing, options.boot_unix_us)

@@ -27,17 +27,23 @@ _CAMERA = frozenset(
         Do.VIDEO_STOP_CAPTURE,
     }
 )
-_ABSENT = frozenset({Do.GRIPPER, Do.WINCH, Do.SET_ACTUATOR, Do.OBLIQUE_SURVEY, Do.VTOL_TRANSITION})
-_REGIONS = frozenset({Do.NAV_ROI, Do.SET_ROI, Do.SET_ROI_LOCATION, Do.SET_ROI_NONE, Do.SET_ROI_WPNEXT_OFFSET})
+_ABSENT = frozenset({Do.WINCH, Do.SET_ACTUATOR, Do.OBLIQUE_SURVEY, Do.VTOL_TRANSITION})
+_NO_PARAMS = (0.0,) * 7
+REGIONS = frozenset({Do.NAV_ROI, Do.SET_ROI, Do.SET_ROI_LOCATION, Do.SET_ROI_NONE, Do.SET_ROI_WPNEXT_OFFSET})
 
 
 class RegionOfInterest:
-    """The region to look at, by yawing the whole vehicle: there is no gimbal."""
+    """The region to look at, by yawing the whole vehicle; a gimbal looks at places too."""
 
     __slots__ = ("_offset_rad", "_place_ned_m", "_to_target")
 
     def __init__(self) -> None:
         self.release()
+
+    @property
+    def place_ned_m(self) -> Vec3 | None:
+        """The region if it is a place; None: it is not, or there is none."""
+        return self._place_ned_m
 
     def release(self) -> None:
         """Look along the path."""
@@ -96,15 +102,16 @@ class MissionActions:
     def perform(self, item: MissionItem, view: View) -> None:
         """Perform an item; one that only controls the order of items, such as a jump, does nothing."""
         command = item.command
-        if command in _REGIONS:
+        if command in REGIONS:
             self.region.change(item, view)
+            self._events.append(IssuedCommand(command, _NO_PARAMS, self.region.place_ned_m))
         elif command in _CAMERA:
             self.command_camera(item)
         elif command == Do.SET_CAM_TRIGG_DIST:
             self._start_by_distance(item, view.position_ned_m)
         elif command == Do.SET_CAM_TRIGG_INTERVAL:
             self._start_by_time(item)
-        elif command in (Do.SET_HOME, Do.ARM_DISARM):
+        elif command in (Do.SET_HOME, Do.ARM_DISARM, Do.GRIPPER):
             self._pass_on(item)
         elif command in _ABSENT:
             self.say(WARNING, f"Mission item {item.seq + 1} does nothing: no such device here")

@@ -95,7 +95,9 @@ class IssuedCommand:
     Attributes:
         command: MAV_CMD.
         params: params 1 to 7.
+        place_ned_m: of a region of interest.
     """
 
     command: int
     params: SevenParams
+    place_ned_m: Vec3 | None = None

@@ -20,6 +20,7 @@ from framerunner.commands import (
     with_faults,
     with_sensors,
 )
+from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
 from framerunner.commands.px4 import check_px4_flight, for_px4
 
 if TYPE_CHECKING:
@@ -106,22 +107,24 @@ def fly(
     pilot: _Pilot = None,
     drone_limits: _DroneLimits = None,
     response: _Response = None,
+    hardware: HardwareOptions = NONE,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
     monitor_link: _MonitorLink = None,
     lifeline: _Lifeline = False,
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
-    In lockstep there is no log, and a video only with --video. Exit code 0: completed, 1: flown but not
-    completed, 2: bad input.
+    A drone given by --drone is taken for a real one, unless it is `framerunner sim` or --simulated: it is
+    checked, and the operator holds G to arm; SPACE lands, SPACE again stops the motors. Exit code 0:
+    completed, 1: flown but not completed, 2: bad input or failed check.
 
     **Examples**
 
-        framerunner fly test-case-1
+        framerunner fly test-case-1 --monitor
 
         framerunner fly test-case-1 --lockstep --record --sensors mocap
 
-        framerunner fly test-case-1 --px4 ../PX4-Autopilot --speed 4
+        framerunner fly --dry-run --drone serial:///dev/ttyUSB0:57600 --camera 0
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
@@ -129,16 +132,18 @@ def fly(
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
     _check(drone, camera, speed, instance, lockstep=lockstep, px4=px4)
-    seed = _checked_seed(seed, monitor, lockstep, px4)
+    seed, procedure = _checked_seed(seed, monitor, lockstep, px4), hardware_of(hardware, drone)
+
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
 
     loaded = load_mission_with(mission, pilot)
-    chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep, px4=px4)
+    chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep, px4=px4)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, px4, camera_delay)
-    plan = _calibrated(plan, calibration, drone)
-    return _run(FlightSettings(plan, real_time, out, record, video, monitor, monitor_link), lifeline=lifeline)
+    plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
+    real_time = RealTimeSettings(drone, camera, api, speed, instance, px4, camera_delay, procedure)
+    ends = (plan, None if lockstep else real_time, out, record, video, monitor, monitor_link)
+    return _run(FlightSettings(*ends), lifeline=lifeline)
 
 
 def _run(settings: FlightSettings, *, lifeline: bool) -> int:
@@ -153,6 +158,7 @@ def _scenario(
     name: str,
     sensors: str | None,
     fault: tuple[str, ...],
+    hardware: HardwareOptions,
     *,
     starts: bool,
     lockstep: bool,
@@ -165,7 +171,8 @@ def _scenario(
         raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
     if fault and not starts:
         raise SettingError("--fault: is for a simulated drone that is started; leave it out with --drone")
-    scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
+    loaded = with_dry_limit(load_scenario(name), hardware)
+    scenario = with_faults(with_sensors(loaded, sensors), fault)
     failing = next((each for each in scenario.faults if each.part == "link"), None)
     if failing is not None and starts and not lockstep:
         raise SettingError(

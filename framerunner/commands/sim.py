@@ -52,7 +52,7 @@ class Onboard:
         bool,
         Parameter(
             negative="--no-camera",
-            help="announce the camera over MAVLink, as a separate component, and take photos",
+            help="announce the camera over MAVLink, as a separate component, take photos, record video",
         ),
     ] = True
 
@@ -162,7 +162,7 @@ def sim(
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8100/.
 
-    Stop it with Ctrl-C.
+    Its devices, such as the camera, are also on UDP 14030. Stop it with Ctrl-C.
 
     **Examples**
 

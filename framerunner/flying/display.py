@@ -15,7 +15,8 @@ from rich.table import Table
 
 from framerunner.flying.judges import Judge
 from framerunner.runs.recorder import FlightRecorder
-from offboard.app import Moment
+from offboard.app import MissionEnd, Moment
+from offboard.safety.operator import GO_WORDS
 from scenarios.result import FlightResult, RefereeSnapshot
 from vision.types import Detection
 
@@ -101,7 +102,8 @@ def moment_table(title: str, moment: Moment, time: str) -> Table:
     if moment.paused:
         table.add_row("[yellow]paused[/]", escape(pause_in_words(moment).removeprefix("paused: ")))
     elif moment.remark:
-        table.add_row("[yellow]limited[/]", escape(moment.remark))
+        waits = moment.remark.startswith(GO_WORDS)
+        table.add_row(f"[yellow]{'waiting' if waits else 'limited'}[/]", escape(moment.remark))
     table.add_row("time", time)
     table.add_row("drone", f"{place_in_words(moment)}  {escape(moment.state.mode)}")
     for colour in ("red", "green", "blue"):
@@ -189,6 +191,15 @@ def _faults_in_words(result: FlightResult) -> str:
     if result.fault_outcome:
         parts.append(f"{result.fault_outcome} ({result.fault_expected})")
     return "; ".join(parts)
+
+
+def dry_run_line(end: MissionEnd) -> str:
+    """How a dry run ended, in a line for people."""
+    how = f"aborted: {end.reason}" if end.ended == "aborted" else "done"
+    return (
+        f"dry run {how}; the mission ran for {end.flight_time_s:.1f} s in {end.ticks} ticks, last "
+        f"in {end.mission_state}; nothing was armed"
+    )
 
 
 def result_lines(result: FlightResult) -> str:

@@ -19,6 +19,7 @@ from framerunner.runs.track import Track, TrackRecorder
 from offboard.app import MissionEnd, Moment, Observer, TickHook, fly_mission
 from offboard.drone import Drone
 from offboard.perception import Perception
+from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.faults.outcome import fault_fields
 from scenarios.result import FlightResult, RefereeReport
 
@@ -44,6 +45,7 @@ async def fly(
     run: Run | None = None,
     measured: Callable[[], Mapping[str, Any]] = dict,
     before_tick: TickHook | None = None,
+    safety: SafetyRules = SIMULATED,
 ) -> FinishedFlight:
     """Fly a plan's mission from connecting to the verdict.
 
@@ -56,14 +58,14 @@ async def fly(
         run: awaits the flight itself, without the judgement; for what must be done around it.
         measured: called at the end; further fields of the result, such as `timing`.
         before_tick: awaited before each tick of the mission; it may wait only in lockstep.
+        safety: the operator, and what the drone does when the flight is aborted.
 
     Raises:
         DroneError: the drone cannot be reached or made ready.
         CameraLostError: the camera gives no image at the start.
         ValueError: the plan has no mission.
     """
-    recorder = TrackRecorder()
-    causes = CauseWatch()
+    recorder, causes = TrackRecorder(), CauseWatch()
     watching = (recorder.see, causes.see, *observers, judge.see)
 
     def observe(moment: Moment) -> None:
@@ -71,27 +73,26 @@ async def fly(
             see(moment)
 
     flight = fly_mission(
-        drone,
-        perception,
-        plan.chart,
+        *(drone, perception, plan.chart),
         limit_s=plan.limit_s,
         observer=observe,
         box=plan.box,
         limits=plan.command_limits,
         surroundings=plan.surroundings,
         before_tick=before_tick,
+        safety=safety,
     )
     outcome = await (flight if run is None else run(flight))
-    report = await judge.report(
-        outcome.mission_state, None if outcome.ended == "finished" else outcome.reason
-    )
+    why = None if outcome.ended == "finished" else outcome.reason
+    report = await judge.report(outcome.mission_state, why)
     standing = await judge.standing()
     began_us = None if standing is None else standing.began_us
     track = recorder.track(began_us)
     cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
     failed = fault_fields(await judge.faults(), report, plan.scenario.sensors)
-    more = {**failed, **measured()}
-    result = _result(plan, report, outcome, track, cause=cause, judged_by=judge.source, measured=more)
+    result = _result(
+        plan, report, outcome, track, cause=cause, judged_by=judge.source, measured={**failed, **measured()}
+    )
     return FinishedFlight(result, outcome, track)
 
 

@@ -22,6 +22,8 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import LateResponse
 from offboard.app import Moment, Observer, TickHook
 from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraSilentError, ImageChoice
+from offboard.safety.caps import CapKeeper
+from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.models import Scenario, TrueState
 from scenarios.result import FaultFacts, RefereeReport, RefereeSnapshot
 from sitl.camera import CameraFeed, Exposure
@@ -54,6 +56,7 @@ async def lockstep_flight(
     on_image: ImageObserver | None = None,
     truth_observers: Sequence[TruthObserver] = (),
     before_tick: TickHook | None = None,
+    safety: SafetyRules = SIMULATED,
 ) -> FinishedFlight:
     """Fly a plan as fast as the machine can; its seed is of wind and of what else is random.
 
@@ -63,6 +66,7 @@ async def lockstep_flight(
         on_image: called with each image.
         truth_observers: called with the true state of every control tick; must be quick.
         before_tick: awaited before each tick, while simulated time stands still; see `RunControl`.
+        safety: the operator, and what the drone does when the flight is aborted.
 
     Raises:
         DroneError: the drone does not get ready.
@@ -78,6 +82,7 @@ async def lockstep_flight(
         observers,
         measured=lambda: {"state_sha256": states.hexdigest()},
         before_tick=before_tick,
+        safety=safety,
     )
 
 
@@ -103,6 +108,7 @@ class LockstepVehicle:
             plan.start_pose,
             observers=(*observers, self.perception.follow),
             response=None if plan.response is None else LateResponse(plan.response, plan.seed or 0),
+            caps=None if plan.caps is None else CapKeeper(plan.caps, plan.box),
         )
 
 

@@ -27,6 +27,7 @@ from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Vec3
 from offboard.arming import Arming
 from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.safety.caps import CapKeeper
 from scenarios.models import TrueState
 from sitl.simulation import Simulation
 
@@ -67,6 +68,7 @@ class LockstepDrone:
         observers: called with the true state of every control tick.
         telemetry_delay_us: see `TELEMETRY_DELAY_US`; ValueError if not below the 50 ms between ticks.
         response: the vehicle answers late; None: as its autopilot does.
+        caps: applied to each command; None: there are none.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class LockstepDrone:
         observers: Sequence[TruthObserver] = (),
         telemetry_delay_us: int = TELEMETRY_DELAY_US,
         response: LateResponse | None = None,
+        caps: CapKeeper | None = None,
     ) -> None:
         if not 0 <= telemetry_delay_us < TICK_US:
             raise ValueError(f"telemetry_delay_us {telemetry_delay_us}: must be from 0 to below {TICK_US}")
@@ -86,6 +89,8 @@ class LockstepDrone:
         self._observers = tuple(observers)
         self._delay_us = telemetry_delay_us
         self._response = response
+        self._caps = caps
+        self._latest: DroneState | None = None
         self._alignment: Alignment | None = None
         self._heartbeat_us = 0
         self._position_us = POSITION_PHASE_US
@@ -153,6 +158,7 @@ class LockstepDrone:
                 else "the vehicle was disarmed by others"
             )
             raise DroneError(what + _vehicle_texts(self._autopilot))
+        self._latest = state
         return state
 
     async def motors_on(self, *, confirmed: bool = True) -> None:
@@ -199,14 +205,19 @@ class LockstepDrone:
             answer = self._autopilot.set_mode(FlightMode.HOLD)
             self._confirm("hold", answer, lambda: self._mode is FlightMode.HOLD)
 
-    async def refuse(self) -> None:
-        """As `hold`: no pilot takes this drone, so none gives it back."""
-        await self.hold()
+    async def land_now(self, *, demanded: bool = False) -> None:
+        """Stop commanding and land, unless a failsafe has the vehicle; see `Drone.land_now`."""
+        self._stop_commanding()
+        if self._mode in (FlightMode.OFFBOARD, FlightMode.LAND) or demanded:
+            await self.land()
+
+    refuse = hold  # no pilot takes this drone, so none gives it back
 
     def command(self, command: VelocityCommand) -> None:
         """Set the velocity to fly from now on. Without motors on it is ignored."""
-        if self._commanding:
-            self._send(command)
+        if not self._commanding:
+            return
+        self._send(command if self._caps is None else self._caps.limit(command, self._latest))
 
     async def close(self) -> None:
         """Stop commanding."""
@@ -305,6 +316,10 @@ class LockstepDrone:
         yaw_rad = _received_angle(state.yaw_rad)
         pose = alignment.pose(Pose(self._position_ned_m, yaw_rad))
         roll_rad, pitch_rad = _received_angle(state.roll_rad), _received_angle(state.pitch_rad)
+        gimbal, camera_attitude = self._simulation.gimbal, None
+        if gimbal is not None:
+            camera_ned = quaternion_from_euler(0.0, gimbal.pitch_rad, yaw_rad + gimbal.yaw_rad)
+            camera_attitude = alignment.attitude(camera_ned)
         return DroneState(
             state.time_us,
             *pose.position_m,
@@ -316,6 +331,7 @@ class LockstepDrone:
             self._autopilot.status.landed_state is LandedState.ON_GROUND,
             (state.time_us - self._sent_position_us) * 1e-6,
             alignment.attitude(quaternion_from_euler(roll_rad, pitch_rad, yaw_rad)),
+            camera_attitude,
         )
 
 

@@ -11,6 +11,7 @@ from framerunner.flying.response import Response
 from offboard.keep_in_box import Box, flight_box
 from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.surroundings import Surroundings
+from offboard.safety.caps import Caps
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Camera, Scenario, start_position
 from scenarios.part import Part
@@ -39,6 +40,7 @@ class FlightPlan:
         drone_limits: of a real drone, for a mission of the class `open`; None: those of the airframe.
         response: how late the simulated vehicle of a lockstep flight answers; None: as its autopilot does.
         calibration: of a real camera; None: it is the scenario's.
+        caps: on the speed and the height of the drone, whatever the mission asks; None: there are none.
     """
 
     scenario: Scenario
@@ -48,6 +50,7 @@ class FlightPlan:
     drone_limits: CommandLimits | None = None
     response: Response | None = None
     calibration: Calibration | None = None
+    caps: Caps | None = None
 
     @property
     def chart(self) -> Mission:
@@ -55,6 +58,11 @@ class FlightPlan:
         if self.mission is None:
             raise ValueError("the plan has no mission to be flown")
         return self.mission
+
+    @property
+    def title(self) -> str:
+        """Scenario and mission, for people."""
+        return f"{self.scenario.name}: {self.chart.name}"
 
     @cached_property
     def airframe(self) -> Airframe:
@@ -111,7 +119,8 @@ class FlightPlan:
     @property
     def box(self) -> Box:
         """The space that the drone is kept in, whatever its mission commands."""
-        return flight_box(self.scenario, self.lift_m)
+        box = flight_box(self.scenario, self.lift_m)
+        return box if self.caps is None else self.caps.box(box, self.start_pose[2])
 
     @property
     def command_limits(self) -> CommandLimits:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Coroutine
 from contextlib import AsyncExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from framerunner.flying.timing import flight_timing
 from framerunner.runs.recorder import RecordingCamera, RunRecords
 from framerunner.runs.run_folder import warn
 from offboard.app import MissionEnd
+from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.result import Timing
 from vision.types import CameraFrame
 from wire.simulator_api import SimulatorApi
@@ -23,6 +24,7 @@ if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow t
     from framerunner.flying.judges import Judge
     from framerunner.flying.mission_reporter import MissionReporter
     from framerunner.flying.simulator_process import SitlProcess
+    from framerunner.preflight.settings import HardwareSettings
     from offboard.link.companion import Companion
     from offboard.mavsdk_drone import MavsdkDrone
     from offboard.perception import CameraPerception
@@ -39,6 +41,7 @@ class RealTimeSettings:
     instance: int = 0  # of the simulator that is started: shifts its ports
     px4: Path | None = None  # folder of a PX4 that flies in the simulator that is started; None: our own does
     camera_delay_s: float = 0.1  # age of an image on arrival, for a camera that sends no time stamps
+    hardware: HardwareSettings | None = None  # of a drone that may be a real one; None: it is simulated
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,19 +89,20 @@ async def fly_in_real_time(
         vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
         named = settings.simulator is not None
         judge, plan = await choose_judge(plan, vehicle.api, session, named=named)
+        plan, safety = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)
         source = records.folder.mission.read_text(encoding="utf-8")
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
-        drone = _drone(plan, vehicle, records, stack, companion)
+        dry_run = settings.hardware is not None and settings.hardware.dry_run
+        drone = _drone(plan, vehicle, records, stack, companion, dry_run=dry_run)
         camera = await _camera(plan, vehicle, records, stack, reporter)
         perception = _perception(plan, vehicle, judge, camera)
         perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
         if clock is not None:
             clock.wait_for_images_of(perception)
-        title = f"{plan.scenario.name}: {plan.chart.name}"
-        display = FlightDisplay(title, plan.limit_s, records.recorder, judge)
+        display = FlightDisplay(plan.title, plan.limit_s, records.recorder, judge)
 
         async def run(flight: Coroutine[Any, Any, MissionEnd]) -> MissionEnd:
             async with display:
@@ -113,9 +117,41 @@ async def fly_in_real_time(
             return {"timing": flight_timing(drone, perception, clock, factor, settings.speed, fused=fused)}
 
         what = (plan, drone, perception, judge, (records.see, reporter.see))
-        flown = await fly(*what, run=run, measured=timing, before_tick=reporter.look)
+        flown = await fly(*what, run=run, measured=timing, before_tick=reporter.look, safety=safety)
         await reporter.send_result(records.complete(flown.result))
     return flown
+
+
+async def _safety(
+    plan: FlightPlan, settings: RealTimeSettings, records: RunRecords, stack: AsyncExitStack
+) -> tuple[FlightPlan, SafetyRules]:
+    """Let a drone that may be a real one be checked, and read its operator's keys until the flight's end.
+
+    A drone that says that it is framerunner's simulated one needs neither, nor caps that nobody asked for.
+    """
+    hardware, drone_url = settings.hardware, settings.drone_url
+    if hardware is None or drone_url is None:
+        return plan, SIMULATED
+    from framerunner.preflight.prepare import is_own_simulator
+
+    if hardware.asks_nothing and await is_own_simulator(drone_url):
+        return replace(plan, caps=plan.caps if hardware.capped else None), SIMULATED
+    from framerunner.preflight.keys import TerminalKeys
+    from framerunner.preflight.prepare import prepare
+    from framerunner.preflight.run import PreflightSettings
+
+    checks = PreflightSettings(
+        drone_url,
+        settings.camera_url,
+        settings.camera_delay_s,
+        set_parameters=hardware.set_parameters,
+        accepted=hardware.accepted,
+        folder=records.folder.path,
+    )
+    safety = await prepare(plan, checks, hardware)
+    if safety.operator is not None:
+        await stack.enter_async_context(TerminalKeys(safety.operator))
+    return plan, safety
 
 
 async def _vehicle(
@@ -144,18 +180,26 @@ async def _vehicle(
 
 
 def _drone(
-    plan: FlightPlan, vehicle: _Endpoints, records: RunRecords, stack: AsyncExitStack, companion: Companion
+    plan: FlightPlan,
+    vehicle: _Endpoints,
+    records: RunRecords,
+    stack: AsyncExitStack,
+    companion: Companion,
+    *,
+    dry_run: bool,
 ) -> MavsdkDrone:
-    """The drone on its link, which is closed with the stack."""
+    """The drone on its link, which is closed with the stack; in a dry run it is never armed."""
+    from offboard.dry_run import DryRunDrone
     from offboard.mavsdk_drone import MavsdkDrone
 
     hang_report = stack.enter_context(records.folder.hang_report.open("w", encoding="utf-8"))
-    drone = MavsdkDrone(
+    drone = (DryRunDrone if dry_run else MavsdkDrone)(
         vehicle.drone_url,
         start_arena=plan.start_pose,
         hang_report=hang_report,
         box=plan.box,
         corrects=plan.corrects_commands,
+        caps=plan.caps,
     )
     drone.record_to(records.folder.tlog)
     stack.callback(lambda: warn(drone.recording_problem))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from framerunner.flying.display import LockstepProgress, result_lines
+from framerunner.flying.display import LockstepProgress, dry_run_line, result_lines
 from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
@@ -89,10 +89,15 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
     finally:
         folder.remove_if_empty()
     late = "" if result.timing is None else result.timing.words
-    lines = [result_lines(result), *([late] if late else []), *left_lines(folder, result)]
+    hardware = None if settings.real_time is None else settings.real_time.hardware
+    is_dry = hardware is not None and hardware.dry_run
+    told = dry_run_line(flown.outcome) if is_dry else result_lines(result)
+    lines = [told, *([late] if late else []), *left_lines(folder, result)]
     print("\n".join(lines), flush=True)
     if flown.outcome.interrupted:
         return _INTERRUPTED_CODE
+    if is_dry:
+        return 1 if flown.outcome.ended == "aborted" else 0
     return 0 if result.completed else 1
 
 

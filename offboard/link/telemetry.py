@@ -23,9 +23,11 @@ from typing import Any, Protocol
 
 from mavsdk.asyncio import MavsdkError
 
-from geometry.vectors import Vec3
+from geometry.rotations import quaternion_from_euler
+from geometry.vectors import Quaternion, Vec3
 from offboard.arming import Arming
 from offboard.drone import VelocityCommand
+from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
 from wire.dialect import AUTOPILOT_COMPONENT_ID
 from wire.mission_tunnel import TEXT_PREFIX
 from wire.vehicle_telemetry import MessageOrder
@@ -53,6 +55,17 @@ class Sample:
     position_us: int = 0  # of position and velocity, microseconds since boot
     roll_rad: float = 0.0  # with `yaw_ned_rad` the attitude: Euler angles Z-Y-X, body FRD to NED
     pitch_rad: float = 0.0
+    gimbal: GimbalAttitude | None = None  # latest by then
+
+    @property
+    def attitude_ned(self) -> Quaternion:
+        """Body FRD to NED."""
+        return quaternion_from_euler(self.roll_rad, self.pitch_rad, self.yaw_ned_rad)
+
+    @property
+    def camera_attitude_ned(self) -> Quaternion | None:
+        """Of a camera on a gimbal; None: there is none."""
+        return None if self.gimbal is None else self.gimbal.ned(self.yaw_ned_rad)
 
 
 class TelemetryFeed:
@@ -70,6 +83,7 @@ class TelemetryFeed:
         self.position_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self.velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self.position_us = 0
+        self._gimbal = GimbalFeed()
         self.arming = Arming()  # with the heartbeats
         self.mode = ""  # name of the flight mode, such as "OFFBOARD"
         self.landed = True  # from EXTENDED_SYS_STATE
@@ -103,6 +117,7 @@ class TelemetryFeed:
         self._loop = asyncio.get_running_loop()
         plugin.subscribe_attitude_euler(self._on_attitude)
         direct.subscribe_message("LOCAL_POSITION_NED", self._on_position)
+        self._gimbal.subscribe(direct)
         plugin.subscribe_armed(self._on_armed)
         if numbered_modes:
             direct.subscribe_message("HEARTBEAT", partial(_take_mode, self, numbered_modes))
@@ -211,6 +226,7 @@ class TelemetryFeed:
                 self.position_us,
                 radians(euler.roll_deg),
                 radians(euler.pitch_deg),
+                self._gimbal.newest,
             )
             self._samples.append(self.sample)
             self._wake()

@@ -1,4 +1,4 @@
-"""Where a point of the arena is in the image: a pinhole camera, fixed to the drone, without tilt."""
+"""Where a point of the arena is in the image of a pinhole camera, fixed to the drone or on a gimbal."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ class CameraModel:
         half_height_px: to its upper and lower edges.
         position_flu_m: of the camera on the drone: forward, left, up.
         readout_s: of a rolling shutter, from the first to the last row; an image's time is the middle.
+        on_gimbal: whether a gimbal carries it; its attitude is reported then.
     """
 
     focal_px: float
@@ -30,6 +31,7 @@ class CameraModel:
     half_height_px: float
     position_flu_m: Vec3
     readout_s: float = 0.0
+    on_gimbal: bool = False
 
     @classmethod
     def of(cls, camera: Camera) -> Self:
@@ -37,7 +39,8 @@ class CameraModel:
         half_width_px = camera.width_px / 2
         focal_px = half_width_px / tan(camera.horizontal_fov_rad / 2)
         readout_s = 0.0 if camera.effects is None else camera.effects.readout_s
-        return cls(focal_px, half_width_px, camera.height_px / 2, camera.position_flu_m, readout_s)
+        half_height_px, place, gimbal = camera.height_px / 2, camera.position_flu_m, camera.gimbal
+        return cls(focal_px, half_width_px, half_height_px, place, readout_s, gimbal is not None)
 
     def read_after_s(self, down_px: float) -> float:
         """How long after the time of an image a row is read out; before it if negative."""
@@ -49,6 +52,15 @@ class CameraModel:
         turn = rotation(attitude_arena)
         x, y, z = to_world(turn, *self.position_flu_m)
         return CameraPose((drone_m[0] + x, drone_m[1] + y, drone_m[2] + z), turn)
+
+    def carrier(self, drone_m: Vec3, attitude_arena: Quaternion, camera_attitude_arena: Quaternion) -> Vec3:
+        """The centre of a drone that, with the attitude of a camera on a gimbal, has the camera at its place.
+
+        With it and the camera's attitude, what holds for a fixed camera holds for one on a gimbal.
+        """
+        eye_m = self.pose(drone_m, attitude_arena).position_m
+        x, y, z = to_world(rotation(camera_attitude_arena), *self.position_flu_m)
+        return (eye_m[0] - x, eye_m[1] - y, eye_m[2] - z)
 
     def project(self, pose: CameraPose, point_m: Vec3) -> tuple[float, float] | None:
         """Pixels right of and below the optical axis, of a point in the arena; None if not before the camera.

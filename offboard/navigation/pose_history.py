@@ -10,6 +10,7 @@ from typing import Generic, TypeVar
 from geometry.rotations import interpolated
 from geometry.vectors import Quaternion, Vec3
 from offboard.drone import DroneState
+from offboard.navigation.camera_model import CameraModel
 
 KEPT_US = 2_000_000
 EXTRAPOLATED_US = 100_000  # how far before the first and after the last sample a pose is still given
@@ -71,9 +72,15 @@ class PoseHistory:
     """The last two seconds of the drone's motion.
 
     Positions and attitudes are reported with times of their own, so they are kept apart.
+
+    Args:
+        camera: if it is on a gimbal, poses are those of a drone to which it would be fixed (`carrier`); None:
+            it is not.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, camera: CameraModel | None = None) -> None:
+        self._camera = camera if camera is not None and camera.on_gimbal else None
+        self._camera_attitudes: _Samples[Quaternion] = _Samples()
         self._positions: _Samples[tuple[Vec3, Vec3]] = _Samples()  # metres; velocity, metres a second
         self._attitudes: _Samples[Quaternion] = _Samples()
 
@@ -82,13 +89,21 @@ class PoseHistory:
         position_us = state.time_us - round(state.position_age_s * 1e6)
         self._positions.add(position_us, ((state.x, state.y, state.z), state.velocity_arena_m_s))
         self._attitudes.add(state.time_us, state.attitude_arena)
+        if self._camera is not None and state.camera_attitude_arena is not None:
+            self._camera_attitudes.add(state.time_us, state.camera_attitude_arena)
 
     def at(self, time_us: int) -> DronePose | None:
         """The pose at a vehicle time; None if the states around it are missing."""
         position = self._position_at(time_us)
-        attitude = self._attitude_at(time_us)
+        attitude = self._attitude_at(self._attitudes, time_us)
         if position is None or attitude is None:
             return None
+        if self._camera is not None:
+            turned = self._attitude_at(self._camera_attitudes, time_us)
+            if turned is None:
+                return None
+            carrier_m = self._camera.carrier(position[0], attitude[0], turned[0])
+            return DronePose(time_us, carrier_m, turned[0], position[1], turned[1])
         return DronePose(time_us, position[0], attitude[0], position[1], attitude[1])
 
     def _position_at(self, time_us: int) -> tuple[Vec3, float] | None:
@@ -116,9 +131,9 @@ class PoseHistory:
         )
         return (x, y, z), POSITION_STD_M + JITTER_S * hypot(*v1)
 
-    def _attitude_at(self, time_us: int) -> tuple[Quaternion, float] | None:
+    def _attitude_at(self, known: _Samples[Quaternion], time_us: int) -> tuple[Quaternion, float] | None:
         """Attitude and its standard deviation, radians; the last turn goes on at the ends."""
-        times, samples = self._attitudes.times_us, self._attitudes.values
+        times, samples = known.times_us, known.values
         place = bisect_left(times, time_us)
         if not times:
             return None

@@ -39,7 +39,7 @@ class WorldModel:
     def __init__(self, surroundings: Surroundings, style: FlightStyle) -> None:
         camera = self._camera = CameraModel.of(surroundings.camera)
         self._surroundings = surroundings
-        self._history = PoseHistory()
+        self._history = PoseHistory(camera)
         self._map = FrameMap(camera, surroundings.arena)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
         self.seen_space = SeenSpace(camera, surroundings.arena)

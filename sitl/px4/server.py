@@ -17,7 +17,7 @@ from sitl.streaming.drone_video import DroneVideo
 from sitl.time_grants import FREE_US, TimeGrants
 from sitl.world import CONTROL_PERIOD_US
 
-_FALL_US = 5_000_000  # for which a drone without its autopilot is simulated on
+_FALL_US = 3_000_000  # for which a drone without its autopilot is simulated on
 _SETPOINT_S = 0.002  # wall time in which PX4 takes a setpoint that was sent before time was granted
 _RESTART_S = 1.0  # before a PX4 that has ended is started again
 
@@ -181,7 +181,7 @@ class Px4Server:
             await asyncio.sleep(_SETPOINT_S)
 
     async def _fall(self, link: Px4Link) -> None:
-        """Simulate on without an autopilot, until a new PX4 connects or five seconds have passed."""
+        """Simulate on without an autopilot, until a new PX4 connects or three seconds have passed."""
         simulation = self._simulation
         pacer = Pacer(self._settings.speed, time.monotonic(), simulation.time_us)
         end_us = simulation.time_us + _FALL_US

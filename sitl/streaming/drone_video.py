@@ -29,10 +29,12 @@ class DroneVideo:
 
     Attributes:
         image_us: time of exposure of the image that was sent last; negative before the first.
+        sends_rtp: images are sent as RTP, if that was set up.
     """
 
     def __init__(self, simulation: SimulatedVehicle, settings: ServerSettings) -> None:
         self.image_us = -1
+        self.sends_rtp = True
         self._simulation, self._settings = simulation, settings
         self._camera: CameraFeed | FaultyFeed | None = None
         self._video: VideoServer | None = None
@@ -87,7 +89,7 @@ class DroneVideo:
         time_us, image = arrived
         self.image_us = time_us
         self._video.publish(image, time_us)
-        if self._rtp is not None:
+        if self._rtp is not None and self.sends_rtp:
             self._rtp.send(image, time_us)
         return image
 

@@ -12,6 +12,7 @@ import asyncio
 import heapq
 import json
 import selectors
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import degrees, inf, radians
 from random import Random
@@ -23,12 +24,14 @@ from firmware_py.offboard_requests import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flying.plan import FlightPlan
 from offboard.app import MissionEnd, Moment, fly_mission
-from offboard.keep_in_box import Box, flight_box
+from offboard.keep_in_box import Box
 from offboard.link.commands import SetpointStream
 from offboard.link.telemetry import TelemetryFeed, TickSource
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
 from offboard.perception import CameraPerception
+from offboard.safety.caps import Caps
+from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.models import Scenario, TrueState
 from sitl.camera import CameraFeed
 from sitl.simulation import Simulation
@@ -39,7 +42,7 @@ HEARTBEAT_US = 1_000_000
 SETPOINT_US = 50_000
 LATENCY_US = 2_000
 OVERTAKEN_BY_US = 8_000
-AFTER_US = 2_500_000
+AFTER_S = 2.5
 
 
 @dataclass(frozen=True)
@@ -109,9 +112,12 @@ class LinkedVehicle:
         self.down = Direction(impairment, Random(f"down {seed}"))
         self.up = Direction(impairment, Random(f"up {seed}"))
         self.video = Direction(impairment, Random(f"video {seed}"))
+        self.beats = Direction(impairment, Random(f"beats {seed}"))  # the app's heartbeats
+        self.app: asyncio.Task[MissionEnd] | None = None
         self.telemetry, self.direct = Callbacks(), Callbacks()
         self.offboard = Offboard(self)
         self.images: asyncio.Queue[CameraFrame] = asyncio.Queue()
+        self.events: list[tuple[float, Callable[[LinkedVehicle], None]]] = []
         self._camera = CameraFeed(scenario)
         self._telemetry_us = self._heartbeat_us = 0
 
@@ -135,8 +141,11 @@ class LinkedVehicle:
         if now_us >= self._heartbeat_us:
             self._heartbeat_us += HEARTBEAT_US
             self._tell_condition(now_us)
+            self.beats.send(now_us, self.autopilot.ground_station_heard)
         self.offboard.update(now_us)
-        for way in (self.up, self.down, self.video):
+        while self.events and self.events[0][0] <= now_us / 1e6:
+            self.events.pop(0)[1](self)
+        for way in (self.up, self.down, self.video, self.beats):
             way.deliver(now_us)
 
     def _tell_motion(self, now_us):
@@ -255,8 +264,9 @@ class Offboard:
 class LinkedDrone(MavsdkDrone):
     """The adapter with the simulated link in place of MAVSDK's."""
 
-    def __init__(self, vehicle: LinkedVehicle, scenario: Scenario, box: Box | None):
-        super().__init__("udpin://127.0.0.1:14540", start_arena=FlightPlan(scenario).start_pose, box=box)
+    def __init__(self, vehicle: LinkedVehicle, scenario: Scenario, box: Box | None, caps: Caps | None):
+        start = FlightPlan(scenario).start_pose
+        super().__init__("udpin://127.0.0.1:14540", start_arena=start, box=box, caps=caps)
         self._vehicle = vehicle
         self._feed = TelemetryFeed(vehicle.time_s)
         self._ticks = TickSource(self._feed)
@@ -366,25 +376,58 @@ class LinkedFlight:
 
 
 def fly_over(
-    impairment: Impairment, scenario: Scenario, mission: Mission, *, seed: int = 0, boxed: bool = True
+    impairment: Impairment,
+    scenario: Scenario,
+    mission: Mission,
+    *,
+    seed: int = 0,
+    boxed: bool = True,
+    safety: SafetyRules = SIMULATED,
+    caps: Caps | None = None,
+    events: Sequence[tuple[float, Callable[[LinkedVehicle], None]]] = (),
+    parameters: Mapping[str, float] | None = None,
+    after_s: float = AFTER_S,
 ) -> LinkedFlight:
-    """Fly a mission over a bad link."""
+    """Fly a mission over a bad link.
+
+    Args:
+        impairment: of the link.
+        scenario: that is flown.
+        mission: that flies it.
+        seed: of the link.
+        boxed: the app keeps the drone in its box.
+        safety: rules of the flight.
+        caps: on the commands.
+        events: what happens at times in seconds, in order.
+        parameters: of the vehicle, set before.
+        after_s: for which the vehicle is followed when the app has ended.
+    """
     vehicle = LinkedVehicle(scenario, impairment, seed)
-    box = flight_box(scenario)
+    vehicle.events.extend(events)
+    for name, value in (parameters or {}).items():
+        vehicle.autopilot.parameters.set(name, value)
+    box = FlightPlan(scenario, caps=caps).box
     moments: list[Moment] = []
 
     async def fly() -> MissionEnd:
         kept_in = box if boxed else None
-        drone = LinkedDrone(vehicle, scenario, kept_in)
+        vehicle.app = asyncio.current_task()
+        drone = LinkedDrone(vehicle, scenario, kept_in, caps)
         perception = CameraPerception(_Camera(vehicle))
         return await fly_mission(
-            drone, perception, mission, limit_s=scenario.try_limit_s, observer=moments.append, box=kept_in
+            drone,
+            perception,
+            mission,
+            limit_s=scenario.try_limit_s,
+            observer=moments.append,
+            box=kept_in,
+            safety=safety,
         )
 
     with asyncio.Runner(loop_factory=lambda: SimulatedTimeLoop(vehicle)) as runner:
         outcome = runner.run(fly())
     flown = len(vehicle.truths)
-    end_us = vehicle.time_us + AFTER_US
+    end_us = vehicle.time_us + after_s * 1e6
     while vehicle.time_us < end_us:
         vehicle.tick()
     status = vehicle.autopilot.status

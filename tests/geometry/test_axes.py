@@ -66,3 +66,9 @@ def test_a_local_frame_given_by_its_origin_is_placed_there(origin_arena):
     assert alignment.attitude((1.0, 0.0, 0.0, 0.0)) == pytest.approx(
         (cos(yaw_rad / 2), 0.0, 0.0, sin(yaw_rad / 2))
     )
+
+
+def test_an_arena_position_comes_back_from_the_vehicles_axes():
+    alignment = Alignment(Pose((1.0, -2.0, 0.5), 0.7), Pose((10.0, 20.0, -3.0), -2.1))
+    position = (3.0, 4.0, 1.5)
+    assert alignment.position(alignment.to_ned(position)) == pytest.approx(position)

@@ -91,6 +91,11 @@ class KinematicDrone:
         if self.hold_error:
             raise self.hold_error
 
+    async def land_now(self, *, demanded: bool = False) -> None:
+        self.calls.append("land_now demanded" if demanded else "land_now")
+        self.armed = False
+        self.z = self.base_m
+
     async def refuse(self) -> None:
         self.calls.append("refuse")
         self.pilot_mode = "HOLD"

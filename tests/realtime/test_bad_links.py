@@ -39,7 +39,7 @@ def test_a_flight_over_a_bad_link_ends_in_hold(tmp_path, instance, impairment, e
         with simulator(tmp_path, instance, *where):
             folder = tmp_path / "app"
             folder.mkdir()
-            urls = ("--drone", f"udpin://127.0.0.1:{app_port}", "--camera", camera(instance))
+            urls = ("--drone", f"udpin://127.0.0.1:{app_port}", "--camera", camera(instance), "--simulated")
             mission = ("--mission", "frame_challenge")
             with program(folder, "fly", str(scenario), *urls, *mission) as flight:
                 assert flight.process.wait(90.0) == 1, flight.err + flight.out

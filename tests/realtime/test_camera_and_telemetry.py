@@ -85,12 +85,22 @@ async def test_a_camera_is_listed_described_and_takes_pictures_that_can_be_fetch
     assert np.ptp(picture) > 50
 
 
-async def test_video_and_storage_are_told_and_what_is_not_there_is_refused(drone):
+async def test_video_is_recorded_and_storage_formatted_and_what_is_not_there_is_refused(drone):
     camera = drone.camera
     await first(camera.subscribe_camera_list(), lambda update: update.cameras)
-    for refused in (camera.start_video(CAMERA), camera.format_storage(CAMERA, 1)):
-        with pytest.raises(CameraError):
-            await refused
+    await camera.set_mode(CAMERA, Mode.VIDEO)
+    await camera.start_video(CAMERA)
+    await asyncio.sleep(1.0)
+    await camera.stop_video(CAMERA)
+    listed = await drone.ftp.list_directory("DCIM")
+    assert [entry.name for entry in listed.entries] != []
+    await camera.stop_video_streaming(CAMERA, 0)
+    await camera.start_video_streaming(CAMERA, 0)
+    await camera.format_storage(CAMERA, 0)
+    await camera.reset_settings(CAMERA)
+    assert "DCIM" not in [entry.name for entry in (await drone.ftp.list_directory("/")).entries]
+    with pytest.raises(CameraError):
+        await camera.zoom_in_start(CAMERA)
     stream = (await first(camera.subscribe_video_stream_info(), lambda update: update)).video_stream_info
     assert stream.settings.horizontal_resolution_pix == 320
     assert stream.settings.uri  # the preferred one's

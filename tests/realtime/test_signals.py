@@ -77,7 +77,7 @@ def test_a_drone_that_is_not_there_is_said_in_one_line(tmp_path):
     pictures.mkdir()
     cv2.imwrite(str(pictures / "1.png"), np.zeros((240, 320, 3), np.uint8))
     port = 14540 + free_instance()
-    arguments = ("--drone", f"udpin://127.0.0.1:{port}", "--camera", str(pictures))
+    arguments = ("--drone", f"udpin://127.0.0.1:{port}", "--camera", str(pictures), "--simulated")
     began_s = time.monotonic()
     with program(tmp_path, "fly", "test-case-1", *arguments) as running:
         assert running.process.wait(30.0) == 2

@@ -42,7 +42,8 @@ class Lens:
         axis_px = (calibration.cx_px, calibration.cy_px)
         self._axis_from_middle = (axis_px[0] - (width - 1) / 2, axis_px[1] - (height - 1) / 2)
         rays = rays_of_pixels(self.size_px, self._focals_px, axis_px, calibration.distortion)
-        self._table = (self.focal_px * rays).reshape(-1, 2)
+        # Complex numbers, right + i down, so that one look-up gives both.
+        self._table = (self.focal_px * rays).view(np.complex128).reshape(-1)
         self._limits = np.array([width - 2, height - 2])
 
     def check_size(self, width_px: int, height_px: int) -> None:
@@ -57,14 +58,17 @@ class Lens:
     def ideal(self, places: Floats) -> Floats:
         """Pixels of an ideal camera, for pixels of the image; both shape (..., 2), right and down."""
         at = places + self._middle
-        first = np.clip(np.floor(at).astype(np.intp), 0, self._limits)
+        first = np.minimum(np.maximum(at.astype(np.intp), 0), self._limits)
         share = at - first
-        index = first[..., 1] * self.size_px[0] + first[..., 0]
-        right, down = share[..., :1], share[..., 1:]
-        table, width = self._table, self.size_px[0]
-        above = table[index] * (1.0 - right) + table[index + 1] * right
-        below = table[index + width] * (1.0 - right) + table[index + width + 1] * right
-        corrected: Floats = above * (1.0 - down) + below * down
+        right, down = share[..., 0], share[..., 1]
+        columns = self.size_px[0]
+        index = first[..., 1] * columns + first[..., 0]
+        upper_left, upper_right, lower_left, lower_right = self._table.take(
+            index + np.array([0, 1, columns, columns + 1]).reshape(-1, *[1] * index.ndim)
+        )
+        above = upper_left + (upper_right - upper_left) * right
+        below = lower_left + (lower_right - lower_left) * right
+        corrected: Floats = (above + (below - above) * down)[..., None].view(np.float64)
         return corrected
 
     def seen(self, right_px: float, down_px: float) -> tuple[float, float]:

@@ -160,8 +160,15 @@ class OneClient:
         self._listener.close()
 
 
-def bind_udp(place: Address, advice: str) -> UdpSocket:
-    """A UDP socket that listens; `advice` is what to do when the port is taken."""
+def bind_udp(place: Address, advice: str, *, gives_way: bool = False) -> UdpSocket:
+    """A UDP socket that listens.
+
+    Args:
+        place: the local address.
+        advice: what to do when the port is taken.
+        gives_way: whether a program that binds the same address later, as MAVSDK does (SO_REUSEADDR),
+            receives instead of this one.
+    """
     with _explained(f"UDP {_name(place)} cannot be opened", advice):
         family, address = _local(place, socket.SOCK_DGRAM)
         opened = socket.socket(family, socket.SOCK_DGRAM)
@@ -170,6 +177,8 @@ def bind_udp(place: Address, advice: str) -> UdpSocket:
         except OSError:
             opened.close()
             raise
+        if gives_way:  # after binding, so that a port that is in use already is refused
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     return UdpSocket(opened)
 
 

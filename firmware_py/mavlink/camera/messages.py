@@ -11,7 +11,13 @@ from firmware_py.status import FlightMode
 from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres
 from wire.exchange import Exchange
 
-_FLAGS = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
+_STREAMS = mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+_RECORDS = (  # pictures are taken while video is recorded, and both in each mode
+    mavlink.CAMERA_CAP_FLAGS_CAPTURE_VIDEO
+    | mavlink.CAMERA_CAP_FLAGS_HAS_MODES
+    | mavlink.CAMERA_CAP_FLAGS_CAN_CAPTURE_IMAGE_IN_VIDEO_MODE
+    | mavlink.CAMERA_CAP_FLAGS_CAN_CAPTURE_VIDEO_IN_IMAGE_MODE
+)
 _RUNNING = mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING
 # MAVLink has no type for MJPEG over HTTP: the nearest is a stream over TCP of unknown encoding.
 _TYPES = {
@@ -38,10 +44,11 @@ def heartbeat(mode: FlightMode) -> Message:
     )
 
 
-def information(camera: CameraModel, *, streams: bool, time_us: int) -> Message:
-    """CAMERA_INFORMATION; `streams`: whether there is video."""
+def information(camera: CameraModel, *, streams: bool, records: bool, time_us: int) -> Message:
+    """CAMERA_INFORMATION; `streams`: whether there are video streams, `records`: whether it records video."""
     major, minor, patch = OWN_VERSION
-    flags = _FLAGS | (mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if streams else 0)
+    flags = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
+    flags |= (_STREAMS if streams else 0) | (_RECORDS if records else 0)
     return mavlink.MAVLink_camera_information_message(
         boot_ms(time_us),
         list(_padded(camera.vendor, _LABEL_BYTES)),
@@ -58,9 +65,9 @@ def information(camera: CameraModel, *, streams: bool, time_us: int) -> Message:
     )
 
 
-def settings(time_us: int) -> Message:
-    """CAMERA_SETTINGS: it takes images, and has neither zoom nor focus."""
-    return mavlink.MAVLink_camera_settings_message(boot_ms(time_us), mavlink.CAMERA_MODE_IMAGE, nan, nan)
+def settings(mode: int, time_us: int) -> Message:
+    """CAMERA_SETTINGS: the mode (CAMERA_MODE); there is neither zoom nor focus."""
+    return mavlink.MAVLink_camera_settings_message(boot_ms(time_us), mode, nan, nan)
 
 
 def storage_information(space: PictureSpace | None, time_us: int) -> Message:
@@ -81,16 +88,30 @@ def storage_information(space: PictureSpace | None, time_us: int) -> Message:
         0.0,
         mavlink.STORAGE_TYPE_OTHER,
         b"vehicle",
-        mavlink.STORAGE_USAGE_FLAG_SET | mavlink.STORAGE_USAGE_FLAG_PHOTO,
+        mavlink.STORAGE_USAGE_FLAG_SET | mavlink.STORAGE_USAGE_FLAG_PHOTO | mavlink.STORAGE_USAGE_FLAG_VIDEO,
     )
 
 
-def capture_status(interval_s: float, count: int, space: PictureSpace | None, time_us: int) -> Message:
-    """CAMERA_CAPTURE_STATUS: the present series' interval (0: none), pictures since boot, free storage."""
-    image_status = _INTERVAL_SET if interval_s > 0.0 else 0
-    free_mib = space.free_mib if space else 0.0
+def capture_status(
+    interval_s: float, count: int, recorded_us: int | None, space: PictureSpace | None, time_us: int
+) -> Message:
+    """CAMERA_CAPTURE_STATUS.
+
+    Args:
+        interval_s: of the present series of pictures; 0: none.
+        count: pictures since boot, or since the storage was formatted.
+        recorded_us: duration of the present recording; None: none.
+        space: storage.
+        time_us: vehicle time.
+    """
     return mavlink.MAVLink_camera_capture_status_message(
-        boot_ms(time_us), image_status, 0, interval_s, 0, free_mib, count
+        boot_ms(time_us),
+        _INTERVAL_SET if interval_s > 0.0 else 0,
+        0 if recorded_us is None else 1,
+        interval_s,
+        (recorded_us or 0) // 1000,
+        space.free_mib if space else 0.0,
+        count,
     )
 
 
@@ -113,29 +134,37 @@ def image_captured(autopilot: Autopilot, exchange: Exchange, index: int, url: st
     )
 
 
-def stream_information(stream: VideoStream, number: int, count: int) -> Message:
+def stream_information(stream: VideoStream, number: int, count: int, *, running: bool) -> Message:
     """VIDEO_STREAM_INFORMATION of one stream, numbered from 1."""
     kind, encoding = _TYPES[stream.encoding]
     return mavlink.MAVLink_video_stream_information_message(
         number,
         count,
         kind,
-        *_stream_fields(stream),
+        *_stream_fields(stream, running=running),
         stream.encoding.value.encode()[:_NAME_BYTES],
         stream.uri.encode()[:_URI_BYTES],
         encoding,
     )
 
 
-def stream_status(stream: VideoStream, number: int) -> Message:
-    """VIDEO_STREAM_STATUS of one stream: it always runs."""
-    return mavlink.MAVLink_video_stream_status_message(number, *_stream_fields(stream))
+def stream_status(stream: VideoStream, number: int, *, running: bool) -> Message:
+    """VIDEO_STREAM_STATUS of one stream."""
+    return mavlink.MAVLink_video_stream_status_message(number, *_stream_fields(stream, running=running))
 
 
-def _stream_fields(stream: VideoStream) -> tuple[float, ...]:
+def _stream_fields(stream: VideoStream, *, running: bool) -> tuple[float, ...]:
     """The fields that both messages contain: flags, rate, size, bit rate, rotation, field of view."""
     field_of_view_deg = round(stream.field_of_view_deg)
-    return (_RUNNING, stream.rate_hz, stream.width_px, stream.height_px, 0, 0, field_of_view_deg)
+    return (
+        _RUNNING if running else 0,
+        stream.rate_hz,
+        stream.width_px,
+        stream.height_px,
+        0,
+        0,
+        field_of_view_deg,
+    )
 
 
 def _padded(text: str, length: int) -> bytes:

@@ -1,4 +1,4 @@
-"""What a camera component needs: its camera, its video streams, and the storage of its pictures."""
+"""What a camera component needs: its camera, its video streams, and the storage of pictures and videos."""
 
 from __future__ import annotations
 
@@ -74,7 +74,15 @@ class PictureSpace:
 
 
 class CaptureSink(Protocol):
-    """Takes pictures and keeps them; never raises."""
+    """Takes pictures and records video, and keeps them; never raises."""
+
+    @property
+    def can_record(self) -> bool:
+        """Whether it can record video."""
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether video is being recorded; it ends by itself when the storage is full."""
 
     def capture(self, time_us: int, index: int) -> str | None:
         """Take a picture.
@@ -87,6 +95,22 @@ class CaptureSink(Protocol):
             A URL to download it, of at most 205 bytes; empty if it is not kept; None if it could not be
             taken.
         """
+
+    def start_video(self, index: int) -> bool:
+        """Record video from the next image on.
+
+        Args:
+            index: counts recordings from 0.
+
+        Returns:
+            Whether it records now.
+        """
+
+    def stop_video(self) -> None:
+        """Finish the recording, if there is one."""
+
+    def format(self) -> bool:
+        """Delete all pictures and recordings; False if that failed."""
 
     def space(self) -> PictureSpace | None:
         """The storage; None if pictures are not kept."""

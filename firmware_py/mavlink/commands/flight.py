@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import copysign, floor, isfinite, isinf, isnan, nan
 
 from firmware_py.autopilot import Autopilot
@@ -21,10 +22,13 @@ _MIN_ORBIT_M = 1.0
 
 
 class FlightCommands(Service):
-    """Passes these commands to the autopilot."""
+    """Passes these commands to the autopilot; regions of interest to `look_at` too."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
+    def __init__(
+        self, autopilot: Autopilot, look_at: Callable[[Vec3 | None], None] = lambda point_ned_m: None
+    ) -> None:
         self._autopilot = autopilot
+        self._gimbal_look_at = look_at
         self.commands = {
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _command: autopilot.set_mode(FlightMode.RETURN),
             mavlink.MAV_CMD_NAV_LAND: lambda _command: autopilot.land(),
@@ -37,7 +41,7 @@ class FlightCommands(Service):
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
             mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
             mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._set_roi_location,
-            mavlink.MAV_CMD_DO_SET_ROI_NONE: lambda _command: autopilot.look_at(None),
+            mavlink.MAV_CMD_DO_SET_ROI_NONE: lambda _command: self._look_at(None),
             mavlink.MAV_CMD_DO_SET_ROI: self._set_roi,
             mavlink.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode,
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
@@ -144,13 +148,18 @@ class FlightCommands(Service):
         place = self._place(command, command.altitude_m)
         if place is None or any(map(isnan, place)):
             return CommandResult.DENIED
-        return self._autopilot.look_at(place)
+        return self._look_at(place)
+
+    def _look_at(self, point_ned_m: Vec3 | None) -> CommandResult:
+        """Set the region of interest, for the vehicle's yaw and, if there is one, for the gimbal."""
+        self._gimbal_look_at(point_ned_m)
+        return self._autopilot.look_at(point_ned_m)
 
     def _set_roi(self, command: Command) -> CommandResult:
         """The older DO_SET_ROI: param 1 is the mode, of which NONE and LOCATION are supported."""
         mode = command.params[0]
         if mode == mavlink.MAV_ROI_NONE:
-            return self._autopilot.look_at(None)
+            return self._look_at(None)
         if mode == mavlink.MAV_ROI_LOCATION:
             return self._set_roi_location(command)
         return CommandResult.UNSUPPORTED

@@ -7,8 +7,11 @@ from math import isfinite
 from firmware_py.autopilot import Autopilot
 from firmware_py.geodesy import LocalProjection
 from firmware_py.mavlink.camera.model import CameraControl
+from firmware_py.mavlink.commands.gripper import GripperService
+from firmware_py.mavlink.gimbal.manager import GimbalManager
 from firmware_py.mavlink.missions.messages import mission_current
 from firmware_py.mavlink.service import Command, Service
+from firmware_py.missions.actions import REGIONS
 from firmware_py.missions.checks import mission_faults
 from firmware_py.missions.flight import IssuedCommand, View
 from firmware_py.missions.geofence import Geofence
@@ -21,7 +24,7 @@ _REPEATS, _REPEAT_US = 10, 1_000_000  # of MISSION_ITEM_REACHED, as PX4
 _NO_TOTAL = 0xFFFF
 _ACTIVE, _SUSPENDED = 1, 2
 _ACTIVE_MODES = frozenset({FlightMode.MISSION, FlightMode.TAKEOFF, FlightMode.LAND})
-_WITHOUT_EFFECT = frozenset(  # every mission of MAVSDK contains them, and there is no gimbal
+_GIMBALS = frozenset(  # every mission of MAVSDK contains them; without a gimbal they have no effect
     {
         mavlink.MAV_CMD_DO_MOUNT_CONFIGURE,
         mavlink.MAV_CMD_DO_MOUNT_CONTROL,
@@ -34,10 +37,19 @@ _WITHOUT_EFFECT = frozenset(  # every mission of MAVSDK contains them, and there
 class MissionExecution(Service):
     """Checks missions when they change, starts them, reports their progress and passes on their commands."""
 
-    def __init__(self, autopilot: Autopilot, exchange: Exchange, camera: CameraControl | None) -> None:
+    def __init__(
+        self,
+        autopilot: Autopilot,
+        exchange: Exchange,
+        camera: CameraControl | None,
+        gimbal: GimbalManager | None = None,
+        gripper: GripperService | None = None,
+    ) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._camera = camera
+        self._gimbal = gimbal
+        self._gripper = gripper
         self._fence = Geofence(autopilot.missions, autopilot.parameters)
         self._view = View()
         self._origin: GeodeticPoint | None = None
@@ -159,8 +171,6 @@ class MissionExecution(Service):
 
     def _execute(self, issued: IssuedCommand) -> CommandResult:
         autopilot = self._autopilot
-        if issued.command in _WITHOUT_EFFECT:
-            return CommandResult.ACCEPTED
         first, x, y, z = issued.params[0], *issued.params[4:]
         match issued.command:
             case mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
@@ -170,9 +180,20 @@ class MissionExecution(Service):
                     return autopilot.set_home(None)
                 known = isfinite(x) and isfinite(y) and isfinite(z)
                 return autopilot.set_home(GeodeticPoint(x, y, z)) if known else CommandResult.DENIED
-        if self._camera is None:
-            return CommandResult.UNSUPPORTED
-        return self._camera.run(issued.command, issued.params)
+        return self._command_device(issued)
+
+    def _command_device(self, issued: IssuedCommand) -> CommandResult:
+        """Pass a command on to gimbal, gripper or camera."""
+        command, gimbal = issued.command, self._gimbal
+        if command in REGIONS:
+            if gimbal is not None:
+                gimbal.look_at(issued.place_ned_m)
+            return CommandResult.ACCEPTED
+        if command in _GIMBALS:
+            return CommandResult.ACCEPTED if gimbal is None else gimbal.run(command, issued.params)
+        if command == mavlink.MAV_CMD_DO_GRIPPER and self._gripper is not None:
+            return self._gripper.run(issued.params)
+        return CommandResult.UNSUPPORTED if self._camera is None else self._camera.run(command, issued.params)
 
 
 def _mission_state(autopilot: Autopilot) -> int:

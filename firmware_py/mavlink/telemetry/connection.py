@@ -17,11 +17,11 @@ from firmware_py.status import NAVIGATION_STATES, FlightMode, VehicleStatus
 from wire.dialect import BROADCAST, Message, boot_ms, mavlink
 from wire.exchange import Exchange
 from wire.link import Link
+from wire.simulator_identity import simulator_uid
 
 FOLLOWED_PX4_VERSION = (1, 17, 0)
 OWN_VERSION = (0, 1, 0)
 _RELEASE = 0xFF  # FIRMWARE_VERSION_TYPE_OFFICIAL
-_UID_PREFIX = 0x66726D72  # "frmr"; the system id follows
 _CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
     | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
@@ -69,7 +69,7 @@ def _autopilot_version(system_id: int) -> Message:
     # Of flight software and middleware; operating system and board have none.
     versions = (packed_version(FOLLOWED_PX4_VERSION), packed_version(OWN_VERSION), 0, 0)
     no_hashes = [[0] * 8] * 3
-    uid = _UID_PREFIX << 32 | system_id
+    uid = simulator_uid(system_id)
     return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, *versions, *no_hashes, 0, 0, uid)
 
 

@@ -176,16 +176,18 @@ def _wanted_headings(
     """The heading to turn to at each sample (NaN for any); where each gate's is kept: first, last, angle."""
     wanted: list[float] = []
     motions = zip(samples.positions_m.tolist(), samples.velocities_m_s.tolist(), strict=True)
+    # Plain numbers, once for each stretch: the heading of its axes, and where to look.
+    axes = [atan2(stretch.leg.turn[1], stretch.leg.turn[0]) for stretch in stretches]
+    looks = [None if stretch.look_m is None else stretch.look_m.tolist() for stretch in stretches]
     for ((x, y, _), (vx, vy, _)), number in zip(motions, samples.stretches.tolist(), strict=True):
-        stretch = stretches[number]
+        stretch, heading, look = stretches[number], axes[number], looks[number]
         if stretch.crosses:
             wanted.append(stretch.yaw_rad)
             continue
-        heading = atan2(stretch.leg.turn[1], stretch.leg.turn[0])
-        if stretch.look_m is None:
+        if look is None:
             wanted.append(heading if isnan(stretch.yaw_rad) else stretch.yaw_rad)
             continue
-        dx, dy = float(stretch.look_m[0]) - x, float(stretch.look_m[1]) - y
+        dx, dy = look[0] - x, look[1] - y
         away = hypot(dx, dy)
         bearing = atan2(dy, dx)
         if hypot(vx, vy) > COURSE_M_S:

@@ -226,7 +226,7 @@ def test_pictures_by_distance():
 
 
 def test_items_for_missing_devices_are_skipped_with_a_text():
-    world = World(plan(waypoint(0, 10, 10), doing(Do.GRIPPER, 1, 0), waypoint(0, 20, 10)))
+    world = World(plan(waypoint(0, 10, 10), doing(Do.WINCH, 1, 0), waypoint(0, 20, 10)))
     world.run()
     assert "Mission item 2 does nothing: no such device here" in world.texts
     assert world.reached == [0, 1, 2]

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from math import dist
+from math import dist, inf
 
 import numpy as np
 import pytest
 
-from geometry.rotations import quaternion_from_euler
+from geometry.rotations import quaternion_from_euler, rotation, to_world
 from offboard.drone import DroneState
 from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.goals import CONTEST
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
 from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.world_model import WorldModel
+from scenarios.gimbal import Gimbal
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Arena, Base, Camera
 from tests.offboard.navigation.sightings import corners_px, frame_at, sighting
@@ -41,6 +42,35 @@ def image(time_us: int) -> Detections:
     place = (exposed.x, exposed.y, exposed.z)
     seen = sighting(RED, place, exposed.attitude_arena, np.random.default_rng(0), noise=0.0)
     return Detections(time_us=time_us, frames=() if seen is None else (seen,))
+
+
+def test_a_camera_on_a_gimbal_gives_the_place_of_what_it_looks_at():
+    """The drone flies with its nose 40 degrees to the right of red and tilts; the camera looks at red."""
+    turned, offset_m = quaternion_from_euler(0.0, 0.1, 0.0), Camera().position_flu_m
+    tilted = quaternion_from_euler(0.2, -0.15, -0.7)
+
+    def at(time_us: int) -> DroneState:
+        return replace(state(time_us), attitude_arena=tilted, yaw=-0.7, camera_attitude_arena=turned)
+
+    def seen(time_us: int) -> Detections:
+        exposed = at(time_us)
+        place = np.array((exposed.x, exposed.y, exposed.z))
+        eye = place + to_world(rotation(tilted), *offset_m)
+        carrier = eye - to_world(rotation(turned), *offset_m)
+        found = sighting(RED, tuple(carrier), turned, np.random.default_rng(0), noise=0.0)
+        return Detections(time_us=time_us, frames=() if found is None else (found,))
+
+    def place_of_red(camera: Camera, image_of: Callable[[int], Detections]) -> float:
+        surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), camera, (0.25, 0.25, 0.1))
+        world = WorldModel(surroundings, CONTEST)
+        for tick in TICKS:
+            due = [us for us in IMAGES_US if us // TICK_US == tick - 2]
+            world.observe(at(tick * TICK_US), [image_of(us) for us in due])
+        red = world.frame("red")
+        return inf if red is None else dist(red.position_m, RED.position_arena_m)
+
+    assert place_of_red(Camera(gimbal=Gimbal()), seen) < 0.03
+    assert place_of_red(Camera(), seen) > 0.5  # the drone's attitude is not the camera's
 
 
 IMAGES_US = range(1_030_000, 2_900_000, 100_000)  # exposed between ticks

@@ -46,7 +46,7 @@ def flown(seed, folder):
         subprocess.run(
             [
                 *(*FRAMERUNNER, "fly", "test-case-1", "--out", str(folder / "runs")),
-                *("--drone", f"udpin://0.0.0.0:{14540 + instance}"),
+                *("--simulated", "--drone", f"udpin://0.0.0.0:{14540 + instance}"),
                 *("--simulator", f"http://127.0.0.1:{8100 + instance}"),
             ],
             timeout=400,

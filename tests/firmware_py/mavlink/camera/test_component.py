@@ -24,6 +24,9 @@ REQUEST, START, STOP = 512, 2000, 2001
 class Album:
     """Keeps pictures by name, until it is broken."""
 
+    can_record = True
+    is_recording = False
+
     def __init__(self):
         self.taken = []
         self.broken = False
@@ -33,6 +36,17 @@ class Album:
             return None
         self.taken.append((time_us, index))
         return f"mftp:///DCIM/{index}.jpg"
+
+    def start_video(self, index):
+        self.is_recording = not self.broken
+        return self.is_recording
+
+    def stop_video(self):
+        self.is_recording = False
+
+    def format(self):
+        self.taken.clear()
+        return not self.broken
 
     def space(self):
         return PictureSpace(100.0, 25.0)
@@ -87,7 +101,7 @@ def test_information_describes_the_lens(viewer, question):
     assert (camera.resolution_h, camera.resolution_v) == (320, 240)
     assert camera.sensor_size_v == pytest.approx(camera.sensor_size_h * 0.75)
     assert camera.focal_length == pytest.approx(camera.sensor_size_h / 2)  # 90 degrees
-    assert camera.flags == 2 | 256
+    assert camera.flags == 1 | 2 | 4 | 8 | 16 | 256
     assert bytes(camera.vendor_name).rstrip(b"\0") == b"framerunner"
 
 
@@ -232,10 +246,16 @@ def test_a_picture_that_fails_is_reported_as_failed(viewer, album):
     [
         (203, [0, 0, 0, 0, 1], ACCEPTED),
         (203, [0, 1], UNSUPPORTED),
-        (526, [1, 1], UNSUPPORTED),
+        (526, [1, 1], ACCEPTED),
+        (526, [0, 1, 1], ACCEPTED),
+        (526, [1, 0], DENIED),
+        (526, [2, 1], DENIED),
         (529, [1], ACCEPTED),
         (530, [0, 0], ACCEPTED),
-        (530, [0, 1], DENIED),
+        (530, [0, 1], ACCEPTED),
+        (530, [0, 2], DENIED),
+        (531, [1, 1], UNSUPPORTED),
+        (532, [1, 1], UNSUPPORTED),
         (START, [0, -1, 0], DENIED),
         (START, [0, inf, 0], DENIED),
         (START, [0, 1, -1], DENIED),
@@ -243,15 +263,91 @@ def test_a_picture_that_fails_is_reported_as_failed(viewer, album):
         (206, [inf], DENIED),
         (214, [nan], DENIED),
         (214, [500], ACCEPTED),
-        (2500, [], UNSUPPORTED),
-        (2501, [], UNSUPPORTED),
+        (2500, [], ACCEPTED),
+        (2501, [], ACCEPTED),
         (2502, [0], ACCEPTED),
         (2502, [3], DENIED),
-        (2503, [0], UNSUPPORTED),
+        (2503, [0], ACCEPTED),
+        (2503, [1], ACCEPTED),
+        (2503, [2], DENIED),
+        (2503, [3], DENIED),
     ],
 )
 def test_other_commands(viewer, command, params, result):
     assert acks(viewer.ask(viewer.long(command, *params, target=CAMERA))) == [(100, command, result)]
+
+
+def status_of(viewer):
+    (status,) = named(viewer.ask(viewer.long(REQUEST, 262, target=CAMERA)), "CAMERA_CAPTURE_STATUS")
+    return status
+
+
+def test_a_recording_is_reported_as_often_as_wanted_until_it_is_stopped(viewer, album):
+    answers = viewer.ask(viewer.long(2500, 0, 2.0, target=CAMERA))
+    assert acks(answers) == [(100, 2500, ACCEPTED)]
+    assert album.is_recording
+    told = [m for on, m in viewer.advance(2.0) if on == "ground" and m.get_type() == "CAMERA_CAPTURE_STATUS"]
+    assert [(m.video_status, m.recording_time_ms) for m in told] == [
+        (1, 500),
+        (1, 1000),
+        (1, 1500),
+        (1, 2000),
+    ]
+    viewer.ask(viewer.long(2500, 0, 0.0, target=CAMERA))  # a repeated command begins no other recording
+    assert status_of(viewer).recording_time_ms == 2000
+    answers = viewer.ask(viewer.long(2501, target=CAMERA))
+    assert [m.video_status for m in named(answers, "CAMERA_CAPTURE_STATUS")] == [0]
+    assert not album.is_recording
+
+
+def test_a_recording_that_ends_by_itself_is_reported(viewer, album):
+    viewer.ask(viewer.long(2500, 0, 0.0, target=CAMERA))
+    assert status_of(viewer).video_status == 1
+    album.stop_video()
+    told = [m for on, m in viewer.advance(0.1) if on == "onboard" and m.get_type() == "CAMERA_CAPTURE_STATUS"]
+    assert [m.video_status for m in told] == [0]
+    album.broken = True
+    assert acks(viewer.ask(viewer.long(2500, target=CAMERA))) == [(100, 2500, FAILED)]
+
+
+def test_formatting_resets_the_count_of_pictures(viewer, album):
+    viewer.send(viewer.long(START, 0, 0.1, 3, target=CAMERA))
+    viewer.advance(1.0)
+    assert acks(viewer.ask(viewer.long(526, 1, 1, 1, target=CAMERA))) == [(100, 526, ACCEPTED)]
+    assert status_of(viewer).image_count == 0
+    assert acks(viewer.ask(viewer.long(REQUEST, 263, 0, target=CAMERA))) == [(100, REQUEST, DENIED)]
+
+
+def test_without_a_recorder_there_is_neither_video_nor_its_mode(autopilot, make_peer):
+    viewer = make_peer(autopilot, node_options={"camera": MODEL})
+    (camera,) = named(viewer.ask(viewer.long(REQUEST, 259, target=CAMERA)), "CAMERA_INFORMATION")
+    assert camera.flags == 2
+    for command, params, result in (
+        (530, [0, 1], DENIED),
+        (2500, [], UNSUPPORTED),
+        (526, [1, 1], UNSUPPORTED),
+    ):
+        assert acks(viewer.ask(viewer.long(command, *params, target=CAMERA))) == [(100, command, result)]
+
+
+def test_the_mode_is_told(viewer):
+    answers = viewer.ask(viewer.long(530, 0, 1, target=CAMERA))
+    assert [m.mode_id for m in named(answers, "CAMERA_SETTINGS")] == [1]
+    viewer.ask(viewer.long(529, 1, target=CAMERA))
+    assert [m.mode_id for m in named(viewer.ask(viewer.long(522, 1, target=CAMERA)), "CAMERA_SETTINGS")] == [
+        0
+    ]
+
+
+def test_streams_in_rtp_stop_and_those_over_http_go_on(autopilot, make_peer):
+    switched = []
+    options = {"camera": MODEL, "video": STREAMS, "switch_video": switched.append}
+    viewer = make_peer(autopilot, node_options=options)
+    for command, running in ((2503, [0, 1]), (2502, [1, 1])):
+        viewer.ask(viewer.long(command, 0, target=CAMERA))
+        told = named(viewer.ask(viewer.long(REQUEST, 270, 0, target=CAMERA)), "VIDEO_STREAM_STATUS")
+        assert [m.flags for m in told] == running
+    assert switched == [False, True]
 
 
 def test_a_mission_reaches_the_camera(viewer, album):

@@ -1,31 +1,30 @@
-"""The drone's state in arena axes from a vehicle's telemetry."""
+"""A vehicle's state in arena axes, as its telemetry reported it at a tick."""
 
 from __future__ import annotations
 
 from geometry.axes import Alignment, Pose
-from geometry.rotations import quaternion_from_euler
 from offboard.drone import DroneState
 from offboard.link.telemetry import Sample, TelemetryFeed
 
 
-def drone_state(
+def reported_state(
+    sample: Sample,
     feed: TelemetryFeed,
     alignment: Alignment,
     offboard_mode: str,
-    sample: Sample,
     missed: tuple[DroneState, ...] = (),
 ) -> DroneState:
     """The state at a tick.
 
     Args:
-        feed: the vehicle's telemetry, whose mode and arming are the latest.
+        sample: of the tick.
+        feed: for mode, arming and landing, which have no time stamps.
         alignment: from the vehicle's local axes to the arena's.
         offboard_mode: name of the mode in which the vehicle follows this app's setpoints.
-        sample: where the vehicle was at the tick.
-        missed: the states at the ticks that were skipped before it.
+        missed: states at the ticks that were skipped before this one, oldest first.
     """
     pose = alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
-    attitude_ned = quaternion_from_euler(sample.roll_rad, sample.pitch_rad, sample.yaw_ned_rad)
+    camera_ned = sample.camera_attitude_ned
     return DroneState(
         time_us=sample.time_us,
         x=pose.position_m[0],
@@ -38,6 +37,7 @@ def drone_state(
         mode=feed.mode,
         landed=feed.landed,
         position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
-        attitude_arena=alignment.attitude(attitude_ned),
+        attitude_arena=alignment.attitude(sample.attitude_ned),
+        camera_attitude_arena=None if camera_ned is None else alignment.attitude(camera_ned),
         missed=missed,
     )

@@ -1,0 +1,123 @@
+"""The gimbal device, component 154 (https://mavlink.io/en/services/gimbal_v2.html).
+
+It reports its attitude and describes itself. It takes orders of its manager only, which is in the autopilot.
+"""
+
+from __future__ import annotations
+
+from math import cos, isfinite, sin
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.gimbal.model import GIMBAL_COMPONENT_ID, GimbalDevice
+from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.telemetry.connection import OWN_VERSION
+from firmware_py.status import CommandResult
+from geometry.rotations import quaternion_from_euler, yaw_of
+from wire.dialect import BROADCAST, Message, boot_ms, mavlink
+from wire.exchange import Exchange
+
+_HEARTBEAT_US = 1_000_000
+_ATTITUDE_US = 100_000
+_LEVEL = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
+_IN_VEHICLE_FRAME = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
+CAPABILITIES = (  # the values are those of GIMBAL_MANAGER_CAP_FLAGS too
+    mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_LOCK
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_LOCK
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK
+)
+
+
+def device_flags(gimbal: GimbalDevice) -> int:
+    """GIMBAL_DEVICE_FLAGS and GIMBAL_MANAGER_FLAGS of a gimbal's present mode."""
+    return int(_LEVEL | (mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK if gimbal.yaw_locked else 0))
+
+
+class GimbalComponent(Service):
+    """Answers for the gimbal device, sends its heartbeat and, at 10 Hz, its attitude."""
+
+    component_id = GIMBAL_COMPONENT_ID
+
+    def __init__(self, autopilot: Autopilot, exchange: Exchange, gimbal: GimbalDevice) -> None:
+        self._autopilot = autopilot
+        self._exchange = exchange
+        self._gimbal = gimbal
+        self._heartbeat_due_us = 0
+        self._attitude_due_us = 0
+        self.commands = {mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message}
+
+    def update(self) -> None:
+        """Send what is due."""
+        time_us = self._exchange.time_us
+        if time_us >= self._attitude_due_us:
+            self._attitude_due_us = time_us - time_us % _ATTITUDE_US + _ATTITUDE_US
+            self._exchange.broadcast(self._attitude(), GIMBAL_COMPONENT_ID)
+        if time_us >= self._heartbeat_due_us:
+            self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
+            self._exchange.broadcast(self._heartbeat(), GIMBAL_COMPONENT_ID)
+
+    def _request_message(self, command: Command) -> CommandResult:
+        number = command.params[0]
+        match int(number) if isfinite(number) else -1:
+            case mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION:
+                message = self._information()
+            case mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS:
+                message = self._attitude()
+            case _:
+                return CommandResult.DENIED
+        self._exchange.send(command.link, message, GIMBAL_COMPONENT_ID)
+        return CommandResult.ACCEPTED
+
+    def _heartbeat(self) -> Message:
+        """HEARTBEAT of a gimbal, with the vehicle's mode for MAVSDK's follow-me, as the camera's."""
+        return mavlink.MAVLink_heartbeat_message(
+            mavlink.MAV_TYPE_GIMBAL,
+            mavlink.MAV_AUTOPILOT_INVALID,
+            mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+            self._autopilot.status.mode.custom_mode,
+            mavlink.MAV_STATE_ACTIVE,
+            3,
+        )
+
+    def _attitude(self) -> Message:
+        """GIMBAL_DEVICE_ATTITUDE_STATUS: yaw to the vehicle's heading, which `delta_yaw` gives, to north."""
+        gimbal = self._gimbal
+        pitch_rad, yaw_rate_rad_s = gimbal.pitch_rad, gimbal.yaw_rate_rad_s
+        return mavlink.MAVLink_gimbal_device_attitude_status_message(
+            BROADCAST,
+            BROADCAST,
+            boot_ms(self._exchange.time_us),
+            device_flags(gimbal) | _IN_VEHICLE_FRAME,
+            quaternion_from_euler(0.0, pitch_rad, gimbal.yaw_rad),
+            -yaw_rate_rad_s * sin(pitch_rad),
+            gimbal.pitch_rate_rad_s,
+            yaw_rate_rad_s * cos(pitch_rad),
+            0,
+            yaw_of(self._autopilot.state.attitude),
+            0.0,
+            0,  # the sender's component
+        )
+
+    def _information(self) -> Message:
+        limits = self._gimbal.limits
+        major, minor, patch = OWN_VERSION
+        return mavlink.MAVLink_gimbal_device_information_message(
+            boot_ms(self._exchange.time_us),
+            b"framerunner",
+            b"simulated gimbal",
+            b"",
+            major | minor << 8 | patch << 16,
+            0,
+            0,
+            CAPABILITIES,
+            0,
+            0.0,
+            0.0,
+            limits.pitch_min_rad,
+            limits.pitch_max_rad,
+            -limits.yaw_max_rad,
+            limits.yaw_max_rad,
+        )

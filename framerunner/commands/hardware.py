@@ -1,0 +1,117 @@
+"""Options of flights with a drone that may be a real one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from errors import SettingError
+from framerunner.commands import check_range
+
+if TYPE_CHECKING:
+    from framerunner.preflight.settings import HardwareSettings
+    from offboard.safety.caps import Caps
+    from scenarios.models import Scenario
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class HardwareOptions:
+    """As the command line gives them."""
+
+    max_speed: Annotated[
+        float | None,
+        Parameter(
+            help="cap on the level speed in m/s, whatever the mission asks; with --drone 2 if not given"
+        ),
+    ] = None
+    max_height: Annotated[
+        float | None, Parameter(help="cap on the height above the start in m; the box's ceiling if not given")
+    ] = None
+    dry_run: Annotated[
+        bool, Parameter(help="with --drone, propellers off: checks, camera, mission, setpoints; never arms")
+    ] = False
+    yes: Annotated[
+        bool,
+        Parameter(negative="", help="with --drone: checks, but no operator's go; for simulations and CI"),
+    ] = False
+    simulated: Annotated[
+        bool, Parameter(negative="", help="with --drone: it is a simulation; no checks, no operator, no caps")
+    ] = False
+    set_parameters: Annotated[
+        bool, Parameter(help="with --drone: set failsafe parameters that fail, and keep their old values")
+    ] = False
+    accept: Annotated[
+        tuple[str, ...],
+        Parameter(
+            negative="", help="with --drone: fly although the check of this name fails; may be repeated"
+        ),
+    ] = ()
+    on_abort: Annotated[
+        Literal["land", "hold"], Parameter(help="with --drone: what it does when the flight is aborted")
+    ] = "land"
+    operator: Annotated[str, Parameter(help="with --drone: who flies, for the flight card")] = ""
+
+
+NONE = HardwareOptions()
+
+
+def caps_of(options: HardwareOptions, drone: str | None) -> Caps | None:
+    """The caps of a flight; None for a simulated drone without a given one. Raises SettingError."""
+    from offboard.safety.caps import Caps
+
+    check_range("--max-speed", options.max_speed, 0.1, 20.0)
+    check_range("--max-height", options.max_height, 0.3, 100.0)
+    given = options.max_speed is not None or options.max_height is not None
+    if not given and (drone is None or options.simulated):
+        return None
+    default = Caps()
+    speed_m_s = default.level_m_s if options.max_speed is None else options.max_speed
+    vertical_m_s = min(default.vertical_m_s, speed_m_s)
+    return Caps(speed_m_s, vertical_m_s, default.yaw_rate_rad_s, options.max_height)
+
+
+def hardware_of(options: HardwareOptions, drone: str | None) -> HardwareSettings | None:
+    """The procedure of a flight; None for a simulated drone. Raises SettingError."""
+    from framerunner.preflight.settings import HardwareSettings
+
+    given = {
+        "--dry-run": options.dry_run,
+        "--yes": options.yes,
+        "--set-parameters": options.set_parameters,
+        "--accept": bool(options.accept),
+        "--on-abort": options.on_abort != NONE.on_abort,
+        "--operator": bool(options.operator),
+    }
+    used = [name for name, is_given in given.items() if is_given]
+    if drone is None:
+        used += ["--simulated"] if options.simulated else []
+        if used:
+            raise SettingError(f"{used[0]}: is for a drone given by --drone; leave it out")
+        return None
+    if options.simulated:
+        if used:
+            raise SettingError(
+                f"{used[0]}: a drone that is --simulated is not checked; leave one of them out"
+            )
+        return None
+    return HardwareSettings(
+        needs_go=not options.yes,
+        abort=options.on_abort,
+        dry_run=options.dry_run,
+        set_parameters=options.set_parameters,
+        accepted=options.accept,
+        operator=options.operator,
+        capped=options.max_speed is not None or options.max_height is not None,
+    )
+
+
+def with_dry_limit(scenario: Scenario, options: HardwareOptions) -> Scenario:
+    """The scenario with the short time limit of a dry run, if it is one."""
+    from framerunner.preflight.settings import DRY_RUN_S
+
+    if not options.dry_run:
+        return scenario
+    return scenario.model_copy(update={"try_limit_s": min(DRY_RUN_S, scenario.try_limit_s)})

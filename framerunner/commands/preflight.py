@@ -1,0 +1,99 @@
+"""`framerunner preflight`: the checks before a flight, and the return of parameters after it."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import closing
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from framerunner.commands import DEFAULT_MISSION, check_range, load_mission_with
+
+if TYPE_CHECKING:
+    from framerunner.flying.plan import FlightPlan
+    from framerunner.preflight.run import PreflightSettings
+
+
+def preflight(
+    scenario: Annotated[str, Parameter(help="name or file of the scenario")] = "test-case-1",
+    *,
+    drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
+    camera: Annotated[
+        str | None, Parameter(help="URL, device or folder of its camera; checked if given")
+    ] = None,
+    camera_delay: Annotated[
+        float, Parameter(help="age in s of an image that arrives without a time stamp")
+    ] = 0.1,
+    mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
+    max_speed: Annotated[float, Parameter(help="cap on the level speed, m/s")] = 2.0,
+    max_height: Annotated[float | None, Parameter(help="cap on the height above the start, m")] = None,
+    set_parameters: Annotated[
+        bool, Parameter(negative="", help="set failsafe parameters that fail, and keep their old values")
+    ] = False,
+    restore_parameters: Annotated[
+        Path | None, Parameter(help="only set the parameters of this file, which --set-parameters wrote")
+    ] = None,
+    accept: Annotated[
+        tuple[str, ...], Parameter(negative="", help="name of a check that may fail; may be repeated")
+    ] = (),
+    out: Annotated[Path, Parameter(help="folder for the flight card and for old parameters")] = Path(),
+) -> int:
+    """Check a real drone as `fly` does before it arms it, and write the flight card; nothing is armed.
+
+    The fence of the flight is uploaded and read back. Parameters are changed only with --set-parameters, and
+    returned by --restore-parameters. Each check is a line: result, name, value, what is allowed, what to do.
+
+    Exit code 0: it may be armed, 1: a check has failed, 2: bad input.
+
+    **Examples**
+
+        framerunner preflight --drone serial:///dev/ttyUSB0:921600 --camera 0
+
+        framerunner preflight --set-parameters
+
+        framerunner preflight --restore-parameters parameters-before.params
+    """
+    check_range("--camera-delay", camera_delay, 0.0, 0.5)
+    if restore_parameters is not None:
+        return _restore(drone, restore_parameters)
+
+    from framerunner.commands.hardware import HardwareOptions, caps_of
+    from framerunner.flying.plan import FlightPlan
+    from framerunner.preflight.run import PreflightSettings
+    from scenarios.loader import load_scenario
+
+    caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission_with(mission, None)
+    plan = FlightPlan(load_scenario(scenario), loaded, None, caps=caps)
+    return _check(plan, PreflightSettings(drone, camera, camera_delay, set_parameters, accept, out))
+
+
+def _check(plan: FlightPlan, settings: PreflightSettings) -> int:
+    from framerunner.preflight.card import make_card
+    from framerunner.preflight.card_files import write_card
+    from framerunner.preflight.run import run_preflight, tell
+
+    report = asyncio.run(run_preflight(plan, settings))
+    tell(report)
+    now = datetime.now().astimezone()
+    card = make_card(plan, settings, report, abort="land", operator="", kind="checks only", now=now)
+    write_card(card, settings.folder)
+    return 0 if report.may_arm else 1
+
+
+def _restore(drone: str, path: Path) -> int:
+    from framerunner.preflight.parameters import load_parameters, set_parameter
+    from framerunner.preflight.session import VehicleSession, open_link
+    from offboard.drone import DroneError
+
+    kept = load_parameters(path)
+    with closing(open_link(drone)) as link:
+        session = VehicleSession(link)
+        if session.record.armed:
+            raise DroneError("the vehicle is armed; land and disarm it before its parameters are changed")
+        for parameter in kept:
+            set_parameter(session, parameter)
+            print(f"{parameter.name} is {parameter.value:g} again", flush=True)
+    return 0

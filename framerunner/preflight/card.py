@@ -1,0 +1,115 @@
+"""The flight card: one page with all that matters of a flight, written before the drone is armed."""
+
+from __future__ import annotations
+
+import getpass
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from framerunner.preflight.run import PreflightReport
+from offboard.safety.check import Outcome
+
+if TYPE_CHECKING:
+    from framerunner.flying.plan import FlightPlan
+    from framerunner.preflight.run import PreflightSettings
+    from offboard.safety.rules import AbortAction
+
+PROCEDURE = (
+    "Stop: press SPACE. The drone lands where it is.",
+    "Stop the motors at once: press SPACE again. The drone falls.",
+    "The app does not answer: move the mode switch to position mode and land, or use the kill switch.",
+    "The app ends or the link is lost: the drone's failsafes above land it.",
+    "A fence, a failsafe or the app's box acts: let the drone land; find the cause before the next start.",
+)
+"""What the operator does when something goes wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A table of the card; the first column names what the others tell."""
+
+    title: str
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FlightCard:
+    """The card's contents, for people."""
+
+    title: str
+    sections: tuple[Section, ...]
+
+
+def make_card(
+    plan: FlightPlan,
+    settings: PreflightSettings,
+    report: PreflightReport,
+    *,
+    abort: AbortAction,
+    operator: str,
+    kind: str,
+    now: datetime,
+) -> FlightCard:
+    """Put the card together.
+
+    Args:
+        plan: with a mission.
+        settings: of the checks.
+        report: of the checks.
+        abort: what the drone does when the flight is aborted.
+        operator: who flies.
+        kind: of the flight, such as "dry run".
+        now: with a time zone.
+    """
+    fence = report.fence
+    corners = ", ".join(f"({x:.1f}, {y:.1f})" for x, y in fence.corners_arena_m)
+    flight = (
+        ("date", now.strftime("%Y-%m-%d %H:%M %Z").strip()),
+        ("operator", operator or getpass.getuser()),
+        ("kind", kind),
+        ("drone", report.vehicle),
+        ("link", settings.drone_url),
+        ("camera", settings.camera_url or "none"),
+        ("scenario", plan.scenario.name),
+        ("mission", f"{plan.chart.name}, class {plan.chart.mission_class}"),
+        ("time limit", f"{plan.limit_s:g} s from motors on"),
+        ("on abort", "lands where it is" if abort == "land" else "holds"),
+    )
+    limits = (
+        ("caps", "none" if plan.caps is None else plan.caps.words),
+        ("fence, arena axes", f"x, y in m: {corners}"),
+        ("fence, height and radius", f"{fence.height_m:g} m above the start, {fence.radius_m:g} m around it"),
+    )
+    overridden = tuple((each.name, each.value) for each in report.checks if each.outcome is Outcome.ACCEPTED)
+    changes = tuple((each.name, f"{each.before:g}", f"{each.after:g}") for each in report.changes)
+    if report.kept is not None:
+        changes += (("old values", str(report.kept), ""),)
+    return FlightCard(
+        f"Flight card: {plan.scenario.name}",
+        (
+            Section("Flight", flight),
+            Section("Caps and fence", limits),
+            Section("Failed checks that the operator accepts", overridden or (("none", ""),)),
+            Section("Parameters changed: name, before, now", changes or (("none", "", ""),)),
+            Section("Abort procedure", tuple((str(n), step) for n, step in enumerate(PROCEDURE, 1))),
+            Section("Checks: name, result, value, allowed, what to do", _check_rows(report)),
+        ),
+    )
+
+
+def _check_rows(report: PreflightReport) -> tuple[tuple[str, ...], ...]:
+    return tuple(
+        (check.name, check.outcome.value, check.value, check.limit, check.advice) for check in report.checks
+    )
+
+
+def wrapped_rows(section: Section, widths: Sequence[int]) -> list[tuple[list[str], ...]]:
+    """A section's rows with each cell broken into lines of at most a column's width in characters."""
+    from textwrap import wrap
+
+    return [
+        tuple(wrap(cell, width) or [""] for cell, width in zip(row, widths, strict=False))
+        for row in section.rows
+    ]

@@ -1,0 +1,92 @@
+"""From a plan to a drone that may be armed: checks, flight card, and the operator at the terminal."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import threading
+from contextlib import closing
+from datetime import datetime
+
+from errors import SettingError
+from framerunner.flying.plan import FlightPlan
+from framerunner.preflight.card import make_card
+from framerunner.preflight.card_files import HTML_NAME, write_card
+from framerunner.preflight.keys import HINT, has_terminal
+from framerunner.preflight.run import PreflightSettings, run_preflight, tell
+from framerunner.preflight.session import VehicleSession, open_link
+from framerunner.preflight.settings import HardwareSettings
+from offboard.safety.operator import Operator
+from offboard.safety.rules import SafetyRules
+from vision.sources import open_source
+from wire.transports.urls import parse_url
+
+
+def check_operator(hardware: HardwareSettings) -> None:
+    """Raise SettingError if a go is needed and nobody can give it."""
+    if hardware.needs_go and not hardware.dry_run and not has_terminal():
+        raise SettingError(
+            "a real drone is armed only by an operator's key, and there is no terminal: start it in one; "
+            "--yes flies without an operator, --simulated says that the drone is a simulation"
+        )
+
+
+async def is_own_simulator(drone_url: str) -> bool:
+    """Whether the vehicle on a link is framerunner's simulated drone, by what it says of itself.
+
+    Raises:
+        LinkError: the address is bad, or the link cannot be opened.
+        DroneError: no vehicle is heard.
+    """
+    parse_url(drone_url)
+    cancelled = threading.Event()
+
+    def ask() -> bool:
+        with closing(open_link(drone_url)) as link:
+            return VehicleSession(link, cancelled).is_own_simulator
+
+    try:
+        return await asyncio.to_thread(ask)
+    finally:
+        cancelled.set()
+
+
+async def prepare(plan: FlightPlan, checks: PreflightSettings, hardware: HardwareSettings) -> SafetyRules:
+    """Check the drone and write its flight card.
+
+    Args:
+        plan: with a mission.
+        checks: what is checked; the card is written into its folder.
+        hardware: the procedure.
+
+    Returns:
+        The rules of the flight, with its operator.
+
+    Raises:
+        LinkError: the drone's address is bad, or its link cannot be opened.
+        CameraError: the camera's URL can be no camera.
+        NotArmedError: a check has failed that the operator does not accept.
+        DroneError: the vehicle is not heard or does not answer.
+        SettingError: there is no terminal for the operator, or a name is no check's.
+    """
+    parse_url(checks.drone_url)
+    if checks.camera_url is not None:
+        open_source(checks.camera_url)  # says in a line what can be no camera; it is opened later
+    check_operator(hardware)
+    print("checks before arming, some ten seconds:", file=sys.stderr, flush=True)
+    report = await run_preflight(plan, checks)
+    tell(report)
+    card = make_card(
+        plan,
+        checks,
+        report,
+        abort=hardware.abort,
+        operator=hardware.operator,
+        kind="dry run: nothing is armed" if hardware.dry_run else "flight",
+        now=datetime.now().astimezone(),
+    )
+    write_card(card, checks.folder)
+    print(f"flight card: {checks.folder / HTML_NAME}", file=sys.stderr, flush=True)
+    report.require()
+    needs_go = hardware.needs_go and not hardware.dry_run
+    return SafetyRules(hardware.abort, Operator(needs_go=needs_go, hint=HINT))

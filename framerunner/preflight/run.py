@@ -1,0 +1,325 @@
+"""The checks before a real drone is armed: measured, judged, told, and written on the flight card."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from math import isnan, nan
+from pathlib import Path
+
+from errors import UserError
+from firmware_py.geodesy import LocalProjection
+from firmware_py.types import GeodeticPoint
+from framerunner.doctor.checks import examine
+from framerunner.doctor.findings import Finding, Level
+from framerunner.doctor.listen import Record
+from framerunner.flying.plan import FlightPlan
+from framerunner.preflight.camera import CameraTimes, measure_camera
+from framerunner.preflight.fence_upload import Vertex, read_fence, upload_fence
+from framerunner.preflight.parameters import ParameterValue, read_parameters, set_and_keep
+from framerunner.preflight.session import TIME_REQUESTS, VehicleSession, open_link
+from geometry.axes import Alignment, Pose
+from offboard.drone import DroneError
+from offboard.safety.check import Check, Outcome, accept, failures, passed
+from offboard.safety.failsafes import failsafe_checks, failsafe_rows, values_to_set
+from offboard.safety.fence import FlightFence, flight_fence
+from offboard.safety.vehicle_checks import (
+    BatteryFacts,
+    EstimatorFacts,
+    LinkFacts,
+    battery_check,
+    camera_checks,
+    estimator_check,
+    link_checks,
+)
+from wire.dialect import degrees_e7, mavlink
+from wire.px4_modes import mode_words
+
+LISTEN_S = 5.0
+CAMERA_S = 3.0
+KEPT_PARAMETERS = "parameters-before{}.params"
+_OWN = frozenset(
+    # Findings of the doctor that checks with a limit replace.
+    (
+        *("battery", "link", "innovations", "setpoints lost", "ground station lost", "battery low", "fence"),
+        *(row.name for row in failsafe_rows()),
+    )
+)
+_OUTCOMES = {Level.GOOD: Outcome.PASS, Level.NOTE: Outcome.NOTE, Level.MISSING: Outcome.FAIL}
+
+
+class NotArmedError(UserError):
+    """Checks before arming failed; the message is one line for people."""
+
+
+@dataclass(frozen=True, slots=True)
+class PreflightSettings:
+    """What to check.
+
+    Attributes:
+        drone_url: of the vehicle.
+        camera_url: of its camera; None: it is not checked.
+        camera_delay_s: of images without time stamps.
+        set_parameters: failsafe parameters that fail are set, and their old values kept.
+        accepted: names of checks that may fail.
+        folder: where the old values are written.
+    """
+
+    drone_url: str
+    camera_url: str | None = None
+    camera_delay_s: float = 0.1
+    set_parameters: bool = False
+    accepted: tuple[str, ...] = ()
+    folder: Path = Path()
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterChange:
+    """A parameter that was set before the flight."""
+
+    name: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, slots=True)
+class PreflightReport:
+    """What the checks have found.
+
+    Attributes:
+        vehicle: the drone in words.
+        checks: all, in the order in which they are told.
+        fence: of the flight.
+        changes: of parameters.
+        kept: the file with their old values; None if nothing was set.
+    """
+
+    vehicle: str
+    checks: tuple[Check, ...]
+    fence: FlightFence
+    changes: tuple[ParameterChange, ...] = ()
+    kept: Path | None = None
+
+    @property
+    def may_arm(self) -> bool:
+        """Whether no check prevents arming."""
+        return not failures(self.checks)
+
+    def require(self) -> None:
+        """Raise `NotArmedError` if a check prevents arming."""
+        failed = failures(self.checks)
+        if failed:
+            names = ", ".join(check.name for check in failed)
+            what = "a check has failed" if len(failed) == 1 else f"{len(failed)} checks have failed"
+            raise NotArmedError(f"not armed: {what} ({names}); correct it, or accept it by --accept NAME")
+
+
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """What was found on the link, on a thread."""
+
+    record: Record
+    link: LinkFacts
+    checks: tuple[Check, ...]
+    changes: tuple[ParameterChange, ...]
+    kept: Path | None
+
+
+async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> PreflightReport:
+    """Check a disarmed vehicle and its camera; takes some eight seconds.
+
+    Raises:
+        DroneError: the vehicle is not heard or does not answer.
+        LinkError: its link cannot be opened.
+        SettingError: a name that is accepted is no check's, or the old parameters cannot be kept.
+    """
+    fence = flight_fence(plan.box, plan.start_pose[:3])
+    cancelled = threading.Event()
+    camera = None if settings.camera_url is None else _camera(settings.camera_url)
+    watching = None if camera is None else asyncio.create_task(camera)
+    try:
+        measured = await asyncio.to_thread(_measure, plan, settings, fence, cancelled)
+        times = None if watching is None else await watching
+    finally:
+        cancelled.set()
+        if watching is not None:
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
+    record = measured.record
+    checks = [
+        *_doctors(examine(record)),
+        estimator_check(_estimator(record)),
+        battery_check(_battery(record)),
+        *link_checks(measured.link),
+        *measured.checks,
+        _caps_check(plan, fence),
+    ]
+    if times is not None:
+        clock_ms = record.clock_ms[-1] if record.clock_ms else None
+        checks += camera_checks(times.facts(clock_ms, settings.camera_delay_s))
+    accepted = tuple(accept(checks, settings.accepted))
+    return PreflightReport(_vehicle_words(record), accepted, fence, measured.changes, measured.kept)
+
+
+def tell(report: PreflightReport) -> None:
+    """Print each check on a line, and what was changed, on standard error."""
+    lines = [check.line for check in report.checks]
+    lines += [f"set      {each.name}: {each.before:g} -> {each.after:g}" for each in report.changes]
+    if report.kept is not None:
+        lines.append(f"old values: {report.kept}; return them by framerunner preflight --restore-parameters")
+    print("\n".join(lines), file=sys.stderr, flush=True)
+
+
+async def _camera(url: str) -> CameraTimes:
+    return await measure_camera(url, CAMERA_S)
+
+
+def _measure(
+    plan: FlightPlan, settings: PreflightSettings, fence: FlightFence, cancelled: threading.Event
+) -> _Measured:
+    """All that is done on the link; blocks."""
+    with closing(open_link(settings.drone_url)) as link:
+        session = VehicleSession(link, cancelled)
+        session.listen(LISTEN_S)
+        record = session.record
+        facts = LinkFacts(record.packets.lost_share, session.round_trips_s(), TIME_REQUESTS)
+        has_position = has_global_position(record)
+        checks: list[Check] = []
+        rows = failsafe_rows(session.autopilot)
+        if not rows:
+            advice = "check them by hand, then accept it by --accept failsafes"
+            checks.append(Check("failsafes", Outcome.FAIL, "no table for this autopilot", "", advice))
+        values = read_parameters(session, [row.name for row in rows])
+        changes: tuple[ParameterChange, ...] = ()
+        kept = _unused(settings.folder)
+        if settings.set_parameters and not record.armed:
+            numbers = {name: each.value for name, each in values.items()}
+            wanted = values_to_set(numbers, fence, has_global_position=has_position, rows=rows)
+            changes = _set(session, wanted, values, kept)
+            values |= read_parameters(session, wanted)
+        numbers = {name: each.value for name, each in values.items()}
+        checks += failsafe_checks(numbers, fence, has_global_position=has_position, rows=rows)
+        checks.append(_fence_check(session, plan, fence))
+    return _Measured(record, facts, tuple(checks), changes, kept if changes else None)
+
+
+def _set(
+    session: VehicleSession, wanted: Mapping[str, float], values: Mapping[str, ParameterValue], path: Path
+) -> tuple[ParameterChange, ...]:
+    if not wanted:
+        return ()
+    set_and_keep(session, wanted, values, path)
+    return tuple(ParameterChange(name, values[name].value, value) for name, value in wanted.items())
+
+
+def _unused(folder: Path) -> Path:
+    """A new file for old values, so that those of an earlier flight are never lost."""
+    numbers = ("", *(f"-{number}" for number in range(2, 1000)))
+    paths = (folder / KEPT_PARAMETERS.format(number) for number in numbers)
+    return next(path for path in paths if not path.exists())
+
+
+def has_global_position(record: Record) -> bool:
+    """Whether the vehicle knows where on Earth it is, so that its fence has an effect."""
+    status = record.latest.get("ESTIMATOR_STATUS")
+    known = status is not None and bool(status.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS)
+    return known and "GPS_GLOBAL_ORIGIN" in record.latest
+
+
+def fence_vertices(record: Record, plan: FlightPlan, fence: FlightFence) -> tuple[Vertex, ...] | None:
+    """The fence's corners on Earth, by the pose that the vehicle reports on its start; None: not known."""
+    origin = record.latest.get("GPS_GLOBAL_ORIGIN")
+    attitude, position = record.telemetry.attitude, record.telemetry.position
+    if origin is None or attitude is None or position is None:
+        return None
+    start = Pose(plan.start_pose[:3], plan.start_pose[3])
+    alignment = Alignment(start, Pose(position.position_ned_m, attitude.yaw_ned_rad))
+    projection = LocalProjection(GeodeticPoint(origin.latitude / 1e7, origin.longitude / 1e7, 0.0))
+    points = [projection.to_geodetic(corner) for corner in fence.corners_ned_m(alignment)]
+    return tuple((degrees_e7(each.latitude_deg), degrees_e7(each.longitude_deg)) for each in points)
+
+
+def _fence_check(session: VehicleSession, plan: FlightPlan, fence: FlightFence) -> Check:
+    """Upload the fence and read it back."""
+    record, name = session.record, "fence"
+    limit = f"{len(fence.corners_arena_m)} corners within {fence.radius_m:g} m of the start"
+    if record.armed:
+        return Check(name, Outcome.FAIL, "not uploaded to an armed vehicle", limit, "land and disarm it")
+    if not has_global_position(record):
+        words = "the vehicle has no global position, so its fence has no effect"
+        advice = "only the app's box and a net keep it in; put up a net"
+        return Check(name, Outcome.NOTE, words, limit, advice)
+    vertices = fence_vertices(record, plan, fence)
+    if vertices is None:
+        advice = "wait until it reports attitude and position"
+        return Check(name, Outcome.FAIL, "the vehicle's pose is not known", limit, advice)
+    try:
+        upload_fence(session, vertices)
+        back = read_fence(session)
+    except DroneError as error:
+        return Check(name, Outcome.FAIL, str(error), limit, "or fly inside a net and --accept fence")
+    value = "uploaded and read back" if back == vertices else "another fence is read back"
+    return passed(name, back == vertices, value, limit, "try again; another station may write to it")
+
+
+def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
+    limits, height_m = plan.command_limits, plan.box.high_m[2] - plan.start_pose[2]
+    caps = plan.caps
+    if caps is None:
+        return Check("caps", Outcome.FAIL, "none", "", "give --max-speed")
+    value = f"{caps.words}; {height_m:.1f} m above the start"
+    limit = f"below the fence, {fence.height_m:g} m"
+    if limits.forward_m_s > caps.level_m_s or max(limits.up_m_s, limits.down_m_s) > caps.vertical_m_s:
+        return Check("caps", Outcome.NOTE, value, limit, "they are below what the mission may ask for")
+    return passed("caps", height_m < fence.height_m, value, limit, "give a lower --max-height")
+
+
+def _doctors(findings: Sequence[Finding]) -> list[Check]:
+    """The doctor's findings, but for those that other checks replace."""
+    return [
+        Check(
+            "estimator settings" if each.subject == "estimator" else each.subject,
+            _OUTCOMES[each.level],
+            each.text,
+            "",
+            each.advice,
+        )
+        for each in findings
+        if each.subject not in _OWN
+    ]
+
+
+def _battery(record: Record) -> BatteryFacts:
+    status = record.latest.get("SYS_STATUS")
+    if status is None:
+        return BatteryFacts(nan, nan)
+    percent = nan if status.battery_remaining < 0 else float(status.battery_remaining)
+    volts = nan if status.voltage_battery in (0, 65535) else status.voltage_battery / 1000
+    return BatteryFacts(percent, volts)
+
+
+def _estimator(record: Record) -> EstimatorFacts:
+    status = record.latest.get("ESTIMATOR_STATUS")
+    if status is None:
+        return EstimatorFacts(reported=False)
+    flags = status.flags
+    ratios = (status.vel_ratio, status.pos_horiz_ratio, status.pos_vert_ratio, status.mag_ratio)
+    absolute, relative = mavlink.ESTIMATOR_POS_HORIZ_ABS, mavlink.ESTIMATOR_POS_HORIZ_REL
+    return EstimatorFacts(
+        reported=True,
+        has_attitude=bool(flags & mavlink.ESTIMATOR_ATTITUDE),
+        has_position=bool(flags & (absolute | relative)),
+        has_height=bool(flags & mavlink.ESTIMATOR_POS_VERT_ABS),
+        largest_ratio=max((ratio for ratio in ratios if not isnan(ratio)), default=0.0),
+    )
+
+
+def _vehicle_words(record: Record) -> str:
+    mode = record.modes.get(record.latest["HEARTBEAT"].custom_mode) or mode_words(
+        record.latest["HEARTBEAT"].custom_mode
+    )
+    return f"{record.autopilot_name}, {record.type_name}, system {record.system_id}, mode {mode}"

@@ -1,0 +1,104 @@
+"""Brings a drone down when its flight is aborted: hold or a landing, and an operator's stop of the motors."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from offboard.drone import Drone, DroneError, DroneState
+from offboard.safety.rules import SafetyRules
+
+ATTEND_US = 120_000_000  # vehicle time for which an operator may stop the motors after an abort
+
+
+class FlightAbort:
+    """Ends the commanding of one drone that is in the air.
+
+    Args:
+        drone: whose motors were requested.
+        safety: the rules of the flight.
+        see: called with the drone's states afterwards, while an operator may still stop the motors.
+    """
+
+    def __init__(self, drone: Drone, safety: SafetyRules, see: Callable[[DroneState], None]) -> None:
+        self._drone = drone
+        self._safety = safety
+        self._see = see
+
+    async def bring_down(self) -> str:
+        """Hold or land, as the rules and the operator say.
+
+        An operator's first stop lands whatever the rules say, the second one stops the motors. With an
+        operator this returns when the drone is disarmed, when the link is lost, or after `ATTEND_US`.
+
+        Returns:
+            What is to be told beside the reason of the abort; empty if nothing.
+        """
+        operator = self._safety.operator
+        if operator is None:
+            return await self._end()
+        while not operator.kills:
+            stops = operator.stops
+            work = asyncio.ensure_future(self._end_and_attend())
+            try:
+                return await asyncio.shield(work)
+            except asyncio.CancelledError:
+                await _cancelled(work)
+                if operator.stops == stops:  # Ctrl-C
+                    raise
+                uncancel()
+        return await self._kill()
+
+    async def _end_and_attend(self) -> str:
+        problem = await self._end()
+        await self._attend()
+        return problem
+
+    async def _end(self) -> str:
+        operator, abort = self._safety.operator, self._safety.abort
+        demanded = operator is not None and operator.stops > 0
+        try:
+            if abort == "land" or demanded:
+                await self._drone.land_now(demanded=demanded)
+            else:
+                await self._drone.hold()
+        except DroneError as error:
+            return f"{'land' if demanded else abort}: {error}"
+        return ""
+
+    async def _attend(self) -> None:
+        """Watch the drone until it is disarmed."""
+        ticks, end_us = self._drone.ticks(), None
+        try:
+            async for state in ticks:
+                end_us = state.time_us + ATTEND_US if end_us is None else end_us
+                if not state.armed or state.time_us > end_us:
+                    return
+                self._see(state)
+        except DroneError:
+            return  # the link is lost, so nothing can be demanded of the drone any more
+        finally:
+            close = getattr(ticks, "aclose", None)
+            if close is not None:
+                await close()
+
+    async def _kill(self) -> str:
+        if self._safety.operator is not None:
+            self._safety.operator.on_stop(None)  # a third press must not interrupt this
+        try:
+            await self._drone.motors_off()
+        except DroneError as error:
+            return f"stopping the motors: {error}"
+        return "the operator stopped the motors"
+
+
+def uncancel() -> None:
+    """Take back the cancellation of this task, which is reported instead."""
+    task = asyncio.current_task()
+    if task is not None:
+        task.uncancel()
+
+
+async def _cancelled(work: asyncio.Future[str]) -> None:
+    work.cancel()
+    await asyncio.gather(work, return_exceptions=True)

@@ -1,0 +1,56 @@
+"""The connections of one MAVSDK instance, which forwards between all of them."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+
+from mavsdk.asyncio import ForwardingOption, Mavsdk, MavsdkError
+
+from offboard.drone import DroneError
+from offboard.link.companion import Companion
+from offboard.link.tlog import TlogRecorder
+
+logger = logging.getLogger(__name__)
+
+
+async def open_connections(
+    mavsdk: Mavsdk, urls: Sequence[str], tlog_path: Path | None, companion: Companion | None
+) -> TlogRecorder | None:
+    """Open the connections to recorder, companion, ground stations and vehicle.
+
+    Args:
+        mavsdk: gets the connections.
+        urls: of ground stations, then of the vehicle.
+        tlog_path: where all traffic is recorded; None: nowhere.
+        companion: sends over the vehicle's link; None: there is none.
+
+    Returns:
+        The recorder, which the caller closes.
+
+    Raises:
+        DroneError: the vehicle's link or the recording cannot be opened.
+    """
+    recorder = None
+    if tlog_path is not None:
+        try:
+            recorder = TlogRecorder(tlog_path)
+            await mavsdk.add_any_connection(await recorder.listen(), ForwardingOption.ON)
+        except (OSError, MavsdkError) as error:
+            if recorder is not None:
+                recorder.close()
+            raise DroneError(f"cannot record to {tlog_path}: {error}") from None
+    if companion is not None:
+        try:
+            await mavsdk.add_any_connection(companion.listen(), ForwardingOption.ON)
+        except (OSError, MavsdkError) as error:  # the mission can be flown without
+            logger.warning("the mission cannot be reported: %s", error)
+    try:
+        for url in urls:
+            await mavsdk.add_any_connection(url, ForwardingOption.ON)
+    except MavsdkError as error:
+        if recorder is not None:
+            recorder.close()
+        raise DroneError(f"cannot open {urls[-1]}: {error}") from None
+    return recorder

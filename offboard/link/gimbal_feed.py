@@ -1,0 +1,52 @@
+"""The attitude of the gimbal that carries the camera, as telemetry reports it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from geometry.rotations import multiply, normalized, quaternion_from_yaw
+from geometry.vectors import Quaternion
+
+_YAW_LOCK, _YAW_IN_VEHICLE_FRAME, _YAW_IN_EARTH_FRAME = 16, 32, 64  # GIMBAL_DEVICE_FLAGS
+_MIN_LENGTH = 0.5  # of a quaternion that is one
+
+
+@dataclass(frozen=True, slots=True)
+class GimbalAttitude:
+    """What the last GIMBAL_DEVICE_ATTITUDE_STATUS says."""
+
+    attitude: Quaternion  # of the camera, forward-right-down; roll and pitch to the horizon
+    to_north: bool  # its yaw is to north; else to the vehicle's heading
+
+    def ned(self, yaw_ned_rad: float) -> Quaternion:
+        """The camera's attitude, forward-right-down to NED, when the vehicle has a heading."""
+        return self.attitude if self.to_north else multiply(quaternion_from_yaw(yaw_ned_rad), self.attitude)
+
+
+class GimbalFeed:
+    """Keeps the newest attitude; it is written on MAVSDK's thread.
+
+    Attributes:
+        newest: None before the first, and without a gimbal.
+    """
+
+    def __init__(self) -> None:
+        self.newest: GimbalAttitude | None = None
+
+    def subscribe(self, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
+        """Subscribe to MAVSDK's synchronous plugin `mavlink_direct`."""
+        direct.subscribe_message("GIMBAL_DEVICE_ATTITUDE_STATUS", self._on_attitude)
+
+    def _on_attitude(self, message: Any, _user: object) -> None:  # noqa: ANN401
+        fields = json.loads(message.fields_json)
+        values = [float(value) if isinstance(value, int | float) else 0.0 for value in fields["q"]]
+        if len(values) != 4 or not all(map(isfinite, values)) or sum(v * v for v in values) < _MIN_LENGTH:
+            return
+        flags = int(fields["flags"])
+        locked = bool(flags & _YAW_LOCK)  # older gimbals say the frame by this alone
+        to_north = bool(flags & _YAW_IN_EARTH_FRAME) or (locked and not flags & _YAW_IN_VEHICLE_FRAME)
+        w, x, y, z = values
+        self.newest = GimbalAttitude(normalized((w, x, y, z)), to_north)

@@ -1,0 +1,111 @@
+"""A camera's images as H.264 in a fragmented MP4 file, made piece by piece in memory.
+
+Images are compressed in a thread of their own, so the flight is not delayed; when the encoder is late, images
+are left out. Every fragment begins with a key frame and is complete, so what was written before a program
+ended can be played.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from contextlib import suppress
+from fractions import Fraction
+
+import av
+import numpy as np
+import numpy.typing as npt
+from av.video.stream import VideoStream
+
+Image = npt.NDArray[np.uint8]
+
+_CLOCK_HZ = 90_000
+_WAITING = 8  # images; more are left out
+_OPTIONS = {"movflags": "frag_keyframe+empty_moov+default_base_moof"}
+_CODEC = {"preset": "ultrafast", "tune": "zerolatency", "crf": "20"}  # visually close to the image
+
+
+class VideoEncoder:
+    """Compresses images; `take` returns what of the file is done.
+
+    Args:
+        width_px: of the images; a last odd column or row is left out, as usual H.264 needs even sizes.
+        height_px: of the images.
+        rate_hz: of the images, nominal; each has its own time.
+
+    Attributes:
+        failed: whether the encoder has ended by an error.
+    """
+
+    def __init__(self, width_px: int, height_px: int, rate_hz: float) -> None:
+        self._width_px, self._height_px = width_px // 2 * 2, height_px // 2 * 2
+        self._rate_hz = rate_hz
+        self._images: queue.Queue[tuple[Image, int] | None] = queue.Queue(_WAITING)
+        self._pieces: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._first_us = -1
+        self.failed = False
+        self._thread = threading.Thread(target=self._run, name="video file", daemon=True)
+        self._thread.start()
+
+    def show(self, image: Image, time_us: int) -> None:
+        """Add an image with its time, vehicle time; the first one has time 0 in the file. Never blocks.
+
+        The image is BGR, shape (height, width, 3), and must not be changed afterwards.
+        """
+        if self._first_us < 0:
+            self._first_us = time_us
+        with suppress(queue.Full):
+            self._images.put_nowait((image, time_us - self._first_us))
+
+    def take(self) -> bytes:
+        """The next bytes of the file; empty if there are none now."""
+        pieces: list[bytes] = []
+        with suppress(queue.Empty):
+            while True:
+                pieces.append(self._pieces.get_nowait())
+        return b"".join(pieces)
+
+    def finish(self) -> bytes:
+        """Compress what waits, end the file and return its last bytes."""
+        if self._thread.is_alive():
+            self._images.put(None)
+            self._thread.join()
+        return self.take()
+
+    def write(self, data: bytes) -> int:
+        """Take bytes of the file from the multiplexer, which sees this object as the file."""
+        self._pieces.put(bytes(data))
+        return len(data)
+
+    def _run(self) -> None:
+        try:
+            with av.open(self, "w", format="mp4", options=_OPTIONS) as container:
+                stream = container.add_stream(
+                    "libx264", rate=Fraction(self._rate_hz).limit_denominator(1000), options=_CODEC
+                )
+                self._set_up(stream)
+                while (given := self._images.get()) is not None:
+                    for packet in stream.encode(self._frame(*given)):
+                        container.mux(packet)
+                for packet in stream.encode(None):
+                    container.mux(packet)
+        except (av.FFmpegError, OSError, ValueError):
+            self.failed = True
+            while self._images.get() is not None:  # until `finish`
+                pass
+
+    def _set_up(self, stream: VideoStream) -> None:
+        stream.width, stream.height = self._width_px, self._height_px
+        stream.pix_fmt = "yuv420p"
+        context = stream.codec_context
+        context.time_base = Fraction(1, _CLOCK_HZ)
+        context.gop_size = max(1, round(self._rate_hz))  # a fragment a second
+        context.max_b_frames = 0
+        context.thread_count = 1
+
+    def _frame(self, image: Image, time_us: int) -> av.VideoFrame:
+        cut = np.ascontiguousarray(image[: self._height_px, : self._width_px])
+        frame = av.VideoFrame.from_ndarray(cut, format="bgr24")
+        frame.pts = round(time_us * _CLOCK_HZ / 1e6)
+        frame.time_base = Fraction(1, _CLOCK_HZ)
+        return frame

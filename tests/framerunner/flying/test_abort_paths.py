@@ -1,0 +1,232 @@
+"""Every way in which a real drone's flight is aborted, flown with the app's adapter in simulated time.
+
+The vehicle has the failsafe parameters that the checks before arming demand.
+"""
+
+from math import hypot
+from random import Random
+
+import pytest
+
+from firmware_py.status import FlightMode
+from framerunner.flying.plan import FlightPlan
+from offboard.mission import load_mission
+from offboard.pilot import Pilot
+from offboard.safety.caps import Caps
+from offboard.safety.failsafes import failsafe_rows
+from offboard.safety.fence import flight_fence
+from offboard.safety.operator import Operator
+from offboard.safety.rules import SafetyRules
+from scenarios.faults.parse import parse_fault
+from scenarios.loader import load_scenario
+from tests.framerunner.simulated_link import Direction, Impairment, fly_over
+from tests.offboard.fakes import runaway
+
+GOOD = Impairment()
+SILENT = Impairment(silent_s=(0.0, 1e9))
+UP = (0, 0, 0.2)
+
+
+def hall(fault=None, limit_s=30.0, sensors="ideal"):
+    faults = () if fault is None else (parse_fault(fault),)
+    update = {"frames": (), "try_limit_s": limit_s, "faults": faults, "sensors": sensors}
+    return load_scenario("test-case-1").model_copy(update=update)
+
+
+def demanded_parameters(scenario):
+    plan = FlightPlan(scenario)
+    fence = flight_fence(plan.box, plan.start_pose[:3])
+    return {row.name: row.wanted(fence) for row in failsafe_rows()}
+
+
+def fly(
+    tmp_path, *, scenario=None, operator=None, mission=None, events=(), impairment=GOOD, caps=None, **changed
+):
+    """A flight as with --drone, which rises slowly for ever; all is followed until the drone is down."""
+    scenario = scenario or hall()
+    operator = operator or Operator(needs_go=False)
+    return fly_over(
+        impairment,
+        scenario,
+        mission or runaway(tmp_path, UP),
+        safety=SafetyRules("land", operator),
+        caps=caps or Caps(),
+        events=events,
+        parameters=demanded_parameters(scenario) | changed,
+        after_s=40.0,
+    )
+
+
+def came_down(flight):
+    """Whether it is disarmed, on the ground, and never fell."""
+    fastest_m_s = min(truth.velocity_arena_m_s[2] for truth in flight.truths)
+    return not flight.armed and flight.truths[-1].position_arena_m[2] < 0.6 and fastest_m_s > -2.0
+
+
+def modes(flight):
+    return [moment.state.mode for moment in flight.moments]
+
+
+def test_the_operators_stop_lands(tmp_path):
+    operator = Operator(needs_go=False)
+    flight = fly(tmp_path, operator=operator, events=[(12.0, lambda _: operator.press_stop())])
+    assert flight.outcome.reason == "stopped by the operator"
+    assert came_down(flight)
+    flown_s = flight.outcome.flight_time_s
+    assert 3.0 < flown_s < 13.0
+
+
+def test_the_second_stop_stops_the_motors_during_the_landing(tmp_path):
+    operator = Operator(needs_go=False)
+    events = [(12.0, lambda _: operator.press_stop()), (13.0, lambda _: operator.press_stop())]
+    flight = fly(tmp_path, operator=operator, events=events)
+    assert flight.outcome.reason == "stopped by the operator; the operator stopped the motors"
+    assert not flight.armed
+    off_s = next(each.time_us for each in flight.truths if each.time_us > 12e6 and not each.motors_on) / 1e6
+    assert off_s == pytest.approx(13.0, abs=0.05)
+
+
+def test_both_stops_at_once_stop_the_motors(tmp_path):
+    operator = Operator(needs_go=False)
+    events = [(12.0, lambda _: (operator.press_stop(), operator.press_stop()))]
+    flight = fly(tmp_path, operator=operator, events=events)
+    off_s = next(each.time_us for each in flight.truths if each.time_us > 11e6 and not each.motors_on) / 1e6
+    assert off_s == pytest.approx(12.0, abs=0.1)
+
+
+def test_a_stop_arrives_over_a_lossy_link(tmp_path):
+    operator = Operator(needs_go=False)
+    lossy = Impairment(loss=0.2, jitter_s=0.2)
+    events = [(12.0, lambda _: operator.press_stop())]
+    flight = fly(tmp_path, operator=operator, impairment=lossy, events=events)
+    assert flight.outcome.reason.startswith("stopped by the operator")
+    assert came_down(flight)
+
+
+def test_nothing_is_armed_before_the_go(tmp_path):
+    operator = Operator(hint="hold G")
+    flight = fly(tmp_path, operator=operator, events=[(15.0, lambda _: operator.give_go())])
+    first_s = next(truth.time_us for truth in flight.truths if truth.motors_on) / 1e6
+    assert first_s > 15.0
+    assert "waiting for the operator's go: hold G" in {moment.remark for moment in flight.moments}
+    assert flight.outcome.ended == "timed out"
+
+
+def test_a_stop_before_the_go_arms_nothing(tmp_path):
+    operator = Operator()
+    events = [(9.0, lambda _: operator.press_stop()), (10.0, lambda _: operator.give_go())]
+    flight = fly(tmp_path, operator=operator, events=events)
+    assert (flight.outcome.ended, flight.outcome.reason) == ("aborted", "stopped by the operator")
+    assert not any(truth.motors_on for truth in flight.truths)
+
+
+def test_a_go_that_does_not_come_ends_the_wait(tmp_path, monkeypatch):
+    monkeypatch.setattr("offboard.app.GO_LIMIT_US", 5_000_000)
+    flight = fly(tmp_path, operator=Operator())
+    assert flight.outcome.reason.startswith("no go within")
+    assert not any(truth.motors_on for truth in flight.truths)
+
+
+def test_a_lost_link_leaves_the_landing_to_the_vehicle(tmp_path):
+    flight = fly(tmp_path, impairment=Impairment(silent_s=(12.0, 1e9)))
+    assert flight.outcome.reason.startswith("link lost")
+    assert came_down(flight)
+    assert modes(flight)[-1] == "OFFBOARD"  # the app has seen nothing of it
+
+
+def test_an_app_that_is_gone_leaves_the_landing_to_the_vehicle(tmp_path):
+    """As after `kill -9`: setpoints end at once, and nothing else is sent."""
+
+    def kill(vehicle):
+        vehicle.up = vehicle.beats = Direction(SILENT, Random(0))
+
+    flight = fly(tmp_path, events=[(12.0, kill)])
+    assert came_down(flight)
+    assert flight.outcome.reason.startswith("the pilot or a failsafe took over: mode LAND")
+
+
+def test_a_low_battery_lands(tmp_path):
+    flight = fly(tmp_path, scenario=hall("battery sag 0.2 at 5 s", sensors="mocap"))
+    assert flight.outcome.reason.startswith("the pilot or a failsafe took over: mode LAND")
+    assert came_down(flight)
+
+
+def test_a_camera_that_is_lost_lands(tmp_path):
+    def cover(vehicle):
+        vehicle.video = Direction(SILENT, Random(0))
+
+    flight = fly(tmp_path, events=[(12.0, cover)])
+    assert flight.outcome.reason.startswith("the camera is dead: no image for 1.")
+    assert came_down(flight)
+
+
+def test_an_estimator_without_a_position_descends(tmp_path):
+    flight = fly(tmp_path, scenario=hall("external_pose off at 4 s", sensors="mocap"))
+    assert flight.outcome.ended == "aborted"
+    assert not flight.armed
+
+
+def test_a_fence_that_is_breached_lands(tmp_path):
+    """The vehicle's fence is within the app's box here, as if the box failed."""
+    away = runaway(tmp_path, (0.8, 0, 0))
+    flight = fly(tmp_path, mission=away, GF_MAX_HOR_DIST=3.0, GF_ACTION=5)
+    assert flight.outcome.reason.startswith("the pilot or a failsafe took over: mode LAND")
+    assert came_down(flight)
+    assert max(hypot(x + 3, y + 3) for x, y, _ in (t.position_arena_m for t in flight.truths)) < 4.5
+
+
+@pytest.mark.parametrize("velocity", [(1, 1, 0), (0, 0, 1), (1, 0, 1)])
+def test_caps_hold_whatever_a_mission_asks(tmp_path, velocity, caplog):
+    caps = Caps(level_m_s=0.5, vertical_m_s=0.4, height_m=1.5)
+    away = runaway(tmp_path, velocity)
+    flight = fly(tmp_path, mission=away, caps=caps, scenario=hall(limit_s=12.0))
+    start_z = flight.truths[0].position_arena_m[2]
+    level = max(hypot(*truth.velocity_arena_m_s[:2]) for truth in flight.truths)
+    assert level < 0.6
+    assert max(truth.velocity_arena_m_s[2] for truth in flight.truths) < 0.5
+    assert max(truth.position_arena_m[2] for truth in flight.truths) < start_z + 1.55
+    assert flight.outcome.ended == "timed out"
+    said = [record.message for record in caplog.records if record.message.startswith("cap on")]
+    assert len(said) == len({line.partition(":")[0] for line in said}) > 0
+    assert came_down(flight)
+
+
+class Broken(Pilot):
+    """Fails in flight."""
+
+    def fail(self) -> None:
+        """Break."""
+        raise ZeroDivisionError("no reason")
+
+
+def test_a_mission_error_lands(tmp_path):
+    path = tmp_path / "broken.yaml"
+    path.write_text(
+        "name: broken\ninitial: up\nstates:\n  up:\n    enter: [hover, cmd.vel_z = 0.4]\n    transitions:\n"
+        "      - {when: seconds_in_state > 4, to: fails}\n  fails:\n    enter: [fail]\n    transitions:\n"
+        "      - {when: seconds_in_state > 4, to: done}\n  done:\n    final: true\n",
+        encoding="utf-8",
+    )
+    flight = fly(tmp_path, mission=load_mission(str(path), Broken))
+    assert "ZeroDivisionError: no reason" in flight.outcome.reason
+    assert came_down(flight)
+
+
+def test_the_time_limit_lands(tmp_path):
+    flight = fly(tmp_path, scenario=hall(limit_s=6.0))
+    assert flight.outcome.reason == "not finished within 6 s"
+    assert came_down(flight)
+
+
+def test_ctrl_c_lands(tmp_path):
+    events = [(12.0, lambda vehicle: vehicle.app.cancel())]
+    flight = fly(tmp_path, events=events)
+    assert flight.outcome.interrupted
+    assert came_down(flight)
+
+
+def test_hold_on_abort_holds(tmp_path):
+    scenario = hall(limit_s=6.0)
+    safety = SafetyRules("hold")
+    flight = fly_over(GOOD, scenario, runaway(tmp_path, UP), safety=safety, caps=Caps(), after_s=10.0)
+    assert (flight.mode, flight.armed) == (FlightMode.HOLD, True)

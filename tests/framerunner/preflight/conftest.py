@@ -1,0 +1,35 @@
+from types import SimpleNamespace
+
+import pytest
+
+from framerunner.doctor import listen
+from framerunner.flying.plan import FlightPlan
+from framerunner.preflight import run, session
+from offboard.mission import load_mission
+from offboard.safety.caps import Caps
+from scenarios.loader import load_scenario
+from tests.framerunner.preflight.bench import BenchLink
+
+
+@pytest.fixture
+def scenario():
+    return load_scenario("test-case-1")
+
+
+@pytest.fixture
+def plan(scenario):
+    return FlightPlan(scenario, load_mission("explorer_soft_landing"), None, caps=Caps())
+
+
+@pytest.fixture
+def link(scenario, monkeypatch):
+    """The link that the checks open; their clock is the simulation's."""
+    bench = BenchLink(scenario)
+    clock = SimpleNamespace(
+        monotonic=lambda: bench.simulation.time_us / 1e6,
+        monotonic_ns=lambda: bench.simulation.time_us * 1000,
+    )
+    monkeypatch.setattr(session, "time", clock)
+    monkeypatch.setattr(listen, "time", clock)
+    monkeypatch.setattr(run, "open_link", lambda url: bench)
+    return bench

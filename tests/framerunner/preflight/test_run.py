@@ -1,0 +1,165 @@
+"""The checks before arming, on a simulated drone in simulated time."""
+
+import pytest
+
+from errors import SettingError
+from firmware_py.missions.items import PlanType
+from firmware_py.types import GeodeticPoint
+from framerunner.preflight import parameters
+from framerunner.preflight.parameters import load_parameters, read_parameters, set_parameter
+from framerunner.preflight.run import NotArmedError, PreflightSettings, run_preflight
+from framerunner.preflight.session import VehicleSession
+from offboard.safety.check import Outcome
+from wire.dialect import mavlink
+
+FAILING = ["COM_OBL_RC_ACT", "NAV_RCL_ACT", "COM_LOW_BAT_ACT", "GF_MAX_VER_DIST", "GF_MAX_HOR_DIST"]
+
+
+def settings(tmp_path, **changed):
+    return PreflightSettings("udpin://bench", folder=tmp_path, **changed)
+
+
+def outcomes(report):
+    return {check.name: check.outcome for check in report.checks}
+
+
+def names_sent(link, kind):
+    return [message.param_id for message in link.sent if message.get_type() == kind]
+
+
+async def test_each_check_is_told_and_a_failing_one_prevents_arming(link, plan, tmp_path):
+    report = await run_preflight(plan, settings(tmp_path))
+    found = outcomes(report)
+    assert [name for name, outcome in found.items() if outcome is Outcome.FAIL] == FAILING
+    assert {"fence", "battery", "estimator", "link loss", "link latency", "caps", "position"} <= found.keys()
+    assert not report.may_arm
+    with pytest.raises(NotArmedError, match=r"5 checks have failed .*--accept NAME"):
+        report.require()
+    assert names_sent(link, "PARAM_SET") == []
+    assert report.kept is None
+    line = next(check.line for check in report.checks if check.name == "NAV_RCL_ACT")
+    assert line.startswith("FAIL     NAV_RCL_ACT: 2 (return) (allowed: 3 (land)); set it to 3 (land)")
+
+
+async def test_the_fence_is_on_the_vehicle_and_read_back(link, plan, tmp_path):
+    report = await run_preflight(plan, settings(tmp_path))
+    assert outcomes(report)["fence"] is Outcome.PASS
+    autopilot, start = link.simulation.autopilot, plan.scenario.start
+    items = autopilot.missions.plan(PlanType.FENCE).items
+    assert [item.command for item in items] == [mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION] * 4
+    places = [autopilot.local_position(GeodeticPoint(item.x, item.y, 0.0)) for item in items]
+    wanted = [(x - start.x_m, start.y_m - y) for x, y in report.fence.corners_arena_m]  # x points north
+    assert [place[:2] for place in places] == [pytest.approx(corner, abs=0.02) for corner in wanted]
+    for _ in range(500):
+        link.simulation.tick()
+    assert link.simulation.autopilot.status.ready  # the drone stands within it
+
+
+async def test_another_fence_that_is_read_back_fails(link, plan, tmp_path, monkeypatch):
+    monkeypatch.setattr("framerunner.preflight.run.read_fence", lambda session: ())
+    report = await run_preflight(plan, settings(tmp_path))
+    assert outcomes(report)["fence"] is Outcome.FAIL
+
+
+async def test_parameters_are_set_and_returned(link, plan, tmp_path):
+    before = {name: link.simulation.autopilot.parameters.value(name) for name in FAILING}
+    report = await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    assert report.may_arm, [check.line for check in report.checks]
+    assert [change.name for change in report.changes] == FAILING
+    assert names_sent(link, "PARAM_SET") == FAILING
+    assert link.simulation.autopilot.parameters.value("NAV_RCL_ACT") == 3
+    kept = load_parameters(report.kept)
+    assert {each.name: each.value for each in kept} == before
+    session = VehicleSession(link)
+    for each in kept:
+        set_parameter(session, each)
+    assert {name: link.simulation.autopilot.parameters.value(name) for name in FAILING} == before
+
+
+async def test_old_values_that_are_kept_are_not_overwritten(link, plan, tmp_path):
+    first = await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    link.simulation.autopilot.parameters.set("NAV_RCL_ACT", 1)
+    second = await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    third = await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    assert [first.kept.name, second.kept.name] == ["parameters-before.params", "parameters-before-2.params"]
+    assert [each.name for each in load_parameters(second.kept)] == ["NAV_RCL_ACT"]
+    assert (third.kept, third.changes) == (None, ())
+
+
+async def test_nothing_is_set_if_the_old_values_cannot_be_kept(link, plan, tmp_path):
+    nowhere = settings(tmp_path / "nowhere", set_parameters=True)
+    with pytest.raises(SettingError, match="nothing was set"):
+        await run_preflight(plan, nowhere)
+    assert names_sent(link, "PARAM_SET") == []
+
+
+async def test_lost_requests_are_repeated(link, plan, tmp_path):
+    kinds = ("PARAM_REQUEST_READ", "PARAM_SET", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT")
+    counts = dict.fromkeys(kinds, 0)
+
+    def every_third(message):
+        kind = message.get_type()
+        if kind not in counts:
+            return False
+        counts[kind] += 1
+        return counts[kind] % 3 == 1
+
+    link.lost = every_third
+    report = await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    assert report.may_arm, [check.line for check in report.checks]
+
+
+async def test_a_failure_is_accepted_by_its_name_only(link, plan, tmp_path):
+    report = await run_preflight(plan, settings(tmp_path, accepted=("NAV_RCL_ACT",)))
+    assert outcomes(report)["NAV_RCL_ACT"] is Outcome.ACCEPTED
+    assert outcomes(report)["COM_OBL_RC_ACT"] is Outcome.FAIL
+    with pytest.raises(SettingError, match="--accept NAV_RCL: there is no such check; the checks are"):
+        await run_preflight(plan, settings(tmp_path, accepted=("NAV_RCL",)))
+
+
+async def test_an_armed_vehicle_is_left_alone(link, plan, tmp_path):
+    while not link.simulation.autopilot.status.ready:
+        link.receive(0.1)
+    link.simulation.autopilot.parameters.set("COM_DISARM_PRFLT", -1)
+    link.simulation.autopilot.arm()
+    report = await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    found = outcomes(report)
+    assert (found["armed"], found["fence"]) == (Outcome.FAIL, Outcome.FAIL)
+    assert names_sent(link, "PARAM_SET") == []
+    assert not any(message.get_type() == "MISSION_COUNT" for message in link.sent)
+
+
+async def test_nothing_that_is_sent_arms(link, plan, tmp_path):
+    await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    commands = {message.command for message in link.sent if message.get_type().startswith("COMMAND_")}
+    allowed = {mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_RUN_PREARM_CHECKS}
+    assert commands <= allowed
+    assert not link.simulation.autopilot.status.armed
+
+
+def test_integers_survive_the_wire(link):
+    session = VehicleSession(link)
+    for value in (0, 1, 3):
+        kept = parameters.ParameterValue("NAV_DLL_ACT", value, mavlink.MAV_PARAM_TYPE_INT32)
+        set_parameter(session, kept)
+        assert read_parameters(session, ["NAV_DLL_ACT"])["NAV_DLL_ACT"] == kept
+
+
+def test_a_parameter_that_is_not_there_is_left_out(link):
+    assert read_parameters(VehicleSession(link), ["NO_SUCH"]) == {}
+
+
+@pytest.mark.parametrize(
+    "text", ["", "# only a comment\n", "1 1 NAME 2 9\n", "1\t1\tNAME\tnan\t9\n", "1\t1\tNAME\t1.5\t6\n"]
+)
+def test_a_file_that_holds_no_parameters_is_refused_in_a_line(tmp_path, text):
+    path = tmp_path / "old.params"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SettingError, match=r"--restore-parameters .*old.params"):
+        load_parameters(path)
+
+
+def test_a_file_of_qgroundcontrol_is_read(tmp_path):
+    path = tmp_path / "old.params"
+    path.write_text("# Vehicle-Id Component-Id Name Value Type\n1\t1\tGF_ACTION\t2\t6\n", encoding="utf-8")
+    assert load_parameters(path) == [parameters.ParameterValue("GF_ACTION", 2.0, 6)]

@@ -1,0 +1,90 @@
+from dataclasses import replace
+from math import nan
+
+import pytest
+
+from errors import SettingError
+from offboard.safety.check import Check, Outcome, accept, failures
+from offboard.safety.vehicle_checks import (
+    BatteryFacts,
+    CameraFacts,
+    EstimatorFacts,
+    LinkFacts,
+    battery_check,
+    camera_checks,
+    estimator_check,
+    link_checks,
+)
+
+ESTIMATOR = EstimatorFacts(True, True, True, True, 0.1)
+LINK = LinkFacts(0.0, (0.02,) * 20, 20)
+CAMERA = CameraFacts(30.0, 0.05, 0.1, 0.1, (320, 240))
+
+
+def failed(*checks):
+    return [check.name for check in checks if check.outcome is Outcome.FAIL]
+
+
+def test_a_good_drone_passes():
+    checks = [
+        battery_check(BatteryFacts(80.0, 12.0)),
+        estimator_check(ESTIMATOR),
+        *link_checks(LINK),
+        *camera_checks(CAMERA),
+    ]
+    assert {check.outcome for check in checks} == {Outcome.PASS}
+    assert all(check.limit and not check.advice for check in checks)
+
+
+@pytest.mark.parametrize("percent", [39.0, 0.0, nan])
+def test_a_low_or_unknown_charge_fails(percent):
+    check = battery_check(BatteryFacts(percent, nan))
+    assert check.outcome is Outcome.FAIL
+    assert check.advice
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        *({"reported": False}, {"has_attitude": False}, {"has_position": False}, {"has_height": False}),
+        *({"largest_ratio": 0.6}, {"largest_ratio": nan}),
+    ],
+)
+def test_an_estimator_that_does_not_know_fails(changed):
+    assert failed(estimator_check(replace(ESTIMATOR, **changed))) == ["estimator"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "names"),
+    [
+        ({"lost_share": 0.06}, ["link loss"]),
+        ({"round_trips_s": (0.02,) * 19 + (0.3,)}, ["link latency"]),
+        ({"round_trips_s": (0.02,) * 4}, ["link latency"]),
+    ],
+)
+def test_a_bad_link_fails(changed, names):
+    assert failed(*link_checks(replace(LINK, **changed))) == names
+
+
+@pytest.mark.parametrize(
+    ("changed", "names"),
+    [
+        ({"rate_hz": 5.0}, ["camera"]),
+        ({"longest_gap_s": 0.7}, ["camera"]),
+        ({"age_s": 0.4}, ["camera delay"]),
+        ({"age_s": nan, "assumed_age_s": 0.4}, ["camera delay"]),
+        ({"age_s": nan}, []),
+        ({"problem": "no image within 5 s"}, ["camera"]),
+    ],
+)
+def test_a_bad_camera_fails(changed, names):
+    assert failed(*camera_checks(replace(CAMERA, **changed))) == names
+
+
+def test_a_failure_is_accepted_by_name_or_all():
+    checks = [Check("a", Outcome.FAIL, "x"), Check("b", Outcome.FAIL, "y"), Check("c", Outcome.PASS, "z")]
+    assert [check.name for check in failures(accept(checks, ["a"]))] == ["b"]
+    assert failures(accept(checks, ["all"])) == []
+    assert accept(checks, ["c"])[2].outcome is Outcome.PASS
+    with pytest.raises(SettingError, match="the checks are a, b, c"):
+        accept(checks, ["d"])
