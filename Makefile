@@ -65,6 +65,11 @@ web-check: ## bundle them with packages installed anew; the result must be what 
 	@$(IF_NODE) cd web && $(NPM_CI) && npm run --silent build -- ../build/web-check \
 		&& { diff -r ../build/web-check ../monitor/static || { echo "monitor/static/ is not what web/ gives; run: make web"; exit 1; }; }
 
+.PHONY: test-ardupilot
+test-ardupilot: $(VENV)/installed-dev ## fly the challenge on a genuine ArduCopter: ARDUPILOT_DIR=its folder
+	@if [ -z "$(ARDUPILOT_DIR)" ]; then echo "no ArduPilot: give its folder, built for SITL, by ARDUPILOT_DIR=../ardupilot"; exit 1; fi
+	ARDUPILOT_DIR=$(abspath $(ARDUPILOT_DIR)) $(BIN)/pytest -rs tests/sitl/ardupilot/test_genuine.py
+
 .PHONY: test-fast
 test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
 	$(BIN)/pytest -n 3 --dist worksteal -m "not realtime"

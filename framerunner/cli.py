@@ -26,6 +26,7 @@ def build_app() -> App:
     from cyclopts import App, Parameter
 
     from framerunner.commands import (
+        ardupilot,
         bound,
         camera,
         course,
@@ -64,6 +65,7 @@ def build_app() -> App:
     app.command(bound.bound)
     app.command(monitor.monitor)
     app.command(px4.app)
+    app.command(ardupilot.app)
     app.command(replay.replay)
     app.command(film.film)
     app.command(mission.app)

@@ -34,7 +34,9 @@ class DryRunDrone(MavsdkDrone):
         """Enter offboard with zero setpoints; nothing is armed."""
         await self._stream_before_offboard()
         await self._request(
-            "offboard mode", self._stream.request_offboard(), lambda: self._feed.mode == "OFFBOARD"
+            "offboard mode",
+            self._stream.request_offboard(),
+            lambda: self._feed.mode == self._stream.modes.offboard,
         )
         self._runs = True
 

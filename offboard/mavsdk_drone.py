@@ -1,4 +1,4 @@
-"""The `Drone` port over MAVSDK: any MAVLink vehicle with PX4's modes, simulated or real."""
+"""The `Drone` port over MAVSDK: any multicopter with PX4 or ArduPilot, simulated or real."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from typing import Any, TextIO
 
 from mavsdk.asyncio import Configuration, Mavsdk, MavsdkError
 from mavsdk.asyncio.component_type import ComponentType
-from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
-from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
 
 from geometry.axes import Alignment, Pose
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.keep_in_box import Box, confine
-from offboard.link.commands import PendingRequests, SetpointStream, synchronous
+from offboard.link.autopilots import open_dialect
+from offboard.link.commands import PendingRequests, synchronous
 from offboard.link.companion import Companion
 from offboard.link.connections import open_connections
+from offboard.link.dialect import Dialect
 from offboard.link.reported_state import reported_state
 from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, request_rates
 from offboard.link.tlog import TlogRecorder
@@ -41,13 +41,12 @@ HOLD_SHOWN_S = 1.5  # wall time until a heartbeat, one a second, shows the new m
 LAND_LIMIT_S = 120.0  # vehicle time
 STREAM_BEFORE_OFFBOARD_S = 0.3  # PX4 enters offboard only with fresh setpoints
 FIRST_MODE_S = 8.0  # wall time for PX4's checks to pass in the mode it starts in
-PILOT_MODES = ("MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE")
 
 logger = logging.getLogger(__name__)
 
 
 class MavsdkDrone:
-    """A vehicle over MAVLink.
+    """A vehicle over MAVLink. What PX4 and ArduPilot do differently is in their dialects (`offboard/link/`).
 
     Axes: the vehicle is on `start_arena` when it connects; its telemetry there gives the transform between
     its local axes and the arena's (see `Alignment`), so it must be disarmed then.
@@ -65,7 +64,7 @@ class MavsdkDrone:
         url: udpin://, udpout://, tcpout://, tcpin:// or serial:// (see `parse_url`).
         start_arena: where the drone is: x, y, z (metres) and yaw (radians), arena axes.
         connect_limit_s: wall time to find the vehicle.
-        ready_limit_s: wall time until it can be armed.
+        ready_limit_s: wall time until it can be armed; None: the autopilot's usual one.
         hang_report: a real file for the stack of a hung app; by default standard error.
         box: commands that were corrected here do not leave it; None: there is none.
         corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
@@ -84,7 +83,7 @@ class MavsdkDrone:
         *,
         start_arena: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
         connect_limit_s: float = 10.0,
-        ready_limit_s: float = 30.0,
+        ready_limit_s: float | None = None,
         hang_report: TextIO | None = None,
         box: Box | None = None,
         corrects: bool = True,
@@ -101,8 +100,7 @@ class MavsdkDrone:
         self._system_id: int | None = None
         self._alignment: Alignment | None = None
         self._mavsdk: Mavsdk | None = None
-        self._action: Any = None
-        self._setpoints: SetpointStream | None = None
+        self._dialect: Dialect | None = None  # from `connect` on
         self._telemetry: Any = None
         self._direct: Any = None  # kept, because MAVSDK ends the subscriptions of a plugin that is deleted
         self._requests = PendingRequests()
@@ -174,21 +172,23 @@ class MavsdkDrone:
         for component in (self._recorder, self._companion):
             if component is not None:
                 component.announce(system_id)
-        self._action = ActionAsync(system)
-        self._setpoints = SetpointStream(OffboardAsync(system))
         self._telemetry = TelemetryAsync(system)
         self._direct = MavlinkDirectAsync(system)
-        self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct))
+        self._dialect = await open_dialect(system, self._direct, self._feed)
+        telemetry = synchronous(self._telemetry)
+        self._feed.subscribe(telemetry, synchronous(self._direct), self._dialect.numbered_modes)
+        await self._requests.wait(self._dialect.request_streams())
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then determine the axes."""
+        limit_s = self._ready_limit_s or self._stream.ready_limit_s
         try:
-            await self._wait_for_checks()
+            await self._wait_for_checks(limit_s)
         except TimeoutError:
             missing = ", ".join(self._feed.missing())
             await self._hold_on_ground()
             raise DroneError(
-                f"not ready within {self._ready_limit_s:g} s: {missing}{self._feed.recent_texts()}; "
+                f"not ready within {limit_s:g} s: {missing}{self._feed.recent_texts()}; "
                 f"framerunner doctor --drone {self._url.text} says what is missing"
             ) from None
         if self._feed.armed:
@@ -198,18 +198,25 @@ class MavsdkDrone:
         self._alignment = Alignment(self._start_arena, Pose(feed.position_ned_m, feed.yaw_ned_rad))
         await self._ticks.begin()
 
-    async def _wait_for_checks(self) -> None:
+    async def _wait_for_checks(self, limit_s: float) -> None:
         """Wait until nothing is missing.
 
         PX4's checks are those of the mode it is in. At first that is hold, which requires a global position:
         in a hall, without GPS, they never pass; offboard's do. So offboard is tried when only they fail.
+        ArduPilot's first mode requires less than GUIDED, so it always enters that.
         """
+        if self._stream.checks_in_offboard:
+            async with asyncio.timeout(limit_s):
+                while not self._in_offboard and not self._feed.armed:
+                    with contextlib.suppress(MavsdkError):  # refused without a position
+                        await self._requests.wait(self._stream.request_offboard())
+                    await self._becomes(lambda: self._in_offboard, HOLD_SHOWN_S)
         with contextlib.suppress(TimeoutError):
-            await self._until(lambda: not self._feed.missing(), min(FIRST_MODE_S, self._ready_limit_s / 2))
+            await self._until(lambda: not self._feed.missing(), min(FIRST_MODE_S, limit_s / 2))
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
             await self._request("offboard mode", self._stream.request_offboard())
-        await self._until(lambda: not self._feed.missing(), self._ready_limit_s)
+        await self._until(lambda: not self._feed.missing(), limit_s)
 
     async def ticks(self) -> AsyncIterator[DroneState]:
         """States at 20 Hz of vehicle time; ticks that were not waited for are skipped."""
@@ -225,6 +232,8 @@ class MavsdkDrone:
             self._latest = state
             if self._pilot_has_it:
                 self._send(VelocityCommand())
+            elif self._commanding:
+                self._stream.repeat()
             yield state
 
     async def motors_on(self, *, confirmed: bool = True) -> None:
@@ -232,9 +241,9 @@ class MavsdkDrone:
         await self._stream_before_offboard()
         self._watchdog.start()
         try:
-            request = self._stream.request_offboard()
-            await self._request("offboard mode", request, lambda: self._feed.mode == "OFFBOARD")
-            await self._request("arming", self._action.arm(), lambda: bool(self._feed.armed) or not confirmed)
+            offboard, request = self._stream.modes.offboard, self._stream.request_offboard()
+            await self._request(f"{offboard.lower()} mode", request, lambda: self._feed.mode == offboard)
+            await self._request("arming", self._stream.arm(), lambda: bool(self._feed.armed) or not confirmed)
         except BaseException:
             self._watchdog.stop()
             await self._hold_on_ground()
@@ -260,7 +269,7 @@ class MavsdkDrone:
         """Stop the motors at once (forced disarm), in the air too."""
         self._commanding = False
         self._feed.arming.forget()
-        await self._request("stopping the motors", self._action.kill(), lambda: self._feed.armed is False)
+        await self._request("stopping the motors", self._stream.kill(), lambda: self._feed.armed is False)
         self._watchdog.stop()
         with contextlib.suppress(MavsdkError):
             await self._ticks.until_done(self._requests.wait(self._stream.request_hold()))
@@ -273,24 +282,27 @@ class MavsdkDrone:
             return feed.arming.is_armed(feed.time_us)
 
         self._commanding = False
-        request = self._action.land()
-        await self._request("landing", request, lambda: feed.mode == "LAND" or not armed())
+        request, land = self._stream.land(), self._stream.modes.land
+        await self._request("landing", request, lambda: feed.mode == land or not armed())
         self._watchdog.stop()
         limit_us = feed.time_us + int(LAND_LIMIT_S * 1e6)
         while armed():
             self._check_alive(await self._ticks.next(LINK_LOST_S))
             # One heartbeat has mode and arming, but MAVSDK passes them on one after the other.
-            if feed.mode != "LAND" and not await self._becomes(lambda: not armed(), 0.5):
+            if feed.mode != land and not await self._becomes(lambda: not armed(), 0.5):
                 raise DroneError(f"landing was interrupted: mode {feed.mode}{feed.recent_texts()}")
             if feed.time_us > limit_us:
                 raise DroneError(f"still not landed after {LAND_LIMIT_S:g} s{feed.recent_texts()}")
 
     async def land_now(self, *, demanded: bool = False) -> None:
         """Stop commanding permanently and let the vehicle land; see `Drone.land_now`."""
-        self._stand_still()  # MAVSDK repeats this until the vehicle leaves offboard
+        self._stand_still()  # repeated until the vehicle leaves offboard
         self._commanding = self._pilot_has_it = False
-        lands = self._feed.mode in ("OFFBOARD", "LAND") or (demanded and self._feed.mode not in PILOT_MODES)
-        if self._setpoints is None or not lands:
+        if self._dialect is None:
+            await self.hold()
+            return
+        modes, mode = self._dialect.modes, self._feed.mode
+        if mode not in (modes.offboard, modes.land) and not (demanded and mode not in modes.pilot):
             await self.hold()
             return
         try:
@@ -303,18 +315,19 @@ class MavsdkDrone:
         """Stop commanding permanently and request hold, unless the vehicle has left offboard already."""
         self._commanding = self._pilot_has_it = False
         self._watchdog.stop()
-        if self._setpoints is None:
+        if self._dialect is None:
             return
-        if self._feed.mode == "OFFBOARD":
+        modes = self._dialect.modes
+        if self._in_offboard:
             await self._leave_offboard()
-            if (mode := self._feed.mode) != "HOLD" and mode not in PILOT_MODES:
+            if (mode := self._feed.mode) != modes.hold and mode not in modes.pilot:
                 raise DroneError(f"the vehicle is in {mode} instead{self._feed.recent_texts()}")
         else:
             await asyncio.to_thread(self._stream.end)
 
     async def refuse(self) -> None:
         """Let the vehicle that was given back hold, and wait until it is given back again."""
-        if self._feed.mode == "OFFBOARD":
+        if self._in_offboard:
             await self._leave_offboard()
 
     async def _leave_offboard(self) -> None:
@@ -326,11 +339,11 @@ class MavsdkDrone:
         stream, refusal = self._stream, None
         for _ in range(HOLD_ATTEMPTS):
             refusal = None
-            try:  # not through the plugin if the watchdog has ended the stream
-                await self._request("hold", self._action.hold() if stream.ended else stream.request_hold())
+            try:
+                await self._request("hold", stream.request_hold())
             except DroneError as error:
                 refusal = error
-            if await self._becomes(lambda: self._feed.mode != "OFFBOARD", HOLD_SHOWN_S):
+            if await self._becomes(lambda: not self._in_offboard, HOLD_SHOWN_S):
                 return
         raise refusal or DroneError(
             f"requested {HOLD_ATTEMPTS} times and acknowledged, but telemetry still shows offboard; "
@@ -361,8 +374,8 @@ class MavsdkDrone:
         await self._requests.wait_for_all()
         if self._companion is None:
             await self.disconnect()
-        elif self._setpoints is not None:
-            await asyncio.to_thread(self._setpoints.end)  # even if hold failed
+        elif self._dialect is not None:
+            await asyncio.to_thread(self._dialect.end)  # even if hold failed
 
     async def disconnect(self) -> None:
         """Close the link and the recording; may be called again."""
@@ -381,9 +394,13 @@ class MavsdkDrone:
             self._send(VelocityCommand())
 
     @property
-    def _stream(self) -> SetpointStream:
-        assert self._setpoints is not None, "connect() comes first"
-        return self._setpoints
+    def _stream(self) -> Dialect:
+        assert self._dialect is not None, "connect() comes first"
+        return self._dialect
+
+    @property
+    def _in_offboard(self) -> bool:
+        return self._feed.mode == self._stream.modes.offboard
 
     def _send(self, command: VelocityCommand) -> None:
         if not self._watchdog.tripped_after_s:
@@ -395,8 +412,9 @@ class MavsdkDrone:
         assert self._alignment is not None, "ready() comes first"
         sample = self._feed.sample
         missed = [before for before in self._feed.take_samples() if before.time_us < sample.time_us]
-        states = tuple(reported_state(before, self._feed, self._alignment) for before in missed)
-        return reported_state(sample, self._feed, self._alignment, states)
+        mode = self._stream.modes.offboard
+        states = tuple(reported_state(before, self._feed, self._alignment, mode) for before in missed)
+        return reported_state(sample, self._feed, self._alignment, mode, states)
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s
@@ -422,7 +440,7 @@ class MavsdkDrone:
             raise DroneError(self._feed.not_shown("arming", CONFIRM_S))
         if not self._commanding or self._pilot_has_it:
             return
-        leaves = not state.offboard and state.mode not in PILOT_MODES
+        leaves = not state.offboard and state.mode not in self._stream.modes.pilot
         if not state.armed or (leaves and not self._feed.armed):
             raise DroneError(f"the vehicle was disarmed by others{self._feed.recent_texts()}")
         if leaves:
@@ -470,7 +488,7 @@ class MavsdkDrone:
         A vehicle that a pilot has must not be given back to a hung app, so the stream ends permanently.
         """
         with contextlib.suppress(Exception):  # without setpoints the vehicle's failsafe acts
-            if self._feed.mode == "OFFBOARD":
+            if self._in_offboard:
                 self._stream.request_hold_blocking()
             else:
                 self._stream.end()

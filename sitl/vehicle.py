@@ -153,6 +153,10 @@ class SimulatedVehicle(ABC):
     def _end_tick(self, motors: MotorSpeeds) -> None:
         """Move by these motor speeds, and judge."""
         self.world.step(motors)
+        self._judge()
+
+    def _judge(self) -> None:
+        """Take the true state after a step of the world, and judge it."""
         self._sensors = self.world.sensors()
         armed = self.armed
         if armed is not self.truth.motors_on:

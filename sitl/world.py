@@ -17,7 +17,8 @@ from sitl.solids import frame_solids, touch
 
 PHYSICS_RATE_HZ = 500
 STEPS_PER_CONTROL = 2
-CONTROL_PERIOD_US = 1_000_000 * STEPS_PER_CONTROL // PHYSICS_RATE_HZ
+PHYSICS_PERIOD_US = 1_000_000 // PHYSICS_RATE_HZ
+CONTROL_PERIOD_US = STEPS_PER_CONTROL * PHYSICS_PERIOD_US
 _SETTLING_STEPS = PHYSICS_RATE_HZ  # one second, to stand at rest before time starts
 _MIN_MARGIN_M = 0.05  # how much nearer the drone may come within one control period (12 m/s)
 _SPEED_MARGIN = 1.25  # of the airframe's maximum speed
@@ -64,6 +65,8 @@ class World:
         base = scenario.base.solid
         self._base = _Group(base.centre_arena_m, (base,))
         self._far_ticks = 0  # during which nothing can be touched
+        self._is_near = True  # in this control period something may be touched: `_near`
+        self._near: tuple[Solid, ...] = ()
         self._ground_m = 0.0
         self._touching: dict[Solid, Vec3] = {}  # with the normal at the beginning of the touch
         x_m, y_m, surface_m = start_position(scenario)
@@ -85,21 +88,36 @@ class World:
 
     def step(self, motor_speeds_rad_s: MotorSpeeds) -> None:
         """Advance by one control period with these motor commands (rad/s, the airframe's order)."""
+        self.begin_step(motor_speeds_rad_s)
+        for _ in range(STEPS_PER_CONTROL):
+            self.run_physics()
+        self.end_step()
+
+    def begin_step(self, motor_speeds_rad_s: MotorSpeeds) -> None:
+        """Begin a control period; `STEPS_PER_CONTROL` times `run_physics` and `end_step` must follow.
+
+        Between two of them `dynamics` may be read, and its motors commanded.
+        """
         dynamics = self.dynamics
         dynamics.command_motors(motor_speeds_rad_s)
         if self._wind is not None:
             dynamics.set_air_velocity(self._wind.step(dynamics.velocity_ned_m_s))
-        run = dynamics.run
-        if self._far_ticks > 0:
-            self._far_ticks -= 1
-            for _ in range(STEPS_PER_CONTROL):
-                run()
+        self._is_near = self._far_ticks <= 0
+        if self._is_near:
+            self._near = self._find_near()
         else:
-            near = self._find_near()
-            for _ in range(STEPS_PER_CONTROL):
-                if near or self._touching:
-                    self._push_from(near)
-                run()
+            self._far_ticks -= 1
+
+    def run_physics(self) -> None:
+        """Advance by one step of the physics."""
+        if self._is_near and (self._near or self._touching):
+            self._push_from(self._near)
+        self.dynamics.run()
+
+    def end_step(self) -> None:
+        """End a control period."""
+        dynamics = self.dynamics
+        if self._is_near:
             dynamics.set_ground_height(self._ground_m)
         self.time_us += CONTROL_PERIOD_US
         self._position_ned_m = position = dynamics.position_ned_m()

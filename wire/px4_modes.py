@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from wire import ardupilot_modes
 from wire.dialect import Message, mavlink
 
 _MANUAL = mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
@@ -76,8 +77,10 @@ def mode_of(custom_mode: int) -> Px4Mode | None:
 
 
 def mode_title(heartbeat: Message) -> str:
-    """The name that ground stations show for a HEARTBEAT's mode; its numbers if it is not one of PX4's."""
+    """The name that ground stations show for a HEARTBEAT's mode; its numbers if the autopilot is unknown."""
     number = heartbeat.custom_mode
+    if ardupilot_modes.is_arducopter(heartbeat):
+        return ardupilot_modes.mode_title(number)
     custom = heartbeat.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     if heartbeat.autopilot != mavlink.MAV_AUTOPILOT_PX4 or not custom:
         return f"mode {number}"

@@ -17,7 +17,8 @@ def doctor(
 ) -> int:
     """Listen to a drone, request its data, and say in one page whether it can fly the challenge.
 
-    Any PX4 vehicle, simulated or real. It is never armed and nothing in it is changed.
+    Any vehicle with PX4 or ArduPilot, simulated or real. It is never armed and none of its parameters is
+    changed; ArduPilot is asked for streams of messages on this link, since it sends none by itself.
 
     Exit code 0: it can fly, 1: something is missing, 2: bad input.
 

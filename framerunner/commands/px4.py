@@ -89,6 +89,7 @@ def px4_server(
     onboard: Onboard,
     fault: tuple[str, ...],
     *,
+    px4: Path | None,
     seed: int,
     grants: TimeGrants | None,
 ) -> Px4Server:
@@ -103,7 +104,7 @@ def px4_server(
         return Px4Simulation(chosen, seed=seed)
 
     simulation = new_simulation()  # so that what is wrong with it is said first
-    start = _px4_settings(simulation, settings, onboard.px4)
+    start = _px4_settings(simulation, settings, px4)
     return Px4Server(new_simulation, settings, start, notice=say, grants=grants)
 
 
@@ -124,26 +125,3 @@ def _px4_settings(simulation: Px4Simulation, settings: ServerSettings, px4: Path
     values = all_parameters(simulation.world.airframe, load_suite(scenario.sensors), settings.speed)
     folder = None if settings.storage is None else settings.storage / f"px4-{settings.instance}"
     return Px4Settings(Px4Process(build, settings.instance, folder, values), command)
-
-
-def check_options(onboard: Onboard, settings: ServerSettings, *, count: int, monitor: bool) -> None:
-    """Refuse options of `framerunner sim` that PX4 does not have, or that only it has.
-
-    Raises:
-        SettingError: one of them.
-    """
-    if onboard.autopilot != "px4":
-        if onboard.px4 is not None:
-            raise SettingError(f"--px4 {onboard.px4}: is for PX4; add --autopilot px4")
-        return
-    refused = [
-        ("--count", count != 1, "PX4 flies one drone; start another simulator with --instance 1"),
-        ("--monitor", monitor, "run framerunner monitor beside it, which listens to PX4 on UDP 14550"),
-        ("--link", bool(settings.links), "MAVLink is PX4's own"),
-        ("--signing-key", settings.signing_key is not None, "MAVLink is PX4's own"),
-        ("--parameters", settings.parameters is not None, "PX4 keeps its own, with --storage DIR"),
-        ("--shell", settings.shell, "MAVLink is PX4's own"),
-    ]
-    for option, given, why in refused:
-        if given:
-            raise SettingError(f"{option}: {why}; leave it out with --autopilot px4")

@@ -6,19 +6,18 @@ import asyncio
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
 from cyclopts import Parameter
 
 from errors import SettingError
 from framerunner.commands import Faults, Sensors, WholeNumber, check_range, say, with_faults, with_sensors
-from framerunner.commands.px4 import check_options, px4_server
+from framerunner.commands.ardupilot import ardupilot_server
+from framerunner.commands.px4 import px4_server
 from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
-    from sitl.px4.server import Px4Server
-    from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
     from sitl.time_grants import TimeGrants
@@ -27,20 +26,16 @@ if TYPE_CHECKING:
 _MAX_COUNT = 20
 
 
+class _Server(Protocol):
+    async def run(self) -> None:
+        """Run until cancelled."""
+
+
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Onboard:
-    """What the drone has."""
+    """What the drone has besides flying."""
 
-    autopilot: Annotated[
-        Literal["own", "px4"], Parameter(help="what flies: this project's autopilot, or a genuine PX4")
-    ] = "own"
-    px4: Annotated[
-        Path | None,
-        Parameter(
-            help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
-        ),
-    ] = None
     storage: Annotated[
         Path | None,
         Parameter(help="folder for its files and flight logs, DIR/0 for instance 0; else kept in memory"),
@@ -90,6 +85,58 @@ class Connections:
     ] = "127.0.0.1"
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlownBy:
+    """Which autopilot flies the drone."""
+
+    autopilot: Annotated[
+        Literal["own", "px4", "ardupilot"],
+        Parameter(help="what flies: this project's autopilot, or a genuine PX4 or ArduCopter"),
+    ] = "own"
+    px4: Annotated[
+        Path | None,
+        Parameter(
+            help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
+        ),
+    ] = None
+    ardupilot: Annotated[
+        Path | None,
+        Parameter(
+            help="with --autopilot ardupilot: folder of an ArduPilot built for SITL, to be started; else "
+            "start it yourself"
+        ),
+    ] = None
+
+    def check(self, count: int, settings: ServerSettings, *, monitor: bool) -> None:
+        """Refuse options that the chosen autopilot does not have.
+
+        Raises:
+            SettingError: one of them is given.
+        """
+        for name, title, folder in (("px4", "PX4", self.px4), ("ardupilot", "ArduPilot", self.ardupilot)):
+            if folder is not None and name != self.autopilot:
+                raise SettingError(f"--{name} {folder}: is for {title}; add --autopilot {name}")
+        if self.autopilot == "own":
+            return
+        name = {"px4": "PX4", "ardupilot": "ArduPilot"}[self.autopilot]
+        refused = [
+            ("--count", count != 1, f"{name} flies one drone; start another simulator with --instance 1"),
+            (
+                "--monitor",
+                monitor,
+                f"run framerunner monitor beside it, which listens to {name} on UDP 14550",
+            ),
+            ("--link", bool(settings.links), f"MAVLink is {name}'s own"),
+            ("--signing-key", settings.signing_key is not None, f"MAVLink is {name}'s own"),
+            ("--parameters", settings.parameters is not None, f"{name} keeps its own, with --storage DIR"),
+            ("--shell", settings.shell, f"MAVLink is {name}'s own"),
+        ]
+        for option, given, why in refused:
+            if given:
+                raise SettingError(f"{option}: {why}; leave it out with --autopilot {self.autopilot}")
+
+
 def sim(
     *,
     scenario: Annotated[
@@ -104,6 +151,7 @@ def sim(
     fault: Faults = (),
     connections: Connections | None = None,
     onboard: Onboard | None = None,
+    flown_by: FlownBy | None = None,
     monitor: Annotated[
         bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")
     ] = False,
@@ -124,33 +172,48 @@ def sim(
 
         framerunner sim --scenario test-case-1 --monitor
 
-        framerunner sim --ground-remote 192.168.1.20
-
         framerunner sim --count 4 --video-rtp off
 
         framerunner sim --storage drone-files --parameters drone.params
 
-        framerunner sim --link serial:///dev/ttyUSB0:57600
+        framerunner sim --link tcpin://127.0.0.1:5760
 
-        framerunner sim --autopilot px4 --px4 ../PX4-Autopilot
+        framerunner sim --scenario test-case-1 --autopilot px4 --px4 ../PX4-Autopilot
+
+        framerunner sim --scenario test-case-1 --autopilot ardupilot --ardupilot ../ardupilot
     """
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
-    check_range("--seed", seed, 0, 2**63 - 1)
     chosen, onboard = connections or Connections(), onboard or Onboard()
-    watcher = _monitor(chosen.video_port, count) if monitor and onboard.autopilot == "own" else None
+    flown_by = flown_by or FlownBy()
+    watcher = _monitor(chosen.video_port, count) if monitor and flown_by.autopilot == "own" else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
-    check_options(onboard, settings, count=count, monitor=monitor)
-    given = (scenario, settings, onboard, fault)
-    server = _server(*given, count=count, seed=seed, grants=_grants(time_grants))
+    flown_by.check(count, settings, monitor=monitor)
+    check_range("--seed", seed, 0, 2**63 - 1)
+    server = _server(flown_by, (scenario, settings, onboard, fault), count, seed, _grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
 
 
 def _server(
+    flown_by: FlownBy,
+    flown: tuple[str, ServerSettings, Onboard, tuple[str, ...]],
+    count: int,
+    seed: int,
+    grants: TimeGrants | None,
+) -> _Server:
+    """The simulator with the chosen autopilot."""
+    if flown_by.autopilot == "px4":
+        return px4_server(*flown, px4=flown_by.px4, seed=seed, grants=grants)
+    if flown_by.autopilot == "ardupilot":
+        return ardupilot_server(*flown, ardupilot=flown_by.ardupilot, seed=seed)
+    return _own_server(*flown, count=count, seed=seed, grants=grants)
+
+
+def _own_server(
     scenario: str,
     settings: ServerSettings,
     onboard: Onboard,
@@ -159,10 +222,7 @@ def _server(
     count: int,
     seed: int,
     grants: TimeGrants | None,
-) -> SimulatorServer | Px4Server:
-    if onboard.autopilot == "px4":
-        return px4_server(scenario, settings, onboard, fault, seed=seed, grants=grants)
-
+) -> _Server:
     from sitl.server import SimulatorServer
 
     simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
@@ -231,6 +291,7 @@ def _simulations(
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
+    check_range("--seed", seed, 0, 2**63 - 1)
     scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
     if count == 1:
         return [Simulation(scenario, seed=seed)]
@@ -260,9 +321,7 @@ def _read_key(path: Path | None) -> SigningKey | None:
         raise SettingError(f"--signing-key {path}: {error}") from None
 
 
-async def _run(
-    server: SimulatorServer | Px4Server, monitor: MonitorProcess | None, *, lifeline: bool
-) -> None:
+async def _run(server: _Server, monitor: MonitorProcess | None, *, lifeline: bool) -> None:
     from framerunner.child_process import until_standard_input_ends
 
     async with AsyncExitStack() as stack:

@@ -6,12 +6,14 @@ the estimate is; parameters show only what was requested.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from enum import Enum
-from functools import partial
+from collections.abc import Callable
 from math import isfinite
 
+from framerunner.doctor import ardupilot
+from framerunner.doctor.findings import Finding, Findings, Level
+from framerunner.doctor.findings import good as _good
+from framerunner.doctor.findings import missing as _missing
+from framerunner.doctor.findings import note as _note
 from framerunner.doctor.listen import Record
 from wire.dialect import Message, mavlink
 from wire.px4_modes import OFFBOARD
@@ -80,30 +82,6 @@ _LOW_BATTERY = {0: "warns", 2: "lands", 3: "returns, then lands"}
 _HEIGHT_SOURCE = {0: "barometer", 1: "GPS", 2: "range finder", 3: "vision"}
 
 
-class Level(Enum):
-    """How much a finding matters."""
-
-    GOOD = "good"
-    NOTE = "note"
-    MISSING = "missing"
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing about the drone: a subject, what is the case, and what to do, which is empty if nothing."""
-
-    level: Level
-    subject: str
-    text: str
-    advice: str = ""
-
-
-_good = partial(Finding, Level.GOOD)
-_note = partial(Finding, Level.NOTE)
-_missing = partial(Finding, Level.MISSING)
-Findings = Iterator[Finding]
-
-
 def can_fly(findings: list[Finding]) -> bool:
     """Whether nothing is missing."""
     return all(finding.level is not Level.MISSING for finding in findings)
@@ -111,13 +89,16 @@ def can_fly(findings: list[Finding]) -> bool:
 
 def examine(record: Record) -> list[Finding]:
     """All findings, in the order in which a flight needs them."""
-    return [finding for check in _CHECKS for finding in check(record)]
+    checks = _ARDUPILOT_CHECKS if record.is_ardupilot else _CHECKS
+    return [finding for check in checks for finding in check(record)]
 
 
 def _autopilot(record: Record) -> Findings:
     heartbeat = record.latest["HEARTBEAT"]
     if heartbeat.autopilot != mavlink.MAV_AUTOPILOT_PX4:
-        yield _missing("autopilot", record.autopilot_name, "fly uses PX4's modes; use a PX4 vehicle")
+        yield _missing(
+            "autopilot", record.autopilot_name, "fly uses the modes of PX4 and ArduPilot; use one of them"
+        )
     elif heartbeat.type not in _MULTICOPTERS:
         yield _missing("autopilot", f"PX4, {record.type_name}", "the challenge needs a multicopter")
     else:
@@ -467,4 +448,18 @@ _CHECKS: tuple[Callable[[Record], Findings], ...] = (
     _battery,
     _limits,
     _failsafes,
+)
+_ARDUPILOT_CHECKS: tuple[Callable[[Record], Findings], ...] = (
+    ardupilot.autopilot,
+    _armed,
+    ardupilot.health,
+    _sensors,
+    ardupilot.estimator,
+    _streams,
+    _link,
+    ardupilot.position,
+    _still,
+    _battery,
+    ardupilot.limits,
+    ardupilot.failsafes,
 )

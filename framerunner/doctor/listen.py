@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from math import dist
 
+from wire import ardupilot_modes
+from wire.ardupilot_messages import EKF_STATUS_REPORT_ID, add_ardupilot_messages
 from wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
     Message,
@@ -52,6 +54,27 @@ _ONCE = {
     "GPS_GLOBAL_ORIGIN": mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
     "ESTIMATOR_STATUS": mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
     "AVAILABLE_MODES": mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES,
+}
+ARDUPILOT_PARAMETERS = (
+    *("BATT_FS_LOW_ACT", "BATT_MONITOR", "DISARM_DELAY"),
+    *("EK3_SRC1_POSXY", "EK3_SRC1_POSZ", "EK3_SRC1_VELXY", "EK3_SRC1_YAW", "VISO_TYPE"),
+    *("FENCE_ACTION", "FENCE_ALT_MAX", "FENCE_ENABLE", "FENCE_RADIUS"),
+    *("FS_EKF_ACTION", "FS_GCS_ENABLE", "FS_THR_ENABLE"),
+    *("GUID_OPTIONS", "GUID_TIMEOUT", "LAND_SPEED", "RTL_ALT"),
+    *("WPNAV_ACCEL", "WPNAV_SPEED", "WPNAV_SPEED_DN", "WPNAV_SPEED_UP"),
+)
+_ARDUPILOT_ONCE = {
+    "AUTOPILOT_VERSION": mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    "HOME_POSITION": mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+    "GPS_GLOBAL_ORIGIN": mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+}
+_ARDUPILOT_STREAMS_HZ = {  # it sends none by itself; these are requested for this link until its next start
+    "ATTITUDE": (mavlink.MAVLINK_MSG_ID_ATTITUDE, 50.0),
+    "LOCAL_POSITION_NED": (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 50.0),
+    "SYS_STATUS": (mavlink.MAVLINK_MSG_ID_SYS_STATUS, 2.0),
+    "EXTENDED_SYS_STATE": (mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, 2.0),
+    "GPS_RAW_INT": (mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, 2.0),
+    "EKF_STATUS_REPORT": (EKF_STATUS_REPORT_ID, 2.0),
 }
 TEXTS_KEPT = 12
 _AUTOPILOTS = {mavlink.MAV_AUTOPILOT_PX4: "PX4", mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ArduPilot"}
@@ -187,7 +210,8 @@ class Record:
         elif kind == "EVENT":
             self.arming.take(message)
         elif kind == "PARAM_VALUE":
-            self.parameters[message.param_id] = parameter_value(message)
+            value = float(message.param_value) if self.is_ardupilot else parameter_value(message)
+            self.parameters[message.param_id] = value
         elif kind == "AVAILABLE_MODES" and not message.mode_name.startswith("("):  # "(": PX4 does not use it
             self.modes[message.custom_mode] = message.mode_name
 
@@ -209,6 +233,12 @@ class Record:
         return _AUTOPILOTS.get(number, f"autopilot {number}")
 
     @property
+    def is_ardupilot(self) -> bool:
+        """Its autopilot is ArduPilot."""
+        heartbeat = self.latest.get("HEARTBEAT")
+        return heartbeat is not None and ardupilot_modes.is_ardupilot(heartbeat)
+
+    @property
     def type_name(self) -> str:
         """The kind of vehicle (MAV_TYPE) in words."""
         entry = mavlink.enums["MAV_TYPE"].get(self.latest["HEARTBEAT"].type)
@@ -223,8 +253,10 @@ class Record:
 
     @property
     def mode_name(self) -> str:
-        """The flight mode inside a sentence: as the vehicle lists it, else as PX4 numbers it."""
+        """The flight mode inside a sentence: as the vehicle lists it, else as its autopilot numbers it."""
         custom_mode = self.latest["HEARTBEAT"].custom_mode
+        if self.is_ardupilot:
+            return ardupilot_modes.mode_name(custom_mode)
         return self.modes.get(custom_mode) or mode_words(custom_mode)
 
     @property
@@ -289,6 +321,8 @@ def listen(link: VehicleLink, record: Record, seconds: float, progress: Progress
     To a disarmed vehicle this is a ground station, since PX4 reports its reasons only to one. To an armed
     one it is not: the vehicle would take its end for a lost ground station.
     """
+    if record.is_ardupilot:
+        add_ardupilot_messages()
     began_s = request_s = time.monotonic()
     beat_s = requested_s = -10.0
     prearm_s = began_s + _PREARM_S
@@ -327,10 +361,14 @@ def _system_id(record: Record) -> int:
 def open_requests(record: Record) -> Iterator[Message]:
     """The requests that have not been answered yet."""
     system_id = _system_id(record)
-    for name, number in _ONCE.items():
+    if record.is_ardupilot:
+        for name, (number, rate_hz) in _ARDUPILOT_STREAMS_HZ.items():
+            if name not in record.latest:
+                yield command_long(system_id, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / rate_hz)
+    for name, number in (_ARDUPILOT_ONCE if record.is_ardupilot else _ONCE).items():
         if name not in record.latest:
             yield request_message(system_id, number)
-    for name in PARAMETERS:
+    for name in ARDUPILOT_PARAMETERS if record.is_ardupilot else PARAMETERS:
         if name not in record.parameters:
             yield mavlink.MAVLink_param_request_read_message(
                 system_id, AUTOPILOT_COMPONENT_ID, name.encode(), -1

@@ -10,7 +10,8 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from framerunner.doctor.checks import Finding, Level, can_fly
+from framerunner.doctor.checks import can_fly
+from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import Record
 from wire.dialect import mavlink
 from wire.px4_modes import mode_words

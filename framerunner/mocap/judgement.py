@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import isfinite, isnan
 
-from framerunner.doctor.checks import Finding, Level
+from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import Record
 from framerunner.mocap.motion import PoseComparison
 from wire.dialect import mavlink

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from framerunner.doctor.checks import Finding, Level
+from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.page import findings_table
 from framerunner.mocap.judgement import Facts, judge, line
 from framerunner.mocap.session import MocapSession, SendSettings

@@ -14,7 +14,8 @@ from pathlib import Path
 from errors import UserError
 from firmware_py.geodesy import LocalProjection
 from firmware_py.types import GeodeticPoint
-from framerunner.doctor.checks import Finding, Level, examine
+from framerunner.doctor.checks import examine
+from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import Record
 from framerunner.flying.plan import FlightPlan
 from framerunner.preflight.camera import CameraTimes, measure_camera

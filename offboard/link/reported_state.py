@@ -8,7 +8,11 @@ from offboard.link.telemetry import Sample, TelemetryFeed
 
 
 def reported_state(
-    sample: Sample, feed: TelemetryFeed, alignment: Alignment, missed: tuple[DroneState, ...] = ()
+    sample: Sample,
+    feed: TelemetryFeed,
+    alignment: Alignment,
+    offboard_mode: str,
+    missed: tuple[DroneState, ...] = (),
 ) -> DroneState:
     """The state at a tick.
 
@@ -16,6 +20,7 @@ def reported_state(
         sample: of the tick.
         feed: for mode, arming and landing, which have no time stamps.
         alignment: from the vehicle's local axes to the arena's.
+        offboard_mode: name of the mode in which the vehicle follows this app's setpoints.
         missed: states at the ticks that were skipped before this one, oldest first.
     """
     pose = alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
@@ -28,7 +33,7 @@ def reported_state(
         yaw=pose.yaw_rad,
         velocity_arena_m_s=alignment.vector(sample.velocity_ned_m_s),
         armed=feed.arming.is_armed(sample.time_us),
-        offboard=feed.mode == "OFFBOARD",
+        offboard=feed.mode == offboard_mode,
         mode=feed.mode,
         landed=feed.landed,
         position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),

@@ -15,8 +15,9 @@ import contextlib
 import json
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import nan, radians
 from typing import Any, Protocol
 
@@ -27,6 +28,7 @@ from geometry.vectors import Quaternion, Vec3
 from offboard.arming import Arming
 from offboard.drone import VelocityCommand
 from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
+from wire.dialect import AUTOPILOT_COMPONENT_ID
 from wire.mission_tunnel import TEXT_PREFIX
 from wire.vehicle_telemetry import MessageOrder
 
@@ -99,14 +101,28 @@ class TelemetryFeed:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._new_tick = asyncio.Event()
 
-    def subscribe(self, plugin: Any, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
-        """Subscribe to MAVSDK's synchronous plugins `telemetry` and `mavlink_direct`."""
+    def subscribe(
+        self,
+        plugin: Any,  # noqa: ANN401 - MAVSDK is untyped
+        direct: Any,  # noqa: ANN401
+        numbered_modes: Mapping[int, str] | None = None,
+    ) -> None:
+        """Subscribe to MAVSDK's synchronous plugins `telemetry` and `mavlink_direct`.
+
+        Args:
+            plugin: `telemetry`.
+            direct: `mavlink_direct`.
+            numbered_modes: names of the vehicle's modes by HEARTBEAT.custom_mode; without, MAVSDK names them.
+        """
         self._loop = asyncio.get_running_loop()
         plugin.subscribe_attitude_euler(self._on_attitude)
         direct.subscribe_message("LOCAL_POSITION_NED", self._on_position)
         self._gimbal.subscribe(direct)
         plugin.subscribe_armed(self._on_armed)
-        plugin.subscribe_flight_mode(self._on_mode)
+        if numbered_modes:
+            direct.subscribe_message("HEARTBEAT", partial(_take_mode, self, numbered_modes))
+        else:
+            plugin.subscribe_flight_mode(self._on_mode)
         plugin.subscribe_landed_state(self._on_landed)
         plugin.subscribe_health(self._on_health)
         plugin.subscribe_status_text(self._on_text)
@@ -252,6 +268,13 @@ class TelemetryFeed:
             loop.call_soon_threadsafe(self._new_tick.set)
         except RuntimeError:  # closed between the test and the call
             self._loop = None
+
+
+def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Any, _user: object) -> None:  # noqa: ANN401
+    """Take the mode in an autopilot's HEARTBEAT, of `mavlink_direct`."""
+    if heartbeat.component_id == AUTOPILOT_COMPONENT_ID:
+        number = json.loads(heartbeat.fields_json)["custom_mode"]
+        feed.mode = names.get(number, f"mode {number}")
 
 
 def _least_lag(before_s: float | None, lag_s: float) -> float:

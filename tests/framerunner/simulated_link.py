@@ -25,7 +25,7 @@ from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flying.plan import FlightPlan
 from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box
-from offboard.link.commands import SetpointStream
+from offboard.link.dialect import Px4Dialect
 from offboard.link.telemetry import TelemetryFeed, TickSource
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
@@ -274,13 +274,13 @@ class LinkedDrone(MavsdkDrone):
 
     async def connect(self):
         vehicle, autopilot = self._vehicle, self._vehicle.autopilot
-        self._action = SimpleNamespace(
+        action = SimpleNamespace(
             arm=lambda: vehicle.command(autopilot.arm),
             kill=lambda: vehicle.command(lambda: autopilot.disarm(force=True)),
             land=lambda: vehicle.command(autopilot.land),
             hold=vehicle.offboard.stop,
         )
-        self._setpoints = SetpointStream(vehicle.offboard)
+        self._dialect = Px4Dialect(vehicle.offboard, action)
         self._telemetry = SimpleNamespace(
             set_rate_attitude_euler=_refuse, set_rate_position_velocity_ned=_refuse
         )

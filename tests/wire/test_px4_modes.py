@@ -35,7 +35,8 @@ def test_flags_are_pymavlinks_where_it_has_them(mode):
 def test_an_unknown_mode_is_named_by_its_numbers():
     assert mode_of(0x6304_0000) is None
     assert mode_title(heartbeat(0x6304_0000)) == "mode 4.99"
-    assert mode_title(heartbeat(5, autopilot=3)) == "mode 5"
+    assert mode_title(heartbeat(5, autopilot=3)) == "Loiter"
+    assert mode_title(heartbeat(5, autopilot=8)) == "mode 5"
     assert mode_title(heartbeat(HOLD.custom_mode, flags=0)) == f"mode {HOLD.custom_mode}"
     assert (mode_words(0x6304_0000), px4_name(0x6304_0000)) == ("mode 4/99", "UNKNOWN")
     assert (mode_title(heartbeat(HOLD.custom_mode)), mode_words(HOLD.custom_mode)) == ("Hold", "hold")

@@ -4,7 +4,8 @@ import struct
 
 import pytest
 
-from framerunner.doctor.checks import Level, can_fly, examine
+from framerunner.doctor.checks import can_fly, examine
+from framerunner.doctor.findings import Level
 from framerunner.doctor.listen import SUMMARY, Record, event_id
 from wire.dialect import mavlink
 
@@ -98,7 +99,7 @@ def test_a_healthy_drone_can_fly():
 @pytest.mark.parametrize(
     ("message", "subject"),
     [
-        (heartbeat(autopilot=3), "autopilot"),
+        (heartbeat(autopilot=15), "autopilot"),
         (heartbeat(kind=1), "autopilot"),
         (heartbeat(base_mode=157, state=4), "armed"),
         (heartbeat(state=5), "failsafe"),

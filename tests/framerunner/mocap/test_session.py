@@ -9,7 +9,7 @@ from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.streams import ONBOARD
 from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
-from framerunner.doctor.checks import Level
+from framerunner.doctor.findings import Level
 from framerunner.doctor.listen import Record
 from framerunner.mocap.judgement import Facts, is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison

@@ -1,0 +1,82 @@
+"""`framerunner ardupilot`, and the simulator whose autopilot is ArduPilot."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from framerunner.commands import say, with_faults, with_sensors
+
+if TYPE_CHECKING:
+    from framerunner.commands.sim import Onboard
+    from sitl.ardupilot.server import ArduPilotServer, ArduPilotSettings
+    from sitl.ardupilot.simulation import ArduPilotSimulation
+    from sitl.server_settings import ServerSettings
+
+app = App(name="ardupilot", help="What a genuine ArduCopter needs to fly in the simulated world.")
+
+
+@app.command
+def params(airframe: Annotated[str, Parameter(help="name or file of the airframe")] = "x500") -> int:
+    """Print the parameters by which ArduCopter flies an airframe here: one `NAME VALUE` a line.
+
+    **Examples**
+
+        framerunner ardupilot params abejorro > abejorro.parm
+    """
+    from firmware_py.airframe import load_airframe
+    from sitl.ardupilot.parameters import all_parameters, text_of
+
+    print(text_of(all_parameters(load_airframe(airframe))), end="")
+    return 0
+
+
+def ardupilot_server(
+    scenario: str,
+    settings: ServerSettings,
+    onboard: Onboard,
+    fault: tuple[str, ...],
+    *,
+    ardupilot: Path | None,
+    seed: int,
+) -> ArduPilotServer:
+    """The simulator with ArduPilot, by the options of `framerunner sim`."""
+    from scenarios.loader import load_scenario
+    from sitl.ardupilot.server import ArduPilotServer
+    from sitl.ardupilot.simulation import ArduPilotSimulation
+
+    chosen = with_faults(with_sensors(load_scenario(scenario), onboard.sensors), fault)
+
+    def new_simulation() -> ArduPilotSimulation:
+        return ArduPilotSimulation(chosen, seed=seed)
+
+    simulation = new_simulation()  # so that what is wrong with it is said first
+    start = _start(simulation, settings, ardupilot)
+    return ArduPilotServer(new_simulation, settings, start, notice=say)
+
+
+def _start(
+    simulation: ArduPilotSimulation, settings: ServerSettings, ardupilot: Path | None
+) -> ArduPilotSettings:
+    from firmware_py.types import GeodeticPoint
+    from sitl.ardupilot.build import ArduPilotProcess, find_build, options
+    from sitl.ardupilot.parameters import all_parameters
+    from sitl.ardupilot.server import ArduPilotSettings
+
+    scenario = simulation.scenario
+    origin = scenario.origin
+    home = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
+    values = all_parameters(simulation.world.airframe)
+    file = f"{simulation.world.airframe.name}.parm"
+    command = (
+        f"framerunner ardupilot params {scenario.airframe} > {file}; "
+        f"arducopter {shlex.join(options(settings, home, file))}"
+    )
+    if ardupilot is None:
+        return ArduPilotSettings(None, command)
+    folder = None if settings.storage is None else settings.storage / f"ardupilot-{settings.instance}"
+    program = find_build(ardupilot)
+    return ArduPilotSettings(ArduPilotProcess(program, settings, home, values, folder), command)

@@ -1,0 +1,166 @@
+"""What an ArduPilot drone lacks for the challenge; what it shares with PX4 is in `checks.py`.
+
+ArduPilot reports no accuracy of its estimate. EKF_STATUS_REPORT shows which states it has and how well
+measurements agree; its sources are parameters, EK3_SRC1_*.
+"""
+
+from __future__ import annotations
+
+from framerunner.doctor.findings import Finding, Findings, Level, good, missing, note
+from framerunner.doctor.listen import Record
+from wire import ardupilot_modes
+from wire.dialect import mavlink
+
+_GUIDE = "docs/ardupilot.md, section 5"
+_GPS, _EXTERNAL_NAVIGATION = 3, 6
+_POSITION_SOURCES = {0: "nothing", 2: "beacons", _GPS: "GPS", 4: "beacons", 5: "optical flow"}
+_POSITION_SOURCES |= {_EXTERNAL_NAVIGATION: "external navigation"}
+_HEIGHT_SOURCES = {0: "nothing", 1: "barometer", 2: "range finder", _GPS: "GPS", 4: "beacons"}
+_HEIGHT_SOURCES |= {_EXTERNAL_NAVIGATION: "external navigation"}
+_ACCURATE_MM = 100.0
+_BAD_VARIANCE = 0.8  # of EKF_STATUS_REPORT: ArduPilot's FS_EKF_THRESH
+_HIGH_VARIANCE = 0.5
+_HAS_ATTITUDE, _HAS_POSITION, _HAS_HEIGHT, _CONSTANT_POSITION = 1, 8 | 16, 32, 128  # EKF_STATUS_FLAGS
+_CHALLENGE_HEIGHT_M, _CHALLENGE_REACH_M = 3.0, 8.0
+
+
+def autopilot(record: Record) -> Findings:
+    """Whether it is ArduCopter, whose GUIDED mode takes velocities."""
+    heartbeat = record.latest["HEARTBEAT"]
+    if not ardupilot_modes.is_arducopter(heartbeat):
+        yield missing("autopilot", f"ArduPilot, {record.type_name}", "the challenge needs a multicopter")
+        return
+    yield good("autopilot", f"ArduPilot, {record.type_name}")
+    version = record.latest.get("AUTOPILOT_VERSION")
+    if version is None:
+        yield note("guided", "it does not report its capabilities", "use ArduCopter 4.5 or later")
+    elif not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED:
+        yield missing("guided", "takes no local setpoints", "use ArduCopter 4.5 or later")
+    else:
+        yield good("guided", "takes velocities in body axes")
+
+
+def health(record: Record) -> Findings:
+    """The pre-arm checks; ArduPilot reports its reasons as texts."""
+    status = record.latest.get("SYS_STATUS")
+    if status is None:
+        yield missing("health", "no SYS_STATUS", "let the link carry it")
+        return
+    if status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK or record.armed:
+        yield good("pre-arm checks", "passed")
+        return
+    found = [text.partition(": ")[2] for _, text in record.texts if text.startswith(("PreArm: ", "Arm: "))]
+    reasons = "; ".join(dict.fromkeys(found))
+    advice = "correct what is named" if reasons else "its estimator needs some 40 s after its start"
+    yield missing("pre-arm checks", f"not passed: {reasons}" if reasons else "not passed", advice)
+
+
+def estimator(record: Record) -> Findings:
+    """Which states the estimator has, and whether measurements agree with them."""
+    report = record.latest.get("EKF_STATUS_REPORT")
+    if report is None:
+        yield note("estimator", "it does not report its state (EKF_STATUS_REPORT)")
+        return
+    if not report.flags & _HAS_ATTITUDE:
+        yield missing("estimator", "it does not know its attitude", "keep the drone still for some seconds")
+        return
+    variances = {
+        "velocity": report.velocity_variance,
+        "position": report.pos_horiz_variance,
+        "height": report.pos_vert_variance,
+        "heading": report.compass_variance,
+    }
+    high = {name: value for name, value in variances.items() if value > _HIGH_VARIANCE}
+    words = ", ".join(f"{name} {value:.2f}" for name, value in high.items())
+    if any(value >= _BAD_VARIANCE for value in high.values()):
+        yield missing("estimator", f"it rejects measurements: {words}", "correct the sensor or its settings")
+    elif high:
+        yield note("estimator", f"measurements hardly agree: {words}", "wait, or correct the sensor")
+    else:
+        yield good("estimator", f"measurements agree, largest variance {max(variances.values()):.2f}")
+
+
+def position(record: Record) -> Findings:
+    """Where its position and height are from."""
+    report, parameters = record.latest.get("EKF_STATUS_REPORT"), record.parameters
+    source = int(parameters.get("EK3_SRC1_POSXY", _GPS))
+    words = _POSITION_SOURCES.get(source, f"source {source}")
+    advice = f"give it its position by motion capture or visual odometry: {_GUIDE}"
+    if report is not None and (report.flags & _CONSTANT_POSITION or not report.flags & _HAS_POSITION):
+        if source == _EXTERNAL_NAVIGATION:
+            advice = (
+                f"EK3_SRC1_POSXY asks for external navigation: send ODOMETRY and set its origin: {_GUIDE}"
+            )
+        yield missing("position", f"the estimator has none; its source is {words}", advice)
+    elif source == _EXTERNAL_NAVIGATION:
+        yield good("position", f"by {words}")
+    else:
+        gps = record.latest.get("GPS_RAW_INT")
+        accuracy_mm = 0 if gps is None or source != _GPS else gps.h_acc
+        if 0 < accuracy_mm <= _ACCURATE_MM:
+            yield good("position", f"by {words}, estimated accuracy {accuracy_mm / 1000:.2f} m")
+        else:
+            accuracy = f", estimated accuracy {accuracy_mm / 1000:.1f} m" if accuracy_mm else ""
+            text = f"by {words}{accuracy}: the drone will stray; a frame's opening is 0.38 m wide"
+            yield missing("position", text, advice)
+    yield from _height(record, advice)
+
+
+def _height(record: Record, advice: str) -> Findings:
+    report = record.latest.get("EKF_STATUS_REPORT")
+    source = int(record.parameters.get("EK3_SRC1_POSZ", 1))
+    words = _HEIGHT_SOURCES.get(source, f"source {source}")
+    if report is not None and not report.flags & _HAS_HEIGHT:
+        yield missing("height", f"the estimator has none; its source is {words}", advice)
+    elif source == _EXTERNAL_NAVIGATION:
+        yield good("height", f"by {words}")
+    else:
+        text = f"by {words}, which drifts in flight; a frame's opening is 0.18 m high"
+        yield note("height", text, f"take it from external navigation (EK3_SRC1_POSZ 6): {_GUIDE}")
+
+
+def limits(record: Record) -> Findings:
+    """Parameters that slow the drone down or end the flight."""
+    parameters = record.parameters
+    if not parameters:
+        yield note("parameters", "no parameter was received", "check that the link is not read-only")
+        return
+    for name, minimum in (("WPNAV_SPEED", 100.0), ("WPNAV_SPEED_UP", 100.0), ("WPNAV_SPEED_DN", 50.0)):
+        value = parameters.get(name)
+        if value is not None and value < minimum:
+            yield missing(name, f"{value:g} cm/s", f"set it to {minimum:g} or more")
+    delay_s = parameters.get("DISARM_DELAY", 10.0)
+    if 0.0 < delay_s < 5.0:
+        yield missing("DISARM_DELAY", f"{delay_s:g} s", "set it to 10: take-off begins with a slow ramp")
+    if int(parameters.get("GUID_OPTIONS", 0)) & 48:
+        advice = "set GUID_OPTIONS to 0: the app needs position and velocity control"
+        yield missing("GUID_OPTIONS", f"{parameters['GUID_OPTIONS']:g}", advice)
+    if parameters.get("FENCE_ENABLE"):
+        for name, minimum in (("FENCE_ALT_MAX", _CHALLENGE_HEIGHT_M), ("FENCE_RADIUS", _CHALLENGE_REACH_M)):
+            value = parameters.get(name)
+            if value is not None and value < minimum:
+                yield missing(name, f"fence at {value:g} m", f"the challenge needs {minimum:g} m")
+
+
+def failsafes(record: Record) -> Findings:
+    """What the drone does without commands, for a person to confirm."""
+    parameters = record.parameters
+    timeout_s = parameters.get("GUID_TIMEOUT")
+    if timeout_s is not None:
+        advice = "" if 0.5 <= timeout_s <= 1.0 else "set GUID_TIMEOUT to 1: until then it flies on"
+        level = Level.NOTE if advice else Level.GOOD
+        yield Finding(level, "setpoints lost", f"it stops and hovers after {timeout_s:g} s", advice)
+    station = parameters.get("FS_GCS_ENABLE")
+    if station is not None:
+        climb_m = parameters.get("RTL_ALT", 1500.0) / 100
+        words = "nothing" if not station else f"action {station:g}"
+        advice = ""
+        if station in (1.0, 3.0, 4.0):
+            words = f"return, which climbs to {climb_m:g} m first"
+            advice = "under a roof set FS_GCS_ENABLE to 5 (land)"
+        elif station == 5.0:
+            words = "land"
+        yield Finding(Level.NOTE if advice else Level.GOOD, "ground station lost", words, advice)
+    if parameters.get("FS_THR_ENABLE") == 1.0:
+        advice = "under a roof set FS_THR_ENABLE to 3 (land)"
+        yield note("radio control lost", "return, which climbs to RTL_ALT first", advice)

@@ -1,0 +1,203 @@
+"""ArduCopter's dialect: GUIDED mode instead of offboard, and a take-off that must be requested.
+
+How ArduCopter 4.7 behaves (its `mode_guided.cpp`, `takeoff.cpp`, `GCS_MAVLink_Copter.cpp`):
+
+- In GUIDED it follows SET_POSITION_TARGET_LOCAL_NED. A velocity in MAV_FRAME_BODY_NED is turned with the
+  heading at its arrival and stays fixed in the world until the next one, as PX4's. When none arrives for
+  `GUID_TIMEOUT` (3 s by default) it stops and hovers.
+- On the ground it ignores velocities. MAV_CMD_NAV_TAKEOFF starts the motors and climbs until a velocity
+  arrives; one that arrives before the drone has left the ground ends the take-off.
+- LOITER follows the sticks, and without sticks it descends. BRAKE stops and hovers without sticks.
+- It sends only HEARTBEAT and STATUSTEXT until streams are requested.
+
+Setpoints are sent here, not by MAVSDK's offboard plugin: its thread repeats them at 20 Hz, which would end
+each take-off. So a hung app sends nothing, and `GUID_TIMEOUT` acts.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import threading
+from typing import Any
+
+from mavsdk.asyncio import MavsdkError
+from mavsdk.plugins.mavlink_direct import MavlinkMessage
+
+from offboard.drone import VelocityCommand
+from offboard.link.commands import synchronous
+from offboard.link.dialect import ModeNames
+from offboard.link.telemetry import TelemetryFeed
+from wire import ardupilot_modes
+from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
+
+TAKEOFF_HEIGHT_M = 1.0  # requested; velocities take over as soon as the drone is off the ground
+TAKEOFF_CLIMB_M_S = 0.05  # a command on the ground to climb faster than this is a take-off
+TAKEOFF_AGAIN_US = 5_000_000  # vehicle time; arming takes 2 s and the motors' start half a second
+_STREAMS_HZ = {
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 10.0,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
+}
+_VELOCITY_AND_YAW_RATE = (
+    mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_Y_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_Z_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AX_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AY_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AZ_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+)
+
+ARDUPILOT_MODES = ModeNames(offboard="GUIDED", hold="BRAKE", land="LAND", pilot=ardupilot_modes.PILOT_MODES)
+
+
+class CommandRefusedError(MavsdkError):  # type: ignore[misc]  # MAVSDK is untyped
+    """The vehicle answered a command, but not with "accepted"; the message is the MAV_RESULT's name."""
+
+
+class ArduPilotDialect:
+    """One ArduCopter, by MAVSDK's plugins `action` and `mavlink_direct`; see the module and `Dialect`.
+
+    Args:
+        action: MAVSDK's asyncio plugin.
+        direct: MAVSDK's asyncio plugin.
+        feed: the vehicle's telemetry, which shows whether it is on the ground.
+        system_id: the vehicle's.
+    """
+
+    modes = ARDUPILOT_MODES
+    numbered_modes = ardupilot_modes.NAMES
+    checks_in_offboard = True
+    ready_limit_s = 90.0  # its estimator uses GPS some 40 s after its start
+
+    def __init__(self, action: Any, direct: Any, feed: TelemetryFeed, system_id: int) -> None:  # noqa: ANN401
+        self.ended = False
+        self._action = action
+        self._direct = synchronous(direct)
+        self._feed = feed
+        self._system_id = system_id
+        self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
+        self._sent_since_repeat = False
+        self._takeoff_us: int | None = None  # vehicle time at which take-off was last requested
+        self._lock = threading.Lock()  # the watchdog's thread sends, too
+
+    async def request_streams(self) -> None:
+        """Request what a flight needs; what is refused is missing later, in words."""
+        for message_id, rate_hz in _STREAMS_HZ.items():
+            with contextlib.suppress(MavsdkError):
+                await self._command_long(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz)
+
+    def send(self, command: VelocityCommand) -> None:
+        """Send a velocity; on the ground, request take-off if it climbs."""
+        with self._lock:
+            if self.ended:
+                return
+            self._command, self._sent_since_repeat = command, True
+            climbs = command.up_m_s > TAKEOFF_CLIMB_M_S
+            with contextlib.suppress(MavsdkError):  # the link is closed; telemetry shows that
+                if self._stands_ready and climbs:
+                    self._take_off()
+                else:
+                    self._takeoff_us = None
+                    self._send("SET_POSITION_TARGET_LOCAL_NED", _velocity_target(command))
+
+    def repeat(self) -> None:
+        """Send the last velocity again if nothing was sent since the last call."""
+        command, sent = self._command, self._sent_since_repeat
+        if command is not None and not sent:
+            self.send(command)
+        self._sent_since_repeat = False
+
+    async def request_offboard(self) -> None:
+        """Request GUIDED."""
+        await self._set_mode(ardupilot_modes.GUIDED)
+
+    async def request_hold(self) -> None:
+        """End the setpoints until the next one, and request BRAKE."""
+        await asyncio.to_thread(self.request_hold_blocking)
+
+    def request_hold_blocking(self) -> None:
+        """The same from a thread, which waits for the answer."""
+        self._command = None
+        self._command_long_blocking(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(ardupilot_modes.BRAKE))
+
+    async def arm(self) -> None:
+        """Arm."""
+        await self._action.arm()
+
+    async def kill(self) -> None:
+        """Disarm at once, in the air too."""
+        self._command = None
+        await self._action.kill()
+
+    async def land(self) -> None:
+        """Request the mode LAND."""
+        self._command = None
+        await self._action.land()
+
+    def end(self) -> None:
+        """End the setpoints permanently."""
+        with self._lock:
+            self.ended, self._command = True, None
+
+    @property
+    def _stands_ready(self) -> bool:
+        """Armed in GUIDED on the ground."""
+        feed = self._feed
+        return feed.landed and feed.mode == ARDUPILOT_MODES.offboard and feed.arming.is_armed(feed.time_us)
+
+    def _take_off(self) -> None:
+        """Request take-off, and again when the drone is still on the ground after some seconds."""
+        now_us = self._feed.time_us
+        if self._takeoff_us is None or now_us - self._takeoff_us > TAKEOFF_AGAIN_US:
+            self._takeoff_us = now_us
+            fields = self._command_fields(mavlink.MAV_CMD_NAV_TAKEOFF, *(0.0,) * 6, TAKEOFF_HEIGHT_M)
+            self._send("COMMAND_LONG", fields)
+
+    async def _set_mode(self, number: int) -> None:
+        await self._command_long(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(number))
+
+    async def _command_long(self, number: int, *parameters: float) -> None:
+        await asyncio.to_thread(self._command_long_blocking, number, *parameters)
+
+    def _command_long_blocking(self, number: int, *parameters: float) -> None:
+        fields = self._command_fields(number, *parameters)
+        answer = json.loads(self._direct.send_command(self._message("COMMAND_LONG", fields)).fields_json)
+        result = answer.get("result")
+        if result != mavlink.MAV_RESULT_ACCEPTED:
+            known = mavlink.enums["MAV_RESULT"].get(result)
+            name = f"result {result}" if known is None else known.name.removeprefix("MAV_RESULT_")
+            raise CommandRefusedError(name)
+
+    def _command_fields(self, number: int, *parameters: float) -> dict[str, float]:
+        filled = (*parameters, *([0.0] * (7 - len(parameters))))
+        values = {f"param{index}": value for index, value in enumerate(filled, start=1)}
+        return {"command": number, "confirmation": 0, **values}
+
+    def _send(self, name: str, fields: dict[str, float]) -> None:
+        self._direct.send_message(self._message(name, fields))
+
+    def _message(self, name: str, fields: dict[str, float]) -> MavlinkMessage:
+        target = {"target_system": self._system_id, "target_component": AUTOPILOT_COMPONENT_ID}
+        return MavlinkMessage(
+            name, 0, 0, self._system_id, AUTOPILOT_COMPONENT_ID, json.dumps({**target, **fields})
+        )
+
+
+def _velocity_target(command: VelocityCommand) -> dict[str, float]:
+    """The fields of SET_POSITION_TARGET_LOCAL_NED for a velocity and a yaw rate in body axes."""
+    zeros = dict.fromkeys(("x", "y", "z", "afx", "afy", "afz", "yaw"), 0.0)
+    return {
+        **zeros,
+        "time_boot_ms": 0,
+        "coordinate_frame": mavlink.MAV_FRAME_BODY_NED,
+        "type_mask": _VELOCITY_AND_YAW_RATE,
+        "vx": command.forward_m_s,
+        "vy": -command.left_m_s,
+        "vz": -command.up_m_s,
+        "yaw_rate": -command.yaw_rate_rad_s,
+    }

@@ -1,0 +1,119 @@
+"""What differs between autopilots: their modes' names, and how they are commanded.
+
+`MavsdkDrone` asks a dialect for everything that PX4 and ArduPilot do differently. PX4's is here, ArduPilot's
+in `ardupilot.py`. To add an autopilot, write its dialect and choose it in `autopilots.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Protocol
+
+from mavsdk.asyncio.plugins.offboard import OffboardAsync
+
+from offboard.drone import VelocityCommand
+from offboard.link.commands import SetpointStream
+
+
+@dataclass(frozen=True, slots=True)
+class ModeNames:
+    """The flight modes that the app knows, by the names that `TelemetryFeed.mode` has."""
+
+    offboard: str  # follows the app's setpoints
+    hold: str  # hovers without setpoints or sticks
+    land: str
+    pilot: frozenset[str]  # flown by a pilot's sticks
+
+
+PX4_MODES = ModeNames(
+    offboard="OFFBOARD",
+    hold="HOLD",
+    land="LAND",
+    pilot=frozenset({"MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE"}),
+)
+
+
+class Dialect(Protocol):
+    """Commands to one vehicle. Its coroutines raise `MavsdkError` when the vehicle refuses.
+
+    Attributes:
+        modes: the names of its modes.
+        numbered_modes: names by HEARTBEAT.custom_mode; empty: MAVSDK's names are used.
+        ended: no setpoint is sent any more.
+        ready_limit_s: wall time until it can be armed, usually.
+        checks_in_offboard: its pre-arm checks are those of its mode, so it must enter offboard to be ready.
+    """
+
+    modes: ModeNames
+    numbered_modes: Mapping[int, str]
+    ended: bool
+    checks_in_offboard: bool
+    ready_limit_s: float
+
+    async def request_streams(self) -> None:
+        """Request what the vehicle does not send by itself, as soon as it is connected."""
+
+    def send(self, command: VelocityCommand) -> None:
+        """Send a velocity from now on; ignored after `end`. From any thread."""
+
+    def repeat(self) -> None:
+        """Send the last velocity again if nothing was sent since the last call; once a tick."""
+
+    async def request_offboard(self) -> None:
+        """Request the mode that follows setpoints."""
+
+    async def request_hold(self) -> None:
+        """End the setpoints until the next one, and request hold."""
+
+    def request_hold_blocking(self) -> None:
+        """The same from a thread, which waits for the answer."""
+
+    async def arm(self) -> None:
+        """Arm."""
+
+    async def kill(self) -> None:
+        """Disarm at once, in the air too."""
+
+    async def land(self) -> None:
+        """Request landing where the vehicle is."""
+
+    def end(self) -> None:
+        """End the setpoints permanently, without a request; from any thread."""
+
+
+class Px4Dialect(SetpointStream):
+    """PX4, by MAVSDK's plugins `offboard` and `action`."""
+
+    modes = PX4_MODES
+    numbered_modes: Mapping[int, str] = MappingProxyType({})
+    checks_in_offboard = False
+    ready_limit_s = 30.0
+
+    def __init__(self, offboard: OffboardAsync, action: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
+        super().__init__(offboard)
+        self._action = action
+
+    async def request_streams(self) -> None:
+        """Nothing: PX4 sends all streams by itself."""
+
+    def repeat(self) -> None:
+        """Nothing: MAVSDK's thread repeats setpoints."""
+
+    async def request_hold(self) -> None:
+        """End the stream until the next setpoint, and request hold."""
+        # Not through the plugin if the watchdog has ended the stream.
+        await (self._action.hold() if self.ended else super().request_hold())
+
+    async def arm(self) -> None:
+        """Arm."""
+        await self._action.arm()
+
+    async def kill(self) -> None:
+        """Disarm at once, in the air too."""
+        await self._action.kill()
+
+    async def land(self) -> None:
+        """Request the mode land."""
+        await self._action.land()

@@ -1,0 +1,85 @@
+"""An ArduCopter that the user has built for SITL: found and started."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from errors import SettingError
+from firmware_py.types import GeodeticPoint
+from sitl.ardupilot.parameters import Value, text_of
+from sitl.autopilots.process import AutopilotProcess
+from sitl.links import UdpAddresses
+from sitl.server_settings import ServerSettings
+
+PROGRAM = "arducopter"
+PARAMETER_FILE = "framerunner.parm"
+_PLACES = ("", "build/sitl/bin", "bin")
+
+
+def find_build(folder: Path) -> Path:
+    """ArduCopter's program: in the given folder, or in ArduPilot's sources after a build for SITL.
+
+    Raises:
+        SettingError: there is none.
+    """
+    for place in _PLACES:
+        program = folder / place / PROGRAM
+        if os.access(program, os.X_OK) and program.is_file():
+            return program.resolve()
+    raise SettingError(
+        f"--ardupilot {folder}: has no {PROGRAM}; give ArduPilot's folder after "
+        "`./waf configure --board sitl` and `./waf copter`"
+    )
+
+
+def options(settings: ServerSettings, home: GeodeticPoint, defaults: str) -> list[str]:
+    """The options by which ArduCopter flies here, with MAVLink on this simulator's usual ports.
+
+    Args:
+        settings: instance, ports and speed.
+        home: the scenario's origin.
+        defaults: file of parameters.
+    """
+    instance = settings.instance
+    return [
+        *("--model", f"JSON:{settings.bind}", "-I", str(instance), "--sysid", str(instance + 1)),
+        *("--home", f"{home.latitude_deg:.9f},{home.longitude_deg:.9f},{home.altitude_m:.3f},0"),
+        *("--speedup", f"{settings.speed:g}", "--defaults", defaults),
+        *("--serial0", _udp(settings.onboard), "--serial1", _udp(settings.ground)),
+    ]
+
+
+def _udp(link: UdpAddresses) -> str:
+    """The device by which ArduPilot sends a link's telemetry."""
+    assert link.remote is not None, "the simulator's default links have one"
+    return f"udpclient:{link.remote[0]}:{link.remote[1]}"
+
+
+class ArduPilotProcess(AutopilotProcess):
+    """ArduCopter as a child process.
+
+    Args:
+        program: as `find_build` returns.
+        settings: instance, ports and speed.
+        home: the scenario's origin.
+        parameters: for its start; in a folder that is kept, those that were changed in flight win.
+        folder: where it runs and keeps parameters and logs. None: a temporary one.
+    """
+
+    def __init__(
+        self,
+        program: Path,
+        settings: ServerSettings,
+        home: GeodeticPoint,
+        parameters: dict[str, Value],
+        folder: Path | None,
+    ) -> None:
+        super().__init__("ArduPilot", "--ardupilot", folder, {})
+        self._program, self._settings, self._home = program, settings, home
+        self._parameters = parameters
+
+    def command(self) -> list[str]:
+        """ArduCopter's own options."""
+        (self.folder / PARAMETER_FILE).write_text(text_of(self._parameters), encoding="ascii")
+        return [str(self._program), *options(self._settings, self._home, PARAMETER_FILE)]

@@ -1,0 +1,111 @@
+"""A genuine autopilot that the user has built: started, watched and ended."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ctypes
+import os
+import signal
+import sys
+from abc import ABC, abstractmethod
+from asyncio.subprocess import DEVNULL, Process
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from errors import SettingError
+
+_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
+_LAST_BYTES = 2000
+
+
+class AutopilotProcess(ABC):
+    """An autopilot as a child process, which never outlives this one.
+
+    Args:
+        name: of the autopilot, for messages.
+        option: of the command line that names its build, for messages.
+        folder: where it runs and keeps parameters and logs. None: a temporary one, removed in the end.
+        environment: its variables besides the inherited ones.
+    """
+
+    def __init__(self, name: str, option: str, folder: Path | None, environment: Mapping[str, str]) -> None:
+        self._name, self._option = name, option
+        prefix = f"framerunner-{name.lower()}-"
+        self._temporary = TemporaryDirectory(prefix=prefix) if folder is None else None
+        self.folder = Path(self._temporary.name) if self._temporary is not None else folder or Path()
+        self._environment = dict(environment)
+        self._process: Process | None = None
+
+    @property
+    def log(self) -> Path:
+        """What it prints."""
+        return self.folder / f"{self._name.lower()}.log"
+
+    @abstractmethod
+    def command(self) -> list[str]:
+        """By which it is started, in `folder`, which exists."""
+
+    def inherits(self, name: str) -> bool:
+        """Whether it gets this variable of the environment."""
+        return not name.startswith("PYTHON")
+
+    async def start(self) -> None:
+        """Start it; one that ran before has ended.
+
+        Raises:
+            SettingError: it cannot be started.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        inherited = {name: value for name, value in os.environ.items() if self.inherits(name)}
+        command = self.command()
+        try:
+            with self.log.open("wb") as output:
+                self._process = await asyncio.create_subprocess_exec(
+                    *command,
+                    cwd=self.folder,
+                    env=inherited | self._environment,
+                    stdin=DEVNULL,
+                    stdout=output,
+                    stderr=output,
+                    start_new_session=True,
+                    preexec_fn=_end_with_parent(),
+                )
+        except OSError as error:
+            message = f"{self._option} {command[0]}: cannot be started ({error.strerror})"
+            raise SettingError(message) from None
+
+    async def ended(self) -> str:
+        """Wait until it ends; how, in words."""
+        assert self._process is not None, "start() comes first"
+        code = await self._process.wait()
+        how = f"was ended by signal {-code}" if code < 0 else f"ended with code {code}"
+        return f"{self._name} {how}{self._last_words()}"
+
+    async def stop(self) -> None:
+        """End it and its start-up script at once; its flight log is complete from disarming on."""
+        if self._process is None:
+            return
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        await self._process.wait()
+        self._process = None
+
+    def _last_words(self) -> str:
+        """Its last error or line, for the end of a message."""
+        with contextlib.suppress(OSError):
+            text = self.log.read_bytes()[-_LAST_BYTES:].decode(errors="replace")
+            lines = [line.strip() for line in text.splitlines() if line.strip()]
+            errors = [line for line in lines if "ERROR" in line]
+            if lines:
+                return f": {(errors or lines)[-1]}"
+        return ""
+
+
+def _end_with_parent() -> Callable[[], None] | None:
+    """What the child calls before it becomes the autopilot: Linux ends it when this process ends."""
+    if sys.platform != "linux":
+        return None
+    call = ctypes.CDLL(None).prctl
+    return lambda: call(_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
