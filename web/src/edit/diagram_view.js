@@ -17,7 +17,7 @@ const CLICK_PX = 4;
 const END = 9; // how near to the end of a line the mouse takes it, in the drawing's units
 const END_INWARDS = 17; // how far from its state
 const MISSING_HEIGHT = 24;
-const ZOOM = { least: 0.15, most: 3, step: 1.0015 };
+const ZOOM = { least: 0.05, most: 3, step: 1.0015 };
 const MARGIN = 24; // around what is brought into view, in pixels
 
 export class DiagramView {
@@ -76,7 +76,8 @@ export class DiagramView {
     this.#listener = listener;
     this.#words = words;
     const arrow = svg("marker", {
-      id: "e-arrow", viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 8, markerHeight: 8, orient: "auto-start-reverse",
+      id: "e-arrow", viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 11, markerHeight: 11,
+      markerUnits: "userSpaceOnUse", orient: "auto-start-reverse",
     }, svg("path", { d: "M0,0L10,5L0,10z", class: "e-arrow" }));
     this.#superstates = svg("g");
     this.#states = svg("g"); // in front of lines and labels, which would keep the mouse from a state that they pass

@@ -239,7 +239,8 @@ export class RunPanel {
     this.#spans = now.full ? now.spans : [...this.#spans, ...now.spans];
     this.#root.classList.toggle("e-paused", now.paused);
     setText(this.#pause, word(now.paused ? "go_on" : "pause"));
-    const seconds = { time: number(now.time_s - began_s, 1), state: now.state, since: number(now.seconds_in_state, 1) };
+    const since_s = now.seconds_in_state || now.time_s - (this.#spans.at(-1)?.to_s ?? now.time_s); // a finished chart counts no seconds
+    const seconds = { time: number(now.time_s - began_s, 1), state: now.state, since: number(since_s, 1) };
     setText(this.#line, word(!now.state ? "starting" : now.paused ? "paused_in" : "flying_in", seconds));
     setText(this.#hit, hitWords(this.#contacts));
     this.#listener.lit(now.active, this.#counts, now.taken.flatMap(({ ids }) => ids));

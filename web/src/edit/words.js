@@ -54,7 +54,7 @@ const WORDS = {
     value: "Primer valor", findings: "Lo que dice el revisor", checker: "Revisor", none: "Sin errores: la misión puede volar.", advice: "{count} {count:consejo|consejos} para más adelante",
     unreadable: "Ahora no se puede leer el texto; el diagrama muestra lo que había antes.",
     away: "sin conexión con el programa del editor; se intenta de nuevo", restored: "Lo que no se guardó la última vez está aquí de nuevo.",
-    others: "abierto también en otra ventana", names: "Nombres que se pueden usar", template_note: "Un estado de la plantilla {name}: un cambio vale para todos sus usos.",
+    others: "abierto también en otra ventana", names: "Nombres", template_note: "Un estado de la plantilla {name}: un cambio vale para todos sus usos.",
     foreign_note: "Escrito en la misión que esta amplía; se puede cambiar allí.", create: "Crear", from: "Empezar con",
     empty: "un diagrama vacío", example: "un ejemplo con comentarios", a_copy: "una copia de {name}", open: "Abrir una misión", no_files: "Aún no hay misiones en esta carpeta.",
     overwrite: "Otro programa ha cambiado el archivo. ¿Guardar de todos modos?", text: "Texto", diagram: "Diagrama", add_transition: "Añadir una transición", new_name: "nombre",

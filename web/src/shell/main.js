@@ -36,7 +36,7 @@ function show([state, words]) {
   if (!place) return;
   const element = place.querySelector(".words");
   place.dataset.state = state;
-  const said = document.documentElement.lang === "es" ? SPANISH[words] ?? words : words; // few pages have two languages
+  const said = document.documentElement.lang === "es" ? SPANISH[words] ?? words.replace("link lost", SPANISH["link lost"]).replace(" of ", " de ") : words; // few pages have two languages
   if (element.textContent !== said) element.textContent = said;
 }
 
