@@ -25,7 +25,6 @@ from geometry.vectors import Vec3
 
 _MAX_WAITING = 64
 _MAX_LATE_US = 100_000
-_MAX_PREDICTION_US = 20_000
 _MAX_GAP_US = 100_000  # between samples of the IMU
 _RELIED_ON_US = 1_000_000
 _STAND_PERIOD_US = 100_000
@@ -71,7 +70,6 @@ class InertialEstimator:
         self.latest = Readings(0)
         self._watches = watch_sensors(settings)
         self._now_us = self._imu_us = 0
-        self._position_us = NEVER_US  # when the horizontal position was measured last
         self._ticks = 0
         noise = settings.noise
         self._floor = (noise.gyro_density**2, noise.accel_density**2)  # times the sampling rate
@@ -85,7 +83,7 @@ class InertialEstimator:
     @property
     def has_position(self) -> bool:
         """Whether the horizontal position is measured, or was until a short while ago."""
-        return self._now_us - self._position_us <= self._settings.no_aid_us
+        return self._is_recent(self.aiding.position_us)
 
     def take_external_pose(self, pose: ExternalPose) -> None:
         """Take a pose from outside; it is fused at the time at which it was true."""
@@ -282,42 +280,21 @@ class InertialEstimator:
         self.aiding.target.filter.white_noise = (max(turn, gyro / period_s), max(push, accel / period_s))
 
     def _advance_filter(self, imu: ImuSample) -> None:
-        """Let the filter follow at its distance, and carry its corrections to the present.
-
-        It is predicted to a measurement's time, or as far as one prediction may reach; between, samples wait.
-        """
+        """Let the filter follow at its distance, and carry its corrections to the present."""
         recent, waiting, into = self._output.recent, self._waiting, self.aiding.target.filter
-        period_us, half_us = imu.period_us, imu.period_us // 2
-        horizon_us = imu.time_us - -(-self._settings.delay_us // period_us) * period_us  # whole samples
-        while True:
-            end_us = into.time_us + _MAX_PREDICTION_US
-            if waiting and waiting[0][0] - half_us < end_us:
-                end_us = waiting[0][0] - half_us
-            if end_us > horizon_us:
-                return
-            samples = []
-            while recent and recent[0][0] <= horizon_us:
-                samples.append(recent.popleft())
-                if samples[-1][0] >= end_us:
-                    break
-            if not samples:
-                return
-            into.predict(samples)
-            self._fuse_until(into.time_us + half_us)
-            if self.stands and self._is_unaided(into.time_us) and is_still(imu):
+        while recent and recent[0][0] <= imu.time_us - self._settings.delay_us:
+            time_us, period_s, rate, force = recent.popleft()
+            into.add(time_us, period_s, rate, force)
+            due_us = time_us + int(period_s * 5e5)
+            while waiting and waiting[0][0] <= due_us:
+                sample = heappop(waiting)[2]
+                if not self.aiding.is_redundant(sample):
+                    self._correct(self.aiding.fuse(sample))
+            if self.stands and self._is_unaided(time_us) and is_still(imu):
                 self._correct(self.aiding.stand())
-
-    def _fuse_until(self, time_us: int) -> None:
-        """Fuse the measurements that were true before a time."""
-        waiting, aiding = self._waiting, self.aiding
-        while waiting and waiting[0][0] <= time_us:
-            sample = heappop(waiting)[2]
-            if not aiding.is_redundant(sample):
-                self._correct(aiding.fuse(sample))
 
     def _correct(self, error: list[float]) -> None:
         into, resets = self.aiding.target.filter, self.aiding.target.resets
-        self._position_us = self.aiding.position_us
         if resets == self._resets:
             self._output.correct(error, into)
         else:

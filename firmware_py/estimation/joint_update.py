@@ -2,9 +2,8 @@
 
 A Kalman filter may take measured numbers with independent errors one by one (Simon, "Optimal State
 Estimation", 2006, section 6.1). What the one tells of the next is worked out here among the few measured
-numbers, as a Cholesky factorisation of their covariance, row by row, in scalar code; only the sum of all
-corrections is applied to the large covariance: numpy's calls on matrices of this size cost more than their
-arithmetic.
+numbers, as an L D L' factorisation of their covariance, in scalar code; only the sum of all corrections is
+applied to the large covariance: numpy's calls on matrices of this size cost more than their arithmetic.
 """
 
 from __future__ import annotations
@@ -12,10 +11,6 @@ from __future__ import annotations
 import numpy as np
 
 from firmware_py.estimation.error_state import ErrorCovariance, Matrix
-
-_Fused = tuple[int, float, float, list[float]]
-"""A number that was fused: its index, 1 over the root of its variance given those before, its innovation
-times that, and its row of the factor without the diagonal."""
 
 
 class JointUpdate:
@@ -42,14 +37,14 @@ class JointUpdate:
             self._left = [number - part for number, part in zip(innovations, known, strict=True)]
         else:
             self._left = list(innovations)
-        self._taken: list[_Fused] = []
+        self._taken: list[tuple[list[float], float, list[float]]] = []
         self._gains: list[list[float]] = []
         self._weights: list[float] = []
 
     def square(self, index: int, variance: float) -> float:
         """Normalised innovation squared of a number, after those that have been fused."""
-        left, total, _ = self._after_others(index, variance)
-        return left * left / total
+        left = self._left[index]
+        return left * left / (self._spread[index][index] + variance)
 
     def fuse(self, index: int, variance: float) -> float:
         """Fuse a number.
@@ -61,33 +56,28 @@ class JointUpdate:
         Returns:
             Its normalised innovation squared; over the numbers of one measurement, these add up to its NIS.
         """
-        left, total, row = self._after_others(index, variance)
-        scale = total**-0.5
+        spread, left = self._spread, self._left
+        row = spread[index]
+        total = row[index] + variance
+        innovation = left[index]
         # The gain of this number is a combination of the columns of P H'.
-        gain = [0.0] * len(self._left)
-        gain[index] = scale
-        for share, other in zip(row, self._gains, strict=True):
-            for at, part in enumerate(other):
-                gain[at] -= scale * share * part
-        self._taken.append((index, scale, scale * left, row))
-        self._gains.append(gain)
-        self._weights.append(scale * left)
-        return left * left / total
-
-    def _after_others(self, index: int, variance: float) -> tuple[float, float, list[float]]:
-        """A number's innovation and its variance given those that have been fused; its row of the factor."""
-        spread = self._spread[index]
-        left, total = self._left[index], spread[index] + variance
-        row: list[float] = []
-        for other, scale, weight, other_row in self._taken:
-            share = spread[other]
-            for mine, its in zip(row, other_row, strict=True):
-                share -= mine * its
-            share *= scale
-            row.append(share)
-            left -= share * weight
-            total -= share * share
-        return left, total, row
+        combination = [0.0] * len(left)
+        combination[index] = 1.0
+        for before, total_before, row_before in self._taken:
+            factor = row_before[index] / total_before
+            for at, part in enumerate(before):
+                combination[at] -= factor * part
+        row = row.copy()
+        self._taken.append((combination, total, row))
+        for at, other in enumerate(spread):
+            factor = other[index] / total
+            left[at] -= factor * innovation
+            for column, part in enumerate(row):
+                other[column] -= factor * part
+        scale = total**-0.5
+        self._gains.append([scale * part for part in combination])
+        self._weights.append(scale * innovation)
+        return innovation * innovation / total
 
     def apply(self) -> None:
         """Correct the covariance and its error by all that has been fused."""

@@ -1,12 +1,11 @@
 """The error-state Kalman filter: nominal state, biases and their covariance, at one instant.
 
-State and covariance are predicted by several samples of the IMU together, up to a measurement's time or for
-some hundredths of a second.
+Samples of the IMU are summed, and state and covariance predicted, only when a measurement is due or the sum
+covers some hundredths of a second.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import isfinite
 
 from firmware_py.estimation.error_state import (
@@ -20,10 +19,11 @@ from firmware_py.estimation.error_state import (
     ErrorCovariance,
 )
 from firmware_py.estimation.settings import InertialNoise
-from firmware_py.estimation.strapdown import ImuRecord, NavigationState, increments
+from firmware_py.estimation.strapdown import Increments, NavigationState
 from geometry.rotations import rotation
 from geometry.vectors import ZERO3, Vec3
 
+_MAX_PREDICTION_S = 0.0199
 _PREDICTIONS_TO_SYMMETRISE = 100
 
 
@@ -65,27 +65,47 @@ class NavigationFilter:
         self.white_noise = (0.0, 0.0)
         self._noise = noise
         self._returning = [(i, kind) for i, kind in enumerate(drifts) if isfinite(kind.time_constant_s)]
+        self._sum = Increments()
+        self._summed_us = 0
+        self._samples = 0
         self._predictions = 0
 
     def start(self, time_us: int) -> None:
         """Begin at a time."""
-        self.time_us = time_us
+        self.time_us = self._summed_us = time_us
 
-    def predict(self, samples: Sequence[ImuRecord]) -> None:
-        """Bring state and covariance to the end of some samples of the IMU.
+    def add(self, time_us: int, period_s: float, rate_frd_rad_s: Vec3, force_frd_m_s2: Vec3) -> None:
+        """Take a sample of the IMU.
 
         Args:
-            samples: that follow the filter's time, oldest first; one at least.
+            time_us: end of its interval.
+            period_s: length of the interval.
+            rate_frd_rad_s: measured, shape (3,).
+            force_frd_m_s2: measured specific force, shape (3,).
         """
-        period_s, (tx, ty, tz), (vx, vy, vz) = increments(samples)
+        total = self._sum
+        total.add(period_s, rate_frd_rad_s, force_frd_m_s2)
+        self._summed_us = time_us
+        self._samples += 1
+        if total.period_s >= _MAX_PREDICTION_S:
+            self.predict()
+
+    def predict(self) -> None:
+        """Bring state and covariance to the last sample's time."""
+        total = self._sum
+        period_s = total.period_s
+        if period_s == 0.0:
+            return
         p, q, r = self.gyro_bias_frd_rad_s
+        tx, ty, tz = total.turn_frd_rad
         x, y, z = self.accel_bias_frd_m_s2
+        vx, vy, vz = total.push_frd_m_s
         turn_frd = (tx - p * period_s, ty - q * period_s, tz - r * period_s)
         push_frd = (vx - x * period_s, vy - y * period_s, vz - z * period_s)
         push_ned = self.state.integrate(turn_frd, push_frd, period_s)
         noise = self._noise
         turn_variance, push_variance = self.white_noise
-        sample_s2 = period_s * period_s / len(samples)  # sum of the squared periods of equal samples
+        sample_s2 = period_s * period_s / self._samples  # sum of the squared periods of equal samples
         self.covariance.predict(
             rotation(self.state.attitude),
             push_ned,
@@ -99,7 +119,9 @@ class NavigationFilter:
         )
         for index, kind in self._returning:
             self.drifts[index] *= kind.over(period_s)[0]
-        self.time_us = samples[-1][0]
+        total.clear()
+        self._samples = 0
+        self.time_us = self._summed_us
         self._predictions += 1
         if self._predictions % _PREDICTIONS_TO_SYMMETRISE == 0:
             self.covariance.symmetrise()

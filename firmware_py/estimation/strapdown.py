@@ -8,15 +8,9 @@ second order (sculling); the position by the trapezoidal rule.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-from geometry.vectors import Quaternion, Vec3
+from geometry.vectors import ZERO3, Quaternion, Vec3
 
 GRAVITY_M_S2 = 9.80665
-
-ImuRecord = tuple[int, float, Vec3, Vec3]
-"""End (us) and length (s) of a sample of the IMU; mean angular rate, and mean specific force in body axes at
-its middle."""
 
 
 class NavigationState:
@@ -108,28 +102,49 @@ class NavigationState:
         self.position_ned_m = (n + position_ned_m[0], e + position_ned_m[1], d + position_ned_m[2])
 
 
-def increments(samples: Iterable[ImuRecord]) -> tuple[float, Vec3, Vec3]:
-    """Sum samples of the IMU over an interval, in body axes at its beginning.
+class Increments:
+    """Sums of samples of the IMU over an interval, in body axes at its beginning.
 
-    Args:
-        samples: that follow one another, oldest first.
-
-    Returns:
-        Length of the interval, s; rotation vector, shape (3,); integral of the specific force, shape (3,).
+    Attributes:
+        period_s: length of the interval.
+        turn_frd_rad: rotation vector, shape (3,).
+        push_frd_m_s: integral of the specific force, shape (3,).
     """
-    total_s = tx = ty = tz = vx = vy = vz = 0.0
-    for _, period_s, (p, q, r), (x, y, z) in samples:
-        half_s = 0.5 * period_s
-        dx, dy, dz = p * half_s, q * half_s, r * half_s
+
+    __slots__ = ("period_s", "push_frd_m_s", "turn_frd_rad")
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin a new interval."""
+        self.period_s = 0.0
+        self.turn_frd_rad = ZERO3
+        self.push_frd_m_s = ZERO3
+
+    def add(self, period_s: float, rate_frd_rad_s: Vec3, force_frd_m_s2: Vec3) -> None:
+        """Add a sample.
+
+        Args:
+            period_s: length of its interval.
+            rate_frd_rad_s: mean angular rate, shape (3,).
+            force_frd_m_s2: mean specific force, in body axes at the sample's middle, shape (3,).
+        """
+        p, q, r = rate_frd_rad_s
+        x, y, z = force_frd_m_s2
+        tx, ty, tz = self.turn_frd_rad
+        dx, dy, dz = 0.5 * p * period_s, 0.5 * q * period_s, 0.5 * r * period_s
         mx, my, mz = tx + dx, ty + dy, tz + dz  # turn to the sample's middle
+        vx, vy, vz = self.push_frd_m_s
         cx, cy, cz = my * z - mz * y, mz * x - mx * z, mx * y - my * x
-        vx += (x + cx + 0.5 * (my * cz - mz * cy)) * period_s
-        vy += (y + cy + 0.5 * (mz * cx - mx * cz)) * period_s
-        vz += (z + cz + 0.5 * (mx * cy - my * cx)) * period_s
-        tx, ty, tz = (
+        self.push_frd_m_s = (
+            vx + (x + cx + 0.5 * (my * cz - mz * cy)) * period_s,
+            vy + (y + cy + 0.5 * (mz * cx - mx * cz)) * period_s,
+            vz + (z + cz + 0.5 * (mx * cy - my * cx)) * period_s,
+        )
+        self.turn_frd_rad = (
             mx + dx + ty * dz - tz * dy,
             my + dy + tz * dx - tx * dz,
             mz + dz + tx * dy - ty * dx,
         )
-        total_s += period_s
-    return total_s, (tx, ty, tz), (vx, vy, vz)
+        self.period_s += period_s

@@ -178,9 +178,9 @@ def sim(
 
         framerunner sim --link tcpin://127.0.0.1:5760
 
-        framerunner sim --scenario test-case-1 --autopilot px4 --px4 ../PX4-Autopilot
+        framerunner sim --autopilot px4 --px4 ../PX4-Autopilot
 
-        framerunner sim --scenario test-case-1 --autopilot ardupilot --ardupilot ../ardupilot
+        framerunner sim --autopilot ardupilot --ardupilot ../ardupilot
     """
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)

@@ -134,7 +134,7 @@ async def _safety(
         return plan, SIMULATED
     from framerunner.preflight.prepare import is_own_simulator
 
-    if hardware.asks_nothing and await is_own_simulator(drone_url):
+    if hardware.asks_nothing and await is_own_simulator(drone_url, settings.camera_url):
         return replace(plan, caps=plan.caps if hardware.capped else None), SIMULATED
     from framerunner.preflight.keys import TerminalKeys
     from framerunner.preflight.prepare import prepare

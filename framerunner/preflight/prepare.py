@@ -31,14 +31,25 @@ def check_operator(hardware: HardwareSettings) -> None:
         )
 
 
-async def is_own_simulator(drone_url: str) -> bool:
+def _check_urls(drone_url: str, camera_url: str | None) -> None:
+    parse_url(drone_url)
+    if camera_url is not None:
+        open_source(camera_url)  # says in a line what can be no camera; it is opened later
+
+
+async def is_own_simulator(drone_url: str, camera_url: str | None) -> bool:
     """Whether the vehicle on a link is framerunner's simulated drone, by what it says of itself.
 
+    Args:
+        drone_url: of the vehicle.
+        camera_url: of its camera; checked first, as far as that goes without opening it.
+
     Raises:
+        CameraError: the camera's URL can be no camera.
         LinkError: the address is bad, or the link cannot be opened.
         DroneError: no vehicle is heard.
     """
-    parse_url(drone_url)
+    _check_urls(drone_url, camera_url)
     cancelled = threading.Event()
 
     def ask() -> bool:
@@ -69,9 +80,7 @@ async def prepare(plan: FlightPlan, checks: PreflightSettings, hardware: Hardwar
         DroneError: the vehicle is not heard or does not answer.
         SettingError: there is no terminal for the operator, or a name is no check's.
     """
-    parse_url(checks.drone_url)
-    if checks.camera_url is not None:
-        open_source(checks.camera_url)  # says in a line what can be no camera; it is opened later
+    _check_urls(checks.drone_url, checks.camera_url)
     check_operator(hardware)
     print("checks before arming, some ten seconds:", file=sys.stderr, flush=True)
     report = await run_preflight(plan, checks)

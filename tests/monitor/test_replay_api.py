@@ -24,6 +24,7 @@ async def test_the_list_and_a_run_are_json(monkeypatch):
             "verdict": "clean",
             "total_time_s": 39.0,
             "started": "2026-01-02T03:04:05+00:00",
+            "session": False,
         }
         async with client.get(f"{served.url}api/runs/first") as answer:
             assert answer.headers["Content-Type"] == "application/json"

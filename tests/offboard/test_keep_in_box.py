@@ -151,7 +151,7 @@ async def test_a_drone_carried_off_ends_in_hold(tmp_path):
 
 def test_what_the_adapter_adds_to_a_command_does_not_lead_out_either():
     drone, sent = MavsdkDrone("udpin://127.0.0.1:14540", box=BOX), []
-    drone._commanding, drone._setpoints = True, SimpleNamespace(send=sent.append)
+    drone._commanding, drone._dialect = True, SimpleNamespace(send=sent.append)
     drone._tracker = SimpleNamespace(correct=lambda command, state: VelocityCommand(up_m_s=0.7))
     for z in (3.0, 4.9, 5.5):
         drone._latest = state(z=z)
@@ -161,7 +161,7 @@ def test_what_the_adapter_adds_to_a_command_does_not_lead_out_either():
 
 def test_a_mission_that_corrects_its_own_commands_has_them_sent_unchanged():
     drone, sent = MavsdkDrone("udpin://127.0.0.1:14540", box=BOX, corrects=False), []
-    drone._commanding, drone._setpoints = True, SimpleNamespace(send=sent.append)
+    drone._commanding, drone._dialect = True, SimpleNamespace(send=sent.append)
     drone._tracker = SimpleNamespace(correct=lambda command, state: VelocityCommand(up_m_s=0.7))
     drone._latest = state(z=3.0)
     drone.command(VelocityCommand(forward_m_s=0.5))

@@ -131,6 +131,7 @@ class Aiding:
     def fuse(self, sample: Sample) -> list[float]:
         """Correct the filter by a measurement of its time; return the errors found, shape (n,)."""
         into = self.target.filter
+        into.predict()
         if type(sample) is ExternalPose:
             self._pose.fuse(sample)
         elif type(sample) is BarometerSample:
@@ -149,6 +150,7 @@ class Aiding:
     def stand(self) -> list[float]:
         """Use that the vehicle stands still, while nothing measures its position; see `fuse`."""
         into = self.target.filter
+        into.predict()
         self._stood_us = into.time_us
         for axis, velocity in enumerate(into.state.velocity_ned_m_s):
             into.covariance.fuse_state(VELOCITY + axis, -velocity, _STANDING_VELOCITY_M2_S2)
