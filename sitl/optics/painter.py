@@ -158,7 +158,7 @@ class Painter:
 
     def _upright_bands(self, a: float, b: float, starts: Sequence[float]) -> list[Ints] | None:
         """The bands from the left to the right border; None if they are too steep for that."""
-        if abs(a) > b:
+        if abs(a) >= b:  # also straight down, where both are zero
             return None
         (left, _), (right, bottom) = self._corners_px[0], self._corners_px[2]
         l0, l1, l2, l3 = (-(start + a * left) / b for start in starts)

@@ -109,7 +109,7 @@ def test_the_operator_arms_by_a_held_key_and_stops_by_the_space_bar(tmp_path, in
 
 def test_without_a_terminal_nothing_is_armed(tmp_path, instance):
     (tmp_path / "app").mkdir()
-    with program(tmp_path / "app", "fly", "test-case-1", *drone(instance)) as app:
+    with program(tmp_path / "app", "fly", "test-case-1", *drone(instance), "--operator", "Ada") as app:
         assert app.process.wait(30.0) == 2
         assert "--yes" in app.err and "no terminal" in app.err
     assert not list((tmp_path / "app").glob("runs/*"))

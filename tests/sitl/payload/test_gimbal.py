@@ -88,6 +88,19 @@ def test_images_follow_the_gimbal():
     assert not np.array_equal(view(fixed), view(carried))
 
 
+def test_straight_down_the_image_is_ground():
+    """The camera is exactly level in roll, so the horizon has no direction in the image."""
+    carried = Simulation(scenario(gimbal={}))
+    for _ in range(25):
+        carried.tick()
+    sky = view(carried)[0, 0]
+    carried.gimbal.turn(GimbalTarget(nan, nan, radians(-60.0), 0.0, False))
+    for _ in range(600):
+        carried.tick()
+    assert carried.gimbal.pitch_rad == -pi / 2
+    assert not (view(carried) == sky).all(axis=2).any()
+
+
 def test_a_scenario_without_a_gimbal_has_none_and_says_nothing_of_it():
     plain = Simulation(scenario())
     plain.tick()
