@@ -21,6 +21,7 @@ export class LivePanel {
   #view;
   /** @type {number[][]} */
   #track = [];
+  #isOver = false; // the flight of the track; its last places may come later
 
   /**
    * @param {HTMLElement} root
@@ -66,6 +67,7 @@ export class LivePanel {
   /** The server told how the flight stands. @param {Live} live */
   hear(live) {
     const isFlying = live.state === "starting" || live.state === "flying";
+    this.#isOver = !isFlying;
     this.#start.toggleAttribute("disabled", isFlying);
     this.#stop.toggleAttribute("disabled", !isFlying);
     const values = { scenario: live.scenario, speed: String(live.speed), text: live.text };
@@ -88,9 +90,12 @@ export class LivePanel {
   move(place, t, state) {
     const [x, y] = place;
     const last = this.#track.at(-1);
-    if (last && t < last[0]) this.#track = [];
+    if (last && t < last[0]) { // another flight
+      this.#track = [];
+      this.#isOver = false;
+    }
     if (!last || Math.hypot(x - last[1], y - last[2]) > STEP_M) this.#track.push([t, x, y, place[2]]);
     this.#view.add(true, this.#track, place, []);
-    if (state) setText(this.#line, state);
+    if (state && !this.#isOver) setText(this.#line, state);
   }
 }

@@ -147,7 +147,7 @@ export class ReplayPanel {
       make("dt", {}, name), make("dd", {}, typeof value === "number" ? number(value, 2) : String(value))]));
     const head = make("tr", {}, ...["seconds", "from_state", "to", "guard_word"].map((key) => make("th", {}, word(/** @type {any} */ (key)))));
     this.#table.replaceChildren(...(last.length > 0 ? [head] : []), ...last.slice(0, 5).map(({ time_s, from, to, when }) => make("tr", {},
-      make("td", {}, number(time_s, 1)), make("td", {}, from), make("td", {}, to), make("td", {}, when || word("always")))));
+      make("td", { class: "e-number" }, number(time_s, 1)), make("td", {}, from), make("td", {}, to), make("td", {}, when || word("always")))));
   }
 }
 

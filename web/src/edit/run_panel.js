@@ -269,7 +269,7 @@ export class RunPanel {
         this.#listener.lost(each.lost_in);
       }, { class: "e-link" });
       return make("tr", { "data-completed": String(each.completed) },
-        make("td", {}, show), make("td", {}, shortVerdict(each.verdict)), make("td", {}, each.lost_in), make("td", {}, number(each.total_time_s, 1)));
+        make("td", {}, show), make("td", {}, shortVerdict(each.verdict)), make("td", {}, each.lost_in), make("td", { class: "e-number" }, number(each.total_time_s, 1)));
     }));
     setText(this.#line, word("flown_many", {
       flown: String(this.#rows.length), completed: String(this.#rows.filter(({ completed }) => completed).length),
