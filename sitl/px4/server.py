@@ -19,7 +19,7 @@ from sitl.world import CONTROL_PERIOD_US
 
 _FALL_US = 3_000_000  # for which a drone without its autopilot is simulated on
 _SETPOINT_S = 0.002  # wall time in which PX4 takes a setpoint that was sent before time was granted
-_RESTART_S = 1.0  # before a PX4 that has ended is started again
+_ENDING_S = 1.0  # wall time in which a PX4 that has closed the connection ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +100,7 @@ class Px4Server:
             self._notice("PX4 is connected")
             with contextlib.suppress(Px4GoneError):
                 await self._run_paced(link)
+            link.drop()
             reason = await self._reason()
             self._notice(f"{reason}; at {self._simulation.time_us / 1e6:.1f} s the motors stop")
             if self._grants is not None:
@@ -134,7 +135,7 @@ class Px4Server:
         process = self._px4.process
         if process is not None:
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(_RESTART_S):
+                async with asyncio.timeout(_ENDING_S):
                     return await process.ended()
         return "PX4 has closed the connection"
 
