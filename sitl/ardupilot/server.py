@@ -108,7 +108,8 @@ class ArduPilotServer:
         self._exchange = FrameExchange(self._new_simulation, self._step_video)
         self._video = DroneVideo(self._exchange.simulation, settings)
         self._shown = self._exchange.simulation
-        self._frame_s: float | None = None  # wall time of the last frame
+        self._frame_s: float | None = None  # wall time of the last frame; None: ArduPilot has sent none yet
+        self._is_falling = False  # ArduPilot has ended: its last frames are not answered
         self._failed: asyncio.Future[None] | None = None
 
     def _new_simulation(self) -> ArduPilotSimulation:
@@ -172,7 +173,7 @@ class ArduPilotServer:
             frame = decode_frame(packet)
             if frame is not None and link.peer is not None:
                 newest = frame, link.peer
-        if newest is None:
+        if newest is None or self._is_falling:
             return
         if self._frame_s is None:
             self._notice("ArduPilot is connected")
@@ -189,21 +190,19 @@ class ArduPilotServer:
 
     async def _watch(self) -> None:
         """Report when ArduPilot is silent, and when it sends again."""
-        silent_s = 0.0
+        silent = False
         while True:
             await asyncio.sleep(_SILENCE_S / 2)
-            if self._frame_s is None:
-                continue
-            age_s = time.monotonic() - self._frame_s
-            if age_s > _SILENCE_S and not silent_s:
+            was_silent, frame_s = silent, self._frame_s
+            silent = frame_s is not None and time.monotonic() - frame_s > _SILENCE_S
+            if silent and not was_silent:
                 held_s = self._exchange.simulation.time_us / 1e6
                 self._notice(
                     f"ArduPilot has sent no outputs for {_SILENCE_S:g} s; simulated time waits for it at "
                     f"{held_s:.3f} s"
                 )
-            elif silent_s and age_s <= _SILENCE_S:
+            elif was_silent and not silent and frame_s is not None:
                 self._notice("ArduPilot sends again; no step was skipped")
-            silent_s = age_s if age_s > _SILENCE_S else 0.0
 
     async def _run_process(self) -> None:
         """Start ArduPilot, and again when it has ended; without a build, say how."""
@@ -218,9 +217,10 @@ class ArduPilotServer:
             if time.monotonic() - began_s < _MIN_LIFE_S or self._frame_s is None:
                 raise ArduPilotEndedError(f"{reason} (its output: {process.log})")
             self._notice(f"{reason}; at {self._exchange.simulation.time_us / 1e6:.1f} s the motors stop")
+            self._frame_s, self._is_falling = None, True
             await self._fall()
             self._exchange.restart()
-            self._frame_s = None
+            self._is_falling = False
 
     async def _fall(self) -> None:
         """Simulate on with standing motors, so that the try ends as it must."""

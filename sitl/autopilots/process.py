@@ -33,8 +33,10 @@ class AutopilotProcess(ABC):
     def __init__(self, name: str, option: str, folder: Path | None, environment: Mapping[str, str]) -> None:
         self._name, self._option = name, option
         prefix = f"framerunner-{name.lower()}-"
-        self._temporary = TemporaryDirectory(prefix=prefix) if folder is None else None
-        self.folder = Path(self._temporary.name) if self._temporary is not None else folder or Path()
+        if folder is None:
+            self._temporary = TemporaryDirectory(prefix=prefix)
+            folder = Path(self._temporary.name)
+        self.folder = folder.absolute()
         self._environment = dict(environment)
         self._process: Process | None = None
 
@@ -57,11 +59,16 @@ class AutopilotProcess(ABC):
         Raises:
             SettingError: it cannot be started.
         """
-        self.folder.mkdir(parents=True, exist_ok=True)
-        inherited = {name: value for name, value in os.environ.items() if self.inherits(name)}
-        command = self.command()
         try:
-            with self.log.open("wb") as output:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            command = self.command()
+            output = self.log.open("wb")
+        except OSError as error:
+            advice = "name another folder by --storage"
+            raise SettingError(f"{self.folder}: cannot be written to ({error.strerror}); {advice}") from None
+        inherited = {name: value for name, value in os.environ.items() if self.inherits(name)}
+        try:
+            with output:
                 self._process = await asyncio.create_subprocess_exec(
                     *command,
                     cwd=self.folder,

@@ -50,10 +50,7 @@ class Px4Simulation(SimulatedVehicle):
     def sense(self) -> bytes:
         """The messages of this tick; begins it."""
         true = self._begin_tick()
-        assert self._sensing is not None, "the suite is not ideal"
-        readings, pose = self._sensing.read(true)
-        if (faulty := self.faults.sensors) is not None:
-            readings, pose = faulty.change(readings, pose)
+        readings, pose = self._read_sensors(true)
         return self.messages.pack(readings, pose, true)
 
     def move(self, controls: ActuatorControls | None) -> None:

@@ -30,7 +30,7 @@ Matrix = npt.NDArray[np.float64]
 def swatch_of(image: Image) -> Image:
     """The middle of an image, a fifth of its width and height, which the swatch must fill."""
     height, width = image.shape[:2]
-    rows, columns = max(8, round(_MIDDLE * height)), max(8, round(_MIDDLE * width))
+    rows, columns = (min(size, max(8, round(_MIDDLE * size))) for size in (height, width))
     top, left = (height - rows) // 2, (width - columns) // 2
     return image[top : top + rows, left : left + columns]
 

@@ -170,7 +170,7 @@ class GimbalManager(Service):
         )
 
     def _is_in_control(self, sender: Controller) -> bool:
-        return sender in (self._primary, self._secondary)
+        return sender != _NOBODY and sender in (self._primary, self._secondary)
 
     def _refuse(self, sender: Controller) -> None:
         owner = "nobody" if self._primary == _NOBODY else f"{self._primary[0]}/{self._primary[1]}"
