@@ -5,12 +5,10 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from errors import UserError
-from sitl.ardupilot.build import ArduPilotProcess
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
 from sitl.ardupilot.simulation import PULSE_MIN_US, ArduPilotSimulation
+from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.server_settings import ServerSettings
 from sitl.streaming.drone_video import DroneVideo
 from sitl.world import PHYSICS_PERIOD_US
@@ -20,18 +18,6 @@ _SILENCE_S = 2.0  # wall time without a frame that is reported
 _FALL_US = 5_000_000  # for which a drone without its autopilot is simulated on
 _MIN_LIFE_S = 5.0  # wall time; an ArduPilot that ends sooner is not started again
 _STANDING = (PULSE_MIN_US,) * 16
-
-
-class ArduPilotEndedError(UserError):
-    """ArduPilot has ended; the message is one line for people."""
-
-
-@dataclass(frozen=True, slots=True)
-class ArduPilotSettings:
-    """How ArduPilot is started; without a process the user starts it."""
-
-    process: ArduPilotProcess | None
-    command: str  # by which a user starts it
 
 
 class FrameExchange:
@@ -100,7 +86,7 @@ class ArduPilotServer:
         self,
         new_simulation: Callable[[], ArduPilotSimulation],
         settings: ServerSettings,
-        ardupilot: ArduPilotSettings,
+        ardupilot: AutopilotStart,
         notice: Callable[[str], None] = lambda line: None,
     ) -> None:
         self._settings, self._ardupilot, self._notice = settings, ardupilot, notice
@@ -130,7 +116,7 @@ class ArduPilotServer:
             LinkError: ArduPilot's port is in use.
             VideoError: the port of the video is in use.
             SettingError: ArduPilot cannot be started.
-            ArduPilotEndedError: it ended soon after its start.
+            AutopilotEndedError: it ended soon after its start.
         """
         loop, port = asyncio.get_running_loop(), self._port
         link = bind_udp((self._settings.bind, port), "choose another --instance")
@@ -215,7 +201,7 @@ class ArduPilotServer:
             await process.start()
             reason = await process.ended()
             if time.monotonic() - began_s < _MIN_LIFE_S or self._frame_s is None:
-                raise ArduPilotEndedError(f"{reason} (its output: {process.log})")
+                raise AutopilotEndedError(f"{reason} (its output: {process.log})")
             self._notice(f"{reason}; at {self._exchange.simulation.time_us / 1e6:.1f} s the motors stop")
             self._frame_s, self._is_falling = None, True
             await self._fall()

@@ -11,13 +11,18 @@ import sys
 from abc import ABC, abstractmethod
 from asyncio.subprocess import DEVNULL, Process
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from errors import SettingError
+from errors import SettingError, UserError
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 _LAST_BYTES = 2000
+
+
+class AutopilotEndedError(UserError):
+    """A genuine autopilot has ended; the message is one line for people."""
 
 
 class AutopilotProcess(ABC):
@@ -108,6 +113,14 @@ class AutopilotProcess(ABC):
             if lines:
                 return f": {(errors or lines)[-1]}"
         return ""
+
+
+@dataclass(frozen=True, slots=True)
+class AutopilotStart:
+    """How an autopilot is started; without a process the user starts it."""
+
+    process: AutopilotProcess | None
+    command: str  # by which a user starts it
 
 
 def _end_with_parent() -> Callable[[], None] | None:

@@ -13,10 +13,11 @@ from pathlib import Path
 import pytest
 
 from scenarios.loader import load_scenario
+from sitl.autopilots.process import AutopilotStart
 from sitl.px4.build import Px4Process, find_build
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
 from sitl.px4.messages import ActuatorControls
-from sitl.px4.server import Px4Server, Px4Settings
+from sitl.px4.server import Px4Server
 from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
@@ -38,7 +39,7 @@ def serving(lines, speed=20.0):
         return made[-1]
 
     settings = ServerSettings(instance=instance, speed=speed)
-    server = Px4Server(make, settings, Px4Settings(None, "px4"), notice=lines.append)
+    server = Px4Server(make, settings, AutopilotStart(None, "px4"), notice=lines.append)
     return server, FIRST_PORT + instance, made
 
 
