@@ -168,7 +168,9 @@ class ArduPilotServer:
             before = self._exchange.simulation
             link.write(self._exchange.answer(newest[0]), newest[1])
             if self._exchange.simulation is not before:
-                self._notice("ArduPilot counts its frames anew: a new drone is on the start, at time zero")
+                self._notice(
+                    "ArduPilot counts its frames from zero again: a new drone is on the start, at time zero"
+                )
         except Exception as error:  # it would be lost in the event loop
             assert self._failed is not None
             if not self._failed.done():

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from errors import SettingError
 from scenarios.loader import load_scenario
 from sitl.autopilots.process import AutopilotStart
 from sitl.px4.build import Px4Process, find_build
@@ -180,6 +181,18 @@ async def test_a_px4_that_ends_at_once_is_reported_with_its_error(tmp_path):
     assert await process.ended() == "PX4 ended with code 3: ERROR [init] no airframe"
     assert "PX4_PARAM_MPC_THR_HOVER=0.5" in process.log.read_text()
     assert "PX4_SIM_MODEL=none_iris" in process.log.read_text()
+
+
+def test_a_folder_is_given_to_px4_by_its_absolute_path(tmp_path):
+    command = Px4Process(tmp_path, 0, Path("drone-files/px4-0"), {}).command()
+    assert Path("drone-files/px4-0").absolute() == Path(command[command.index("-w") + 1])
+
+
+async def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
+    (tmp_path / "file").touch()
+    process = Px4Process(build_of(tmp_path, "true"), 0, tmp_path / "file" / "px4-0", {})
+    with pytest.raises(SettingError, match="name another folder by --storage"):
+        await process.start()
 
 
 def is_gone(child):
