@@ -89,7 +89,8 @@ test-realtime-alone: setup
 
 .PHONY: test-px4
 test-px4: $(VENV)/installed-dev ## fly a genuine PX4 in the simulated world: make test-px4 PX4_DIR=../PX4-Autopilot
-	FRAMERUNNER_PX4_DIR="$(PX4_DIR)" $(BIN)/pytest -rs tests/sitl/px4/test_genuine.py
+	@if [ -z "$(PX4_DIR)" ]; then echo "no PX4: give its folder, built for SITL, by PX4_DIR=../PX4-Autopilot"; exit 1; fi
+	FRAMERUNNER_PX4_DIR=$(abspath $(PX4_DIR)) $(BIN)/pytest -rs tests/sitl/px4/test_genuine.py
 
 .PHONY: bench
 bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt; options in BENCH="--peers none"

@@ -81,13 +81,12 @@ class Simulation(SimulatedVehicle):
 
     def tick(self) -> None:
         """Advance by one control period: sense, control, move, judge."""
-        sensors, faulty = self._begin_tick(), self.faults.sensors
+        sensors = self._begin_tick()
         if self._sensing is None:
+            faulty = self.faults.sensors
             motors = self.autopilot.step(sensors if faulty is None else faulty.change_ideal(sensors))
         else:
-            readings, pose = self._sensing.read(sensors)
-            if faulty is not None:
-                readings, pose = faulty.change(readings, pose)
+            readings, pose = self._read_sensors(sensors)
             if pose is not None:
                 self.autopilot.estimator.take_external_pose(pose)
             motors = self.autopilot.step(readings)

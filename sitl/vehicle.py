@@ -150,6 +150,14 @@ class SimulatedVehicle(ABC):
         sensors.battery_voltage_v, sensors.battery_current_a = self.battery.voltage_v, self.battery.current_a
         return sensors
 
+    def _read_sensors(self, true: Sensors) -> tuple[Readings, ExternalPose | None]:
+        """What the sensors deliver in the tick of a true state, with faults; the suite is not ideal."""
+        assert self._sensing is not None, "ideal sensors read nothing"
+        readings, pose = self._sensing.read(true)
+        if (faulty := self.faults.sensors) is not None:
+            return faulty.change(readings, pose)
+        return readings, pose
+
     def _end_tick(self, motors: MotorSpeeds) -> None:
         """Move by these motor speeds, and judge."""
         self.world.step(motors)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 _DRIFT = 200e-6  # two cheap quartz oscillators differ by less
-_JUMP_S = 1.0  # a stream that stood still, or started anew, has new offsets
+_JUMP_S = 1.0  # a stream that stood still, or was restarted, has new offsets
 _SAME_CLOCK_S = 1.0
 
 

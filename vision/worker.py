@@ -42,9 +42,8 @@ _LIVE_OPTIONS = {  # FFmpeg's, in OpenCV's form; of live streams the latest imag
     "rtp": f"protocol_whitelist;file,udp,rtp|{_LATEST}",
 }
 REQUEST = struct.Struct("<BI")  # kind, and the number of bytes that follow
-ANSWER = struct.Struct(
-    "<BIId"
-)  # kind, width and height (pixels), monotonic time of capture or arrival (seconds)
+ANSWER = struct.Struct("<BIId")
+"""Kind, width and height (pixels), monotonic time of capture or arrival (seconds)."""
 
 
 class Request(IntEnum):

@@ -12,8 +12,9 @@ from framerunner.commands import say, with_faults, with_sensors
 
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
-    from sitl.ardupilot.server import ArduPilotServer, ArduPilotSettings
+    from sitl.ardupilot.server import ArduPilotServer
     from sitl.ardupilot.simulation import ArduPilotSimulation
+    from sitl.autopilots.process import AutopilotStart
     from sitl.server_settings import ServerSettings
 
 app = App(name="ardupilot", help="What a genuine ArduCopter needs to fly in the simulated world.")
@@ -28,9 +29,9 @@ def params(airframe: Annotated[str, Parameter(help="name or file of the airframe
         framerunner ardupilot params abejorro > abejorro.parm
     """
     from firmware_py.airframe import load_airframe
-    from sitl.ardupilot.parameters import all_parameters, text_of
+    from sitl.ardupilot.parameters import all_parameters, file_of
 
-    print(text_of(all_parameters(load_airframe(airframe))), end="")
+    print(file_of(all_parameters(load_airframe(airframe))), end="")
     return 0
 
 
@@ -60,11 +61,11 @@ def ardupilot_server(
 
 def _start(
     simulation: ArduPilotSimulation, settings: ServerSettings, ardupilot: Path | None
-) -> ArduPilotSettings:
+) -> AutopilotStart:
     from firmware_py.types import GeodeticPoint
     from sitl.ardupilot.build import ArduPilotProcess, find_build, options
     from sitl.ardupilot.parameters import all_parameters
-    from sitl.ardupilot.server import ArduPilotSettings
+    from sitl.autopilots.process import AutopilotStart
 
     scenario = simulation.scenario
     origin = scenario.origin
@@ -76,7 +77,7 @@ def _start(
         f"arducopter {shlex.join(options(settings, home, file))}"
     )
     if ardupilot is None:
-        return ArduPilotSettings(None, command)
+        return AutopilotStart(None, command)
     folder = None if settings.storage is None else settings.storage / f"ardupilot-{settings.instance}"
     program = find_build(ardupilot)
-    return ArduPilotSettings(ArduPilotProcess(program, settings, home, values, folder), command)
+    return AutopilotStart(ArduPilotProcess(program, settings, home, values, folder), command)

@@ -13,7 +13,8 @@ from framerunner.commands import say, with_faults, with_sensors
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
     from scenarios.models import Scenario
-    from sitl.px4.server import Px4Server, Px4Settings
+    from sitl.autopilots.process import AutopilotStart
+    from sitl.px4.server import Px4Server
     from sitl.px4.simulation import Px4Simulation
     from sitl.server_settings import ServerSettings
     from sitl.time_grants import TimeGrants
@@ -42,8 +43,9 @@ def params(
         framerunner px4 params abejorro --sensors outdoor --env
     """
     from firmware_py.airframe import load_airframe
+    from sitl.autopilots.parameters import text_of
     from sitl.px4.build import environment
-    from sitl.px4.parameters import all_parameters, text_of
+    from sitl.px4.parameters import all_parameters
     from sitl.sensors.suite import load_suite
 
     values = all_parameters(load_airframe(airframe), load_suite(sensors), speed)
@@ -104,14 +106,14 @@ def px4_server(
         return Px4Simulation(chosen, seed=seed)
 
     simulation = new_simulation()  # so that what is wrong with it is said first
-    start = _px4_settings(simulation, settings, px4)
+    start = _start(simulation, settings, px4)
     return Px4Server(new_simulation, settings, start, notice=say, grants=grants)
 
 
-def _px4_settings(simulation: Px4Simulation, settings: ServerSettings, px4: Path | None) -> Px4Settings:
+def _start(simulation: Px4Simulation, settings: ServerSettings, px4: Path | None) -> AutopilotStart:
+    from sitl.autopilots.process import AutopilotStart
     from sitl.px4.build import Px4Process, find_build
     from sitl.px4.parameters import all_parameters
-    from sitl.px4.server import Px4Settings
     from sitl.sensors.suite import load_suite
 
     scenario = simulation.scenario
@@ -120,8 +122,8 @@ def _px4_settings(simulation: Px4Simulation, settings: ServerSettings, px4: Path
         f"{settings.speed:g} --env) build/px4_sitl_default/bin/px4 -i {settings.instance}"
     )
     if px4 is None:
-        return Px4Settings(None, command)
+        return AutopilotStart(None, command)
     build = find_build(px4)
     values = all_parameters(simulation.world.airframe, load_suite(scenario.sensors), settings.speed)
     folder = None if settings.storage is None else settings.storage / f"px4-{settings.instance}"
-    return Px4Settings(Px4Process(build, settings.instance, folder, values), command)
+    return AutopilotStart(Px4Process(build, settings.instance, folder, values), command)

@@ -120,7 +120,18 @@ class FlownBy:
         if self.autopilot == "own":
             return
         name = {"px4": "PX4", "ardupilot": "ArduPilot"}[self.autopilot]
+        plain, sends_itself = Connections(), self.autopilot == "px4"
         refused = [
+            (
+                "--onboard-remote",
+                sends_itself and settings.onboard_remote != plain.onboard_remote,
+                f"MAVLink is {name}'s own",
+            ),
+            (
+                "--ground-remote",
+                sends_itself and settings.ground_remote != plain.ground_remote,
+                f"MAVLink is {name}'s own",
+            ),
             ("--count", count != 1, f"{name} flies one drone; start another simulator with --instance 1"),
             (
                 "--monitor",

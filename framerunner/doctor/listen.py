@@ -1,6 +1,7 @@
 """What a drone reports: listen to it, request what it does not send by itself, and record the answers.
 
-Nothing here changes the drone: messages are requested and parameters read.
+Nothing here changes the drone: messages are requested and parameters read. ArduPilot sends no streams by
+itself, so they are requested of it.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from math import dist
+from math import dist, isfinite
 
 from wire import ardupilot_modes
 from wire.ardupilot_messages import EKF_STATUS_REPORT_ID, add_ardupilot_messages
@@ -23,6 +24,7 @@ from wire.dialect import (
     is_vehicle,
     mavlink,
     request_message,
+    request_rate,
 )
 from wire.framing import missing_before
 from wire.px4_modes import mode_words
@@ -211,7 +213,8 @@ class Record:
             self.arming.take(message)
         elif kind == "PARAM_VALUE":
             value = float(message.param_value) if self.is_ardupilot else parameter_value(message)
-            self.parameters[message.param_id] = value
+            if isfinite(value):
+                self.parameters[message.param_id] = value
         elif kind == "AVAILABLE_MODES" and not message.mode_name.startswith("("):  # "(": PX4 does not use it
             self.modes[message.custom_mode] = message.mode_name
 
@@ -364,7 +367,7 @@ def open_requests(record: Record) -> Iterator[Message]:
     if record.is_ardupilot:
         for name, (number, rate_hz) in _ARDUPILOT_STREAMS_HZ.items():
             if name not in record.latest:
-                yield command_long(system_id, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / rate_hz)
+                yield request_rate(system_id, number, rate_hz)
     for name, number in (_ARDUPILOT_ONCE if record.is_ardupilot else _ONCE).items():
         if name not in record.latest:
             yield request_message(system_id, number)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from errors import SettingError
 from firmware_py.types import GeodeticPoint
-from sitl.ardupilot.parameters import Value, text_of
+from sitl.ardupilot.parameters import file_of
+from sitl.autopilots.parameters import Value
 from sitl.autopilots.process import AutopilotProcess
 from sitl.links import UdpAddresses
 from sitl.server_settings import ServerSettings
@@ -81,5 +82,5 @@ class ArduPilotProcess(AutopilotProcess):
 
     def command(self) -> list[str]:
         """ArduCopter's own options."""
-        (self.folder / PARAMETER_FILE).write_text(text_of(self._parameters), encoding="ascii")
+        (self.folder / PARAMETER_FILE).write_text(file_of(self._parameters), encoding="ascii")
         return [str(self._program), *options(self._settings, self._home, PARAMETER_FILE)]

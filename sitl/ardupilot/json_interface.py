@@ -60,7 +60,7 @@ def encode_state(
         position_ned_m: from the home position given to ArduPilot.
         velocity_ned_m_s: over ground.
         attitude: body FRD to NED.
-        range_m: of a range finder that looks down; None: there is none.
+        range_m: of a range finder that looks down, below zero if it measures none; None: there is none.
     """
     ranges = "" if range_m is None else f',"rng_1":{range_m:.4f}'
     return (

@@ -7,9 +7,8 @@ from math import sqrt
 from errors import SettingError
 from firmware_py.airframe import Airframe
 from sitl.ardupilot.simulation import PULSE_MAX_US, PULSE_MIN_US
+from sitl.autopilots.parameters import Value, text_of
 from sitl.world import PHYSICS_RATE_HZ
-
-Value = int | float
 
 _HOVER_SHARE = 0.25  # of full thrust, at least; ArduCopter's estimate of it has a lower limit of 0.125
 _RATE_BANDWIDTH_RAD_S = 20.0  # of roll and pitch, with motors that are fast enough
@@ -138,9 +137,6 @@ def _sign(value: float) -> int:
     return 1 if value > 0.0 else -1
 
 
-def text_of(parameters: dict[str, Value]) -> str:
+def file_of(parameters: dict[str, Value]) -> str:
     """A file of parameters as ArduPilot's `--defaults` takes it."""
-    lines = [
-        f"{name} {value if isinstance(value, int) else f'{value:.7g}'}" for name, value in parameters.items()
-    ]
-    return "\n".join(lines) + "\n"
+    return "".join([f"{name} {text_of(value)}\n" for name, value in parameters.items()])

@@ -5,12 +5,10 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from errors import UserError
-from sitl.ardupilot.build import ArduPilotProcess
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
 from sitl.ardupilot.simulation import PULSE_MIN_US, ArduPilotSimulation
+from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.server_settings import ServerSettings
 from sitl.streaming.drone_video import DroneVideo
 from sitl.world import PHYSICS_PERIOD_US
@@ -20,18 +18,6 @@ _SILENCE_S = 2.0  # wall time without a frame that is reported
 _FALL_US = 5_000_000  # for which a drone without its autopilot is simulated on
 _MIN_LIFE_S = 5.0  # wall time; an ArduPilot that ends sooner is not started again
 _STANDING = (PULSE_MIN_US,) * 16
-
-
-class ArduPilotEndedError(UserError):
-    """ArduPilot has ended; the message is one line for people."""
-
-
-@dataclass(frozen=True, slots=True)
-class ArduPilotSettings:
-    """How ArduPilot is started; without a process the user starts it."""
-
-    process: ArduPilotProcess | None
-    command: str  # by which a user starts it
 
 
 class FrameExchange:
@@ -100,7 +86,7 @@ class ArduPilotServer:
         self,
         new_simulation: Callable[[], ArduPilotSimulation],
         settings: ServerSettings,
-        ardupilot: ArduPilotSettings,
+        ardupilot: AutopilotStart,
         notice: Callable[[str], None] = lambda line: None,
     ) -> None:
         self._settings, self._ardupilot, self._notice = settings, ardupilot, notice
@@ -108,7 +94,8 @@ class ArduPilotServer:
         self._exchange = FrameExchange(self._new_simulation, self._step_video)
         self._video = DroneVideo(self._exchange.simulation, settings)
         self._shown = self._exchange.simulation
-        self._frame_s: float | None = None  # wall time of the last frame
+        self._frame_s: float | None = None  # wall time of the last frame; None: ArduPilot has sent none yet
+        self._is_falling = False  # ArduPilot has ended: its last frames are not answered
         self._failed: asyncio.Future[None] | None = None
 
     def _new_simulation(self) -> ArduPilotSimulation:
@@ -129,7 +116,7 @@ class ArduPilotServer:
             LinkError: ArduPilot's port is in use.
             VideoError: the port of the video is in use.
             SettingError: ArduPilot cannot be started.
-            ArduPilotEndedError: it ended soon after its start.
+            AutopilotEndedError: it ended soon after its start.
         """
         loop, port = asyncio.get_running_loop(), self._port
         link = bind_udp((self._settings.bind, port), "choose another --instance")
@@ -172,7 +159,7 @@ class ArduPilotServer:
             frame = decode_frame(packet)
             if frame is not None and link.peer is not None:
                 newest = frame, link.peer
-        if newest is None:
+        if newest is None or self._is_falling:
             return
         if self._frame_s is None:
             self._notice("ArduPilot is connected")
@@ -181,7 +168,9 @@ class ArduPilotServer:
             before = self._exchange.simulation
             link.write(self._exchange.answer(newest[0]), newest[1])
             if self._exchange.simulation is not before:
-                self._notice("ArduPilot counts its frames anew: a new drone is on the start, at time zero")
+                self._notice(
+                    "ArduPilot counts its frames from zero again: a new drone is on the start, at time zero"
+                )
         except Exception as error:  # it would be lost in the event loop
             assert self._failed is not None
             if not self._failed.done():
@@ -189,21 +178,19 @@ class ArduPilotServer:
 
     async def _watch(self) -> None:
         """Report when ArduPilot is silent, and when it sends again."""
-        silent_s = 0.0
+        silent = False
         while True:
             await asyncio.sleep(_SILENCE_S / 2)
-            if self._frame_s is None:
-                continue
-            age_s = time.monotonic() - self._frame_s
-            if age_s > _SILENCE_S and not silent_s:
+            was_silent, frame_s = silent, self._frame_s
+            silent = frame_s is not None and time.monotonic() - frame_s > _SILENCE_S
+            if silent and not was_silent:
                 held_s = self._exchange.simulation.time_us / 1e6
                 self._notice(
                     f"ArduPilot has sent no outputs for {_SILENCE_S:g} s; simulated time waits for it at "
                     f"{held_s:.3f} s"
                 )
-            elif silent_s and age_s <= _SILENCE_S:
+            elif was_silent and not silent and frame_s is not None:
                 self._notice("ArduPilot sends again; no step was skipped")
-            silent_s = age_s if age_s > _SILENCE_S else 0.0
 
     async def _run_process(self) -> None:
         """Start ArduPilot, and again when it has ended; without a build, say how."""
@@ -216,11 +203,12 @@ class ArduPilotServer:
             await process.start()
             reason = await process.ended()
             if time.monotonic() - began_s < _MIN_LIFE_S or self._frame_s is None:
-                raise ArduPilotEndedError(f"{reason} (its output: {process.log})")
+                raise AutopilotEndedError(f"{reason} (its output: {process.log})")
             self._notice(f"{reason}; at {self._exchange.simulation.time_us / 1e6:.1f} s the motors stop")
+            self._frame_s, self._is_falling = None, True
             await self._fall()
             self._exchange.restart()
-            self._frame_s = None
+            self._is_falling = False
 
     async def _fall(self) -> None:
         """Simulate on with standing motors, so that the try ends as it must."""

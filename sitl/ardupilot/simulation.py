@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isnan
+
 from firmware_py.airframe import Airframe
 from firmware_py.measurements import ImuSample
 from firmware_py.types import Sensors
@@ -12,6 +14,7 @@ from sitl.vehicle import SimulatedVehicle
 from sitl.world import PHYSICS_PERIOD_US, STEPS_PER_CONTROL
 
 PULSE_MIN_US, PULSE_MAX_US = 1000, 2000  # of the motors, as the parameters say
+_OUT_OF_RANGE_M = -1.0  # a distance below zero is none for ArduPilot
 
 
 class ArduPilotSimulation(SimulatedVehicle):
@@ -69,7 +72,8 @@ class ArduPilotSimulation(SimulatedVehicle):
         world.end_step()
         self._judge()
         self._true = self._begin_tick()
-        self._read_sensors()
+        if self._sensing is not None:
+            self._take_readings()
         return self._line(self._true)
 
     def _line_between(self) -> bytes:
@@ -79,15 +83,12 @@ class ArduPilotSimulation(SimulatedVehicle):
         time_us = self.world.time_us + self._steps * PHYSICS_PERIOD_US
         return self._line(Sensors(time_us, dynamics.position_ned_m(), velocity, attitude, rate, force))
 
-    def _read_sensors(self) -> None:
-        if self._sensing is None:
-            return
-        readings, pose = self._sensing.read(self._true)
-        if (faulty := self.faults.sensors) is not None:
-            readings, pose = faulty.change(readings, pose)
+    def _take_readings(self) -> None:
+        readings, _pose = self._read_sensors(self._true)
         self._imu = readings.imu or self._imu
         if readings.range_finder is not None:
-            self._range_m = readings.range_finder.distance_m
+            distance_m = readings.range_finder.distance_m
+            self._range_m = _OUT_OF_RANGE_M if isnan(distance_m) else distance_m
 
     def _line(self, true: Sensors) -> bytes:
         imu = self._imu

@@ -11,13 +11,18 @@ import sys
 from abc import ABC, abstractmethod
 from asyncio.subprocess import DEVNULL, Process
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from errors import SettingError
+from errors import SettingError, UserError
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 _LAST_BYTES = 2000
+
+
+class AutopilotEndedError(UserError):
+    """A genuine autopilot has ended; the message is one line for people."""
 
 
 class AutopilotProcess(ABC):
@@ -33,8 +38,10 @@ class AutopilotProcess(ABC):
     def __init__(self, name: str, option: str, folder: Path | None, environment: Mapping[str, str]) -> None:
         self._name, self._option = name, option
         prefix = f"framerunner-{name.lower()}-"
-        self._temporary = TemporaryDirectory(prefix=prefix) if folder is None else None
-        self.folder = Path(self._temporary.name) if self._temporary is not None else folder or Path()
+        if folder is None:
+            self._temporary = TemporaryDirectory(prefix=prefix)
+            folder = Path(self._temporary.name)
+        self.folder = folder.absolute()
         self._environment = dict(environment)
         self._process: Process | None = None
 
@@ -57,11 +64,16 @@ class AutopilotProcess(ABC):
         Raises:
             SettingError: it cannot be started.
         """
-        self.folder.mkdir(parents=True, exist_ok=True)
-        inherited = {name: value for name, value in os.environ.items() if self.inherits(name)}
-        command = self.command()
         try:
-            with self.log.open("wb") as output:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            command = self.command()
+            output = self.log.open("wb")
+        except OSError as error:
+            advice = "name another folder by --storage"
+            raise SettingError(f"{self.folder}: cannot be written to ({error.strerror}); {advice}") from None
+        inherited = {name: value for name, value in os.environ.items() if self.inherits(name)}
+        try:
+            with output:
                 self._process = await asyncio.create_subprocess_exec(
                     *command,
                     cwd=self.folder,
@@ -101,6 +113,14 @@ class AutopilotProcess(ABC):
             if lines:
                 return f": {(errors or lines)[-1]}"
         return ""
+
+
+@dataclass(frozen=True, slots=True)
+class AutopilotStart:
+    """How an autopilot is started; without a process the user starts it."""
+
+    process: AutopilotProcess | None
+    command: str  # by which a user starts it
 
 
 def _end_with_parent() -> Callable[[], None] | None:

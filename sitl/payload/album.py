@@ -115,6 +115,8 @@ class CameraAlbum:
 
     def _write(self, data: bytes) -> bool:
         """Append to the video; False if the storage is full."""
+        if not data:
+            return True
         try:
             self._storage.write(self._video, self._written, data)
         except OSError:

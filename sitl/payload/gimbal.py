@@ -30,7 +30,7 @@ class SimulatedGimbal:
         self._max_rate_rad_s = settings.rate_max_rad_s
         self.limits = GimbalLimits(settings.pitch_min_rad, settings.pitch_max_rad, settings.yaw_max_rad)
         self._target = GimbalTarget(0.0, 0.0)
-        self._heading_rad = 0.0
+        self._heading_rad = self._turn_rate_rad_s = 0.0
         self.pitch_rad = self.yaw_rad = 0.0
         self.pitch_rate_rad_s = self.yaw_rate_rad_s = 0.0
 
@@ -46,8 +46,8 @@ class SimulatedGimbal:
 
     @property
     def rate_frd_rad_s(self) -> Vec3:
-        """Its turning to another angle in the last step, in the camera's axes forward, right, down."""
-        yaw_rate = self.yaw_rate_rad_s
+        """Of the camera on it in the last step, in the camera's axes forward, right, down."""
+        yaw_rate = self._turn_rate_rad_s
         return (-yaw_rate * sin(self.pitch_rad), self.pitch_rate_rad_s, yaw_rate * cos(self.pitch_rad))
 
     def turn(self, target: GimbalTarget) -> None:
@@ -73,6 +73,7 @@ class SimulatedGimbal:
         yaw_rad = self._moved(held_rad, wanted_rad, target.yaw_rate_rad_s, step_s)
         yaw_rad = min(max(yaw_rad, -limits.yaw_max_rad), limits.yaw_max_rad)
         self.yaw_rate_rad_s = (yaw_rad - held_rad) / step_s
+        self._turn_rate_rad_s = (yaw_rad - self.yaw_rad + turned_rad) / step_s
         self.yaw_rad = yaw_rad
 
     def _moved(self, angle_rad: float, wanted_rad: float, rate_rad_s: float, step_s: float) -> float:

@@ -10,16 +10,12 @@ from __future__ import annotations
 import queue
 import threading
 from contextlib import suppress
-from fractions import Fraction
 
 import av
-import numpy as np
-import numpy.typing as npt
-from av.video.stream import VideoStream
 
-Image = npt.NDArray[np.uint8]
+from sitl.optics.painter import Image
+from sitl.streaming.h264 import CLOCK_HZ, add_h264_stream, h264_frame
 
-_CLOCK_HZ = 90_000
 _WAITING = 8  # images; more are left out
 _OPTIONS = {"movflags": "frag_keyframe+empty_moov+default_base_moof"}
 _CODEC = {"preset": "ultrafast", "tune": "zerolatency", "crf": "20"}  # visually close to the image
@@ -29,7 +25,7 @@ class VideoEncoder:
     """Compresses images; `take` returns what of the file is done.
 
     Args:
-        width_px: of the images; a last odd column or row is left out, as usual H.264 needs even sizes.
+        width_px: of the images; a last odd column or row is left out.
         height_px: of the images.
         rate_hz: of the images, nominal; each has its own time.
 
@@ -38,7 +34,7 @@ class VideoEncoder:
     """
 
     def __init__(self, width_px: int, height_px: int, rate_hz: float) -> None:
-        self._width_px, self._height_px = width_px // 2 * 2, height_px // 2 * 2
+        self._size_px = (width_px, height_px)
         self._rate_hz = rate_hz
         self._images: queue.Queue[tuple[Image, int] | None] = queue.Queue(_WAITING)
         self._pieces: queue.SimpleQueue[bytes] = queue.SimpleQueue()
@@ -80,12 +76,11 @@ class VideoEncoder:
     def _run(self) -> None:
         try:
             with av.open(self, "w", format="mp4", options=_OPTIONS) as container:
-                stream = container.add_stream(
-                    "libx264", rate=Fraction(self._rate_hz).limit_denominator(1000), options=_CODEC
-                )
-                self._set_up(stream)
+                stream = add_h264_stream(container, self._size_px, self._rate_hz, _CODEC)
                 while (given := self._images.get()) is not None:
-                    for packet in stream.encode(self._frame(*given)):
+                    image, time_us = given
+                    frame = h264_frame(stream, image, round(time_us * CLOCK_HZ / 1e6))
+                    for packet in stream.encode(frame):
                         container.mux(packet)
                 for packet in stream.encode(None):
                     container.mux(packet)
@@ -93,19 +88,3 @@ class VideoEncoder:
             self.failed = True
             while self._images.get() is not None:  # until `finish`
                 pass
-
-    def _set_up(self, stream: VideoStream) -> None:
-        stream.width, stream.height = self._width_px, self._height_px
-        stream.pix_fmt = "yuv420p"
-        context = stream.codec_context
-        context.time_base = Fraction(1, _CLOCK_HZ)
-        context.gop_size = max(1, round(self._rate_hz))  # a fragment a second
-        context.max_b_frames = 0
-        context.thread_count = 1
-
-    def _frame(self, image: Image, time_us: int) -> av.VideoFrame:
-        cut = np.ascontiguousarray(image[: self._height_px, : self._width_px])
-        frame = av.VideoFrame.from_ndarray(cut, format="bgr24")
-        frame.pts = round(time_us * _CLOCK_HZ / 1e6)
-        frame.time_base = Fraction(1, _CLOCK_HZ)
-        return frame

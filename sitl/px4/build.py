@@ -6,17 +6,13 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from errors import SettingError, UserError
+from errors import SettingError
+from sitl.autopilots.parameters import Value, text_of
 from sitl.autopilots.process import AutopilotProcess
-from sitl.px4.parameters import Value, text_of
 
 MODEL = "none_iris"
 """The start-up script of PX4's that waits for a simulator on TCP; its parameters are overwritten by ours."""
 _PLACES = ("", "build/px4_sitl_default", "px4_sitl_default")
-
-
-class Px4EndedError(UserError):
-    """PX4 has ended; the message is one line for people."""
 
 
 def environment(parameters: Mapping[str, Value]) -> dict[str, str]:

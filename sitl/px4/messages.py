@@ -109,13 +109,14 @@ class ControlsReader:
             packet_end = end + CHECKSUM_BYTES + (SIGNATURE_BYTES if flags & SIGNED else 0)
             if len(buffer) < packet_end:
                 break
-            seed = CRC_EXTRA.get(high << 16 | low)
+            message_id = high << 16 | low
+            seed = CRC_EXTRA.get(message_id)
             (sent,) = _CHECKSUM.unpack_from(buffer, end)
             if seed is None or checksum(buffer[start + 1 : end], seed) != sent:
                 self.skipped_bytes += 1
                 position = start + 1  # the next packet may begin in it
                 continue
-            if low == mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
+            if message_id == mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
                 yield self._read(buffer[start + HEADER_BYTES_V2 : end])
             position = packet_end
         self._buffer = buffer[position:]

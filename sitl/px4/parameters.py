@@ -8,9 +8,8 @@ from __future__ import annotations
 from math import sqrt
 
 from firmware_py.airframe import Airframe
+from sitl.autopilots.parameters import Value
 from sitl.sensors.specs import SuiteSpec
-
-Value = int | float
 
 _INTEGRAL_SHARE = 4 / 3  # 1/s, of a rate controller's P, by PX4's defaults 0.15 and 0.2
 _MAX_INTEGRAL_SHARE = 6.0  # for an airframe whose drag resists turning
@@ -143,11 +142,6 @@ def simulation_parameters(speed: float) -> dict[str, Value]:
     if speed > 4.0:
         values["COM_OF_LOSS_T"] = min(60.0, speed / 4)
     return values
-
-
-def text_of(value: Value) -> str:
-    """A value as PX4's `param set` takes it."""
-    return str(value) if isinstance(value, int) else f"{value:.7g}"
 
 
 def _delay_ms(delay_s: float) -> int:

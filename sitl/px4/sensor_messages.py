@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import atan2, degrees, hypot, isnan, nan, sqrt
 
 from firmware_py.atmosphere import pressure_altitude_m
+from firmware_py.geodesy import LocalProjection
 from firmware_py.measurements import (
     ExternalPose,
     FlowSample,
@@ -16,7 +17,7 @@ from firmware_py.measurements import (
 from firmware_py.types import GeodeticPoint, Sensors
 from sitl.px4.messages import Packer
 from sitl.sensors.specs import RangeFinderSpec
-from wire.dialect import mavlink
+from wire.dialect import degrees_e7, mavlink, millimetres, whole
 
 _ACCELEROMETER_AND_GYROSCOPE = 0b111_111
 _MAGNETOMETER = 0b111 << 6
@@ -24,8 +25,6 @@ _BAROMETER = 1 << 9 | 1 << 11 | 1 << 12  # absolute pressure, pressure altitude,
 _TRUTH_PERIOD_US = 20_000
 _STANDARD_GRAVITY_M_S2 = 9.80665
 _NO_COVARIANCE = (nan,) * 21
-_MAX_INT16 = 32767
-_MAX_UINT16 = 65535
 
 
 class SensorMessages:
@@ -37,10 +36,12 @@ class SensorMessages:
 
     Args:
         range_finder: of the drone; None: it has none.
+        origin: of the true positions.
     """
 
-    def __init__(self, range_finder: RangeFinderSpec | None) -> None:
+    def __init__(self, range_finder: RangeFinderSpec | None, origin: GeodeticPoint) -> None:
         self._range_finder = range_finder
+        self._projection = LocalProjection(origin)
         self._sensor = Packer(mavlink.MAVLINK_MSG_ID_HIL_SENSOR)
         self._gps = Packer(mavlink.MAVLINK_MSG_ID_HIL_GPS)
         self._truth = Packer(mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION)
@@ -50,16 +51,13 @@ class SensorMessages:
         self._imu: ImuSample | None = None
         self._started = False
 
-    def pack(
-        self, readings: Readings, pose: ExternalPose | None, true: Sensors, place: GeodeticPoint
-    ) -> bytes:
+    def pack(self, readings: Readings, pose: ExternalPose | None, true: Sensors) -> bytes:
         """All messages of a tick; the last one is its HIL_SENSOR.
 
         Args:
             readings: what the sensors deliver.
             pose: of motion capture, if one has arrived.
             true: the true state, for PX4's log.
-            place: the true place on Earth.
         """
         sensor = self._pack_sensor(readings)
         if not self._started:
@@ -75,7 +73,7 @@ class SensorMessages:
         if readings.optical_flow is not None:
             packets += self._pack_flow(readings.optical_flow)
         if readings.time_us % _TRUTH_PERIOD_US == 0:
-            packets += self._pack_truth(true, place)
+            packets += self._pack_truth(true)
         return packets + sensor
 
     def _pack_sensor(self, readings: Readings) -> bytes:
@@ -107,8 +105,8 @@ class SensorMessages:
         north, east, down = gps.velocity_ned_m_s
         course_deg = degrees(atan2(east, north)) % 360.0
         return self._gps.pack(
-            *(gps.time_us, _scaled(gps.latitude_deg, 1e7), _scaled(gps.longitude_deg, 1e7)),
-            _scaled(gps.altitude_m, 1e3),
+            *(gps.time_us, degrees_e7(gps.latitude_deg), degrees_e7(gps.longitude_deg)),
+            millimetres(gps.altitude_m),
             *(_unsigned(gps.horizontal_accuracy_m * 100), _unsigned(gps.vertical_accuracy_m * 100)),
             _unsigned(hypot(north, east) * 100),
             *(_signed(north * 100), _signed(east * 100), _signed(down * 100)),
@@ -144,14 +142,15 @@ class SensorMessages:
             *(0, -1.0, 0, 0, flow.quality),
         )
 
-    def _pack_truth(self, true: Sensors, place: GeodeticPoint) -> bytes:
+    def _pack_truth(self, true: Sensors) -> bytes:
+        place = self._projection.to_geodetic(true.position_ned_m)
         force = [_signed(each / _STANDARD_GRAVITY_M_S2 * 1000) for each in true.specific_force_frd_m_s2]
         velocity = [_signed(each * 100) for each in true.velocity_ned_m_s]
         speed = _unsigned(sqrt(sum(each * each for each in true.velocity_ned_m_s)) * 100)
         return self._truth.pack(
             *(true.time_us, *true.attitude, *true.angular_rate_frd_rad_s),
-            *(_scaled(place.latitude_deg, 1e7), _scaled(place.longitude_deg, 1e7)),
-            *(_scaled(place.altitude_m, 1e3), *velocity, speed, speed, *force),
+            *(degrees_e7(place.latitude_deg), degrees_e7(place.longitude_deg)),
+            *(millimetres(place.altitude_m), *velocity, speed, speed, *force),
         )
 
 
@@ -164,13 +163,9 @@ def _covariance(position: tuple[float, float, float], turn: tuple[float, float, 
     return (x, 0, 0, 0, 0, 0, y, 0, 0, 0, 0, z, 0, 0, 0, roll, 0, 0, pitch, 0, yaw)
 
 
-def _scaled(value: float, factor: float) -> int:
-    return round(value * factor)
-
-
 def _signed(value: float) -> int:
-    return max(-_MAX_INT16, min(_MAX_INT16, round(value)))
+    return whole(value, 16)
 
 
 def _unsigned(value: float) -> int:
-    return max(0, min(_MAX_UINT16, round(value)))
+    return whole(value, 16, signed=False)

@@ -6,9 +6,8 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from sitl.px4.build import Px4EndedError, Px4Process
+from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
 from sitl.px4.simulation import Px4Simulation
 from sitl.server import BURST_TICKS, LagNotices, Pacer
@@ -19,15 +18,7 @@ from sitl.world import CONTROL_PERIOD_US
 
 _FALL_US = 3_000_000  # for which a drone without its autopilot is simulated on
 _SETPOINT_S = 0.002  # wall time in which PX4 takes a setpoint that was sent before time was granted
-_RESTART_S = 1.0  # before a PX4 that has ended is started again
-
-
-@dataclass(frozen=True, slots=True)
-class Px4Settings:
-    """How PX4 is started; without a process the user starts it."""
-
-    process: Px4Process | None
-    command: str  # by which a user starts it
+_ENDING_S = 1.0  # wall time in which a PX4 that has closed the connection ends
 
 
 class Px4Server:
@@ -52,7 +43,7 @@ class Px4Server:
         self,
         new_simulation: Callable[[], Px4Simulation],
         settings: ServerSettings,
-        px4: Px4Settings,
+        px4: AutopilotStart,
         notice: Callable[[str], None] = lambda line: None,
         grants: TimeGrants | None = None,
     ) -> None:
@@ -70,7 +61,7 @@ class Px4Server:
             LinkError: PX4's port is in use.
             VideoError: the port of the video is in use.
             SettingError: PX4 cannot be started.
-            Px4EndedError: it ended, and time is granted by another program.
+            AutopilotEndedError: it ended, and time is granted by another program.
         """
         settings = self._settings
         self.link = Px4Link((settings.bind, FIRST_PORT + settings.instance), self._notice)
@@ -100,10 +91,13 @@ class Px4Server:
             self._notice("PX4 is connected")
             with contextlib.suppress(Px4GoneError):
                 await self._run_paced(link)
+            link.drop()
             reason = await self._reason()
             self._notice(f"{reason}; at {self._simulation.time_us / 1e6:.1f} s the motors stop")
             if self._grants is not None:
-                raise Px4EndedError(f"{reason} at {self._simulation.time_us / 1e6:.1f} s of simulated time")
+                raise AutopilotEndedError(
+                    f"{reason} at {self._simulation.time_us / 1e6:.1f} s of simulated time"
+                )
             await self._fall(link)
             self._simulation = self._new_simulation()
             self._simulation.faults.notice = self._notice
@@ -127,14 +121,14 @@ class Px4Server:
             task.cancel()
         await asyncio.gather(ended, connected, return_exceptions=True)
         if connected not in done:
-            raise Px4EndedError(f"{ended.result()} (its output: {process.log})")
+            raise AutopilotEndedError(f"{ended.result()} (its output: {process.log})")
 
     async def _reason(self) -> str:
         """Why PX4 is no longer connected."""
         process = self._px4.process
         if process is not None:
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(_RESTART_S):
+                async with asyncio.timeout(_ENDING_S):
                     return await process.ended()
         return "PX4 has closed the connection"
 

@@ -31,7 +31,7 @@ class Px4Simulation(SimulatedVehicle):
 
     def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
         super().__init__(scenario, airframe, seed)
-        self.messages = SensorMessages(self._suite.range_finder)
+        self.messages = SensorMessages(self._suite.range_finder, self._place)
         self._armed = False
         rotors, motor = len(self.world.airframe.rotors), self.world.airframe.motor
         self._still = (0.0,) * rotors
@@ -50,17 +50,13 @@ class Px4Simulation(SimulatedVehicle):
     def sense(self) -> bytes:
         """The messages of this tick; begins it."""
         true = self._begin_tick()
-        assert self._sensing is not None, "the suite is not ideal"
-        readings, pose = self._sensing.read(true)
-        if (faulty := self.faults.sensors) is not None:
-            readings, pose = faulty.change(readings, pose)
-        _, place = self.true_state()
-        return self.messages.pack(readings, pose, true, place)
+        readings, pose = self._read_sensors(true)
+        return self.messages.pack(readings, pose, true)
 
     def move(self, controls: ActuatorControls | None) -> None:
         """End the tick with PX4's outputs; None: there are none, and the motors stand.
 
-        A motor's speed is proportional to its output (PX4's THR_MDL_FAC is 1 then).
+        A motor's speed is proportional to its output (PX4's THR_MDL_FAC is 1 then); NaN stops it.
         """
         if controls is None or not controls.armed:
             self._armed = False
@@ -69,4 +65,4 @@ class Px4Simulation(SimulatedVehicle):
         self._armed = True
         full = self._max_speed_rad_s
         outputs = controls.controls[: len(self._still)]
-        self._end_tick(tuple([full * min(max(output, 0.0), 1.0) for output in outputs]))
+        self._end_tick(tuple([full * min(max(0.0, output), 1.0) for output in outputs]))

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import threading
 from contextlib import suppress
-from fractions import Fraction
 
 import av
-import numpy as np
-from av.video.frame import PictureType
 from av.video.stream import VideoStream
 
 from scenarios.models import Camera
+from sitl.streaming.h264 import CLOCK_HZ, add_h264_stream, h264_frame
 from sitl.video import Image, VideoError
-from wire.h264_rtp import RTP_CLOCK_HZ, describe_h264_rtp
+from wire.h264_rtp import describe_h264_rtp
 from wire.transports.sockets import Address, resolved_ipv4
 
 _PACKET_BYTES = 1200
@@ -50,12 +48,12 @@ class RtpSender:
         self._newest: tuple[Image, int] | None = None
         self._condition = threading.Condition()
         self._closing = False
-        # Usual H.264 has half the resolution of colour, so sizes must be even; a last odd line is cut off.
-        self._width_px, self._height_px = camera.width_px // 2 * 2, camera.height_px // 2 * 2
+        self._last_stamp, self._shift = -1, 0
+        self._period = max(1, round(CLOCK_HZ / camera.rate_hz / speed))
         try:
             url = f"rtp://{self._host}:{self._port}?pkt_size={_PACKET_BYTES}"
             self._container = av.open(url, "w", format="rtp")
-            self._stream = self._make_stream(camera.rate_hz)
+            self._stream = self._make_stream(camera)
         except (av.FFmpegError, OSError, ValueError) as error:
             raise VideoError(f"RTP to {self._host}:{self._port} cannot be sent ({error})") from error
         self._thread = threading.Thread(target=self._run, name="rtp", daemon=True)
@@ -81,17 +79,10 @@ class RtpSender:
             self._condition.notify()
         self._thread.join()
 
-    def _make_stream(self, rate_hz: float) -> VideoStream:
-        rate = Fraction(rate_hz).limit_denominator(1000)
-        stream = self._container.add_stream("libx264", rate=rate, options=_PRESET)
-        stream.width, stream.height = self._width_px, self._height_px
-        stream.pix_fmt = "yuv420p"
-        stream.bit_rate = int(self._width_px * self._height_px * rate_hz * _BITS_PER_PIXEL)
-        context = stream.codec_context
-        context.time_base = Fraction(1, RTP_CLOCK_HZ)
-        context.gop_size = max(1, round(rate_hz))
-        context.max_b_frames = 0
-        context.thread_count = 1
+    def _make_stream(self, camera: Camera) -> VideoStream:
+        size_px = (camera.width_px, camera.height_px)
+        stream = add_h264_stream(self._container, size_px, camera.rate_hz, _PRESET)
+        stream.bit_rate = int(stream.width * stream.height * camera.rate_hz * _BITS_PER_PIXEL)
         return stream
 
     def _run(self) -> None:
@@ -101,20 +92,21 @@ class RtpSender:
                 newest, self._newest = self._newest, None
                 closing = self._closing
             if newest is not None:
-                self._send(self._frame(*newest))
+                image, time_us = newest
+                self._send(h264_frame(self._stream, image, self._stamp(time_us)))
             if closing:
                 break
         self._send(None)
         with suppress(av.FFmpegError, OSError):
             self._container.close()
 
-    def _frame(self, image: Image, time_us: int) -> av.VideoFrame:
-        cut = np.ascontiguousarray(image[: self._height_px, : self._width_px])
-        frame = av.VideoFrame.from_ndarray(cut, format="bgr24")
-        frame.pts = round(time_us * RTP_CLOCK_HZ / 1e6 / self._speed)
-        frame.time_base = Fraction(1, RTP_CLOCK_HZ)
-        frame.pict_type = PictureType.NONE
-        return frame
+    def _stamp(self, time_us: int) -> int:
+        """A time in the stream; it goes on when a new drone begins at vehicle time zero."""
+        stamp = round(time_us * CLOCK_HZ / 1e6 / self._speed)
+        if stamp + self._shift <= self._last_stamp:
+            self._shift = self._last_stamp + self._period - stamp
+        self._last_stamp = stamp + self._shift
+        return self._last_stamp
 
     def _send(self, frame: av.VideoFrame | None) -> None:
         """Send a frame, or what the encoder still holds; lost if the receiver is not reachable now."""

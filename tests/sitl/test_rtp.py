@@ -68,6 +68,23 @@ def test_a_watcher_sees_the_painted_colours(tmp_path):
     assert np.median(gaps) == pytest.approx(0.1, abs=0.02)
 
 
+def test_the_stream_goes_on_when_vehicle_time_begins_again():
+    port = free_port(2)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", port))
+        listener.settimeout(5.0)
+        sender = RtpSender(("127.0.0.1", port), CAMERA)
+        stamps = []
+        for number in (7, 8, 9, 0, 1):
+            sender.send(painted(RED), number * 100_000)
+            packet = listener.recv(2000)
+            stamps.append(int.from_bytes(packet[4:8]))
+            while packet[1] < 128:
+                packet = listener.recv(2000)
+        sender.close()
+    assert np.diff(stamps).tolist() == [9000] * 4
+
+
 def test_who_comes_late_sees_something_within_a_second_of_video():
     packets = []
     port = free_port(2)

@@ -18,7 +18,7 @@ from vision.colour_regions import PRIMARIES, find_colours
 from vision.types import Image
 
 _CHANNEL = {"blue": 0, "green": 1, "red": 2}
-_LEAST_SEEN = 0.98
+_MIN_SEEN = 0.98
 _TOO_DARK, _TOO_BRIGHT = 40.0, 250.0
 _MAX_GAIN = 6.0
 _STEPS, _MARGIN = 20, 2
@@ -30,7 +30,7 @@ Matrix = npt.NDArray[np.float64]
 def swatch_of(image: Image) -> Image:
     """The middle of an image, a fifth of its width and height, which the swatch must fill."""
     height, width = image.shape[:2]
-    rows, columns = max(8, round(_MIDDLE * height)), max(8, round(_MIDDLE * width))
+    rows, columns = (min(size, max(8, round(_MIDDLE * size))) for size in (height, width))
     top, left = (height - rows) // 2, (width - columns) // 2
     return image[top : top + rows, left : left + columns]
 
@@ -69,7 +69,7 @@ def learn_colours(swatches: Mapping[str, Image]) -> ColourMatrix:
         mixed = np.eye(3) + min(1.0, (step + _MARGIN) / _STEPS) * (matrix - np.eye(3))
         rows: ColourMatrix = tuple(map(tuple, np.round(mixed, 4).tolist()))  # type: ignore[assignment]
         shares = {colour: share_seen(correct_colours(swatches[colour], rows), colour) for colour in PRIMARIES}
-        if min(shares.values()) >= _LEAST_SEEN:
+        if min(shares.values()) >= _MIN_SEEN:
             return rows
     colour = min(shares, key=lambda each: shares[each])
     raise CalibrationError(

@@ -25,11 +25,11 @@ _CELLS = (16, 12)
 _STEP_S = 0.001
 _EXPOSURES_S = (0.0, 0.004, 0.008, 0.016, 0.033, 0.05)
 _PARTS = 4
-_LEAST_CORRELATION = 0.8
-_LEAST_IMAGES = 40
-_LEAST_CONTRAST = 4.0  # of 255
-_MOST_CELLS = 24
-_SHORTEST_S, _LONGEST_S = 0.12, 0.45
+_MIN_CORRELATION = 0.8
+_MIN_IMAGES = 40
+_MIN_CONTRAST = 4.0  # of 255
+_MAX_CELLS = 24
+_MIN_INTERVAL_S, _MAX_INTERVAL_S = 0.12, 0.45
 
 
 class LatencyError(UserError):
@@ -64,7 +64,7 @@ def blink_intervals(duration_s: float, seed: int = 0) -> list[float]:
     """
     random, intervals, total_s = Random(seed), list[float](), 0.0
     while total_s < duration_s:
-        intervals.append(random.uniform(_SHORTEST_S, _LONGEST_S))
+        intervals.append(random.uniform(_MIN_INTERVAL_S, _MAX_INTERVAL_S))
         total_s += intervals[-1]
     return intervals
 
@@ -89,8 +89,8 @@ def measure_latency(
         LatencyError: there are too few images, or the light is not seen in them.
     """
     times = np.asarray(received_s, np.float64)
-    if len(times) < _LEAST_IMAGES:
-        raise LatencyError(f"{len(times)} images: too few; film for longer, {_LEAST_IMAGES} are needed")
+    if len(times) < _MIN_IMAGES:
+        raise LatencyError(f"{len(times)} images: too few; film for longer, {_MIN_IMAGES} are needed")
     brightness = np.asarray(cells)
     light = _Light(switches)
     used = _cells_that_blink(light, times, brightness)
@@ -142,9 +142,9 @@ def _cells_that_blink(light: _Light, times: Series, brightness: Series) -> npt.N
     best = np.zeros(brightness.shape[1])
     for delay_s in np.arange(0.0, MAX_DELAY_S, 0.01):
         best = np.maximum(best, _correlation(light.level(times - delay_s, 0.016), brightness))
-    best[np.ptp(brightness, axis=0) < _LEAST_CONTRAST] = 0.0
-    used = np.argsort(-best)[:_MOST_CELLS]
-    used = used[best[used] >= _LEAST_CORRELATION]
+    best[np.ptp(brightness, axis=0) < _MIN_CONTRAST] = 0.0
+    used = np.argsort(-best)[:_MAX_CELLS]
+    used = used[best[used] >= _MIN_CORRELATION]
     if not len(used):
         raise LatencyError(
             "the blinking light is not seen in the images; let it fill a third of the image, in a dim room, "

@@ -31,7 +31,7 @@ _RETRACT = mavlink.GIMBAL_MANAGER_FLAGS_RETRACT
 _VEHICLE_FRAME = mavlink.GIMBAL_MANAGER_FLAGS_YAW_IN_VEHICLE_FRAME
 _EARTH_FRAME = mavlink.GIMBAL_MANAGER_FLAGS_YAW_IN_EARTH_FRAME
 _CAN_POINT_AT_PLACES = mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL
-_NEAREST_M = 0.1  # nearer to a region the gimbal stays
+_MIN_DISTANCE_M = 0.1  # nearer to a region the gimbal stays
 
 
 class GimbalManager(Service):
@@ -156,8 +156,8 @@ class GimbalManager(Service):
             for there, here in zip(region_ned_m, self._autopilot.state.position_ned_m, strict=True)
         )
         level_m = hypot(north, east)
-        if hypot(level_m, down) > _NEAREST_M:
-            yaw_rad = atan2(east, north) if level_m > _NEAREST_M else nan
+        if hypot(level_m, down) > _MIN_DISTANCE_M:
+            yaw_rad = atan2(east, north) if level_m > _MIN_DISTANCE_M else nan
             self._gimbal.turn(GimbalTarget(atan2(-down, level_m), yaw_rad, yaw_locked=True))
 
     def _is_order(self, message: Message) -> bool:
@@ -170,7 +170,7 @@ class GimbalManager(Service):
         )
 
     def _is_in_control(self, sender: Controller) -> bool:
-        return sender in (self._primary, self._secondary)
+        return sender != _NOBODY and sender in (self._primary, self._secondary)
 
     def _refuse(self, sender: Controller) -> None:
         owner = "nobody" if self._primary == _NOBODY else f"{self._primary[0]}/{self._primary[1]}"

@@ -3,6 +3,7 @@
 import itertools
 import random
 import struct
+from math import nan
 
 import pytest
 from hypothesis import example, given
@@ -110,6 +111,11 @@ def test_integer_parameters_are_sent_by_their_bytes(value):
 def test_parameters_are_kept_by_name():
     record = heard(mavlink.MAVLink_param_value_message(b"COM_OF_LOSS_T", 1.5, 9, 1, 0))
     assert record.parameters == {"COM_OF_LOSS_T": 1.5}
+
+
+def test_a_parameter_that_is_no_number_is_left_out():
+    record = heard(mavlink.MAVLink_param_value_message(b"COM_OF_LOSS_T", nan, 9, 1, 0))
+    assert "COM_OF_LOSS_T" not in record.parameters
 
 
 def test_the_drift_is_the_farthest_from_the_first():

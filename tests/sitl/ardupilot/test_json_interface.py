@@ -113,6 +113,13 @@ def test_the_same_pulses_make_the_same_lines():
     assert lines() == lines()
 
 
+def test_a_range_finder_out_of_its_range_sends_a_number():
+    simulation = ArduPilotSimulation(load_scenario("test-case-1").model_copy(update={"sensors": "outdoor"}))
+    lines = [simulation.step((1000,) * 16) for _ in range(100)]  # on the ground, nearer than it measures
+    assert b'"rng_1":-1.0000}' in lines[-1]
+    assert not any(b"nan" in line for line in lines)
+
+
 @pytest.mark.parametrize("name", ["abejorro", "x500", "racer-3in"])
 def test_parameters_suit_the_airframe(name):
     values = all_parameters(load_airframe(name))

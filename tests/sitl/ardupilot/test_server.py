@@ -5,8 +5,9 @@ from contextlib import asynccontextmanager
 
 from scenarios.loader import load_scenario
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE
-from sitl.ardupilot.server import ArduPilotServer, ArduPilotSettings
+from sitl.ardupilot.server import ArduPilotServer
 from sitl.ardupilot.simulation import ArduPilotSimulation
+from sitl.autopilots.process import AutopilotStart
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.sitl.ardupilot.fake_ardupilot import FakeArduPilot
@@ -24,7 +25,7 @@ async def serving(channels=16):
         return made[-1]
 
     settings = ServerSettings(instance=instance)
-    server = ArduPilotServer(make, settings, ArduPilotSettings(None, "arducopter"), notice=lines.append)
+    server = ArduPilotServer(make, settings, AutopilotStart(None, "arducopter"), notice=lines.append)
     task = asyncio.create_task(server.run())
     async with asyncio.timeout(20):
         while not any("waiting for ArduPilot" in line for line in lines):

@@ -49,6 +49,16 @@ def test_the_yaw_follows_the_drone_or_stays_to_north(locked, yaw_rad, heading_ne
     assert yaw_of(gimbal.attitude_arena) == pytest.approx(-heading_ned_rad)
 
 
+@pytest.mark.parametrize(("locked", "rate_rad_s"), [(False, 0.5), (True, 0.0)])
+def test_the_camera_turns_with_the_drone_unless_its_yaw_is_locked(locked, rate_rad_s):
+    gimbal = SimulatedGimbal(Gimbal())
+    gimbal.turn(GimbalTarget(0.0, 0.0, yaw_locked=locked))
+    for number in range(10):
+        gimbal.step(STEP_S, quaternion_from_euler(0.0, 0.0, 0.5 * STEP_S * number))
+    assert gimbal.rate_frd_rad_s == pytest.approx((0.0, 0.0, rate_rad_s))
+    assert gimbal.yaw_rate_rad_s == pytest.approx(0.0)
+
+
 def test_a_gimbal_needs_an_axis():
     with pytest.raises(ValueError, match="yaw_max_rad"):
         Gimbal(pitch_min_rad=0.0, pitch_max_rad=0.0, yaw_max_rad=0.0)

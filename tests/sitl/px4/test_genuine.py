@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from scenarios.loader import load_scenario
+from sitl.autopilots.process import AutopilotStart
 from sitl.px4.build import Px4Process, find_build
 from sitl.px4.parameters import all_parameters
-from sitl.px4.server import Px4Server, Px4Settings
+from sitl.px4.server import Px4Server
 from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
 from sitl.sensors.suite import load_suite
 from sitl.server_settings import ServerSettings
@@ -26,7 +27,7 @@ async def test_lockstep_loses_and_doubles_no_step(tmp_path):
     values = all_parameters(Px4Simulation(scenario).world.airframe, load_suite(scenario.sensors), 10.0)
     process = Px4Process(find_build(Path(PX4_DIR)), instance, tmp_path, values)
     settings = ServerSettings(instance=instance, speed=10.0)
-    server = Px4Server(lambda: Px4Simulation(scenario), settings, Px4Settings(process, ""), lines.append)
+    server = Px4Server(lambda: Px4Simulation(scenario), settings, AutopilotStart(process, ""), lines.append)
     task = asyncio.create_task(server.run())
     async with asyncio.timeout(120):
         while server.link is None or server.link.steps < 25_000:

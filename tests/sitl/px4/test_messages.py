@@ -11,7 +11,7 @@ from firmware_py.types import GeodeticPoint, Sensors
 from sitl.px4.messages import ControlsReader, Packer, checksum
 from sitl.px4.sensor_messages import SensorMessages
 
-PLACE = GeodeticPoint(47.4, 8.5, 488.0)
+ORIGIN = GeodeticPoint(47.4, 8.5, 485.0)  # 3 m below the true position
 IMU = ImuSample(4000, 4000, (0.1, -0.2, 0.3), (0.5, -0.6, -9.8))
 
 
@@ -42,8 +42,8 @@ def test_packets_are_those_of_pymavlink_to_the_bit():
 
 
 def test_a_tick_is_what_pymavlink_reads():
-    messages = SensorMessages(None)
-    messages.pack(Readings(4000, IMU), None, true_state(4000), PLACE)
+    messages = SensorMessages(None, ORIGIN)
+    messages.pack(Readings(4000, IMU), None, true_state(4000))
     readings = Readings(
         20_000,
         IMU,
@@ -53,7 +53,7 @@ def test_a_tick_is_what_pymavlink_reads():
     pose = ExternalPose(
         1, (1.0, 2.0, -3.0), (1.0, 0.0, 0.0, 0.0), None, (1e-6,) * 3, (9e-6,) * 3, (float("nan"),) * 3
     )
-    odometry, gps, truth, sensor = parsed(messages.pack(readings, pose, true_state(20_000), PLACE))
+    odometry, gps, truth, sensor = parsed(messages.pack(readings, pose, true_state(20_000)))
     assert (sensor.get_type(), sensor.id, sensor.time_usec) == ("HIL_SENSOR", 0, 20_000)
     assert sensor.abs_pressure == pytest.approx(956.0)  # hPa
     assert sensor.fields_updated == 0b1101000111111
@@ -65,14 +65,14 @@ def test_a_tick_is_what_pymavlink_reads():
 
 
 def test_the_first_message_sets_the_clock():
-    first = SensorMessages(None).pack(Readings(0, IMU), None, true_state(0), PLACE)
+    first = SensorMessages(None, ORIGIN).pack(Readings(0, IMU), None, true_state(0))
     assert [message.get_type() for message in parsed(first)] == ["HIL_SENSOR"]
 
 
 def test_a_lost_imu_still_advances_the_clock():
-    messages = SensorMessages(None)
-    messages.pack(Readings(4000, IMU), None, true_state(4000), PLACE)
-    (sensor,) = parsed(messages.pack(Readings(8000), None, true_state(8000), PLACE))
+    messages = SensorMessages(None, ORIGIN)
+    messages.pack(Readings(4000, IMU), None, true_state(4000))
+    (sensor,) = parsed(messages.pack(Readings(8000), None, true_state(8000)))
     assert (sensor.time_usec, sensor.fields_updated) == (8000, 0)
 
 

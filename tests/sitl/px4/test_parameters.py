@@ -46,6 +46,10 @@ def test_the_command_prints_them(capsys):
         (["sim", "--px4", "here"], "--px4 here: is for PX4; add --autopilot px4"),
         (["sim", "--autopilot", "px4", "--px4", "/no/px4"], "--px4 /no/px4: has no bin/px4"),
         (["sim", "--autopilot", "px4", "--count", "2"], "--count: PX4 flies one drone"),
+        (
+            ["sim", "--autopilot", "px4", "--ground-remote", "10.0.0.2"],
+            "--ground-remote: MAVLink is PX4's own",
+        ),
         (["sim", "--autopilot", "px4", "--monitor"], "--monitor: run framerunner monitor"),
         (["fly", "--px4", "/no/px4"], "--px4 /no/px4: has no bin/px4"),
         (["fly", "--px4", "here", "--lockstep"], "leave out --lockstep"),

@@ -7,14 +7,18 @@ import subprocess
 import sys
 import threading
 import time
+from math import nan
 from pathlib import Path
 
 import pytest
 
+from errors import SettingError
 from scenarios.loader import load_scenario
+from sitl.autopilots.process import AutopilotStart
 from sitl.px4.build import Px4Process, find_build
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
-from sitl.px4.server import Px4Server, Px4Settings
+from sitl.px4.messages import ActuatorControls
+from sitl.px4.server import Px4Server
 from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
@@ -36,7 +40,7 @@ def serving(lines, speed=20.0):
         return made[-1]
 
     settings = ServerSettings(instance=instance, speed=speed)
-    server = Px4Server(make, settings, Px4Settings(None, "px4"), notice=lines.append)
+    server = Px4Server(make, settings, AutopilotStart(None, "px4"), notice=lines.append)
     return server, FIRST_PORT + instance, made
 
 
@@ -95,6 +99,20 @@ async def test_a_px4_that_is_killed_ends_the_try_and_a_new_one_gets_a_new_drone(
     await stopped(task)
 
 
+async def test_a_px4_that_is_gone_for_good_is_waited_for():
+    lines, fakes = [], []
+    server, port, made = serving(lines)
+    task = asyncio.create_task(server.run())
+    run_fake(port, fakes)
+    await until(lambda: made[-1].time_us > 1_000_000)
+    fakes[-1].connection.shutdown(2)
+    await until(lambda: len(made) == 2)
+    await asyncio.sleep(0.5)
+    assert [line for line in lines if line.startswith("PX4 is connected")] == ["PX4 is connected"]
+    assert "waiting for PX4 on TCP" in lines[-1]
+    await stopped(task)
+
+
 async def test_a_px4_that_stands_still_changes_nothing():
     lines = []
     server, port, made = serving(lines)
@@ -117,6 +135,17 @@ async def test_a_px4_that_stands_still_changes_nothing():
         finally:
             fake.kill()
     await stopped(task)
+
+
+def test_an_output_that_is_no_number_stops_its_motor():
+    simulation = new_simulation()
+    for _ in range(50):
+        controls = ActuatorControls(simulation.time_us, (nan, *(0.3,) * 15), armed=True, lockstep=True)
+        simulation.sense()
+        simulation.move(controls)
+    speeds_rad_s = simulation.world.dynamics.motor_speeds_rad_s()
+    assert speeds_rad_s[0] == 0.0
+    assert min(speeds_rad_s[1:]) > 0.0
 
 
 async def test_an_answer_to_another_sensor_is_counted():
@@ -152,6 +181,18 @@ async def test_a_px4_that_ends_at_once_is_reported_with_its_error(tmp_path):
     assert await process.ended() == "PX4 ended with code 3: ERROR [init] no airframe"
     assert "PX4_PARAM_MPC_THR_HOVER=0.5" in process.log.read_text()
     assert "PX4_SIM_MODEL=none_iris" in process.log.read_text()
+
+
+def test_a_folder_is_given_to_px4_by_its_absolute_path(tmp_path):
+    command = Px4Process(tmp_path, 0, Path("drone-files/px4-0"), {}).command()
+    assert Path("drone-files/px4-0").absolute() == Path(command[command.index("-w") + 1])
+
+
+async def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
+    (tmp_path / "file").touch()
+    process = Px4Process(build_of(tmp_path, "true"), 0, tmp_path / "file" / "px4-0", {})
+    with pytest.raises(SettingError, match="name another folder by --storage"):
+        await process.start()
 
 
 def is_gone(child):
