@@ -1,8 +1,6 @@
-"""Flights at the editor's page: replayed on the chart, many in a table, one in the simulator; moved boxes."""
+"""Flights at the editor's page: replayed on the chart, many in a table; moved boxes."""
 
 from __future__ import annotations
-
-import re
 
 import pytest
 import pytest_asyncio
@@ -45,12 +43,6 @@ async def user(browser, program):
     await context.close()
 
 
-async def show(user, key):
-    """Show a tab; its panel."""
-    await user.page.locator(f"#e-tab-{key}").click()
-    return user.page.locator(f"#e-panel-{key}")
-
-
 async def drag_slider(slider, part):
     """Move the slider of a replay to a part of its range."""
     box = await box_of(slider)
@@ -70,11 +62,11 @@ async def wide_parts(panel):
 
 
 async def test_a_flight_is_replayed_on_the_chart_and_the_map(user):
-    fly = await show(user, "fly")
+    fly = await user.show_tab("fly")
     await fly.locator(".e-controls select").select_option("")  # as fast as possible
     await user.press("Fly", fly)
     await expect(fly.locator(".e-run-line")).to_contain_text("landed", timeout=30_000)
-    replay = await show(user, "replay")
+    replay = await user.show_tab("replay")
     await replay.get_by_label("Flight", exact=True).select_option(index=1)
     slider = replay.locator(".r-slider")
     await drag_slider(slider, 0.4)
@@ -92,7 +84,7 @@ async def test_a_flight_is_replayed_on_the_chart_and_the_map(user):
 
 
 async def test_the_table_of_many_flights_is_not_wider_than_its_panel(user):
-    fly = await show(user, "fly")
+    fly = await user.show_tab("fly")
     await user.press("Fly 20 layouts", fly)
     await expect(fly.locator(".e-batch tr")).to_have_count(21, timeout=90_000)
     await expect(fly.locator(".e-batch")).to_contain_text(LANDING)
@@ -117,16 +109,3 @@ async def test_a_box_stays_where_it_is_dropped_and_arrange_is_undone(user):
     for place in reversed(places):
         await user.press("Undo")
         await expect(climb).to_have_attribute("transform", place)
-
-
-@pytest.mark.realtime
-async def test_a_flight_in_the_simulator_is_started_and_stopped(user):
-    live = await show(user, "live")
-    await live.get_by_role("combobox", name="Speed").select_option("5")
-    await user.press("Fly in the simulator", live)
-    await expect(user.page.locator(".e-active")).to_have_attribute("data-state", CLIMB, timeout=30_000)
-    await expect(live.locator(".t-drone")).to_be_visible()
-    await user.press("Stop", live)
-    await expect(live.locator(".e-run-line")).to_have_text(re.compile("stopped"))
-    await expect(user.page.locator(".e-active")).to_have_count(0, timeout=15_000)
-    await expect(live.get_by_role("button", name="Fly in the simulator")).to_be_enabled()
