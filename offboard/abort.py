@@ -9,6 +9,7 @@ from offboard.drone import Drone, DroneError, DroneState
 from offboard.safety.rules import SafetyRules
 
 ATTEND_US = 120_000_000  # vehicle time for which an operator may stop the motors after an abort
+KILL_ATTEMPTS = 3  # a link may lose the request or its answer
 
 
 class FlightAbort:
@@ -40,13 +41,13 @@ class FlightAbort:
         while not operator.kills:
             stops = operator.stops
             work = asyncio.ensure_future(self._end_and_attend())
+            operator.on_stop(work.cancel)  # not this task: a stop while the work ends must not be lost
             try:
-                return await asyncio.shield(work)
+                return await work
             except asyncio.CancelledError:
-                await _cancelled(work)
                 if operator.stops == stops:  # Ctrl-C
                     raise
-                uncancel()
+        operator.on_stop(None)  # a third press must not interrupt this
         return await self._kill()
 
     async def _end_and_attend(self) -> str:
@@ -83,22 +84,12 @@ class FlightAbort:
                 await close()
 
     async def _kill(self) -> str:
-        if self._safety.operator is not None:
-            self._safety.operator.on_stop(None)  # a third press must not interrupt this
-        try:
-            await self._drone.motors_off()
-        except DroneError as error:
-            return f"stopping the motors: {error}"
-        return "the operator stopped the motors"
-
-
-def uncancel() -> None:
-    """Take back the cancellation of this task, which is reported instead."""
-    task = asyncio.current_task()
-    if task is not None:
-        task.uncancel()
-
-
-async def _cancelled(work: asyncio.Future[str]) -> None:
-    work.cancel()
-    await asyncio.gather(work, return_exceptions=True)
+        problem = ""
+        for _ in range(KILL_ATTEMPTS):
+            try:
+                await self._drone.motors_off()
+            except DroneError as error:
+                problem = f"stopping the motors: {error}"
+            else:
+                return "the operator stopped the motors"
+        return problem
