@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 
 from offboard.drone import Drone, DroneError, DroneState
 from offboard.safety.rules import SafetyRules
 
 ATTEND_US = 120_000_000  # vehicle time for which an operator may stop the motors after an abort
+LINK_LOSSES = 10  # a second each, after which the drone is not watched any more
 KILL_ATTEMPTS = 3  # a link may lose the request or its answer
 
 
@@ -25,12 +27,13 @@ class FlightAbort:
         self._drone = drone
         self._safety = safety
         self._see = see
+        self._end_us: int | None = None  # vehicle time until which the drone is watched
 
     async def bring_down(self) -> str:
         """Hold or land, as the rules and the operator say.
 
         An operator's first stop lands whatever the rules say, the second one stops the motors. With an
-        operator this returns when the drone is disarmed, when the link is lost, or after `ATTEND_US`.
+        operator this returns when the drone is disarmed, when the link stays lost, or after `ATTEND_US`.
 
         Returns:
             What is to be told beside the reason of the abort; empty if nothing.
@@ -68,16 +71,21 @@ class FlightAbort:
         return ""
 
     async def _attend(self) -> None:
-        """Watch the drone until it is disarmed."""
-        ticks, end_us = self._drone.ticks(), None
+        """Watch the drone until it is disarmed; a link that is lost may come back."""
+        for _ in range(LINK_LOSSES):
+            with contextlib.suppress(DroneError):
+                await self._watch()
+                return
+
+    async def _watch(self) -> None:
+        ticks = self._drone.ticks()
         try:
             async for state in ticks:
-                end_us = state.time_us + ATTEND_US if end_us is None else end_us
-                if not state.armed or state.time_us > end_us:
+                if self._end_us is None:
+                    self._end_us = state.time_us + ATTEND_US
+                if not state.armed or state.time_us > self._end_us:
                     return
                 self._see(state)
-        except DroneError:
-            return  # the link is lost, so nothing can be demanded of the drone any more
         finally:
             close = getattr(ticks, "aclose", None)
             if close is not None:
