@@ -253,6 +253,9 @@ def _fence_check(session: VehicleSession, plan: FlightPlan, fence: FlightFence) 
     limit = f"{len(fence.corners_arena_m)} corners within {fence.radius_m:g} m of the start"
     if record.armed:
         return Check(name, Outcome.FAIL, "not uploaded to an armed vehicle", limit, "land and disarm it")
+    if not session.is_px4:
+        advice = "set it by hand (docs/ardupilot.md, section 5), then accept it by --accept fence"
+        return Check(name, Outcome.FAIL, "not uploaded: only PX4's is known", limit, advice)
     if not has_global_position(record):
         words = "the vehicle has no global position, so its fence has no effect"
         advice = "only the app's box and a net keep it in; put up a net"
