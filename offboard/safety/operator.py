@@ -35,7 +35,7 @@ class Operator:
         return self.stops > 1
 
     def ask_for_go(self) -> None:
-        """Forget a go that was given before it was asked for: the operator has not seen a drone that is ready."""
+        """Forget a go that was given before: nobody had been told that the drone is ready."""
         self.has_go = not self._needs_go
 
     def give_go(self) -> None:
