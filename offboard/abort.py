@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 
 from offboard.drone import Drone, DroneError, DroneState
 from offboard.safety.rules import SafetyRules
 
 ATTEND_US = 120_000_000  # vehicle time for which an operator may stop the motors after an abort
+LINK_LOSSES = 10  # a second each, after which the drone is not watched any more
+KILL_ATTEMPTS = 3  # a link may lose the request or its answer
 
 
 class FlightAbort:
@@ -24,12 +27,13 @@ class FlightAbort:
         self._drone = drone
         self._safety = safety
         self._see = see
+        self._end_us: int | None = None  # vehicle time until which the drone is watched
 
     async def bring_down(self) -> str:
         """Hold or land, as the rules and the operator say.
 
         An operator's first stop lands whatever the rules say, the second one stops the motors. With an
-        operator this returns when the drone is disarmed, when the link is lost, or after `ATTEND_US`.
+        operator this returns when the drone is disarmed, when the link stays lost, or after `ATTEND_US`.
 
         Returns:
             What is to be told beside the reason of the abort; empty if nothing.
@@ -40,13 +44,13 @@ class FlightAbort:
         while not operator.kills:
             stops = operator.stops
             work = asyncio.ensure_future(self._end_and_attend())
+            operator.on_stop(work.cancel)  # not this task: a stop while the work ends must not be lost
             try:
-                return await asyncio.shield(work)
+                return await work
             except asyncio.CancelledError:
-                await _cancelled(work)
                 if operator.stops == stops:  # Ctrl-C
                     raise
-                uncancel()
+        operator.on_stop(None)  # a third press must not interrupt this
         return await self._kill()
 
     async def _end_and_attend(self) -> str:
@@ -67,38 +71,33 @@ class FlightAbort:
         return ""
 
     async def _attend(self) -> None:
-        """Watch the drone until it is disarmed."""
-        ticks, end_us = self._drone.ticks(), None
+        """Watch the drone until it is disarmed; a link that is lost may come back."""
+        for _ in range(LINK_LOSSES):
+            with contextlib.suppress(DroneError):
+                await self._watch()
+                return
+
+    async def _watch(self) -> None:
+        ticks = self._drone.ticks()
         try:
             async for state in ticks:
-                end_us = state.time_us + ATTEND_US if end_us is None else end_us
-                if not state.armed or state.time_us > end_us:
+                if self._end_us is None:
+                    self._end_us = state.time_us + ATTEND_US
+                if not state.armed or state.time_us > self._end_us:
                     return
                 self._see(state)
-        except DroneError:
-            return  # the link is lost, so nothing can be demanded of the drone any more
         finally:
             close = getattr(ticks, "aclose", None)
             if close is not None:
                 await close()
 
     async def _kill(self) -> str:
-        if self._safety.operator is not None:
-            self._safety.operator.on_stop(None)  # a third press must not interrupt this
-        try:
-            await self._drone.motors_off()
-        except DroneError as error:
-            return f"stopping the motors: {error}"
-        return "the operator stopped the motors"
-
-
-def uncancel() -> None:
-    """Take back the cancellation of this task, which is reported instead."""
-    task = asyncio.current_task()
-    if task is not None:
-        task.uncancel()
-
-
-async def _cancelled(work: asyncio.Future[str]) -> None:
-    work.cancel()
-    await asyncio.gather(work, return_exceptions=True)
+        problem = ""
+        for _ in range(KILL_ATTEMPTS):
+            try:
+                await self._drone.motors_off()
+            except DroneError as error:
+                problem = f"stopping the motors: {error}"
+            else:
+                return "the operator stopped the motors"
+        return problem

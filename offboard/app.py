@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
 
-from offboard.abort import FlightAbort, uncancel
+from offboard.abort import FlightAbort
 from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
 from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError
@@ -188,9 +188,8 @@ class _Flight:
         except (DroneError, CameraLostError, MissionRunError, OutsideBoxError) as error:
             return await self._stop("aborted", str(error))
         except asyncio.CancelledError:
-            uncancel()  # the outcome reports it
-            is_operator = self._operator is not None and self._operator.stops > 0
-            return await self._stop("aborted", STOPPED if is_operator else INTERRUPTED)
+            _uncancel()  # the outcome reports it
+            return await self._stop("aborted", self._interruption)
         except BaseException:
             await self._stop("aborted", "unexpected error")
             raise
@@ -199,20 +198,30 @@ class _Flight:
         try:
             await self._observe_rest()
         except asyncio.CancelledError:  # what was flown is not lost; the motors are off already
-            uncancel()
-            return self._outcome("aborted", INTERRUPTED)
+            _uncancel()
+            return self._outcome("aborted", self._interruption)
         return self._outcome("finished", "")
+
+    @property
+    def _interruption(self) -> str:
+        """Who has cancelled the flight."""
+        return STOPPED if self._operator is not None and self._operator.stops else INTERRUPTED
 
     async def _wait_for_go(self) -> None:
         """Wait for the operator's go, while link and camera are watched."""
         operator = self._operator
-        if operator is None or operator.has_go:
+        if operator is None:
+            return
+        operator.ask_for_go()
+        if operator.has_go:
             return
         ticks, began_us = self._drone.ticks(), None
         try:
             async for state in ticks:
                 if self._before_tick is not None:
                     await self._before_tick(self._engine, state)
+                if state.armed:
+                    raise DroneError("the vehicle was armed by others while it waited for the go; disarm it")
                 if operator.has_go:
                     return
                 began_us = state.time_us if began_us is None else began_us
@@ -425,6 +434,13 @@ def _why_not_continued(state: DroneState) -> str:
     if not all(map(isfinite, (state.x, state.y, state.z, state.yaw))):
         return "its position is not finite"
     return ""
+
+
+def _uncancel() -> None:
+    """Take back the cancellation of this task, which is reported instead."""
+    task = asyncio.current_task()
+    if task is not None:
+        task.uncancel()
 
 
 async def _close(ticks: AsyncIterator[DroneState]) -> None:

@@ -15,12 +15,8 @@ class DryRunDrone(MavsdkDrone):
     Offboard is requested as for a flight, and the mission's setpoints are sent, which a disarmed vehicle does
     not follow. Once the mission has switched its motors on, the ticks show the vehicle as armed, so that the
     mission's chart runs. A vehicle that somebody arms meanwhile ends the dry run.
-
-    Attributes:
-        setpoints: how many were commanded.
     """
 
-    setpoints = 0
     _runs = False
 
     async def ticks(self) -> AsyncIterator[DroneState]:
@@ -62,7 +58,6 @@ class DryRunDrone(MavsdkDrone):
     def command(self, command: VelocityCommand) -> None:
         """Send the setpoint that would be flown."""
         if self._runs:
-            self.setpoints += 1
             self._send(command if self._caps is None else self._caps.limit(command, self._latest))
 
     async def close(self) -> None:

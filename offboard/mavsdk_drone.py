@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any, TextIO
@@ -13,7 +12,6 @@ from mavsdk.asyncio import Configuration, Mavsdk, MavsdkError
 from mavsdk.asyncio.component_type import ComponentType
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
-from mavsdk.logging import log_subscribe
 
 from geometry.axes import Alignment, Pose
 from offboard.drone import DroneError, DroneState, VelocityCommand
@@ -42,8 +40,6 @@ LAND_LIMIT_S = 120.0  # vehicle time
 STREAM_BEFORE_OFFBOARD_S = 0.3  # PX4 enters offboard only with fresh setpoints
 FIRST_MODE_S = 8.0  # wall time for PX4's checks to pass in the mode it starts in
 
-logger = logging.getLogger(__name__)
-
 
 class MavsdkDrone:
     """A vehicle over MAVLink. What PX4 and ArduPilot do differently is in their dialects (`offboard/link/`).
@@ -69,6 +65,7 @@ class MavsdkDrone:
         box: commands that were corrected here do not leave it; None: there is none.
         corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
         caps: no command exceeds them, and none leads out of the box; None: there are none.
+        system_id: of the vehicle that was checked, by MAVLink; no other one is flown. None: any.
 
     Attributes:
         recording_problem: why recording ended before the flight; set by `disconnect`.
@@ -88,6 +85,7 @@ class MavsdkDrone:
         box: Box | None = None,
         corrects: bool = True,
         caps: Caps | None = None,
+        system_id: int | None = None,
     ) -> None:
         self.recording_problem = ""
         self._url = parse_url(url)
@@ -97,7 +95,8 @@ class MavsdkDrone:
         self._feed = TelemetryFeed()
         self._ticks = TickSource(self._feed)
         self._sent = VelocityCommand()
-        self._system_id: int | None = None
+        self._system_id = system_id
+        self._advice = "give another address"
         self._alignment: Alignment | None = None
         self._mavsdk: Mavsdk | None = None
         self._dialect: Dialect | None = None  # from `connect` on
@@ -132,7 +131,7 @@ class MavsdkDrone:
     def use_clock(self, clock: VehicleClock, system_id: int) -> None:
         """Let the time of the vehicle with this MAVLink id wait for this app from `ready` on."""
         self._ticks.use_clock(clock)
-        self._system_id = system_id
+        self._system_id, self._advice = system_id, "choose another --instance"
         self._watchdog.limits = PATIENT_LIMITS
 
     @property
@@ -146,12 +145,10 @@ class MavsdkDrone:
 
     async def connect(self) -> None:
         """Find the vehicle and subscribe to its telemetry."""
-        advice = "give another address" if self._system_id is None else "choose another --instance"
         try:
-            check_free(self._url, advice)
+            check_free(self._url, self._advice)
         except LinkError as error:
             raise DroneError(str(error)) from None
-        log_subscribe(_log)
         # As a ground station: PX4 sends the reasons of its refusals (STATUSTEXT) only to ground stations.
         self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
         self._recorder = await open_connections(
@@ -166,8 +163,7 @@ class MavsdkDrone:
         system_id = await system.get_system_id()
         if self._system_id not in (None, system_id):
             raise DroneError(
-                f"another vehicle (system {system_id}) sends to {self._url.text}; stop it, or choose another "
-                "--instance"
+                f"another vehicle (system {system_id}) sends to {self._url.text}; stop it, or {self._advice}"
             )
         for component in (self._recorder, self._companion):
             if component is not None:
@@ -243,7 +239,8 @@ class MavsdkDrone:
         try:
             offboard, request = self._stream.modes.offboard, self._stream.request_offboard()
             await self._request(f"{offboard.lower()} mode", request, lambda: self._feed.mode == offboard)
-            await self._request("arming", self._stream.arm(), lambda: bool(self._feed.armed) or not confirmed)
+            armed = (lambda: bool(self._feed.armed)) if confirmed else None
+            await self._request("arming", self._stream.arm(), armed)
         except BaseException:
             self._watchdog.stop()
             await self._hold_on_ground()
@@ -255,6 +252,8 @@ class MavsdkDrone:
         self._commanding = True
 
     async def _stream_before_offboard(self) -> None:
+        if self._feed.armed:  # a vehicle that somebody else has armed may be flying
+            raise DroneError("the vehicle was armed by others before the flight; land and disarm it")
         self._send(VelocityCommand())
         for _ in range(round(STREAM_BEFORE_OFFBOARD_S / 0.05)):
             await self._ticks.next(0.05)
@@ -453,13 +452,16 @@ class MavsdkDrone:
     ) -> None:
         """Wait for the answer and, with `shown`, until telemetry shows the effect.
 
-        Acknowledgements are not trusted: PX4 sends two for a mode, the first one always "accepted".
+        Acknowledgements are not trusted: PX4 sends two for a mode, the first one always "accepted"; and a
+        link may lose all answers to a request that had its effect.
         """
         feed = self._feed
         try:
             await self._ticks.until_done(self._requests.wait(request))
         except MavsdkError as error:
             result = getattr(getattr(error, "result", None), "name", str(error))
+            if result == "TIMEOUT" and shown is not None and await self._becomes(shown, HOLD_SHOWN_S):
+                return
             raise DroneError(f"{what} was refused: {result}{feed.recent_texts()}") from None
         if shown is None:
             return
@@ -492,8 +494,3 @@ class MavsdkDrone:
                 self._stream.request_hold_blocking()
             else:
                 self._stream.end()
-
-
-def _log(level: Any, message: str, _file: object, _line: object) -> bool:  # noqa: ANN401
-    logger.debug("mavsdk %s: %s", getattr(level, "name", level), message)
-    return True  # handled: MAVSDK prints nothing itself

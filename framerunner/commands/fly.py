@@ -115,7 +115,7 @@ def fly(
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
     A drone given by --drone is taken for a real one, unless it is `framerunner sim` or --simulated: it is
-    checked, and the operator holds G to arm; SPACE lands, SPACE again stops the motors. Exit code 0:
+    checked, and the operator holds G to arm; SPACE lands, then K stops the motors. Exit code 0:
     completed, 1: flown but not completed, 2: bad input or failed check.
 
     **Examples**

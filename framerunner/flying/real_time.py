@@ -89,13 +89,13 @@ async def fly_in_real_time(
         vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
         named = settings.simulator is not None
         judge, plan = await choose_judge(plan, vehicle.api, session, named=named)
-        plan, safety = await _safety(plan, settings, records, stack)
+        plan, safety, system_id = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)
         source = records.folder.mission.read_text(encoding="utf-8")
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         dry_run = settings.hardware is not None and settings.hardware.dry_run
-        drone = _drone(plan, vehicle, records, stack, companion, dry_run=dry_run)
+        drone = _drone(plan, vehicle, records, stack, companion, dry_run=dry_run, system_id=system_id)
         camera = await _camera(plan, vehicle, records, stack, reporter)
         perception = _perception(plan, vehicle, judge, camera)
         perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
@@ -124,18 +124,21 @@ async def fly_in_real_time(
 
 async def _safety(
     plan: FlightPlan, settings: RealTimeSettings, records: RunRecords, stack: AsyncExitStack
-) -> tuple[FlightPlan, SafetyRules]:
+) -> tuple[FlightPlan, SafetyRules, int | None]:
     """Let a drone that may be a real one be checked, and read its operator's keys until the flight's end.
 
     A drone that says that it is framerunner's simulated one needs neither, nor caps that nobody asked for.
+    Only the drone with the MAVLink id that is returned may be flown; None: it is not known.
     """
     hardware, drone_url = settings.hardware, settings.drone_url
     if hardware is None or drone_url is None:
-        return plan, SIMULATED
-    from framerunner.preflight.prepare import is_own_simulator
+        return plan, SIMULATED, None
+    from framerunner.preflight.prepare import own_simulator_id
 
-    if hardware.asks_nothing and await is_own_simulator(drone_url, settings.camera_url):
-        return replace(plan, caps=plan.caps if hardware.capped else None), SIMULATED
+    if hardware.asks_nothing:
+        simulated_id = await own_simulator_id(drone_url, settings.camera_url)
+        if simulated_id is not None:
+            return replace(plan, caps=plan.caps if hardware.capped else None), SIMULATED, simulated_id
     from framerunner.preflight.keys import TerminalKeys
     from framerunner.preflight.prepare import prepare
     from framerunner.preflight.run import PreflightSettings
@@ -148,10 +151,10 @@ async def _safety(
         accepted=hardware.accepted,
         folder=records.folder.path,
     )
-    safety = await prepare(plan, checks, hardware)
+    safety, system_id = await prepare(plan, checks, hardware)
     if safety.operator is not None:
         await stack.enter_async_context(TerminalKeys(safety.operator))
-    return plan, safety
+    return plan, safety, system_id
 
 
 async def _vehicle(
@@ -187,6 +190,7 @@ def _drone(
     companion: Companion,
     *,
     dry_run: bool,
+    system_id: int | None,
 ) -> MavsdkDrone:
     """The drone on its link, which is closed with the stack; in a dry run it is never armed."""
     from offboard.dry_run import DryRunDrone
@@ -200,6 +204,7 @@ def _drone(
         box=plan.box,
         corrects=plan.corrects_commands,
         caps=plan.caps,
+        system_id=system_id,
     )
     drone.record_to(records.folder.tlog)
     stack.callback(lambda: warn(drone.recording_problem))

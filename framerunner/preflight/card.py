@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 PROCEDURE = (
     "Stop: press SPACE. The drone lands where it is.",
-    "Stop the motors at once: press SPACE again. The drone falls.",
+    "Stop the motors at once: press SPACE, then K. The drone falls.",
     "The app does not answer: move the mode switch to position mode and land, or use the kill switch.",
     "The app ends or the link is lost: the drone's failsafes above land it.",
     "A fence, a failsafe or the app's box acts: let the drone land; find the cause before the next start.",

@@ -1,7 +1,6 @@
-"""The operator's keys in a terminal: hold G to arm, the space bar to stop.
+"""The operator's keys in a terminal: hold G to arm, the space bar to land, then K to stop the motors.
 
-A terminal sends no key releases. A key that is held repeats: after half a second, then some thirty times a
-second. So a second press is a character that is not followed at once by another one.
+A terminal sends no key releases, and a key that is held repeats. So no key means more when it comes again.
 """
 
 from __future__ import annotations
@@ -18,13 +17,11 @@ from typing import Any
 
 from offboard.safety.operator import Operator
 
-HINT = "hold G for a second to arm; SPACE lands, SPACE again stops the motors"
+HINT = "hold G for a second to arm; SPACE lands, then K stops the motors"
 HOLD_S = 1.0
-REPEAT_S = 0.12
-"""Two characters of a held key are not farther apart, but for the first two."""
 FIRST_REPEAT_S = 0.8
 """From the first character of a held key to the second one, at most."""
-_GO, _STOP = ("g", "G"), " "
+_GO, _STOP, _KILL = "gG", " ", "kK"
 
 
 class KeyReader:
@@ -38,22 +35,15 @@ class KeyReader:
         self._operator = operator
         self._go_began_s: float | None = None
         self._go_last_s = 0.0
-        self._stop_s: float | None = None  # of the last character
-        self._undecided_s: float | None = None  # of one that may be a second press or a repeated first one
 
     def take(self, key: str, now_s: float) -> None:
         """Take a character at a time, seconds."""
-        if key == _STOP:
-            self._take_stop(now_s)
-        elif key in _GO:
+        stops = self._operator.stops
+        if key in _GO:
             self._take_go(now_s)
-        else:
-            self._go_began_s = None
-
-    def update(self, now_s: float) -> None:
-        """Decide what only time can; call it every 50 ms."""
-        if self._undecided_s is not None and now_s - self._undecided_s > REPEAT_S:
-            self._undecided_s = None
+            return
+        self._go_began_s = None
+        if (key == _STOP and stops == 0) or (key in _KILL and stops == 1):
             self._operator.press_stop()
 
     def _take_go(self, now_s: float) -> None:
@@ -62,15 +52,6 @@ class KeyReader:
         self._go_last_s = now_s
         if now_s - self._go_began_s >= HOLD_S:
             self._operator.give_go()
-
-    def _take_stop(self, now_s: float) -> None:
-        last_s, self._stop_s, self._go_began_s = self._stop_s, now_s, None
-        if last_s is None:
-            self._operator.press_stop()  # at once
-        elif now_s - last_s <= REPEAT_S:
-            self._undecided_s = None  # it is held
-        else:
-            self._undecided_s = now_s
 
 
 class TerminalKeys:
@@ -85,7 +66,6 @@ class TerminalKeys:
     def __init__(self, operator: Operator) -> None:
         self._keys = KeyReader(operator)
         self._before: list[Any] | None = None
-        self._task: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> TerminalKeys:
         """Let the terminal give each character at once, without showing it."""
@@ -95,18 +75,16 @@ class TerminalKeys:
             tty.setcbreak(number)
             loop = asyncio.get_running_loop()
             loop.add_reader(number, self._read, number, loop.time)
-            self._task = asyncio.create_task(self._keep_updating(), name="keys")
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Return the terminal as it was."""
-        if self._before is None or self._task is None:
+        if self._before is None:
             return
         number = sys.stdin.fileno()
         asyncio.get_running_loop().remove_reader(number)
-        self._task.cancel()
         with contextlib.suppress(termios.error):  # the terminal was closed
             termios.tcsetattr(number, termios.TCSADRAIN, self._before)
 
@@ -119,12 +97,6 @@ class TerminalKeys:
             asyncio.get_running_loop().remove_reader(number)
         for character in data.decode(errors="replace"):
             self._keys.take(character, clock())
-
-    async def _keep_updating(self) -> None:
-        loop = asyncio.get_running_loop()
-        while True:
-            await asyncio.sleep(0.05)
-            self._keys.update(loop.time())
 
 
 def has_terminal() -> bool:

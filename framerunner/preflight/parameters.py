@@ -7,6 +7,7 @@ https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/parameters.
 from __future__ import annotations
 
 import struct
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -73,7 +74,7 @@ def set_parameter(session: VehicleSession, parameter: ParameterValue) -> None:
 def set_and_keep(
     session: VehicleSession, wanted: Mapping[str, float], kept: Mapping[str, ParameterValue], path: Path
 ) -> None:
-    """Set parameters; their old values are written first.
+    """Set parameters; their old values are written first, and where is told on standard error.
 
     Args:
         session: with the vehicle.
@@ -86,6 +87,8 @@ def set_and_keep(
         SettingError: the file cannot be written; nothing is set.
     """
     write_parameters(path, session.system_id, [kept[name] for name in wanted])
+    hint = f"return them by framerunner preflight --restore-parameters {path}"
+    print(f"old values: {path}; {hint}", file=sys.stderr, flush=True)
     for name, value in wanted.items():
         set_parameter(session, ParameterValue(name, value, kept[name].kind))
 

@@ -37,8 +37,8 @@ def _check_urls(drone_url: str, camera_url: str | None) -> None:
         open_source(camera_url)  # says in a line what can be no camera; it is opened later
 
 
-async def is_own_simulator(drone_url: str, camera_url: str | None) -> bool:
-    """Whether the vehicle on a link is framerunner's simulated drone, by what it says of itself.
+async def own_simulator_id(drone_url: str, camera_url: str | None) -> int | None:
+    """The MAVLink id of the vehicle on a link if it says that it is framerunner's simulated drone, else None.
 
     Args:
         drone_url: of the vehicle.
@@ -52,9 +52,10 @@ async def is_own_simulator(drone_url: str, camera_url: str | None) -> bool:
     _check_urls(drone_url, camera_url)
     cancelled = threading.Event()
 
-    def ask() -> bool:
+    def ask() -> int | None:
         with closing(open_link(drone_url)) as link:
-            return VehicleSession(link, cancelled).is_own_simulator
+            session = VehicleSession(link, cancelled)
+            return session.system_id if session.is_own_simulator else None
 
     try:
         return await asyncio.to_thread(ask)
@@ -62,7 +63,9 @@ async def is_own_simulator(drone_url: str, camera_url: str | None) -> bool:
         cancelled.set()
 
 
-async def prepare(plan: FlightPlan, checks: PreflightSettings, hardware: HardwareSettings) -> SafetyRules:
+async def prepare(
+    plan: FlightPlan, checks: PreflightSettings, hardware: HardwareSettings
+) -> tuple[SafetyRules, int]:
     """Check the drone and write its flight card.
 
     Args:
@@ -71,7 +74,7 @@ async def prepare(plan: FlightPlan, checks: PreflightSettings, hardware: Hardwar
         hardware: the procedure.
 
     Returns:
-        The rules of the flight, with its operator.
+        The rules of the flight, with its operator; the MAVLink id of the drone that was checked.
 
     Raises:
         LinkError: the drone's address is bad, or its link cannot be opened.
@@ -98,4 +101,4 @@ async def prepare(plan: FlightPlan, checks: PreflightSettings, hardware: Hardwar
     print(f"flight card: {checks.folder / HTML_NAME}", file=sys.stderr, flush=True)
     report.require()
     needs_go = hardware.needs_go and not hardware.dry_run
-    return SafetyRules(hardware.abort, Operator(needs_go=needs_go, hint=HINT))
+    return SafetyRules(hardware.abort, Operator(needs_go=needs_go, hint=HINT)), report.system_id

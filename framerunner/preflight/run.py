@@ -37,7 +37,6 @@ from offboard.safety.vehicle_checks import (
     link_checks,
 )
 from wire.dialect import degrees_e7, mavlink
-from wire.px4_modes import mode_words
 
 LISTEN_S = 5.0
 CAMERA_S = 3.0
@@ -92,6 +91,7 @@ class PreflightReport:
 
     Attributes:
         vehicle: the drone in words.
+        system_id: its MAVLink id.
         checks: all, in the order in which they are told.
         fence: of the flight.
         changes: of parameters.
@@ -99,6 +99,7 @@ class PreflightReport:
     """
 
     vehicle: str
+    system_id: int
     checks: tuple[Check, ...]
     fence: FlightFence
     changes: tuple[ParameterChange, ...] = ()
@@ -123,6 +124,7 @@ class _Measured:
     """What was found on the link, on a thread."""
 
     record: Record
+    system_id: int
     link: LinkFacts
     checks: tuple[Check, ...]
     changes: tuple[ParameterChange, ...]
@@ -162,15 +164,17 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
         clock_ms = record.clock_ms[-1] if record.clock_ms else None
         checks += camera_checks(times.facts(clock_ms, settings.camera_delay_s))
     accepted = tuple(accept(checks, settings.accepted))
-    return PreflightReport(_vehicle_words(record), accepted, fence, measured.changes, measured.kept)
+    vehicle, system_id = _vehicle_words(record), measured.system_id
+    return PreflightReport(vehicle, system_id, accepted, fence, measured.changes, measured.kept)
 
 
 def tell(report: PreflightReport) -> None:
-    """Print each check on a line, and what was changed, on standard error."""
+    """Print each check on a line, and what was changed, on standard error.
+
+    Where the old values are was told when they were written: what follows may fail.
+    """
     lines = [check.line for check in report.checks]
     lines += [f"set      {each.name}: {each.before:g} -> {each.after:g}" for each in report.changes]
-    if report.kept is not None:
-        lines.append(f"old values: {report.kept}; return them by framerunner preflight --restore-parameters")
     print("\n".join(lines), file=sys.stderr, flush=True)
 
 
@@ -204,7 +208,7 @@ def _measure(
         numbers = {name: each.value for name, each in values.items()}
         checks += failsafe_checks(numbers, fence, has_global_position=has_position, rows=rows)
         checks.append(_fence_check(session, plan, fence))
-    return _Measured(record, facts, tuple(checks), changes, kept if changes else None)
+    return _Measured(record, session.system_id, facts, tuple(checks), changes, kept if changes else None)
 
 
 def _set(
@@ -249,6 +253,9 @@ def _fence_check(session: VehicleSession, plan: FlightPlan, fence: FlightFence) 
     limit = f"{len(fence.corners_arena_m)} corners within {fence.radius_m:g} m of the start"
     if record.armed:
         return Check(name, Outcome.FAIL, "not uploaded to an armed vehicle", limit, "land and disarm it")
+    if not session.is_px4:
+        advice = "set it by hand (docs/ardupilot.md, section 5), then accept it by --accept fence"
+        return Check(name, Outcome.FAIL, "not uploaded: only PX4's is known", limit, advice)
     if not has_global_position(record):
         words = "the vehicle has no global position, so its fence has no effect"
         advice = "only the app's box and a net keep it in; put up a net"
@@ -273,9 +280,11 @@ def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
         return Check("caps", Outcome.FAIL, "none", "", "give --max-speed")
     value = f"{caps.words}; {height_m:.1f} m above the start"
     limit = f"below the fence, {fence.height_m:g} m"
+    if height_m >= fence.height_m:
+        return Check("caps", Outcome.FAIL, value, limit, "give a lower --max-height")
     if limits.forward_m_s > caps.level_m_s or max(limits.up_m_s, limits.down_m_s) > caps.vertical_m_s:
         return Check("caps", Outcome.NOTE, value, limit, "they are below what the mission may ask for")
-    return passed("caps", height_m < fence.height_m, value, limit, "give a lower --max-height")
+    return Check("caps", Outcome.PASS, value, limit)
 
 
 def _doctors(findings: Sequence[Finding]) -> list[Check]:
@@ -319,7 +328,5 @@ def _estimator(record: Record) -> EstimatorFacts:
 
 
 def _vehicle_words(record: Record) -> str:
-    mode = record.modes.get(record.latest["HEARTBEAT"].custom_mode) or mode_words(
-        record.latest["HEARTBEAT"].custom_mode
-    )
-    return f"{record.autopilot_name}, {record.type_name}, system {record.system_id}, mode {mode}"
+    name, kind = record.autopilot_name, record.type_name
+    return f"{name}, {kind}, system {record.system_id}, mode {record.mode_name}"

@@ -9,7 +9,14 @@ from typing import TypeVar
 
 from framerunner.doctor.listen import COMPONENT_ID, FIND_S, SYSTEM_ID, Record, find, listen
 from offboard.drone import DroneError
-from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, ground_station_heartbeat, mavlink
+from wire.dialect import (
+    AUTOPILOT_COMPONENT_ID,
+    Message,
+    companion_heartbeat,
+    ground_station_heartbeat,
+    mavlink,
+    request_message,
+)
 from wire.simulator_identity import is_simulator
 from wire.transports.vehicle_link import VehicleLink
 
@@ -25,7 +32,10 @@ T = TypeVar("T")
 
 
 class VehicleSession:
-    """A vehicle that was found on a link. It is a ground station to the vehicle, which must be disarmed.
+    """A vehicle that was found on a link.
+
+    To a disarmed vehicle it is a ground station; to an armed one it is not: the vehicle would take the
+    session's end for a lost ground station.
 
     Args:
         link: open; used by the thread that calls this.
@@ -68,14 +78,7 @@ class VehicleSession:
     @property
     def is_own_simulator(self) -> bool:
         """Whether it says that it is framerunner's simulated drone."""
-        request = mavlink.MAVLink_command_long_message(
-            self.system_id,
-            AUTOPILOT_COMPONENT_ID,
-            mavlink.MAV_CMD_REQUEST_MESSAGE,
-            0,
-            mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-            *(0.0,) * 6,
-        )
+        request = request_message(self.system_id, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
 
         def uid(message: Message) -> int | None:
             return message.uid if message.get_type() == "AUTOPILOT_VERSION" else None
@@ -143,7 +146,7 @@ class VehicleSession:
         now_s = time.monotonic()
         if now_s - self._beat_s >= _HEARTBEAT_S:
             self._beat_s = now_s
-            self.send(ground_station_heartbeat())
+            self.send(companion_heartbeat() if self.record.armed else ground_station_heartbeat())
         messages = self._link.receive(0.01)
         now_s = time.monotonic()
         for message in messages:

@@ -79,6 +79,7 @@ class ArduPilotDialect:
         self._action = action
         self._direct = synchronous(direct)
         self._feed = feed
+        feed.needs_landed_state = True  # else each climb in the air would be taken for a take-off
         self._system_id = system_id
         self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
         self._sent_since_repeat = False

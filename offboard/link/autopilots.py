@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from mavsdk.asyncio import Autopilot
+from mavsdk.asyncio import Autopilot, Vehicle
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 
+from offboard.drone import DroneError
 from offboard.link.ardupilot import ArduPilotDialect
 from offboard.link.dialect import Dialect, Px4Dialect
 from offboard.link.telemetry import TelemetryFeed
@@ -20,8 +21,14 @@ async def open_dialect(system: Any, direct: Any, feed: TelemetryFeed) -> Dialect
         system: MAVSDK's asyncio system.
         direct: its asyncio plugin `mavlink_direct`.
         feed: the vehicle's telemetry.
+
+    Raises:
+        DroneError: it is ArduPilot, but no multicopter: the numbers of its modes mean others.
     """
     action = ActionAsync(system)
     if await system.autopilot_type() == Autopilot.ARDUPILOT:
+        kind = await system.vehicle_type()
+        if kind in (Vehicle.FIXED_WING, Vehicle.ROVER, Vehicle.SUBMARINE):
+            raise DroneError(f"the vehicle is a {kind.name.lower().replace('_', ' ')}; use a multicopter")
         return ArduPilotDialect(action, direct, feed, await system.get_system_id())
     return Px4Dialect(OffboardAsync(system), action)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from mavsdk.asyncio import ForwardingOption, Mavsdk, MavsdkError
+from mavsdk.logging import log_subscribe
 
 from offboard.drone import DroneError
 from offboard.link.companion import Companion
@@ -32,6 +34,7 @@ async def open_connections(
     Raises:
         DroneError: the vehicle's link or the recording cannot be opened.
     """
+    log_subscribe(_log)
     recorder = None
     if tlog_path is not None:
         try:
@@ -54,3 +57,8 @@ async def open_connections(
             recorder.close()
         raise DroneError(f"cannot open {urls[-1]}: {error}") from None
     return recorder
+
+
+def _log(level: Any, message: str, _file: object, _line: object) -> bool:  # noqa: ANN401 - MAVSDK is untyped
+    logger.debug("mavsdk %s: %s", getattr(level, "name", level), message)
+    return True  # handled: MAVSDK prints nothing itself

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from typing import Any
 
 from geometry.rotations import multiply, normalized, quaternion_from_yaw
@@ -42,7 +42,7 @@ class GimbalFeed:
 
     def _on_attitude(self, message: Any, _user: object) -> None:  # noqa: ANN401
         fields = json.loads(message.fields_json)
-        values = [float(value) if isinstance(value, int | float) else 0.0 for value in fields["q"]]
+        values = [float(value) if isinstance(value, int | float) else nan for value in fields["q"]]
         if len(values) != 4 or not all(map(isfinite, values)) or sum(v * v for v in values) < _MIN_LENGTH:
             return
         flags = int(fields["flags"])

@@ -87,12 +87,14 @@ class TelemetryFeed:
         self.arming = Arming()  # with the heartbeats
         self.mode = ""  # name of the flight mode, such as "OFFBOARD"
         self.landed = True  # from EXTENDED_SYS_STATE
+        self.needs_landed_state = False  # the vehicle is not ready before that is received
         self.health: Any = None  # MAVSDK's; None before the first
         self.attitudes = 0  # how many were received
         self.positions = 0
         self._attitude_received_s = 0.0
         self._position_received_s = 0.0
         self._heartbeat_received_s = 0.0
+        self._landed_received = False
         self._lag_s: float | None = None  # of vehicle time behind wall time
         self._texts: deque[tuple[float, str]] = deque(maxlen=TEXTS_KEPT)
         self._attitude_order = MessageOrder()
@@ -200,6 +202,8 @@ class TelemetryFeed:
             missing.append("no local position (LOCAL_POSITION_NED)")
         if self.armed is None or not self.mode:
             missing.append("no heartbeat")
+        if self.needs_landed_state and not self._landed_received:
+            missing.append("no landed state (EXTENDED_SYS_STATE)")
         if health is None:
             missing.append("no health (SYS_STATUS)")
         elif not health.is_armable:
@@ -251,6 +255,7 @@ class TelemetryFeed:
 
     def _on_landed(self, state: Any, _user: object) -> None:  # noqa: ANN401
         self.landed = getattr(state, "name", str(state)) == "ON_GROUND"
+        self._landed_received = True
 
     def _on_health(self, health: Any, _user: object) -> None:  # noqa: ANN401
         self.health = health

@@ -84,9 +84,10 @@ class CapKeeper:
         if self._box is None or state is None:
             return command
         kept, sides = confine(command, state, self._box)
-        if sides:
-            self._note("place", f"kept in by the cap: {sides}")
-        return kept
+        if not sides:
+            return command
+        self._note("place", f"kept in by the cap: {sides}")
+        return self._capped_speed(kept)  # beyond a side it leads back, at a speed of its own
 
     def _capped_speed(self, command: VelocityCommand) -> VelocityCommand:
         caps, limits = self._caps, self._limits

@@ -23,6 +23,7 @@ class Operator:
     """
 
     def __init__(self, *, needs_go: bool = True, hint: str = "") -> None:
+        self._needs_go = needs_go
         self.has_go = not needs_go
         self.hint = hint
         self.stops = 0
@@ -32,6 +33,10 @@ class Operator:
     def kills(self) -> bool:
         """Whether the motors must stop at once, wherever the drone is."""
         return self.stops > 1
+
+    def ask_for_go(self) -> None:
+        """Forget a go that was given before: nobody had been told that the drone is ready."""
+        self.has_go = not self._needs_go
 
     def give_go(self) -> None:
         """Let the flight arm; ignored after a stop."""

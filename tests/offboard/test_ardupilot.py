@@ -7,6 +7,7 @@ import math
 from contextlib import asynccontextmanager
 
 import pytest
+from pymavlink.dialects.v20 import common as mavlink
 
 from offboard.drone import DroneError, VelocityCommand
 from offboard.mavsdk_drone import MavsdkDrone
@@ -126,6 +127,20 @@ async def test_without_a_position_it_is_not_ready(copter):
     copter.has_position = False
     with pytest.raises(DroneError, match="not ready within"):
         async with connected(copter, ready_limit_s=2.0):
+            pass
+
+
+async def test_without_its_landed_state_it_is_not_ready(copter):
+    copter.refused = {mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE}
+    with pytest.raises(DroneError, match="no landed state"):
+        async with connected(copter, ready_limit_s=2.0):
+            pass
+
+
+async def test_a_rover_is_not_flown(copter):
+    copter.type = mavlink.MAV_TYPE_GROUND_ROVER
+    with pytest.raises(DroneError, match="the vehicle is a rover; use a multicopter"):
+        async with connected(copter):
             pass
 
 

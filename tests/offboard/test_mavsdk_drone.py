@@ -446,6 +446,22 @@ async def test_an_armed_vehicle_is_not_taken(vehicle):
             pass
 
 
+async def test_a_vehicle_that_others_have_armed_meanwhile_is_not_taken(vehicle):
+    async with connected(vehicle) as drone:
+        vehicle.armed = True
+        await asyncio.sleep(1.2)  # until a heartbeat shows it
+        mode = vehicle.mode
+        with pytest.raises(DroneError, match="armed by others before the flight"):
+            await drone.motors_on()
+        assert vehicle.mode == mode
+
+
+async def test_another_vehicle_than_the_checked_one_is_not_flown(vehicle):
+    with pytest.raises(DroneError, match=r"another vehicle \(system 1\) sends to .*; stop it"):
+        async with connected(vehicle, system_id=7):
+            pass
+
+
 async def test_no_vehicle_is_one_clear_line():
     drone = MavsdkDrone(f"udpin://127.0.0.1:{free_port()}", connect_limit_s=0.3)
     with pytest.raises(DroneError, match=r"no vehicle was found on udpin://127.*within 0\.3 s"):

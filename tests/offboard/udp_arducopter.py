@@ -22,6 +22,8 @@ class UdpArduCopter(UdpVehicle):
         self.mode = (STABILIZE, 0)
         self.has_position = True
         self.requested: set[int] = set()
+        self.refused: set[int] = set()  # messages that it never sends
+        self.type = mavlink.MAV_TYPE_QUADROTOR
         self.takeoffs: list[float] = []
         self.early = 0
         self.ignores_takeoff = False
@@ -51,7 +53,7 @@ class UdpArduCopter(UdpVehicle):
         now_ms = round(self.time_s * 1000)
         if step % 50 == 1:
             base = (128 if self.armed else 0) | 81
-            self._mav.heartbeat_send(2, 3, base, self.mode[0], 4 if self.armed else 3)
+            self._mav.heartbeat_send(self.type, 3, base, self.mode[0], 4 if self.armed else 3)
         if mavlink.MAVLINK_MSG_ID_ATTITUDE in self.requested:
             self._mav.attitude_send(now_ms, 0, 0, self.yaw, 0, 0, 0)
         if mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED in self.requested and step % 2 == 0:
@@ -86,7 +88,7 @@ class UdpArduCopter(UdpVehicle):
     def _obey(self, message) -> int:
         command = message.command
         if command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
-            self.requested.add(int(message.param1))
+            self.requested |= {int(message.param1)} - self.refused
         elif command == mavlink.MAV_CMD_DO_SET_MODE:
             mode = int(message.param2)
             if mode == GUIDED and not self.has_position:

@@ -3,10 +3,12 @@
 The vehicle has the failsafe parameters that the checks before arming demand.
 """
 
+import asyncio
 from math import hypot
 from random import Random
 
 import pytest
+from mavsdk.exceptions import MavsdkError
 
 from firmware_py.status import FlightMode
 from framerunner.flying.plan import FlightPlan
@@ -101,6 +103,40 @@ def test_a_stop_arrives_over_a_lossy_link(tmp_path):
     flight = fly(tmp_path, operator=operator, impairment=lossy, events=events)
     assert flight.outcome.reason.startswith("stopped by the operator")
     assert came_down(flight)
+
+
+def test_a_landing_whose_answer_is_lost_is_not_ended_by_hold(tmp_path):
+    operator = Operator(needs_go=False)
+
+    def lose_answers(vehicle):
+        async def command(act):
+            vehicle.up.send(vehicle.time_us, act)
+            await asyncio.sleep(0.1)
+            raise MavsdkError("TIMEOUT")
+
+        vehicle.command = command
+
+    events = [(11.9, lose_answers), (12.0, lambda _: operator.press_stop())]
+    flight = fly(tmp_path, operator=operator, events=events)
+    assert flight.outcome.reason == "stopped by the operator"
+    assert came_down(flight)
+
+
+def test_a_vehicle_that_others_arm_before_the_go_is_left_to_them(tmp_path):
+    operator = Operator()
+    events = [(12.0, lambda vehicle: vehicle.autopilot.arm()), (15.0, lambda _: operator.give_go())]
+    flight = fly(tmp_path, operator=operator, events=events)
+    assert "armed by others while it waited for the go" in flight.outcome.reason
+    assert flight.outcome.flight_time_s == 0.0
+    assert "OFFBOARD" not in modes(flight)
+
+
+def test_a_go_before_it_is_asked_for_does_not_count(tmp_path, monkeypatch):
+    monkeypatch.setattr("offboard.app.GO_LIMIT_US", 5_000_000)
+    operator = Operator()
+    flight = fly(tmp_path, operator=operator, events=[(0.1, lambda _: operator.give_go())])
+    assert flight.outcome.reason.startswith("no go within")
+    assert not any(truth.motors_on for truth in flight.truths)
 
 
 def test_nothing_is_armed_before_the_go(tmp_path):

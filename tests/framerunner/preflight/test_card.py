@@ -21,6 +21,7 @@ def card(plan):
     )
     report = PreflightReport(
         "PX4, quadrotor, system 1",
+        1,
         checks,
         flight_fence(plan.box, plan.start_pose[:3]),
         (ParameterChange("NAV_RCL_ACT", 2.0, 3.0),),

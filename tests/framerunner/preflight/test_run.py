@@ -9,6 +9,7 @@ from framerunner.preflight import parameters
 from framerunner.preflight.parameters import load_parameters, read_parameters, set_parameter
 from framerunner.preflight.run import NotArmedError, PreflightSettings, run_preflight
 from framerunner.preflight.session import VehicleSession
+from offboard.drone import DroneError
 from offboard.safety.check import Outcome
 from wire.dialect import mavlink
 
@@ -86,6 +87,15 @@ async def test_old_values_that_are_kept_are_not_overwritten(link, plan, tmp_path
     assert (third.kept, third.changes) == (None, ())
 
 
+async def test_where_the_old_values_are_is_told_even_if_setting_fails(link, plan, tmp_path, capsys):
+    link.lost = lambda message: message.get_type() == "PARAM_SET"
+    with pytest.raises(DroneError, match="did not answer"):
+        await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    kept = tmp_path / "parameters-before.params"
+    assert f"--restore-parameters {kept}" in capsys.readouterr().err
+    assert [each.name for each in load_parameters(kept)] == FAILING
+
+
 async def test_nothing_is_set_if_the_old_values_cannot_be_kept(link, plan, tmp_path):
     nowhere = settings(tmp_path / "nowhere", set_parameters=True)
     with pytest.raises(SettingError, match="nothing was set"):
@@ -127,6 +137,9 @@ async def test_an_armed_vehicle_is_left_alone(link, plan, tmp_path):
     assert (found["armed"], found["fence"]) == (Outcome.FAIL, Outcome.FAIL)
     assert names_sent(link, "PARAM_SET") == []
     assert not any(message.get_type() == "MISSION_COUNT" for message in link.sent)
+    beats = [message.type for message in link.sent if message.get_type() == "HEARTBEAT"]
+    assert beats
+    assert mavlink.MAV_TYPE_GCS not in beats  # it would take the end of the checks for a lost ground station
 
 
 async def test_nothing_that_is_sent_arms(link, plan, tmp_path):

@@ -53,6 +53,14 @@ def test_no_climb_at_the_cap():
     assert keeper.limit(VelocityCommand(0.0, 0.0, 0.4), at_cap).up_m_s == pytest.approx(0.0)
 
 
+def test_the_way_back_into_the_box_is_capped_too():
+    slow = Caps(level_m_s=0.2, vertical_m_s=0.1)
+    outside = DroneState(0, 9.0, 9.0, 9.0, 0.0)
+    back = CapKeeper(slow, BOX).limit(VelocityCommand(), outside)
+    assert hypot(back.forward_m_s, back.left_m_s) == pytest.approx(0.2)
+    assert (back.forward_m_s < 0, back.left_m_s < 0, back.up_m_s) == (True, True, -0.1)
+
+
 def test_a_cap_that_leaves_no_room_is_refused():
     low = Box((-5.0, -5.0, 1.0), (5.0, 5.0, 4.0), (0.0, 0.0))
     with pytest.raises(SettingError, match="--max-height"):
