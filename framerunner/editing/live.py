@@ -99,11 +99,13 @@ class LiveFlight:
                 before = await asyncio.to_thread(self._runs)
                 arguments = await asyncio.to_thread(self._arguments, request, Path(folder), instance, links)
                 text = await self._run(request, arguments)
-                text = await asyncio.to_thread(self._reason, before) or text
+                text = await asyncio.to_thread(self._verdict_of_new_run, before) or text
             except asyncio.CancelledError:
                 stopped = True
-            except (UserError, OSError) as error:
-                text = reason(error, request.language) if isinstance(error, UserError) else str(error)
+            except UserError as error:
+                text = reason(error, request.language)
+            except OSError as error:
+                text = str(error)
             finally:
                 self._show(request, "stopped" if stopped else "ended", text[:_MAX_REASON])
 
@@ -143,7 +145,7 @@ class LiveFlight:
         except OSError:
             return set()
 
-    def _reason(self, before: set[str]) -> str:
+    def _verdict_of_new_run(self, before: set[str]) -> str:
         """The verdict's reason of the run that is new; "" if there is none."""
         for name in sorted(self._runs() - before, reverse=True):
             try:

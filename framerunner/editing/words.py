@@ -42,7 +42,6 @@ _ENGLISH: Mapping[str, str] = {
     "typed.elsewhere": (
         "the text was changed in another window at the same time; what you typed last is left out"
     ),
-    "typed.too_large": "the mission would be larger than 1 MB; a mission is a page or two",
     "typed.beyond": "typed text: {place} is after the end of the text; load the page again",
     # Flights.
     "flight.unknown": "'{name}': there is no such flight or batch; start it again",
@@ -102,7 +101,6 @@ _SPANISH: Mapping[str, str] = {
     "typed.elsewhere": (
         "el texto se cambió a la vez en otra ventana; lo último que escribiste no se ha incluido"
     ),
-    "typed.too_large": "la misión pasaría de 1 MB; una misión es una página o dos",
     "typed.beyond": "texto escrito: {place} está después del final del texto; carga la página de nuevo",
     "flight.unknown": "'{name}': no hay tal vuelo ni serie; empieza de nuevo",
     "flight.is_batch": "es una serie de vuelos; cancélala",

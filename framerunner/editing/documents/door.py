@@ -36,7 +36,7 @@ from framerunner.editing.documents.messages import (
 from framerunner.editing.documents.open_document import OpenDocument
 from framerunner.editing.words import Language, Said, SaidError, language_of, reason, say
 from monitor.access import refuse
-from offboard.authoring import Change, Edit, export_scxml, import_scxml, mermaid_of, parse_edit
+from offboard.authoring import Change, Edit, EditError, export_scxml, import_scxml, mermaid_of, parse_edit
 from offboard.mission import MAX_FILE_BYTES, list_missions
 
 _Text = Annotated[str, Body(max_length=100)]
@@ -314,7 +314,7 @@ def _replacement(opened: OpenDocument, typed: TypedChange) -> Edit:
     text, positions = opened.document.text, opened.document.positions
     last = typed.start + typed.removed
     if len(typed.inserted) > MAX_FILE_BYTES:
-        raise SaidError("typed.too_large")
+        raise EditError("edit.too_large")
     if last > positions.to_utf16(len(text)):
         raise SaidError("typed.beyond", place=last)
     start, end = positions.from_utf16(typed.start), positions.from_utf16(last)

@@ -46,6 +46,11 @@ class EditorUser:
         """Click a button."""
         await (within or self.page).get_by_role("button", name=name, exact=True).click()
 
+    async def show_tab(self, key: str) -> Locator:
+        """Show a tab below the diagram; its panel."""
+        await self.page.locator(f"#e-tab-{key}").click()
+        return self.page.locator(f"#e-panel-{key}")
+
     async def field(self, label: str, value: str) -> None:
         """Write into a field of the form and leave it with Enter."""
         box = self.form.get_by_label(label, exact=True)

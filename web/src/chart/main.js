@@ -9,7 +9,7 @@ import { pageRoot } from "../lib/page_data.js";
 const root = pageRoot("chart");
 root.classList.add("m-chart-page");
 const line = make("p", { class: "m-line", role: "status", hidden: true });
-const tabs = make("div", { class: "m-tabs" });
+const tabs = make("div", { class: "m-tabs small-buttons" });
 const body = make("section", { class: "m-panel", "aria-label": "statechart" });
 root.append(line, tabs, body);
 const statechart = new Statechart(body);

@@ -1,9 +1,11 @@
-/** The diagram: states as boxes and transitions as lines, drawn in SVG, moved and joined with the mouse. */
+/** The diagram: states as boxes and transitions as lines, drawn in SVG. `diagram_mouse.js` has what the mouse does with it. */
 import { contains, line, pathOf, pointOn } from "./geometry.js";
 import { freePlace } from "./free_place.js";
 import { layOut, placeWithin, renamed, textWidth } from "./layout.js";
 import { Router } from "./routes.js";
 import { HANDLE, labelWords, missingShape, stateShape, svg } from "./shapes.js";
+import { takeMouse } from "./diagram_mouse.js";
+import { Viewport } from "./viewport.js";
 
 /**
  * @typedef {import("./session.js").Diagram} Diagram
@@ -13,18 +15,14 @@ import { HANDLE, labelWords, missingShape, stateShape, svg } from "./shapes.js";
  * @typedef {{kind: "mission"|"state"|"transition", id: string}} Selection id: of a state or transition of the diagram
  */
 
-const CLICK_PX = 4;
 const END = 9; // how near to the end of a line the mouse takes it, in the drawing's units
 const END_INWARDS = 17; // how far from its state
 const MISSING_HEIGHT = 24;
-const ZOOM = { least: 0.05, most: 3, step: 1.0015 };
-const MARGIN = 24; // around what is brought into view, in pixels
 
 export class DiagramView {
-  #listener;
+  root;
+  viewport;
   #words;
-  #svg;
-  #world;
   #superstates;
   #lines;
   #states;
@@ -39,7 +37,7 @@ export class DiagramView {
   #missing = new Map();
   /** @type {Map<string, Point>} where states were drawn, within their superstates; also of some that are gone */
   #places = new Map();
-  /** @type {Object<string, Point|null>} what was drawn elsewhere than it is kept */
+  /** @type {Object<string, Point>} what was drawn elsewhere than it is kept */
   #unkept = {};
   /** @type {Map<string, SVGGElement>} */
   #stateElements = new Map();
@@ -56,24 +54,18 @@ export class DiagramView {
   #edges = new Map();
   /** @type {Selection} */
   #selection = { kind: "mission", id: "" };
-  #view = { x: 0, y: 0, scale: 1 };
   #isFresh = true;
-  #hovered = ""; // the transition under the mouse
-  #grasped = ""; // the one whose end is dragged
+  #hovered = "";
   /** @type {[Set<string>, Map<string, number>, Set<string>]} what flies, see `light` */
   #light = [new Set(), new Map(), new Set()];
   #lost = "";
 
   /**
    * @param {HTMLElement} parent
-   * @param {{selected: (selection: Selection) => void, placed: (places: Object<string, Point>) => void,
-   *   joined: (from: string, to: string) => void, moved: (state: string, parent: string, place: Point) => void,
-   *   led: (transition: string, end: "source"|"target", state: string) => void,
-   *   opened: (selection: Selection) => void}} listener told what the mouse has done
+   * @param {import("./diagram_mouse.js").Listener} listener told what the user has done
    * @param {{done: string, resume: string}} words for transitions of these events
    */
   constructor(parent, listener, words) {
-    this.#listener = listener;
     this.#words = words;
     const arrow = svg("marker", {
       id: "e-arrow", viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 11, markerHeight: 11,
@@ -88,22 +80,17 @@ export class DiagramView {
       source: svg("circle", { r: HANDLE, class: "e-end", visibility: "hidden" }),
       target: svg("circle", { r: HANDLE, class: "e-end", visibility: "hidden" }),
     };
-    this.#world = svg("g", {}, this.#superstates, this.#lines, this.#labels, this.#states, this.#ends.source, this.#ends.target, this.#draft);
-    this.#svg = svg("svg", { class: "e-diagram", role: "group", "aria-label": "diagram" }, svg("defs", {}, arrow), this.#world);
-    parent.append(this.#svg);
-    this.#svg.addEventListener("pointerdown", (event) => this.#press(event));
-    this.#svg.addEventListener("dblclick", (event) => this.#open(event));
-    this.#svg.addEventListener("pointerover", (event) => {
-      const found = this.#at(event.target);
-      if (event.buttons === 0) this.#hover(found.kind === "transition" ? found.id : "");
-    });
-    this.#svg.addEventListener("wheel", (event) => this.#zoom(event), { passive: false });
-    this.#svg.addEventListener("keydown", (event) => {
+    const world = svg("g", {}, this.#superstates, this.#lines, this.#labels, this.#states, this.#ends.source, this.#ends.target, this.#draft);
+    this.root = svg("svg", { class: "e-diagram", role: "group", "aria-label": "diagram" }, svg("defs", {}, arrow), world);
+    parent.append(this.root);
+    this.viewport = new Viewport(this.root, world);
+    takeMouse(this, listener);
+    this.root.addEventListener("keydown", (event) => {
       if (event.key !== "Enter" && event.key !== " ") return;
-      const found = this.#at(event.target);
+      const found = this.at(event.target);
       if (found.kind !== "mission") {
         event.preventDefault();
-        this.#listener.selected(found);
+        listener.selected(found);
       }
     });
   }
@@ -128,7 +115,7 @@ export class DiagramView {
     }
     this.#diagram = diagram;
     this.#boxes = layOut(diagram, {
-      places: (id) => kept[id] ?? this.#places.get(id), boxes: this.#boxes, view: this.#isFresh ? null : this.#seen(),
+      places: (id) => kept[id] ?? this.#places.get(id), boxes: this.#boxes, view: this.#isFresh ? null : this.viewport.seen,
     });
     this.#index();
     this.#remember(kept);
@@ -155,14 +142,9 @@ export class DiagramView {
     this.#boxes.clear();
   }
 
-  /** Places as drawn that are not those that were kept. @returns {Object<string, Point|null>} null: not used any more */
+  /** Places as drawn that are not those that were kept. */
   get unkept() {
     return this.#unkept;
-  }
-
-  /** The place of a state within its superstate. @param {string} id */
-  placeOf(id) {
-    return this.#places.get(id);
   }
 
   #remember(kept) {
@@ -172,13 +154,6 @@ export class DiagramView {
       this.#places.set(id, place);
       if (kept[id]?.x !== place.x || kept[id]?.y !== place.y) this.#unkept[id] = place;
     }
-  }
-
-  /** The part of the drawing that is seen. @returns {Box} */
-  #seen() {
-    const { width, height } = this.#svg.getBoundingClientRect();
-    const { x, y, scale } = this.#view;
-    return { x: -x / scale, y: -y / scale, width: width / scale, height: height / scale };
   }
 
   #index() {
@@ -220,7 +195,7 @@ export class DiagramView {
       const count = lanes.get(pair) ?? 0;
       lanes.set(pair, count + 1);
       const bent = Math.ceil(count / 2) * (count % 2 === 1 ? 1 : -1) + 0.5;
-      const kind = `${event === "tick" ? "" : ` e-${event}`}${edge.missing ? " e-astray" : ""}`;
+      const kind = `${event === "tick" ? "" : ` e-${event}`}${edge.missing ? " e-dangling" : ""}`;
       const path = svg("path", { class: "e-line", "marker-end": "url(#e-arrow)" });
       const hit = svg("path", { class: "e-hit" });
       const group = svg("g", { class: `e-transition${kind}`, "data-transition": id, tabindex: 0, role: "button",
@@ -255,7 +230,7 @@ export class DiagramView {
       if (!missing || !box) continue;
       const size = { width: textWidth(`${target} ?`) - 24, height: MISSING_HEIGHT };
       const others = [...this.#boxes, ...this.#missing].filter(([other]) => !source.startsWith(`${other}.`)).map(([, each]) => each);
-      this.#missing.set(id, { ...freePlace(size, others, [box], this.#isFresh ? null : this.#seen(), false), ...size });
+      this.#missing.set(id, { ...freePlace(size, others, [box], this.#isFresh ? null : this.viewport.seen, false), ...size });
     }
   }
 
@@ -284,8 +259,13 @@ export class DiagramView {
     return this.#hovered || (kind === "transition" ? id : "");
   }
 
+  /** The transition under the mouse, whose ends are shown; "": none. */
+  get hovered() {
+    return this.#hovered;
+  }
+
   /** @param {string} id */
-  #hover(id) {
+  hover(id) {
     this.#hovered = id;
     this.#showEnds();
   }
@@ -309,7 +289,7 @@ export class DiagramView {
   }
 
   /** The end of a line that is at a point. @param {Point} point @param {string} id of the transition @returns {"source"|"target"|null} */
-  #endAt({ x, y }, id) {
+  endAt({ x, y }, id) {
     const [start = Infinity, end = Infinity] = this.#endsOf(id).map((each) => Math.hypot(each.x - x, each.y - y));
     return Math.min(start, end) > END ? null : end <= start ? "target" : "source";
   }
@@ -367,15 +347,12 @@ export class DiagramView {
 
   /** Show all of it. */
   fit() {
-    const { width, height } = this.#svg.getBoundingClientRect();
     let right = 1, bottom = 1;
     for (const box of [...this.#boxes.values(), ...this.#missing.values()]) {
       right = Math.max(right, box.x + box.width + 40);
       bottom = Math.max(bottom, box.y + box.height + 24);
     }
-    const scale = Math.min(1.2, Math.max(ZOOM.least, Math.min(width / right, height / bottom)));
-    this.#view = { x: Math.max(0, (width - right * scale) / 2), y: 0, scale };
-    this.#showView();
+    this.viewport.fit(right, bottom);
   }
 
   /** Bring a state or transition into view, if it is not. @param {Selection} selection */
@@ -383,44 +360,11 @@ export class DiagramView {
     const curve = kind === "transition" ? this.#transitionElements.get(id)?.curve : undefined;
     const point = curve && pointOn(curve, 0.5);
     const box = kind === "state" ? this.#boxes.get(id) : point && { ...point, width: 0, height: 0 };
-    if (!box) return;
-    const { width, height } = this.#svg.getBoundingClientRect();
-    const { x, y, scale } = this.#view;
-    const moved = (offset, start, size, whole) => {
-      const from = start * scale + offset, to = from + Math.min(size * scale, whole - 2 * MARGIN);
-      return offset + (from < MARGIN ? MARGIN - from : to > whole - MARGIN ? whole - MARGIN - to : 0);
-    };
-    const isSeen = (start, size, whole) => start >= 0 && start + size <= whole;
-    if (isSeen(box.x * scale + x, box.width * scale, width) && isSeen(box.y * scale + y, box.height * scale, height)) return;
-    this.#view = { x: moved(x, box.x, box.width, width), y: moved(y, box.y, box.height, height), scale };
-    this.#showView();
+    if (box) this.viewport.reveal(box);
   }
 
-  #showView() {
-    const { x, y, scale } = this.#view;
-    this.#world.setAttribute("transform", `translate(${x},${y}) scale(${scale})`);
-  }
-
-  /** @param {WheelEvent} event */
-  #zoom(event) {
-    event.preventDefault();
-    const { x, y, scale } = this.#view;
-    const next = Math.min(ZOOM.most, Math.max(ZOOM.least, scale * ZOOM.step ** -event.deltaY));
-    const frame = this.#svg.getBoundingClientRect();
-    const at = { x: event.clientX - frame.x, y: event.clientY - frame.y };
-    this.#view = { x: at.x - (at.x - x) * next / scale, y: at.y - (at.y - y) * next / scale, scale: next };
-    this.#showView();
-  }
-
-  /** @param {PointerEvent} event @returns {Point} in the drawing's units */
-  #point(event) {
-    const frame = this.#svg.getBoundingClientRect();
-    const { x, y, scale } = this.#view;
-    return { x: (event.clientX - frame.x - x) / scale, y: (event.clientY - frame.y - y) / scale };
-  }
-
-  /** @param {EventTarget|null} target @returns {Selection} */
-  #at(target) {
+  /** What an element of the drawing belongs to. @param {EventTarget|null} target @returns {Selection} */
+  at(target) {
     const element = target instanceof Element ? target.closest("[data-state], [data-transition]") : null;
     if (!(element instanceof SVGElement)) return { kind: "mission", id: "" };
     const { state, transition } = element.dataset;
@@ -428,7 +372,7 @@ export class DiagramView {
   }
 
   /** The innermost state at a point, but none of some. @param {Point} point @param {Set<string>} [except] */
-  #stateAt(point, except = new Set()) {
+  stateAt(point, except = new Set()) {
     let found = null;
     for (const { id: path } of this.#diagram.nodes) {
       if (!except.has(path) && contains(this.#boxes.get(path), point)) found = path; // inner ones come later
@@ -437,7 +381,7 @@ export class DiagramView {
   }
 
   /** The state whose handle is at a point, also below a line. @param {Point} point */
-  #handleAt({ x, y }) {
+  handleAt({ x, y }) {
     for (const [path, box] of this.#boxes) {
       if (Math.hypot(x - box.x - box.width, y - box.y - this.#handleHeight(path)) <= HANDLE) return path;
     }
@@ -454,148 +398,74 @@ export class DiagramView {
     return [path, ...(this.#children.get(path) ?? []).flatMap((child) => this.#family(child))];
   }
 
-  /** @param {MouseEvent} event */
-  #open(event) {
-    // While the mouse is captured the event's target is the drawing.
-    const found = this.#at(document.elementFromPoint(event.clientX, event.clientY));
-    if (found.kind !== "mission") this.#listener.opened(found);
+  /** The superstate in which a state is at a point; "": none. @param {string} id @param {Point} point */
+  superstateAt(id, point) {
+    const over = this.stateAt(point, new Set(this.#family(id))) ?? "";
+    return over === "" || this.#children.has(over) ? over : this.parentOf(over);
   }
 
-  /** @param {PointerEvent} event */
-  #press(event) {
-    if (event.button !== 0) return;
-    const target = event.target instanceof Element ? event.target : null;
-    const point = this.#point(event);
-    const { kind, id } = this.#selection;
-    const handle = this.#handleAt(point);
-    const own = handle === null && kind === "transition" ? this.#endAt(point, id) : null;
-    const pulled = own ? id : this.#hovered;
-    const end = own ?? (handle === null ? this.#endAt(point, pulled) : null);
-    if (handle !== null) this.#drag(event, this.#joining(handle));
-    else if (end !== null) {
-      this.#listener.selected({ kind: "transition", id: pulled });
-      this.#drag(event, this.#leading(pulled, end));
-    } else {
-      const found = this.#at(target);
-      this.#listener.selected(found);
-      if (found.kind === "state") this.#drag(event, this.#moving(found.id, this.#point(event)));
-      else if (found.kind === "mission") this.#drag(event, this.#panning(event));
-    }
+  /** @param {string} id @returns {string} "" of a state at the top */
+  parentOf(id) {
+    return this.#parents.get(id);
+  }
+
+  /** Where a state is drawn within another one; null: the state is not there any more. @param {string} id @param {string} parent */
+  placeIn(id, parent) {
+    const box = this.#boxes.get(id);
+    return box ? placeWithin(box, this.#boxes.get(parent)) : null;
   }
 
   /**
-   * Follow the mouse until its button is released.
-   * @param {PointerEvent} pressed
-   * @param {{move: (event: PointerEvent) => void, end: (event: PointerEvent, wasMoved: boolean) => void}} action
+   * Move a state, with those in it and their lines.
+   * @param {string} id
+   * @returns {(dx: number, dy: number) => void} called with how far it is from where it was
    */
-  #drag(pressed, action) {
-    let isMoved = false;
-    /** @type {PointerEvent|null} */
-    let latest = null;
-    let frame = 0;
-    const move = (event) => {
-      isMoved ||= Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) > CLICK_PX;
-      if (!isMoved) return;
-      latest = event;
-      frame ||= requestAnimationFrame(() => {
-        frame = 0;
-        if (latest) action.move(latest);
-      });
-    };
-    const end = (event) => {
-      this.#svg.removeEventListener("pointermove", move);
-      this.#svg.removeEventListener("pointerup", end);
-      this.#svg.removeEventListener("pointercancel", end);
-      cancelAnimationFrame(frame);
-      if (isMoved) action.move(event);
-      action.end(event, isMoved && event.type === "pointerup");
-    };
-    this.#svg.setPointerCapture(pressed.pointerId);
-    this.#svg.addEventListener("pointermove", move);
-    this.#svg.addEventListener("pointerup", end);
-    this.#svg.addEventListener("pointercancel", end);
-  }
-
-  #panning(pressed) {
-    const before = { ...this.#view };
-    return {
-      move: (event) => {
-        this.#view = { ...before, x: before.x + event.clientX - pressed.clientX, y: before.y + event.clientY - pressed.clientY };
-        this.#showView();
-      },
-      end: () => {},
-    };
-  }
-
-  /** @param {string} path @param {Point} start */
-  #moving(path, start) {
-    const family = this.#family(path);
+  mover(id) {
+    const family = this.#family(id);
     const before = new Map(family.map((each) => [each, { ...this.#boxes.get(each) }]));
-    const astray = new Map([...this.#missing].filter(([id]) => family.includes(this.#edges.get(id)?.source ?? "")).map(([id, box]) => [id, { ...box }]));
+    const dangling = new Map([...this.#missing].filter(([each]) => family.includes(this.#edges.get(each)?.source ?? "")).map(([each, box]) => [each, { ...box }]));
     const lines = new Set(family.flatMap((each) => this.#touching.get(each) ?? []));
-    const moveBy = (dx, dy) => {
-      for (const each of family) {
-        const box = before.get(each), now = this.#boxes.get(each);
+    return (dx, dy) => {
+      for (const [each, box] of before) {
+        const now = this.#boxes.get(each);
         if (!now) continue; // it was deleted in another window meanwhile
         Object.assign(now, { x: box.x + dx, y: box.y + dy });
         this.#place(each);
       }
-      for (const [id, box] of astray) Object.assign(this.#missing.get(id) ?? {}, { x: box.x + dx, y: box.y + dy });
-      for (const id of lines) if (this.#transitionElements.has(id)) this.#drawLine(id);
-    };
-    return {
-      move: (event) => {
-        const { x, y } = this.#point(event);
-        moveBy(x - start.x, y - start.y);
-      },
-      end: (event, wasMoved) => {
-        if (!wasMoved || !this.#boxes.has(path)) return;
-        const parent = this.#parents.get(path);
-        const over = this.#stateAt(this.#point(event), new Set(family)) ?? "";
-        const around = over === "" || this.#children.has(over) ? over : this.#parents.get(over);
-        if (event.shiftKey && around !== parent) {
-          this.#listener.moved(path, around, placeWithin(this.#boxes.get(path), this.#boxes.get(around)));
-          return;
-        }
-        this.#listener.placed({ [path]: placeWithin(this.#boxes.get(path), this.#boxes.get(parent)) });
-      },
+      for (const [each, box] of dangling) Object.assign(this.#missing.get(each) ?? {}, { x: box.x + dx, y: box.y + dy });
+      for (const each of lines) if (this.#transitionElements.has(each)) this.#drawLine(each);
     };
   }
 
-  /** A line from a state to the mouse, which becomes a transition. @param {string} from */
-  #joining(from) {
-    const box = this.#boxes.get(from);
-    return this.#pulling({ x: box.x + box.width, y: box.y + this.#handleHeight(from) }, (to) => this.#listener.joined(from, to));
+  /** The middle of a state's handle. @param {string} id @returns {Point} */
+  handleOf(id) {
+    const { x, y, width } = /** @type {Box} */ (this.#boxes.get(id));
+    return { x: x + width, y: y + this.#handleHeight(id) };
   }
 
-  /** An end of a transition follows the mouse, to another state. @param {string} id @param {"source"|"target"} end */
-  #leading(id, end) {
-    this.#grasped = id;
-    const { curve, group } = /** @type {any} */ (this.#transitionElements.get(id));
-    group.classList.add("e-pulled");
-    return this.#pulling(end === "target" ? curve[0] : curve.at(-1), (state) => this.#listener.led(id, end, state));
+  /** The end of a transition's line that is not dragged. @param {string} id @param {"source"|"target"} dragged @returns {Point} */
+  otherEndOf(id, dragged) {
+    const { curve } = /** @type {any} */ (this.#transitionElements.get(id));
+    return dragged === "target" ? curve[0] : curve.at(-1);
   }
 
-  /** @param {Point} start @param {(state: string) => void} dropped */
-  #pulling(start, dropped) {
-    const target = (event) => this.#stateAt(this.#point(event));
-    return {
-      move: (event) => {
-        const { x, y } = this.#point(event);
-        this.#draft.setAttribute("visibility", "visible");
-        this.#draft.setAttribute("d", `M${start.x},${start.y}L${x},${y}`);
-        const over = target(event);
-        for (const [path, group] of this.#stateElements) group.classList.toggle("e-target", path === over);
-      },
-      end: (event, wasMoved) => {
-        this.#draft.setAttribute("visibility", "hidden");
-        for (const group of this.#stateElements.values()) group.classList.remove("e-target");
-        const to = wasMoved ? target(event) : null;
-        this.#transitionElements.get(this.#grasped)?.group.classList.remove("e-pulled");
-        this.#grasped = "";
-        if (to !== null) dropped(to);
-      },
-    };
+  /**
+   * Draw a line that is being dragged, and the state that it would lead to.
+   * @param {Point} start @param {Point} end
+   * @param {string} pulled id of the transition whose end is dragged; "": a new one
+   */
+  drawDraft(start, end, pulled) {
+    this.#draft.setAttribute("visibility", "visible");
+    this.#draft.setAttribute("d", `M${start.x},${start.y}L${end.x},${end.y}`);
+    this.#transitionElements.get(pulled)?.group.classList.add("e-pulled");
+    const over = this.stateAt(end);
+    for (const [id, group] of this.#stateElements) group.classList.toggle("e-target", id === over);
+  }
+
+  removeDraft() {
+    this.#draft.setAttribute("visibility", "hidden");
+    for (const group of this.#stateElements.values()) group.classList.remove("e-target");
+    for (const { group } of this.#transitionElements.values()) group.classList.remove("e-pulled");
   }
 }
 

@@ -53,6 +53,11 @@ export class Flights {
   }
 }
 
+/** A state's id and those of the states around it, outermost first; none if it is empty. @param {string} id @returns {string[]} */
+export function withOuterStates(id) {
+  return id === "" ? [] : id.split(".").map((_, index, parts) => parts.slice(0, index + 1).join("."));
+}
+
 /** The id of a transition as flights have it. @param {import("./session.js").Edge} edge */
 export function flownId({ source, event, order }) {
   return event === "tick" ? `${source}/${order + 1}` : `${source}/${event === "done" ? "then" : "resume"}`;

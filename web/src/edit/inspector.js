@@ -162,15 +162,17 @@ export class Inspector {
         () => this.#select({ kind: "transition", id: edge.id }), { class: "e-link" })));
     const targets = this.#targets(state.id);
     const add = choice(word("add_transition"), [["", "…"], ...targets], "",
-      (to) => to && this.#addTransition(state, to));
+      (to) => to && this.addTransition(state.id, to));
     return make("fieldset", { class: "e-lines" }, make("legend", {}, word("transitions")), make("ul", {}, ...rows), add);
   }
 
-  /** @param {StateNode} state @param {string} to */
-  async #addTransition(state, to) {
-    const count = this.#session.diagram.edges.filter(({ source, event }) => source === state.id && event === "tick").length;
-    if (await this.#edit({ kind: "add_transition", state: state.source, to: this.#session.target(state.id, to) })) {
-      this.#select({ kind: "transition", id: `${state.id}/tick/${count}` });
+  /** Add a transition and show its form. @param {string} from id of a state of this document @param {string} to id of a state */
+  async addTransition(from, to) {
+    const { nodes, edges } = this.#session.diagram;
+    const count = edges.filter(({ source, event }) => source === from && event === "tick").length;
+    const state = nodes.find(({ id }) => id === from)?.source;
+    if (await this.#edit({ kind: "add_transition", state, to: this.#session.target(from, to) })) {
+      this.#select({ kind: "transition", id: `${from}/tick/${count}` });
       this.focus();
     }
   }

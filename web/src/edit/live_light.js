@@ -1,6 +1,7 @@
 /** Lights the chart of a mission that a drone flies now, as the live channel tells it. */
 import { LiveChannel } from "../lib/live_channel.js";
 import { yawOf } from "../lib/yaw.js";
+import { withOuterStates } from "./flights.js";
 
 /**
  * @param {() => string} name of the mission that is shown
@@ -19,7 +20,7 @@ export function watchFlights(name, listener) {
     if (state === shown) return;
     shown = state;
     if (state === "") counts = {};
-    listener.light(state === "" ? [] : state.split(".").map((_, index, parts) => parts.slice(0, index + 1).join(".")), counts);
+    listener.light(withOuterStates(state), counts);
   };
   channel.on("guards", (message) => {
     if (charts.get(message.id)?.name === name()) counts = message.counts;

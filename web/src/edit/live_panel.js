@@ -1,6 +1,7 @@
 /** Flies the mission in the real simulator, which the live channel shows: any page that is open sees it. */
 import { make, setText } from "../lib/dom.js";
-import { button, choice, textField } from "./fields.js";
+import { button, choice } from "./fields.js";
+import { FIRST_SCENARIO, loadChoices, scenarioFields } from "./scenario_fields.js";
 import { TopView } from "./top_view.js";
 import { word } from "./words.js";
 
@@ -10,9 +11,8 @@ const STEP_M = 0.03; // between two points of the track
 /** @typedef {{state: "starting"|"flying"|"ended"|"stopped", scenario: string, speed: number, text: string}} Live */
 
 export class LivePanel {
-  #ask;
   #listener;
-  #scenario = "test-case-1";
+  #scenario = FIRST_SCENARIO;
   #speed = "1";
   #line = make("p", { role: "status", class: "e-run-line" }, word("live_idle"));
   #choices = make("div", { class: "e-row" });
@@ -21,6 +21,7 @@ export class LivePanel {
   #view;
   /** @type {number[][]} */
   #track = [];
+  #isOver = false; // the flight of the track; its last places may come later
 
   /**
    * @param {HTMLElement} root
@@ -29,13 +30,12 @@ export class LivePanel {
    */
   constructor(root, listener) {
     this.#listener = listener;
-    this.#ask = listener.ask;
     const drawing = make("div", { class: "e-top-view" });
     this.#view = new TopView(drawing);
     this.#start = button(word("live_start"), () => this.#fly(), { class: "e-first" });
-    this.#stop = button(word("live_stop"), () => this.#end(), { disabled: true });
-    root.classList.add("e-fly", "e-live");
-    root.append(drawing, make("div", {},
+    this.#stop = button(word("live_stop"), () => this.#do({ do: "stop_live" }), { disabled: true });
+    root.classList.add("e-fly");
+    root.append(drawing, make("div", { class: "e-flying" },
       this.#choices,
       make("div", { class: "e-row" }, this.#start, this.#stop, make("a", { href: "/", target: "_blank" }, word("live_page"))),
       this.#line, make("p", { class: "hint" }, word("live_hint"))));
@@ -43,13 +43,10 @@ export class LivePanel {
   }
 
   async #loadChoices() {
-    const answer = await fetch("/api/editing/choices");
-    if (!answer.ok) return;
-    const { scenarios, lessons } = await answer.json();
-    const words = [...scenarios, ...lessons].map((each) => /** @type {[string, string]} */ ([each, each]));
+    const choices = await loadChoices();
+    if (!choices) return;
     this.#choices.replaceChildren(
-      choice(word("scenario"), words, this.#scenario, (value) => { this.#scenario = value; }),
-      textField(word("or_layout"), "", (value) => { this.#scenario = value || "test-case-1"; }, { placeholder: "calm-17" }),
+      ...scenarioFields(choices, this.#scenario, (scenario) => { this.#scenario = scenario; }),
       choice(word("speed"), SPEEDS, this.#speed, (value) => { this.#speed = value; }));
   }
 
@@ -60,12 +57,8 @@ export class LivePanel {
     await this.#do({ do: "start_live", text, scenario: this.#scenario, speed: Number(this.#speed) });
   }
 
-  async #end() {
-    await this.#do({ do: "stop_live" });
-  }
-
   async #do(request) {
-    const answer = await this.#ask(request);
+    const answer = await this.#listener.ask(request);
     if (answer.kind !== "refused") return;
     setText(this.#line, answer.text);
     this.#start.removeAttribute("disabled");
@@ -74,6 +67,7 @@ export class LivePanel {
   /** The server told how the flight stands. @param {Live} live */
   hear(live) {
     const isFlying = live.state === "starting" || live.state === "flying";
+    this.#isOver = !isFlying;
     this.#start.toggleAttribute("disabled", isFlying);
     this.#stop.toggleAttribute("disabled", !isFlying);
     const values = { scenario: live.scenario, speed: String(live.speed), text: live.text };
@@ -96,9 +90,12 @@ export class LivePanel {
   move(place, t, state) {
     const [x, y] = place;
     const last = this.#track.at(-1);
-    if (last && t < last[0]) this.#track = [];
+    if (last && t < last[0]) { // another flight
+      this.#track = [];
+      this.#isOver = false;
+    }
     if (!last || Math.hypot(x - last[1], y - last[2]) > STEP_M) this.#track.push([t, x, y, place[2]]);
     this.#view.add(true, this.#track, place, []);
-    if (state) setText(this.#line, state);
+    if (state && !this.#isOver) setText(this.#line, state);
   }
 }

@@ -47,29 +47,23 @@ async function chooseFile() {
   list.replaceChildren(...told.files.map(link));
   if (told.files.length === 0) list.append(make("li", { class: "hint" }, word("no_files")));
   if (!mayEdit) return;
+  /** Ask for a new file and open it. @param {"files"|"import"} how @param {object} content */
+  const create = async (how, content) => {
+    const made = await fetch(`/api/edit/${how}?language=${language()}`, {
+      method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(content),
+    });
+    const { file: created, detail } = await made.json();
+    if (made.ok) location.href = `/edit?file=${encodeURIComponent(created)}`;
+    problem.hidden = made.ok;
+    problem.textContent = typeof detail === "string" ? detail : made.statusText;
+  };
   let name = "my_mission", source = "empty";
   const sources = [["empty", word("empty")], ["example", word("example")], ...told.missions.map((/** @type {string} */ each) => [each, word("a_copy", { name: each })])];
   root.append(make("form", { class: "panel e-new" },
     textField(word("name"), name, (value) => { name = value; }),
     choice(word("from"), /** @type {[string, string][]} */ (sources), source, (value) => { source = value; }),
-    button(word("create"), async () => {
-      const made = await fetch(`/api/edit/files?language=${language()}`, {
-        method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ name, source }),
-      });
-      const { file: created, detail } = await made.json();
-      if (made.ok) location.href = `/edit?file=${encodeURIComponent(created)}`;
-      problem.hidden = made.ok;
-      problem.textContent = typeof detail === "string" ? detail : made.statusText;
-    }),
-    importField(async (text, wanted) => {
-      const made = await fetch(`/api/edit/import?language=${language()}`, {
-        method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ name: wanted, scxml: text }),
-      });
-      const { file: created, detail } = await made.json();
-      if (made.ok) location.href = `/edit?file=${encodeURIComponent(created)}`;
-      problem.hidden = made.ok;
-      problem.textContent = typeof detail === "string" ? detail : made.statusText;
-    })));
+    button(word("create"), () => create("files", { name, source })),
+    importField((scxml, wanted) => create("import", { name: wanted, scxml }))));
 }
 
 /** Whether something was typed into a field, which the browser undoes. @param {EventTarget|null} field */
@@ -169,9 +163,9 @@ function edit(name) {
       session.place(places);
       refresh();
     },
-    joined: (from, to) => join(from, to),
-    moved: (moved, parent, place) => move(moved, parent, place),
-    led: (id, end, to) => lead(id, end, to),
+    joined: join,
+    moved: move,
+    led: lead,
     opened: (chosen) => {
       select(chosen, true);
       inspector.focus();
@@ -188,11 +182,14 @@ function edit(name) {
       new Set(taken.map((id) => ids.get(id) ?? "")));
   }
 
+  /** The text, when the server has checked it. */
+  async function sentText() {
+    await session.flush();
+    return text.text;
+  }
+
   const runs = new RunPanel(flying, {
-    async text() {
-      await session.flush();
-      return text.text;
-    },
+    text: sentText,
     mistake,
     lit: light,
     lost: (id) => diagram.markLost(id),
@@ -201,10 +198,7 @@ function edit(name) {
   }, lesson !== null);
   const live = new LivePanel(living, {
     ask: (request) => runs.ask(request),
-    async text() {
-      await session.flush();
-      return text.text;
-    },
+    text: sentText,
   });
   const replay = new ReplayPanel(replaying, {
     lit: light, lost: (id) => diagram.markLost(id), mission: () => session.mission.name ?? "",
@@ -221,10 +215,7 @@ function edit(name) {
   });
   if (lesson) {
     new LessonPanel(teaching, lesson, {
-      async text() {
-        await session.flush();
-        return text.text;
-      },
+      text: sentText,
       save: store,
       mistake,
       scenario: (name, isLast) => runs.choose(name, !isLast),
@@ -310,15 +301,9 @@ function edit(name) {
   }
 
   /** @param {string} from @param {string} to */
-  async function join(from, to) {
-    const node = session.diagram.nodes.find(({ id }) => id === from);
-    if (!node?.source) return tell(word("foreign_note"));
-    const count = session.diagram.edges.filter(({ source, event }) => source === from && event === "tick").length;
-    if (await session.edit({ kind: "add_transition", state: node.source, to: session.target(from, to) })) {
-      select({ kind: "transition", id: `${from}/tick/${count}` }, true);
-      inspector.focus();
-    }
-    return undefined;
+  function join(from, to) {
+    if (session.diagram.nodes.find(({ id }) => id === from)?.source) inspector.addTransition(from, to);
+    else tell(word("foreign_note"));
   }
 
   /**

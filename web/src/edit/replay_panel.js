@@ -5,6 +5,7 @@ import { Clock } from "../lib/replay/clock.js";
 import { fetchJson, Run } from "../lib/replay/run.js";
 import { yawOf } from "../lib/yaw.js";
 import { button } from "./fields.js";
+import { withOuterStates } from "./flights.js";
 import { drawStrip } from "./state_strip.js";
 import { TopView } from "./top_view.js";
 import { contactsOf } from "./verdict.js";
@@ -45,7 +46,7 @@ export class ReplayPanel {
     this.#view = new TopView(drawing);
     root.classList.add("e-fly", "e-replay");
     this.#list.addEventListener("change", () => this.show(this.#list.value));
-    root.append(drawing, make("div", {},
+    root.append(drawing, make("div", { class: "e-flying" },
       make("div", { class: "e-row" },
         make("label", { class: "e-field" }, make("span", {}, word("flight")), this.#list),
         button(word("list_again"), () => this.load())),
@@ -126,8 +127,7 @@ export class ReplayPanel {
     const [state, seconds] = run.stateAt(t);
     const [last, count] = run.transitionsAt(t);
     const recent = last.filter((/** @type {Taken} */ { time_s }) => t - time_s < RECENT_S);
-    const active = state === null ? [] : state.split(".").map((_, index, parts) => parts.slice(0, index + 1).join("."));
-    this.#listener.lit(active, countsUntil(run, count), recent.flatMap((/** @type {Taken} */ { ids }) => ids));
+    this.#listener.lit(withOuterStates(state ?? ""), countsUntil(run, count), recent.flatMap((/** @type {Taken} */ { ids }) => ids));
     const trail = run.poses.slice(0, run.posesUntil(t)).map(({ t: time_s, p }) => [time_s, ...p]);
     const pose = run.poseAt(t);
     const hits = run.result ? contactsOf(run.result).filter(({ time_s }) => time_s <= t) : [];
@@ -147,16 +147,16 @@ export class ReplayPanel {
       make("dt", {}, name), make("dd", {}, typeof value === "number" ? number(value, 2) : String(value))]));
     const head = make("tr", {}, ...["seconds", "from_state", "to", "guard_word"].map((key) => make("th", {}, word(/** @type {any} */ (key)))));
     this.#table.replaceChildren(...(last.length > 0 ? [head] : []), ...last.slice(0, 5).map(({ time_s, from, to, when }) => make("tr", {},
-      make("td", {}, number(time_s, 1)), make("td", {}, from), make("td", {}, to), make("td", {}, when || word("always")))));
+      make("td", { class: "e-number" }, number(time_s, 1)), make("td", {}, from), make("td", {}, to), make("td", {}, when || word("always")))));
   }
 }
 
 /** @param {RunInfo} run */
 function title({ name, scenario, mission, verdict, started }) {
   const time = new Date(started);
-  const when = started && !Number.isNaN(time.getTime()) ? time.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" }) : name;
-  const day = started && !Number.isNaN(time.getTime()) ? `${time.toLocaleDateString()} ` : "";
-  return [`${day}${when}`, scenario, mission, verdict].filter(Boolean).join(" · ");
+  const when = Number.isNaN(time.getTime()) ? name
+    : `${time.toLocaleDateString()} ${time.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" })}`;
+  return [when, scenario, mission, verdict].filter(Boolean).join(" · ");
 }
 
 /** How often each of the first transitions was taken. @param {Run} run @param {number} count */

@@ -1,7 +1,8 @@
 /** Flying the mission from its page: one flight with pause, step and breaks, or many on random layouts. */
 import { make, number, setText } from "../lib/dom.js";
-import { button, choice, textField } from "./fields.js";
+import { button, choice } from "./fields.js";
 import { Flights } from "./flights.js";
+import { FIRST_SCENARIO, loadChoices, options, scenarioFields } from "./scenario_fields.js";
 import { drawStrip } from "./state_strip.js";
 import { TopView } from "./top_view.js";
 import { contactsOf, hitWords, shortVerdict, verdictWords } from "./verdict.js";
@@ -18,7 +19,7 @@ export class RunPanel {
   #flights;
   #run = "";
   #batch = "";
-  #scenario = "test-case-1";
+  #scenario = FIRST_SCENARIO;
   #level = "calm";
   #speed = "1";
   #isStopped = false; // by the button
@@ -84,14 +85,11 @@ export class RunPanel {
   }
 
   async #loadChoices() {
-    const answer = await fetch("/api/editing/choices");
-    if (!answer.ok) return;
-    const { scenarios, lessons, levels } = await answer.json();
-    const words = (list) => list.map((each) => /** @type {[string, string]} */ ([each, each]));
+    const choices = await loadChoices();
+    if (!choices) return;
     this.#choices.replaceChildren(
-      choice(word("scenario"), words([...scenarios, ...lessons]), this.#scenario, (value) => { this.#scenario = value; }),
-      textField(word("or_layout"), "", (value) => { this.#scenario = value || "test-case-1"; }, { placeholder: "calm-17" }),
-      choice(word("level"), words(levels), this.#level, (value) => { this.#level = value; }));
+      ...scenarioFields(choices, this.#scenario, (scenario) => { this.#scenario = scenario; }),
+      choice(word("level"), options(choices.levels), this.#level, (value) => { this.#level = value; }));
   }
 
   /** Fly in a scenario from now on. @param {string} scenario @param {boolean} isSimple without what a beginner does not need */
@@ -271,7 +269,7 @@ export class RunPanel {
         this.#listener.lost(each.lost_in);
       }, { class: "e-link" });
       return make("tr", { "data-completed": String(each.completed) },
-        make("td", {}, show), make("td", {}, shortVerdict(each.verdict)), make("td", {}, each.lost_in), make("td", {}, number(each.total_time_s, 1)));
+        make("td", {}, show), make("td", {}, shortVerdict(each.verdict)), make("td", {}, each.lost_in), make("td", { class: "e-number" }, number(each.total_time_s, 1)));
     }));
     setText(this.#line, word("flown_many", {
       flown: String(this.#rows.length), completed: String(this.#rows.filter(({ completed }) => completed).length),

@@ -91,7 +91,7 @@ export class EditSession {
    * @param {any} message
    * @returns {boolean} whether the text that is shown stays
    */
-  #meet(message) {
+  #synchronize(message) {
     const isOther = this.#session !== "" && message.session !== this.#session; // the program was started anew
     this.#session = message.session;
     this.#isReady = true;
@@ -149,16 +149,13 @@ export class EditSession {
 
   /**
    * Keep where states are drawn.
-   * @param {Object<string, Point|null>} places null forgets one
+   * @param {Object<string, Point>} places
    * @param {boolean} [settled] the page has found these places: nothing to undo
    */
   async place(places, settled = false) {
     if (Object.keys(places).length === 0) return true;
+    Object.assign(this.layout, places); // at once: the next drawing has them
     await this.flush();
-    for (const [path, point] of Object.entries(places)) {
-      if (point) this.layout[path] = point;
-      else delete this.layout[path];
-    }
     return this.#ask({ type: "layout", places, settled });
   }
 
@@ -220,7 +217,7 @@ export class EditSession {
   #receive(message) {
     if (message.warning) this.#listener.refused(message.warning, "");
     if (message.type === "document" || message.type === "changed") {
-      const stays = message.type === "document" && message.answered !== undefined && this.#meet(message);
+      const stays = message.type === "document" && message.answered !== undefined && this.#synchronize(message);
       this.revision = message.revision;
       for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) this[key] = message[key];
       if (language() === "es") for (const finding of this.findings) finding.message = finding.spanish ?? finding.message;
@@ -238,7 +235,8 @@ export class EditSession {
       if (stays) this.flush();
     } else {
       this.#setStatus(message);
-      if (message.layout && !isSame(message.layout, this.layout)) {
+      const isOutdated = [...this.#waiting.values()].some(({ message: sent }) => sent.type === "layout" && sent.number > message.answers);
+      if (message.layout && !isOutdated && !isSame(message.layout, this.layout)) {
         this.layout = message.layout;
         this.#listener.placed();
       }

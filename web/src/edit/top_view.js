@@ -1,38 +1,34 @@
 /** A flight's track from above, with what is in the arena and the goals of a lesson, and the drone's height beside it. */
 import { allFrames, prismsOf } from "../lib/arena/obstacles.js";
 import { make, number } from "../lib/dom.js";
+import { svg } from "./shapes.js";
 import { thingName } from "./verdict.js";
 import { word } from "./words.js";
 
-const SVG = "http://www.w3.org/2000/svg";
 const MAP_PX = 190;
 const [LEFT_PX, TOP_PX, BOTTOM_PX, SCALE_PX] = [30, 8, 32, 58]; // the last: width of the scale of heights
 const MAX_LINES = 20; // of the grid, in each direction
+const ARENA = { length_x_m: 10, width_y_m: 10, height_m: 4 }; // until the scenario is known
+const ARROW = "M 9 0 L -6 6 L -3 0 L -6 -6 Z"; // the drone, its heading to the right
+const DISC = "M 5 0 A 5 5 0 1 1 5 -0.01 Z"; // if that is not known
 
 /** @typedef {{name: string, time_s: number}} Contact since the start of the flight */
-
-/** @param {string} tag @param {Object<string, string|number>} attributes @param {string} [text] @returns {any} */
-function svg(tag, attributes, text) {
-  const element = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
-  if (text !== undefined) element.textContent = text;
-  return element;
-}
 
 export class TopView {
   #picture = svg("svg", { role: "img", "aria-label": word("top_view") });
   #legend = make("ul", { class: "t-legend" });
   #track = svg("polyline", { class: "t-track" });
-  #hits = svg("g", {});
+  #hits = svg("g");
   #drone = svg("g", { class: "t-drone", visibility: "hidden" });
-  #shape = svg("path", { d: "M 9 0 L -6 6 L -3 0 L -6 -6 Z" });
+  #shape = svg("path");
   #words = svg("text", { class: "t-height" });
   #mark = svg("path", { class: "t-mark" });
   /** @type {number[][]} time, x, y and z */
   #points = [];
   /** @type {Contact[]} */
   #contacts = [];
-  #arena = { length_x_m: 10, width_y_m: 10, height_m: 4 };
+  #arena = ARENA;
+  #scenario = null;
 
   /** @param {HTMLElement} parent */
   constructor(parent) {
@@ -48,7 +44,7 @@ export class TopView {
 
   /** Show an arena, and no flight. @param {any} scenario null: not known yet */
   setWorld(scenario) {
-    this.#arena = scenario?.arena ?? { length_x_m: 10, width_y_m: 10, height_m: 4 };
+    this.#arena = scenario?.arena ?? ARENA;
     this.#points = [];
     this.#contacts = [];
     const { length_x_m, width_y_m } = this.#arena;
@@ -207,14 +203,12 @@ export class TopView {
     this.#scenario = scenario;
   }
 
-  #scenario = null;
-
   /** @param {number|null} x_m @param {number|null} y_m @param {number|null} z_m @param {number|null} yaw_rad null: not known */
   #place(x_m, y_m, z_m, yaw_rad) {
     if (typeof x_m !== "number" || typeof y_m !== "number" || typeof z_m !== "number") return;
     const [x, y] = [this.#x(x_m), this.#y(y_m)];
     this.#drone.setAttribute("visibility", "visible");
-    this.#shape.setAttribute("d", typeof yaw_rad === "number" ? "M 9 0 L -6 6 L -3 0 L -6 -6 Z" : "M 5 0 A 5 5 0 1 1 5 -0.01 Z");
+    this.#shape.setAttribute("d", typeof yaw_rad === "number" ? ARROW : DISC);
     this.#shape.setAttribute("transform", `translate(${x} ${y}) rotate(${(-(yaw_rad ?? 0) * 180) / Math.PI})`);
     const isRight = x_m > this.#arena.length_x_m / 4;
     this.#words.setAttribute("x", x + (isRight ? -11 : 11));

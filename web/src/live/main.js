@@ -32,7 +32,7 @@ function panel(place, name, title) {
 }
 
 const line = make("p", { class: "m-line", role: "status", hidden: true });
-const tabs = make("div", { class: "m-tabs" });
+const tabs = make("div", { class: "m-tabs small-buttons" });
 const top = make("div", { class: "m-top" });
 const side = make("div", { class: "m-side" });
 const grid = make("div", { class: "m-grid" });

@@ -176,7 +176,7 @@ export class Arena {
   }
 
   #makeBar() {
-    const bar = make("div", { class: "m-views", role: "toolbar", "aria-label": "views" });
+    const bar = make("div", { class: "m-views small-buttons", role: "toolbar", "aria-label": "views" });
     // What turns the arena would capture the pointer, and the click would never reach the button.
     bar.addEventListener("pointerdown", (event) => event.stopPropagation());
     /** @type {[View, string][]} */ (Object.entries(VIEWS)).forEach(([view, words], index) => {

@@ -162,7 +162,7 @@ export class Statechart {
   }
 
   #makeButtons() {
-    const bar = make("span", { class: "m-chart-buttons", role: "toolbar", "aria-label": "view of the diagram" });
+    const bar = make("span", { class: "m-chart-buttons small-buttons", role: "toolbar", "aria-label": "view of the diagram" });
     const add = (name, words, label, act) => {
       const button = make("button", { type: "button", "aria-label": label, title: label }, words);
       button.addEventListener("click", act);

@@ -45,7 +45,7 @@ export class Bar {
     this.#marks = make("div", { class: "r-marks" });
     runs.forEach((run, row) => this.#addMarks(run, row));
     const track = make("div", { class: "r-track", "data-rows": String(runs.length) }, this.#slider, this.#marks);
-    const buttons = make("div", { class: "r-buttons" }, this.#play, back, on, this.#time, this.#speed);
+    const buttons = make("div", { class: "r-buttons small-buttons" }, this.#play, back, on, this.#time, this.#speed);
     this.root = make("div", { class: "r-bar m-panel", role: "group", "aria-label": "time" }, buttons, track);
     element.append(this.root);
     if (keys) document.addEventListener("keydown", (event) => this.#key(event));
