@@ -8,8 +8,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any, TextIO
 
-from mavsdk.asyncio import Configuration, Mavsdk, MavsdkError
-from mavsdk.asyncio.component_type import ComponentType
+from mavsdk.asyncio import Mavsdk, MavsdkError
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
@@ -19,7 +18,7 @@ from offboard.keep_in_box import Box, confine
 from offboard.link.autopilots import open_dialect
 from offboard.link.commands import PendingRequests, synchronous
 from offboard.link.companion import Companion
-from offboard.link.connections import open_connections
+from offboard.link.connections import new_mavsdk, open_connections
 from offboard.link.dialect import Dialect
 from offboard.link.reported_state import reported_state
 from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, request_rates
@@ -149,8 +148,7 @@ class MavsdkDrone:
             check_free(self._url, self._advice)
         except LinkError as error:
             raise DroneError(str(error)) from None
-        # As a ground station: PX4 sends the reasons of its refusals (STATUSTEXT) only to ground stations.
-        self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+        self._mavsdk = new_mavsdk()
         self._recorder = await open_connections(
             self._mavsdk, (*self._shared_with, self._url.text), self._tlog_path, self._companion
         )

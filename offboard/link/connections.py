@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mavsdk.asyncio import ForwardingOption, Mavsdk, MavsdkError
+from mavsdk.asyncio import Configuration, ForwardingOption, Mavsdk, MavsdkError
+from mavsdk.asyncio.component_type import ComponentType
 from mavsdk.logging import log_subscribe
 
 from offboard.drone import DroneError
@@ -15,6 +16,15 @@ from offboard.link.companion import Companion
 from offboard.link.tlog import TlogRecorder
 
 logger = logging.getLogger(__name__)
+
+
+def new_mavsdk() -> Mavsdk:
+    """MAVSDK as a ground station, as PX4 sends the reasons of its refusals (STATUSTEXT) only to those.
+
+    Its messages go to this module's logger, from its first one on.
+    """
+    log_subscribe(_log)
+    return Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
 
 
 async def open_connections(
@@ -34,7 +44,6 @@ async def open_connections(
     Raises:
         DroneError: the vehicle's link or the recording cannot be opened.
     """
-    log_subscribe(_log)
     recorder = None
     if tlog_path is not None:
         try:

@@ -28,5 +28,6 @@ def test_a_full_disk_ends_the_log_after_a_whole_packet(tmp_path):
     read = []
     while (message := log.recv_match()) is not None:
         read.append(message.time_unix_usec)
+    log.close()
     assert read == list(range(1, recorder.packets + 1))
     assert 3 < recorder.packets < 10
