@@ -107,12 +107,16 @@ class FlightPlan:
         camera, calibration = self.scenario.camera, self.calibration
         if calibration is None:
             return camera
+        mounting = calibration.mounting
+        place_m = None if mounting is None else mounting.position_flu_m
         return camera.model_copy(
             update={
                 "width_px": calibration.width_px,
                 "height_px": calibration.height_px,
                 "horizontal_fov_rad": calibration.horizontal_fov_rad,
                 "effects": CameraEffects(readout_s=calibration.readout_s),
+                "mounting_frd_rad": (0.0, 0.0, 0.0) if mounting is None else mounting.angles_frd_rad,
+                "position_flu_m": camera.position_flu_m if place_m is None else place_m,
             }
         )
 
