@@ -110,8 +110,8 @@ def mounting_flu(angles_frd_rad: Vec3) -> Quaternion:
     """How a sensor is turned on the body, from its axes forward, left, up to the body's.
 
     Args:
-        angles_frd_rad: roll, pitch and yaw of the sensor on the body, axes forward, right, down: rolled to the
-            right, pitched up and turned to the right are positive.
+        angles_frd_rad: roll, pitch and yaw of the sensor on the body, axes forward, right, down: to the
+            right, up and to the right are positive.
     """
     roll_rad, pitch_rad, yaw_rad = angles_frd_rad
     return quaternion_from_euler(roll_rad, -pitch_rad, -yaw_rad)

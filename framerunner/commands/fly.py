@@ -35,11 +35,18 @@ _Drone = Annotated[
 ]
 _Camera = Annotated[str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")]
 _CameraDelay = Annotated[
-    float, Parameter(help="with --camera: age in s of an image that arrives without a time stamp")
+    float | None,
+    Parameter(
+        help="with --camera: age in s of an image that arrives without a time stamp; by default that of the "
+        "calibration, else 0.1"
+    ),
 ]
 _Calibration = Annotated[
     Path | None,
-    Parameter(help="with --drone: its camera's calibration, a file of `framerunner camera calibrate`"),
+    Parameter(
+        help="its camera's calibration, a file of `framerunner camera calibrate`; a simulated drone's is known, "
+        "and is replaced by the file's"
+    ),
 ]
 _Simulator = Annotated[
     str | None,
@@ -91,7 +98,7 @@ def fly(
     mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
     drone: _Drone = None,
     camera: _Camera = None,
-    camera_delay: _CameraDelay = 0.1,
+    camera_delay: _CameraDelay = None,
     calibration: _Calibration = None,
     simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
@@ -128,7 +135,8 @@ def fly(
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
-    check_range("--camera-delay", camera_delay, 0.0, 0.5)
+    if camera_delay is not None:
+        check_range("--camera-delay", camera_delay, 0.0, 0.5)
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
     _check(drone, camera, speed, instance, lockstep=lockstep, px4=px4)
@@ -140,8 +148,9 @@ def fly(
     loaded = load_mission_with(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep, px4=px4)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
-    real_time = RealTimeSettings(drone, camera, api, speed, instance, px4, camera_delay, procedure)
+    plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
+    delay_s = plan.camera_delay_s if camera_delay is None else camera_delay
+    real_time = RealTimeSettings(drone, camera, api, speed, instance, px4, delay_s, procedure)
     ends = (plan, None if lockstep else real_time, out, record, video, monitor, monitor_link)
     return _run(FlightSettings(*ends), lifeline=lifeline)
 
@@ -182,14 +191,12 @@ def _scenario(
     return scenario if px4 is None else for_px4(scenario)
 
 
-def _calibrated(plan: FlightPlan, path: Path | None, drone: str | None) -> FlightPlan:
-    """The plan with the calibration of a real drone's camera, if one is given."""
+def _calibrated(plan: FlightPlan, path: Path | None) -> FlightPlan:
+    """The plan with the calibration of the drone's camera, if one is given."""
     if path is None:
         return plan
     from framerunner.camera_calibration.calibration_file import load_calibration
 
-    if drone is None:
-        raise SettingError("--calibration: a simulated drone's camera is known; leave it out or give --drone")
     if plan.chart.vision == "boxes":
         raise SettingError(
             f"--calibration: mission {plan.chart.name} sees boxes, whose formulas know no lens; leave it out "

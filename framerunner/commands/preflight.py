@@ -25,8 +25,14 @@ def preflight(
         str | None, Parameter(help="URL, device or folder of its camera; checked if given")
     ] = None,
     camera_delay: Annotated[
-        float, Parameter(help="age in s of an image that arrives without a time stamp")
-    ] = 0.1,
+        float | None,
+        Parameter(
+            help="age in s of an image that arrives without a time stamp; by default the calibration's, else 0.1"
+        ),
+    ] = None,
+    calibration: Annotated[
+        Path | None, Parameter(help="the camera's calibration, a file of `framerunner camera calibrate`")
+    ] = None,
     mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
     max_speed: Annotated[float, Parameter(help="cap on the level speed, m/s")] = 2.0,
     max_height: Annotated[float | None, Parameter(help="cap on the height above the start, m")] = None,
@@ -56,18 +62,22 @@ def preflight(
 
         framerunner preflight --restore-parameters parameters-before.params
     """
-    check_range("--camera-delay", camera_delay, 0.0, 0.5)
+    if camera_delay is not None:
+        check_range("--camera-delay", camera_delay, 0.0, 0.5)
     if restore_parameters is not None:
         return _restore(drone, restore_parameters)
 
+    from framerunner.camera_calibration.calibration_file import load_calibration
     from framerunner.commands.hardware import HardwareOptions, caps_of
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.run import PreflightSettings
     from scenarios.loader import load_scenario
 
     caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission_with(mission, None)
-    plan = FlightPlan(load_scenario(scenario), loaded, None, caps=caps)
-    return _check(plan, PreflightSettings(drone, camera, camera_delay, set_parameters, accept, out))
+    known = None if calibration is None else load_calibration(calibration)
+    plan = FlightPlan(load_scenario(scenario), loaded, None, calibration=known, caps=caps)
+    delay_s = plan.camera_delay_s if camera_delay is None else camera_delay
+    return _check(plan, PreflightSettings(drone, camera, delay_s, set_parameters, accept, out))
 
 
 def _check(plan: FlightPlan, settings: PreflightSettings) -> int:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:  # it imports the statechart library, which the virtual camera
     from offboard.mission import Mission
 
 P = TypeVar("P", bound=Part)
+CAMERA_DELAY_S = 0.1
+"""From exposure to arrival of an image, where it was not measured."""
 StartPose = tuple[float, float, float, float]
 """x, y, z of the drone's centre (metres) and yaw (radians), arena axes."""
 
@@ -39,7 +41,7 @@ class FlightPlan:
             Lifted by the base's height, everything is as high above the real floor as the scenario says.
         drone_limits: of a real drone, for a mission of the class `open`; None: those of the airframe.
         response: how late the simulated vehicle of a lockstep flight answers; None: as its autopilot does.
-        calibration: of a real camera; None: it is the scenario's.
+        calibration: of the camera; None: it is the scenario's.
         caps: on the speed and the height of the drone, whatever the mission asks; None: there are none.
     """
 
@@ -119,6 +121,12 @@ class FlightPlan:
                 "position_flu_m": camera.position_flu_m if place_m is None else place_m,
             }
         )
+
+    @property
+    def camera_delay_s(self) -> float:
+        """Age of an image that arrives without a time stamp, if nobody says more."""
+        measured_s = None if self.calibration is None else self.calibration.delay_s
+        return CAMERA_DELAY_S if measured_s is None else measured_s
 
     @property
     def box(self) -> Box:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from framerunner.flying.fly import FinishedFlight, fly
-from framerunner.flying.plan import FlightPlan
+from framerunner.flying.plan import CAMERA_DELAY_S, FlightPlan
 from framerunner.flying.timing import flight_timing
 from framerunner.runs.recorder import RecordingCamera, RunRecords
 from framerunner.runs.run_folder import warn
@@ -40,7 +40,9 @@ class RealTimeSettings:
     speed: float = 1.0  # of the simulator that is started: simulated seconds a second
     instance: int = 0  # of the simulator that is started: shifts its ports
     px4: Path | None = None  # folder of a PX4 that flies in the simulator that is started; None: our own does
-    camera_delay_s: float = 0.1  # age of an image on arrival, for a camera that sends no time stamps
+    camera_delay_s: float = (
+        CAMERA_DELAY_S  # age of an image on arrival, for a camera that sends no time stamps
+    )
     hardware: HardwareSettings | None = None  # of a drone that may be a real one; None: it is simulated
 
 
@@ -96,7 +98,7 @@ async def fly_in_real_time(
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         dry_run = settings.hardware is not None and settings.hardware.dry_run
         drone = _drone(plan, vehicle, records, stack, companion, dry_run=dry_run, system_id=system_id)
-        camera = await _camera(plan, vehicle, records, stack, reporter)
+        camera = await _camera(plan, vehicle, records, stack, reporter, drone.vehicle_time_us)
         perception = _perception(plan, vehicle, judge, camera)
         perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
@@ -223,11 +225,14 @@ async def _camera(
     records: RunRecords,
     stack: AsyncExitStack,
     reporter: MissionReporter,
+    vehicle_time_us: Callable[[float], int | None],
 ) -> RecordingCamera:
     """The camera, whose images are recorded; closed with the stack."""
     from vision.sources import open_source
 
     def keep(frame: CameraFrame) -> None:
+        if frame.time_us is None:  # it is recorded at its arrival, which is between two ticks
+            frame = replace(frame, time_us=vehicle_time_us(frame.received_s))
         records.see_frame(frame)
         reporter.see_frame(frame)
 

@@ -24,7 +24,7 @@ class CameraModel:
         position_flu_m: of the camera on the drone: forward, left, up.
         readout_s: of a rolling shutter, from the first to the last row; an image's time is the middle.
         on_gimbal: whether a gimbal carries it; its attitude is reported then.
-        mounting: how it is turned on the drone, from its axes forward, left, up to the body's; None: not at all.
+        mounting: how it is turned on the drone, from its axes forward, left, up to the body's; None: not.
     """
 
     focal_px: float

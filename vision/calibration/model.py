@@ -29,7 +29,7 @@ class CalibrationError(UserError):
 class Mounting(BaseModel):
     """How a camera is mounted on a drone, as `camera extrinsics` measures it.
 
-    Angles turn the body's axes into the camera's: yaw, then pitch, then roll, about axes down, right, forward.
+    Angles turn the body's axes into the camera's: yaw, pitch, roll, about the axes down, right, forward.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -77,7 +77,7 @@ class Calibration(BaseModel):
         None,
         ge=0,
         le=0.5,
-        description="from exposure to arrival of an image without a time stamp; `--camera-delay` if not given",
+        description="from exposure to arrival of an image without a time stamp; None: --camera-delay says it",
     )
     rms_px: float | None = Field(
         None, ge=0, description="root mean square of what is left of the corners' errors"

@@ -71,7 +71,7 @@ class Motion:
 
     def seconds(self, times_us: Sequence[int]) -> Floats:
         """Vehicle times as seconds since the start."""
-        return (np.array(times_us, np.int64) - self.start_us) * 1e-6
+        return np.array([(time_us - self.start_us) * 1e-6 for time_us in times_us], np.float64)
 
     def is_known(self, times_s: Floats) -> Bools:
         """Whether times are within the reports, and in none of their gaps."""
@@ -102,7 +102,7 @@ class Motion:
         after = np.clip(np.searchsorted(track, times_s), 1, len(track) - 1)
         share = np.clip((times_s - track[after - 1]) / (track[after] - track[after - 1]), 0.0, 1.0)[:, None]
         mixed = (1.0 - share) * self._quaternions[after - 1] + share * self._quaternions[after]
-        return matrices(mixed / np.linalg.norm(mixed, axis=1)[:, None])
+        return matrices(mixed / np.sqrt((mixed**2).sum(axis=1))[:, None])
 
 
 def matrices(quaternions: Floats) -> Floats:

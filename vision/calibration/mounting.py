@@ -2,8 +2,8 @@
 
 Unknown are roll, pitch and yaw of the camera on the body, its place, the delay of its images, and the pose of
 every frame; known are the frames' size, where their corners are in the images, and the drone's poses by its
-telemetry. All are found by robust least squares of the corners' errors (B. Triggs et al., "Bundle adjustment -
-a modern synthesis", 2000). Frames hang nearly upright, so their tilt is unknown within a degree only.
+telemetry. All are found by robust least squares of the corners' errors (B. Triggs et al., "Bundle adjustment
+- a modern synthesis", 2000). Frames hang nearly upright, so their tilt is unknown within a degree only.
 
 The standard deviations are the larger of two: those of the least squares, and those of the jackknife, which
 leaves out one tenth of the flight after the other. The second knows that errors of the drone's estimator go
@@ -25,6 +25,7 @@ from vision.calibration.sightings import (
     MIN_OF_A_FRAME,
     Indices,
     Sightings,
+    Values,
     first_mounting,
     first_yaw,
     frames_among,
@@ -54,21 +55,6 @@ _STEP = 1e-4  # of numerical differences, rad and s
 
 _SIDEWAYS_M = np.array([-1.0, 1.0, 1.0, -1.0]) * FRAME_WIDTH_M / 2.0
 _UPWARDS_M = np.array([1.0, 1.0, -1.0, -1.0]) * FRAME_HEIGHT_M / 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class Values:
-    """What is known of a mounting before; as standard deviations, how exactly it is known after.
-
-    Attributes:
-        angles_frd_rad: roll, pitch and yaw on the body.
-        position_flu_m: of the camera from the drone's centre.
-        delay_s: by which images are older than their times.
-    """
-
-    angles_frd_rad: Vec3
-    position_flu_m: Vec3
-    delay_s: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,12 +93,10 @@ def fit_mounting(seen: Sightings, motion: Motion, focal_px: float, known: Values
     """
     if len(seen) < MIN_OF_A_FRAME:
         return None
-    angles = first_mounting(seen, motion, known.position_flu_m, known.delay_s)
-    start = Values(angles, known.position_flu_m, known.delay_s)
+    start = first_mounting(seen, motion, known)
     free = np.ones(len(seen), np.bool_)  # sightings that may be of a frame
     for number in range(_MAX_ROUNDS):
-        where = (start.angles_frd_rad, start.position_flu_m, start.delay_s)
-        numbers, places = frames_among(seen, free, motion, *where)
+        numbers, places = frames_among(seen, free, motion, start)
         used = np.flatnonzero(numbers >= 0)
         if not len(used):
             return None
@@ -140,7 +124,9 @@ class _Adjustment:
     known: Values
     solution: Floats = field(default_factory=lambda: np.empty(0))
     _weights: Floats = field(default_factory=lambda: np.empty(0))  # shape (n, 4, 2); 0: not used
-    _sides: Floats = field(default_factory=lambda: np.empty(0))  # 1: seen from the side of the normal, else -1
+    _sides: Floats = field(
+        default_factory=lambda: np.empty(0)
+    )  # 1: seen from the side of the normal, else -1
     _size_std: float = 0.0
     _poses: tuple[float, Floats, Floats] | None = None  # of the drone at the corners, with a delay
 
@@ -159,7 +145,7 @@ class _Adjustment:
         at = [*start.angles_frd_rad, *start.position_flu_m, start.delay_s]
         for number, place in enumerate(places):
             mine = self.seen.at(np.flatnonzero(self.numbers == number))
-            yaw = first_yaw(mine, self.motion, start.angles_frd_rad, start.delay_s)
+            yaw = first_yaw(mine, self.motion, start)
             at += [*place, yaw, 0.0, 0.0, 0.0]
         self.solution = np.array(at)
         variances = self.seen.std_px**2 + _PIXEL_STD_PX**2 + (_ATTITUDE_STD_RAD * self.focal_px) ** 2
@@ -170,7 +156,7 @@ class _Adjustment:
             self._minimize("soft_l1")
 
     def refine(self) -> None:
-        """Go on from the solution: frames have their size, and corners far from where they should be are none."""
+        """Go on from the solution: frames have their size, and corners that are far off are not used."""
         self._size_std = SIZE_STD
         self._minimize("soft_l1")
         errors = np.abs(self._errors(self.solution)).max(axis=2)
@@ -184,7 +170,7 @@ class _Adjustment:
         self.solution = least_squares(*what, loss=loss, x_scale="jac", max_nfev=_MAX_STEPS).x
 
     def are_wrong(self) -> Bools:
-        """Which frames are none: their corners are not where a rectangle's would be, or their size is another."""
+        """Which frames are none: their corners are not those of a rectangle, or their size is another."""
         sizes = self._frames(self.solution)[:, 6]
         return (self._frame_errors() > _MAX_FRAME_ERROR) | (np.abs(sizes) > _MAX_SIZE_ERROR)
 
@@ -209,7 +195,7 @@ class _Adjustment:
         return at[_OF_MOUNTING:].reshape(-1, _OF_A_FRAME)
 
     def _drone(self, delay_s: float) -> tuple[Floats, Floats]:
-        """The drone's positions and rotations when the corners were exposed, shapes (n, 4, 3) and (n, 4, 3, 3)."""
+        """Positions and rotations of the drone when corners were exposed, shape (n, 4, 3), (n, 4, 3, 3)."""
         if self._poses is None or self._poses[0] != delay_s:
             times_s = (self.seen.corners_s - delay_s).ravel()
             count = len(self.seen)
@@ -269,7 +255,8 @@ class _Adjustment:
     def _residuals(self, at: Floats) -> Floats:
         """Errors of all corners, then what is known before."""
         mean, std = self._prior(at)
-        return np.concatenate([self._errors(at).ravel(), (at - mean) / std])
+        residuals: Floats = np.concatenate([self._errors(at).ravel(), (at - mean) / std])
+        return residuals
 
     def _deviations(self) -> Floats:
         """Standard deviations of the mounting's numbers."""
@@ -289,7 +276,8 @@ class _Adjustment:
             shifts.append(np.linalg.lstsq(rest, left_out.T @ residuals[mine], rcond=None)[0][:_OF_MOUNTING])
         spread = np.array(shifts) - np.mean(shifts, axis=0)
         jackknife = np.sqrt((_BLOCKS - 1) / _BLOCKS * (spread**2).sum(axis=0))
-        return np.maximum(formal, jackknife)
+        larger: Floats = np.maximum(formal, jackknife)
+        return larger
 
     def _jacobian(self, at: Floats) -> Floats:
         """How the residuals change with the solution's numbers, shape (residuals, numbers)."""
@@ -320,7 +308,9 @@ class _Adjustment:
             first = _OF_MOUNTING + number * _OF_A_FRAME
             mine = self.numbers == number
             dense[mine, :, :, first : first + _OF_A_FRAME] = of_frames[mine]
-        return np.concatenate([dense.reshape(-1, len(at)), np.diag(1.0 / self._prior(at)[1])])
+        before = np.diag(1.0 / self._prior(at)[1])
+        jacobian: Floats = np.concatenate([dense.reshape(-1, len(at)), before])
+        return jacobian
 
     def _prior(self, at: Floats) -> tuple[Floats, Floats]:
         """What is known of each number before, and its standard deviation; infinite: nothing."""
@@ -334,7 +324,8 @@ class _Adjustment:
 def _turn(angles_frd_rad: Floats) -> Floats:
     """The matrix from the camera's axes to the body's, forward, left, up."""
     roll, pitch, yaw = (float(angle) for angle in angles_frd_rad)
-    return matrices(np.array([mounting_flu((roll, pitch, yaw))]))[0]
+    turn: Floats = matrices(np.array([mounting_flu((roll, pitch, yaw))]))[0]
+    return turn
 
 
 def _values(numbers: Floats) -> Values:

@@ -8,7 +8,7 @@ and spreads them when it moves. The mounting with which they are least spread is
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -32,14 +32,29 @@ _PITCHES_RAD, _YAWS_RAD = np.radians(np.arange(-40.0, 41.0, 5.0)), np.radians(np
 _ANGLE_COST = 0.05  # of a radian, as a share of the sightings
 
 
+@dataclass(frozen=True, slots=True)
+class Values:
+    """What is known of a mounting before; as standard deviations, how exactly it is known after.
+
+    Attributes:
+        angles_frd_rad: roll, pitch and yaw on the body.
+        position_flu_m: of the camera from the drone's centre.
+        delay_s: by which images are older than their times.
+    """
+
+    angles_frd_rad: Vec3
+    position_flu_m: Vec3
+    delay_s: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Sightings:
     """Frames in images, n of them.
 
     Attributes:
         colours: of the frames, shape (n,).
-        corners_px: right of and below the optical axis: upper left, upper right, lower right, lower left as seen;
-            NaN where one is not seen, shape (n, 4, 2).
+        corners_px: right of and below the optical axis, upper left, upper right, lower right, lower left as
+            seen; NaN where one is not seen, shape (n, 4, 2).
         std_px: standard deviations, likewise.
         corners_s: when the row of each corner was read, seconds of the motion, shape (n, 4).
         positions_flu_m: of the frames' centres from the camera, forward, left, up, shape (n, 3).
@@ -64,12 +79,22 @@ class Sightings:
 
     def at(self, index: Indices) -> Sightings:
         """Some of them."""
-        rows = (self.colours, self.corners_px, self.std_px, self.corners_s)
-        return Sightings(*(row[index] for row in (*rows, self.positions_flu_m, self.normals_flu)))
+        return Sightings(
+            self.colours[index],
+            self.corners_px[index],
+            self.std_px[index],
+            self.corners_s[index],
+            self.positions_flu_m[index],
+            self.normals_flu[index],
+        )
 
 
 def sightings_of(
-    images: Sequence[Detections], motion: Motion, half_height_px: float, readout_s: float, delay_s: float = 0.0
+    images: Sequence[Detections],
+    motion: Motion,
+    half_height_px: float,
+    readout_s: float,
+    delay_s: float = 0.0,
 ) -> Sightings:
     """The frames in images that differ and at whose times the drone's pose is known.
 
@@ -80,7 +105,9 @@ def sightings_of(
         readout_s: of a rolling shutter, from the first to the last row; an image's time is the middle.
         delay_s: by which images are about older than their times.
     """
-    timed = sorted((image for image in images if image.time_us is not None), key=lambda each: each.time_us or 0)
+    timed = sorted(
+        (image for image in images if image.time_us is not None), key=lambda each: each.time_us or 0
+    )
     useful = [(image, frames) for image in timed if (frames := _useful(image))]
     times_s = motion.seconds([image.time_us or 0 for image, _ in useful])
     kept = _differing(times_s, motion, delay_s)
@@ -131,48 +158,42 @@ def _differing(times_s: Floats, motion: Motion, delay_s: float) -> list[int]:
     return kept
 
 
-def world_places(
-    seen: Sightings, motion: Motion, angles_frd_rad: Vec3, position_flu_m: Vec3, delay_s: float
-) -> Floats:
+def world_places(seen: Sightings, motion: Motion, by: Values) -> Floats:
     """Where sightings put their frames, by a mounting, shape (n, 3)."""
-    times_s = seen.times_s - delay_s
-    turn = matrices(np.array([mounting_flu(angles_frd_rad)]))[0]
-    from_centre = np.array(position_flu_m) + seen.positions_flu_m @ turn.T
-    places: Floats = motion.positions(times_s) + np.einsum("nij,nj->ni", motion.rotations(times_s), from_centre)
+    times_s = seen.times_s - by.delay_s
+    turn = matrices(np.array([mounting_flu(by.angles_frd_rad)]))[0]
+    from_centre = np.array(by.position_flu_m) + seen.positions_flu_m @ turn.T
+    places: Floats = motion.positions(times_s) + np.einsum(
+        "nij,nj->ni", motion.rotations(times_s), from_centre
+    )
     return places
 
 
-def first_mounting(seen: Sightings, motion: Motion, position_flu_m: Vec3, delay_s: float) -> Vec3:
-    """Roll, pitch and yaw of a mounting, in steps of some degrees, with which frames are spread the least."""
+def first_mounting(seen: Sightings, motion: Motion, known: Values) -> Values:
+    """A mounting, its angles in steps of some degrees, with which frames are spread the least."""
     few = [np.flatnonzero(seen.colours == colour) for colour in np.unique(seen.colours)]
     few = [index[np.linspace(0, len(index) - 1, min(len(index), _SEARCHED)).astype(int)] for index in few]
-    best: tuple[float, Vec3] = (-np.inf, (0.0, 0.0, 0.0))
+    best, best_score = known, -np.inf
     for pitch in _PITCHES_RAD.tolist():
         for yaw in _YAWS_RAD.tolist():
-            angles = (0.0, pitch, yaw)
+            at = replace(known, angles_frd_rad=(0.0, pitch, yaw))
             together = 0.0
             for index in few:
-                places = world_places(seen.at(index), motion, angles, position_flu_m, delay_s)
+                places = world_places(seen.at(index), motion, at)
                 together += _neighbours(places, _SAME_PLACE_M).max() / len(seen)
             score = together - _ANGLE_COST * float(np.hypot(pitch, yaw))
-            best = max(best, (score, angles))
-    return best[1]
+            if score > best_score:
+                best, best_score = at, score
+    return best
 
 
-def frames_among(
-    seen: Sightings,
-    usable: Bools,
-    motion: Motion,
-    angles_frd_rad: Vec3,
-    position_flu_m: Vec3,
-    delay_s: float,
-) -> tuple[Indices, list[Vec3]]:
+def frames_among(seen: Sightings, usable: Bools, motion: Motion, by: Values) -> tuple[Indices, list[Vec3]]:
     """Which frame each usable sighting is of.
 
     Returns:
         The number of its frame for each sighting, -1 if it is of none; where the frames are.
     """
-    places = world_places(seen, motion, angles_frd_rad, position_flu_m, delay_s)
+    places = world_places(seen, motion, by)
     numbers = np.full(len(seen), -1, np.intp)
     found: list[Vec3] = []
     for colour in np.unique(seen.colours):
@@ -201,11 +222,11 @@ def _neighbours(places: Floats, within_m: float) -> Indices:
     return counts
 
 
-def first_yaw(seen: Sightings, motion: Motion, angles_frd_rad: Vec3, delay_s: float) -> float:
+def first_yaw(seen: Sightings, motion: Motion, by: Values) -> float:
     """The yaw of a frame's normal, up to half a turn, that most of its sightings allow, radians."""
-    turn = matrices(np.array([mounting_flu(angles_frd_rad)]))[0]
+    turn = matrices(np.array([mounting_flu(by.angles_frd_rad)]))[0]
     body = seen.normals_flu @ turn.T
-    normals = np.einsum("nij,nkj->nki", motion.rotations(seen.times_s - delay_s), body)
+    normals = np.einsum("nij,nkj->nki", motion.rotations(seen.times_s - by.delay_s), body)
     yaws = np.arctan2(normals[..., 1], normals[..., 0])
     candidates = np.linspace(0.0, np.pi, 45, endpoint=False)
     away = np.abs(np.sin(yaws[None] - candidates[:, None, None]))
