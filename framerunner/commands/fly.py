@@ -44,8 +44,8 @@ _CameraDelay = Annotated[
 _Calibration = Annotated[
     Path | None,
     Parameter(
-        help="its camera's calibration, a file of `framerunner camera calibrate`; a simulated drone's is known, "
-        "and is replaced by the file's"
+        help="its camera's calibration, a file of `framerunner camera calibrate`; for a simulated drone it "
+        "replaces the camera's true one"
     ),
 ]
 _Simulator = Annotated[

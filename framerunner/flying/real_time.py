@@ -98,7 +98,7 @@ async def fly_in_real_time(
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         dry_run = settings.hardware is not None and settings.hardware.dry_run
         drone = _drone(plan, vehicle, records, stack, companion, dry_run=dry_run, system_id=system_id)
-        camera = await _camera(plan, vehicle, records, stack, reporter, drone.vehicle_time_us)
+        camera = await _camera(plan, vehicle, records, stack, reporter, vehicle_time_us=drone.vehicle_time_us)
         perception = _perception(plan, vehicle, judge, camera)
         perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
@@ -225,15 +225,16 @@ async def _camera(
     records: RunRecords,
     stack: AsyncExitStack,
     reporter: MissionReporter,
+    *,
     vehicle_time_us: Callable[[float], int | None],
 ) -> RecordingCamera:
     """The camera, whose images are recorded; closed with the stack."""
     from vision.sources import open_source
 
     def keep(frame: CameraFrame) -> None:
-        if frame.time_us is None:  # it is recorded at its arrival, which is between two ticks
-            frame = replace(frame, time_us=vehicle_time_us(frame.received_s))
-        records.see_frame(frame)
+        # Without a time of its own it is recorded at that of its arrival, which is between two ticks.
+        time_us = vehicle_time_us(frame.received_s) if frame.time_us is None else frame.time_us
+        records.see_frame(replace(frame, time_us=time_us))
         reporter.see_frame(frame)
 
     source = await stack.enter_async_context(open_source(vehicle.camera_url, size_px=vehicle.image_size_px))

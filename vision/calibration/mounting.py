@@ -41,6 +41,7 @@ SIZE_STD = 0.005
 UNKNOWN_SIZE_STD = 0.5
 _ANGLE_STD_RAD = 0.6
 _MAX_SIZE_ERROR = 0.06  # a rectangle that differs more from a frame's size is none
+_SURE = 3.0  # standard deviations
 _MAX_STEPS = 40
 _PIXEL_STD_PX = 0.1  # added to what the finder of frames states: its edges' errors are not all independent
 _ATTITUDE_STD_RAD = 0.0025  # of the drone's estimator
@@ -172,7 +173,11 @@ class _Adjustment:
     def are_wrong(self) -> Bools:
         """Which frames are none: their corners are not those of a rectangle, or their size is another."""
         sizes = self._frames(self.solution)[:, 6]
-        return (self._frame_errors() > _MAX_FRAME_ERROR) | (np.abs(sizes) > _MAX_SIZE_ERROR)
+        jacobian = self._jacobian(self.solution)
+        variances = np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True))
+        sizes_std = np.sqrt(self._frames(variances)[:, 6])
+        wrong_size = np.abs(sizes) > np.maximum(_MAX_SIZE_ERROR, _SURE * sizes_std)
+        return (self._frame_errors() > _MAX_FRAME_ERROR) | wrong_size
 
     def _frame_errors(self) -> Floats:
         """The median of each frame's corners' errors, standard deviations; infinite without corners."""

@@ -58,12 +58,12 @@ def _turn_deg(seen: Sightings, motion: Motion) -> float:
 
 def missing_for(movement: Movement, fit: MountingFit | None) -> tuple[str, ...]:
     """What must still be done, in words; empty if the angles are known."""
-    if fit is None or movement.sightings < MIN_SIGHTINGS:
-        return (
-            f"let the camera see frames: {movement.sightings} sightings of frames at one place, "
-            f"{MIN_SIGHTINGS} are needed, wholly in view and 1 to 5 m away",
-        )
     words = []
+    if movement.sightings < MIN_SIGHTINGS:
+        words.append(
+            f"let the camera see frames, wholly in view and 1 to 5 m away: {movement.sightings} different views "
+            f"so far, {MIN_SIGHTINGS} are needed"
+        )
     if movement.turn_deg < MIN_TURN_DEG:
         words.append(
             f"yaw the drone by {MIN_TURN_DEG:.0f} degrees at least, so that a frame moves from one side of "
@@ -74,9 +74,11 @@ def missing_for(movement: Movement, fit: MountingFit | None) -> tuple[str, ...]:
             f"fly towards a frame and away from it, by {MIN_APPROACH_M:g} m at least "
             f"({movement.approach_m:.1f} m so far)"
         )
-    roll, pitch, yaw = (degrees(each) for each in fit.std.angles_frd_rad)
     if words:
         return tuple(words)
+    if fit is None:
+        return ("let the camera see frames: nothing that was seen stays at one place and has a frame's size",)
+    roll, pitch, yaw = (degrees(each) for each in fit.std.angles_frd_rad)
     if roll > MAX_ANGLE_STD_DEG:
         words.append(f"yaw the drone further with frames in view: roll is uncertain by {roll:.1f} degrees")
     uncertain = {"pitch": pitch, "yaw": yaw}
