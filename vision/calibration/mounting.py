@@ -2,7 +2,7 @@
 
 Unknown are roll, pitch and yaw of the camera on the body, its place, the delay of its images, and the pose of
 every frame; known are the frames' size, where their corners are in the images, and the drone's poses by its
-telemetry. All are found by robust least squares of the corners' errors (B. Triggs et al., "Bundle adjustment
+telemetry but for an error that wanders. All are found by robust least squares of the corners' errors (B. Triggs et al., "Bundle adjustment
 - a modern synthesis", 2000). Frames hang nearly upright, so their tilt is unknown within a degree only.
 
 The standard deviations are the larger of two: those of the least squares, and those of the jackknife, which
@@ -35,6 +35,8 @@ from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M
 PLACE_STD_M = 0.02
 """Of the camera's place on the drone, measured with a ruler."""
 DELAY_STD_S = 0.1
+WANDER_STD_M = 0.01
+"""Of the errors of the drone's position, which go on for seconds: by motion capture or visual odometry."""
 FRAME_TILT_STD_RAD = 0.0175
 SIZE_STD = 0.005
 """Of a frame, as a share of it; of what may be none, `UNKNOWN_SIZE_STD`."""
@@ -52,6 +54,8 @@ _BLOCKS = 10
 _MIN_ROUNDS, _MAX_ROUNDS = 2, 6
 _OF_MOUNTING = 7  # numbers before those of the frames: three angles, three of the place, the delay
 _OF_A_FRAME = 7  # x, y, z, yaw, two small angles of its tilt, logarithm of its size
+_OF_A_KNOT = 3  # of how far the drone is from where its estimator has it: x, y, z
+_KNOT_S = 3.0  # between two of them; in between it is interpolated
 _STEP = 1e-4  # of numerical differences, rad and s
 
 _SIDEWAYS_M = np.array([-1.0, 1.0, 1.0, -1.0]) * FRAME_WIDTH_M / 2.0
@@ -129,6 +133,8 @@ class _Adjustment:
         default_factory=lambda: np.empty(0)
     )  # 1: seen from the side of the normal, else -1
     _size_std: float = 0.0
+    _count: int = 0  # of frames
+    _knots: Floats = field(default_factory=lambda: np.empty(0))  # their weights, shape (n, knots)
     _poses: tuple[float, Floats, Floats] | None = None  # of the drone at the corners, with a delay
 
     @property
@@ -148,7 +154,9 @@ class _Adjustment:
             mine = self.seen.at(np.flatnonzero(self.numbers == number))
             yaw = first_yaw(mine, self.motion, start)
             at += [*place, yaw, 0.0, 0.0, 0.0]
-        self.solution = np.array(at)
+        self._count = len(places)
+        self._knots = self._knots_of(self.seen.times_s)
+        self.solution = np.array(at + [0.0] * _OF_A_KNOT * self._knots.shape[1])
         variances = self.seen.std_px**2 + _PIXEL_STD_PX**2 + (_ATTITUDE_STD_RAD * self.focal_px) ** 2
         self._weights = np.nan_to_num(1.0 / np.sqrt(variances))
         self._size_std = size_std
@@ -197,7 +205,23 @@ class _Adjustment:
         return MountingFit(self.values, std, self.seen, self.numbers, self.frames_m, rms_px)
 
     def _frames(self, at: Floats) -> Floats:
-        return at[_OF_MOUNTING:].reshape(-1, _OF_A_FRAME)
+        return at[_OF_MOUNTING : self._first_knot].reshape(-1, _OF_A_FRAME)
+
+    @property
+    def _first_knot(self) -> int:
+        return _OF_MOUNTING + self._count * _OF_A_FRAME
+
+    def _knots_of(self, times_s: Floats) -> Floats:
+        """How much each knot of the wandering error counts at times, shape (n, knots)."""
+        places = (times_s - times_s.min()) / _KNOT_S
+        knots = np.arange(int(places.max()) + 2)
+        weights: Floats = np.maximum(0.0, 1.0 - np.abs(places[:, None] - knots))
+        return weights
+
+    def _wander(self, at: Floats) -> Floats:
+        """The errors of the drone's position, shape (n, 1, 3)."""
+        errors: Floats = self._knots @ at[self._first_knot :].reshape(-1, _OF_A_KNOT)
+        return errors[:, None]
 
     def _drone(self, delay_s: float) -> tuple[Floats, Floats]:
         """Positions and rotations of the drone when corners were exposed, shape (n, 4, 3), (n, 4, 3, 3)."""
@@ -238,7 +262,7 @@ class _Adjustment:
     def _in_camera(self, at: Floats, corners: Floats) -> tuple[Floats, Floats]:
         """Corners of the world from the camera, forward, left, up, and from the drone's centre, likewise."""
         positions, rotations = self._drone(float(at[6]))
-        body = np.einsum("nkji,nkj->nki", rotations, corners - positions)
+        body = np.einsum("nkji,nkj->nki", rotations, corners - positions - self._wander(at))
         return (body - at[3:6]) @ _turn(at[:3]), body
 
     def _pixels(self, camera: Floats) -> Floats:
@@ -302,28 +326,38 @@ class _Adjustment:
             change = (_turn(at[:3] + step) - _turn(at[:3] - step)) / (2.0 * _STEP)
             mounting[..., number] = (body - at[3:6]) @ change
         mounting[..., 3:6] = -turn.T
-        ends = [self._in_camera(np.array([*at[:6], at[6] + step]), corners)[0] for step in (-_STEP, _STEP)]
+        ends = [self._in_camera(_later(at, step), corners)[0] for step in (-_STEP, _STEP)]
         mounting[..., 6] = (ends[1] - ends[0]) / (2.0 * _STEP)
         _, rotations = self._drone(float(at[6]))
         frames = np.einsum("im,nkji,nkjp->nkmp", turn, rotations, slopes, optimize=True)
         dense = np.zeros((*camera.shape[:2], 2, len(at)))
         dense[..., :_OF_MOUNTING] = by_place @ mounting
         of_frames = by_place @ frames
-        for number in range(len(self._frames(at))):
+        for number in range(self._count):
             first = _OF_MOUNTING + number * _OF_A_FRAME
             mine = self.numbers == number
             dense[mine, :, :, first : first + _OF_A_FRAME] = of_frames[mine]
+        wandering = of_frames[:, :, :, None, :_OF_A_KNOT] * -self._knots[:, None, None, :, None]
+        dense[..., self._first_knot :] = wandering.reshape(*dense.shape[:3], -1)
         before = np.diag(1.0 / self._prior(at)[1])
         jacobian: Floats = np.concatenate([dense.reshape(-1, len(at)), before])
         return jacobian
 
     def _prior(self, at: Floats) -> tuple[Floats, Floats]:
         """What is known of each number before, and its standard deviation; infinite: nothing."""
-        known, count = self.known, len(self._frames(at))
-        mean = [0.0] * 3 + [*known.position_flu_m, known.delay_s] + [0.0] * _OF_A_FRAME * count
+        known, count, knots = self.known, self._count, self._knots.shape[1]
+        mean = [0.0] * 3 + [*known.position_flu_m, known.delay_s] + [0.0] * (len(at) - _OF_MOUNTING)
         std = [_ANGLE_STD_RAD] * 3 + [PLACE_STD_M] * 3 + [DELAY_STD_S]
         std += ([np.inf] * 4 + [FRAME_TILT_STD_RAD] * 2 + [self._size_std]) * count
+        std += [WANDER_STD_M] * _OF_A_KNOT * knots
         return np.array(mean), np.array(std)
+
+
+def _later(at: Floats, step_s: float) -> Floats:
+    """A solution with another delay."""
+    later = at.copy()
+    later[6] += step_s
+    return later
 
 
 def _turn(angles_frd_rad: Floats) -> Floats:
