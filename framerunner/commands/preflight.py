@@ -27,8 +27,8 @@ def preflight(
     camera_delay: Annotated[
         float | None,
         Parameter(
-            help="age in s of an image that arrives without a time stamp; by default the calibration says it, "
-            "else 0.1"
+            help="age in s of an image that arrives without a time stamp; by default the "
+            "calibration's, else 0.1"
         ),
     ] = None,
     calibration: Annotated[

@@ -1,18 +1,17 @@
 """`framerunner camera extrinsics` as its user calls it, and what a flight does with its file."""
 
-from dataclasses import replace
-from math import degrees, radians
+from math import degrees
 from pathlib import Path
 
 import pytest
 
-from errors import SettingError, UserError
+from errors import UserError
 from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.camera_calibration.live_mounting import Watched
 from framerunner.commands.camera import extrinsics
 from framerunner.commands.fly import fly
 from framerunner.flying.plan import FlightPlan
-from geometry.rotations import mounting_flu, multiply, quaternion_from_euler
+from geometry.rotations import quaternion_from_euler
 from offboard.drone import DroneError, DroneState
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.pose_history import PoseHistory
@@ -20,8 +19,9 @@ from scenarios.loader import dump_yaml, load_scenario
 from scenarios.models import Camera as CameraSettings
 from scenarios.models import Scenario
 from sitl.camera import Camera
-from tests.vision.calibration.seen_frames import FOCAL_PX, fly as fly_past, survey
-from vision.calibration.model import Calibration, CalibrationError, Mounting
+from tests.vision.calibration.seen_frames import FOCAL_PX, survey
+from tests.vision.calibration.seen_frames import fly as fly_past
+from vision.calibration.model import Calibration
 from vision.detectors import new_detector
 from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 
@@ -41,7 +41,7 @@ states:
     during: [fly_to_goal]
     transitions: [{when: seconds_in_state > 13, to: there}]
   there:
-    enter: [cmd.rot_z = 0.5, "goal_m = (memory.x0 + 0.8, memory.y0 + 0.5, memory.z0 + 1)"]
+    enter: [cmd.rot_z = 0.5, "goal_m = (memory.x0 + 1.4, memory.y0 + 1.2, memory.z0 + 1)"]
     during: [fly_to_goal]
     transitions: [{when: seconds_in_state > 14, to: down}]
   down:
