@@ -2,8 +2,9 @@
 
 Unknown are roll, pitch and yaw of the camera on the body, its place, the delay of its images, and the pose of
 every frame; known are the frames' size, where their corners are in the images, and the drone's poses by its
-telemetry but for an error that wanders. All are found by robust least squares of the corners' errors (B. Triggs et al., "Bundle adjustment
-- a modern synthesis", 2000). Frames hang nearly upright, so their tilt is unknown within a degree only.
+telemetry but for an error of its position that wanders. All are found by robust least squares of the corners'
+errors (B. Triggs et al., "Bundle adjustment - a modern synthesis", 2000). Frames hang nearly upright, so
+their tilt is unknown within a degree only.
 
 The standard deviations are the larger of two: those of the least squares, and those of the jackknife, which
 leaves out one tenth of the flight after the other. The second knows that errors of the drone's estimator go
@@ -155,7 +156,7 @@ class _Adjustment:
             yaw = first_yaw(mine, self.motion, start)
             at += [*place, yaw, 0.0, 0.0, 0.0]
         self._count = len(places)
-        self._knots = self._knots_of(self.seen.times_s)
+        self._knots = _knots_of(self.seen.times_s)
         self.solution = np.array(at + [0.0] * _OF_A_KNOT * self._knots.shape[1])
         variances = self.seen.std_px**2 + _PIXEL_STD_PX**2 + (_ATTITUDE_STD_RAD * self.focal_px) ** 2
         self._weights = np.nan_to_num(1.0 / np.sqrt(variances))
@@ -211,13 +212,6 @@ class _Adjustment:
     def _first_knot(self) -> int:
         return _OF_MOUNTING + self._count * _OF_A_FRAME
 
-    def _knots_of(self, times_s: Floats) -> Floats:
-        """How much each knot of the wandering error counts at times, shape (n, knots)."""
-        places = (times_s - times_s.min()) / _KNOT_S
-        knots = np.arange(int(places.max()) + 2)
-        weights: Floats = np.maximum(0.0, 1.0 - np.abs(places[:, None] - knots))
-        return weights
-
     def _wander(self, at: Floats) -> Floats:
         """The errors of the drone's position, shape (n, 1, 3)."""
         errors: Floats = self._knots @ at[self._first_knot :].reshape(-1, _OF_A_KNOT)
@@ -265,14 +259,10 @@ class _Adjustment:
         body = np.einsum("nkji,nkj->nki", rotations, corners - positions - self._wander(at))
         return (body - at[3:6]) @ _turn(at[:3]), body
 
-    def _pixels(self, camera: Floats) -> Floats:
-        """Pixels right of and below the optical axis."""
-        pixels: Floats = -self.focal_px * camera[..., 1:] / np.maximum(camera[..., :1], _NEAREST_M)
-        return pixels
-
     def _offsets(self, at: Floats) -> Floats:
         """Of the corners from where the solution has them, pixels, shape (n, 4, 2)."""
-        pixels = self._pixels(self._in_camera(at, self._corners(at)[0])[0])
+        camera, _ = self._in_camera(at, self._corners(at)[0])
+        pixels = -self.focal_px * camera[..., 1:] / np.maximum(camera[..., :1], _NEAREST_M)
         offsets: Floats = pixels - np.nan_to_num(self.seen.corners_px)
         return offsets
 
@@ -351,6 +341,14 @@ class _Adjustment:
         std += ([np.inf] * 4 + [FRAME_TILT_STD_RAD] * 2 + [self._size_std]) * count
         std += [WANDER_STD_M] * _OF_A_KNOT * knots
         return np.array(mean), np.array(std)
+
+
+def _knots_of(times_s: Floats) -> Floats:
+    """How much each knot of the wandering error counts at times, shape (n, knots)."""
+    places = (times_s - times_s.min()) / _KNOT_S
+    knots = np.arange(int(places.max()) + 2)
+    weights: Floats = np.maximum(0.0, 1.0 - np.abs(places[:, None] - knots))
+    return weights
 
 
 def _later(at: Floats, step_s: float) -> Floats:

@@ -61,8 +61,8 @@ def missing_for(movement: Movement, fit: MountingFit | None) -> tuple[str, ...]:
     words = []
     if movement.sightings < MIN_SIGHTINGS:
         words.append(
-            f"let the camera see frames, wholly in view and 1 to 5 m away: {movement.sightings} different views "
-            f"so far, {MIN_SIGHTINGS} are needed"
+            f"let the camera see frames, wholly in view and 1 to 5 m away: {movement.sightings} different "
+            f"views so far, {MIN_SIGHTINGS} are needed"
         )
     if movement.turn_deg < MIN_TURN_DEG:
         words.append(

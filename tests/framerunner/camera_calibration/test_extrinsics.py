@@ -19,8 +19,7 @@ from scenarios.loader import dump_yaml, load_scenario
 from scenarios.models import Camera as CameraSettings
 from scenarios.models import Scenario
 from sitl.camera import Camera
-from tests.vision.calibration.seen_frames import FOCAL_PX, survey
-from tests.vision.calibration.seen_frames import fly as fly_past
+from tests.vision.calibration.seen_frames import FOCAL_PX
 from vision.calibration.model import Calibration
 from vision.detectors import new_detector
 from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
@@ -33,7 +32,8 @@ initial: rise
 variables: {x0: 0, y0: 0, z0: 0}
 states:
   rise:
-    enter: [hover, memory.x0 = imu.x, memory.y0 = imu.y, memory.z0 = imu.z, "goal_m = (imu.x, imu.y, imu.z + 1)"]
+    enter: [hover, memory.x0 = imu.x, memory.y0 = imu.y, memory.z0 = imu.z,
+      "goal_m = (imu.x, imu.y, imu.z + 1)"]
     during: [fly_to_goal]
     transitions: [{when: distance_to_goal_m < 0.15, to: here}]
   here:
@@ -123,7 +123,6 @@ def test_a_camera_that_looks_back_or_has_a_gimbal_is_refused() -> None:
 
 def test_a_live_drone_is_only_watched() -> None:
     """Its telemetry has axes north, east, down; images without times get those of their arrival."""
-    images, motion = fly_past(survey, 3.0)
     calibration = Calibration.ideal(320, 240, FOCAL_PX)
     watched = Watched(calibration, None)
     codec = mavlink.MAVLink(None, srcSystem=7, srcComponent=AUTOPILOT_COMPONENT_ID)
@@ -144,7 +143,8 @@ def test_a_live_drone_is_only_watched() -> None:
     assert last.position_m == pytest.approx((1.0, -2.0, 3.0))
     assert last.velocity_m_s == pytest.approx((0.1, -0.2, 0.3), abs=1e-6)
     assert last.attitude == pytest.approx(quaternion_from_euler(0.0, 0.0, -2 * half), abs=1e-5)
+    early = mavlink.MAVLink_attitude_quaternion_message(50_000, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    late = mavlink.MAVLink_attitude_quaternion_message(10, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    messages = [received(early), received(late)]
     with pytest.raises(DroneError, match="restarted"):
-        early = mavlink.MAVLink_attitude_quaternion_message(50_000, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        late = mavlink.MAVLink_attitude_quaternion_message(10, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        watched.take_messages([received(early), received(late)], 60.0)
+        watched.take_messages(messages, 60.0)

@@ -7,10 +7,12 @@ from errors import SettingError
 from offboard.safety.check import Check, Outcome, accept, failures
 from offboard.safety.vehicle_checks import (
     BatteryFacts,
+    CalibrationFacts,
     CameraFacts,
     EstimatorFacts,
     LinkFacts,
     battery_check,
+    calibration_check,
     camera_checks,
     estimator_check,
     link_checks,
@@ -88,3 +90,16 @@ def test_a_failure_is_accepted_by_name_or_all():
     assert accept(checks, ["c"])[2].outcome is Outcome.PASS
     with pytest.raises(SettingError, match="the checks are a, b, c"):
         accept(checks, ["d"])
+
+
+def test_a_mounting_that_was_never_measured_is_noted_and_another_size_fails():
+    size_px = (320, 240)
+    none = calibration_check(CalibrationFacts(size_px=size_px))
+    unmeasured = calibration_check(CalibrationFacts(size_px, size_px))
+    assert (none.outcome, unmeasured.outcome) == (Outcome.NOTE, Outcome.NOTE)
+    assert "never measured" in unmeasured.value and "camera extrinsics" in unmeasured.advice
+    measured = calibration_check(CalibrationFacts(size_px, size_px, (0.0, 0.1, 0.0)))
+    assert measured.outcome is Outcome.PASS and "pitch 5.7" in measured.value
+    assert failed(calibration_check(CalibrationFacts((640, 480), size_px, (0.0, 0.1, 0.0)))) == [
+        "camera calibration"
+    ]
