@@ -135,8 +135,7 @@ def fly(
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
-    if camera_delay is not None:
-        check_range("--camera-delay", camera_delay, 0.0, 0.5)
+    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
     _check(drone, camera, speed, instance, lockstep=lockstep, px4=px4)

@@ -63,8 +63,7 @@ def preflight(
 
         framerunner preflight --restore-parameters parameters-before.params
     """
-    if camera_delay is not None:
-        check_range("--camera-delay", camera_delay, 0.0, 0.5)
+    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     if restore_parameters is not None:
         return _restore(drone, restore_parameters)
 

@@ -13,7 +13,7 @@ on for seconds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -163,21 +163,15 @@ class _Adjustment:
         self._size_std = size_std
         for _ in range(2):
             self._sides = self._seen_from()
-            self._minimize("soft_l1")
+            self.solution = _minimized(self._residuals, self.solution, self._jacobian, "soft_l1")
 
     def refine(self) -> None:
         """Go on from the solution: frames have their size, and corners that are far off are not used."""
         self._size_std = SIZE_STD
-        self._minimize("soft_l1")
+        self.solution = _minimized(self._residuals, self.solution, self._jacobian, "soft_l1")
         errors = np.abs(self._errors(self.solution)).max(axis=2)
         self._weights[errors > _OUTLIER] = 0.0
-        self._minimize("linear")
-
-    def _minimize(self, loss: Literal["linear", "soft_l1"]) -> None:
-        from scipy.optimize import least_squares  # noqa: PLC0415 - it takes 0.2 s
-
-        what = (self._residuals, self.solution, self._jacobian)
-        self.solution = least_squares(*what, loss=loss, x_scale="jac", max_nfev=_MAX_STEPS).x
+        self.solution = _minimized(self._residuals, self.solution, self._jacobian, "linear")
 
     def are_wrong(self) -> Bools:
         """Which frames are none: their corners are not those of a rectangle, or their size is another."""
@@ -211,11 +205,6 @@ class _Adjustment:
     @property
     def _first_knot(self) -> int:
         return _OF_MOUNTING + self._count * _OF_A_FRAME
-
-    def _wander(self, at: Floats) -> Floats:
-        """The errors of the drone's position, shape (n, 1, 3)."""
-        errors: Floats = self._knots @ at[self._first_knot :].reshape(-1, _OF_A_KNOT)
-        return errors[:, None]
 
     def _drone(self, delay_s: float) -> tuple[Floats, Floats]:
         """Positions and rotations of the drone when corners were exposed, shape (n, 4, 3), (n, 4, 3, 3)."""
@@ -256,7 +245,8 @@ class _Adjustment:
     def _in_camera(self, at: Floats, corners: Floats) -> tuple[Floats, Floats]:
         """Corners of the world from the camera, forward, left, up, and from the drone's centre, likewise."""
         positions, rotations = self._drone(float(at[6]))
-        body = np.einsum("nkji,nkj->nki", rotations, corners - positions - self._wander(at))
+        wander = self._knots @ at[self._first_knot :].reshape(-1, _OF_A_KNOT)
+        body = np.einsum("nkji,nkj->nki", rotations, corners - positions - wander[:, None])
         return (body - at[3:6]) @ _turn(at[:3]), body
 
     def _offsets(self, at: Floats) -> Floats:
@@ -341,6 +331,20 @@ class _Adjustment:
         std += ([np.inf] * 4 + [FRAME_TILT_STD_RAD] * 2 + [self._size_std]) * count
         std += [WANDER_STD_M] * _OF_A_KNOT * knots
         return np.array(mean), np.array(std)
+
+
+def _minimized(
+    residuals: Callable[[Floats], Floats],
+    start: Floats,
+    jacobian: Callable[[Floats], Floats],
+    loss: Literal["linear", "soft_l1"],
+) -> Floats:
+    """The numbers of the least squares near a start."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 - it takes 0.2 s
+
+    found = least_squares(residuals, start, jacobian, loss=loss, x_scale="jac", max_nfev=_MAX_STEPS)
+    solution: Floats = found.x
+    return solution
 
 
 def _knots_of(times_s: Floats) -> Floats:
