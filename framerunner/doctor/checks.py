@@ -132,7 +132,9 @@ def _health(record: Record) -> Findings:
     ready = status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK
     mode = record.mode_name.lower()
     if not ready and not record.armed and record.arming.ready_for_offboard:
-        yield _good("pre-arm checks", f"passed for offboard, where fly arms it; not in {mode}")
+        words = "passed for offboard, where fly arms it"
+        also = "" if mode == "offboard" else f"; not in {mode}"  # in it they fail until setpoints come
+        yield _good("pre-arm checks", words + also)
     elif not ready and not record.armed:
         reasons = "; ".join((*record.arming.failures, *((unhealthy_names,) if unhealthy_names else ())))
         words = f"not passed in {mode}" + (f": {reasons}" if reasons else "")
