@@ -159,7 +159,7 @@ def _near(facts: Facts) -> Iterator[Finding]:
     if isnan(distance_m):
         yield _note("position", "the vehicle reports none that could be compared", "")
     elif distance_m > NEAR_M:
-        advice = "it follows something else, or too slowly: docs/real-drone.md, section 7.3"
+        advice = "it follows something else, or too slowly: docs/real-drone.md, step 6"
         yield _missing("position", f"{distance_m:.2f} m from the pose of the same time", advice)
     else:
         yield _good("position", f"{distance_m * 100:.1f} cm from the pose of the same time")
