@@ -50,8 +50,8 @@ class Judge(Protocol):
 class TruthJudge:
     """The simulator's referee, which sees the true state of every control tick, over HTTP.
 
-    If the simulator ends, the verdict is made from the telemetry seen so far. So it is if the referee still has
-    the try of an earlier flight, because in this one the motors were never on.
+    If the simulator ends, the verdict is made from the telemetry seen so far; likewise if the referee still
+    has the try of an earlier flight, because in this one the motors were never on.
 
     Args:
         api: of the simulator.
