@@ -261,7 +261,104 @@ def test_ctrl_c_lands(tmp_path):
     assert came_down(flight)
 
 
-def test_hold_on_abort_holds(tmp_path):
+def hold(tmp_path, operator=None, events=(), impairment=GOOD, scenario=None, hold_s=10.0, **changed):
+    """A flight that holds when its time is over, at some 17 s."""
+    scenario = scenario or hall(limit_s=6.0)
+    return fly_over(
+        impairment,
+        scenario,
+        runaway(tmp_path, UP),
+        safety=SafetyRules("hold", operator or Operator(needs_go=False), hold_s),
+        caps=Caps(),
+        events=events,
+        parameters=demanded_parameters(scenario) | changed,
+        after_s=60.0,
+    )
+
+
+def seconds_in(flight, mode):
+    return sum(moment.state.mode == mode for moment in flight.moments) / 20
+
+
+def test_a_drone_that_holds_lands_after_its_time(tmp_path):
+    flight = hold(tmp_path)
+    assert flight.outcome.reason == "not finished within 6 s; it held for 10 s, then landed"
+    assert seconds_in(flight, "HOLD") == pytest.approx(10.0, abs=0.5)
+    assert came_down(flight)
+
+
+def test_a_stop_lands_a_drone_that_holds(tmp_path):
+    operator = Operator(needs_go=False)
+    flight = hold(tmp_path, operator, [(21.0, lambda _: operator.press_stop())], hold_s=30.0)
+    assert came_down(flight)
+    assert 1.0 < seconds_in(flight, "HOLD") < 15.0
+
+
+def test_a_low_battery_lands_a_drone_that_holds(tmp_path):
+    flight = hold(
+        tmp_path, scenario=hall("battery sag 0.2 at 12 s", limit_s=6.0, sensors="mocap"), hold_s=60.0
+    )
+    assert came_down(flight)
+    assert seconds_in(flight, "HOLD") < 15.0
+    assert "it held" not in flight.outcome.reason
+
+
+@pytest.mark.parametrize("end", ["link lost", "app killed"])
+def test_a_drone_that_holds_lands_by_itself_without_the_app(tmp_path, end):
+    def cut(vehicle):
+        vehicle.up = vehicle.beats = Direction(SILENT, Random(0))
+        if end == "link lost":
+            vehicle.down = Direction(SILENT, Random(0))
+
+    flight = hold(tmp_path, events=[(20.0, cut)], hold_s=60.0)
+    assert came_down(flight)
+
+
+def test_others_keep_a_drone_that_held(tmp_path):
+    def take(vehicle):
+        vehicle.autopilot.set_mode(FlightMode.LAND)  # as by a remote control
+
+    flight = hold(tmp_path, events=[(19.0, take)])
+    assert came_down(flight)
+    assert "it held" not in flight.outcome.reason
+
+
+@pytest.mark.parametrize("seconds", [2.0, 5.0])
+def test_an_app_that_hangs_stands_and_then_lands(tmp_path, seconds):
+    flight = fly(tmp_path, events=[(12.0, lambda vehicle: vehicle.hang(seconds))])
+    if seconds < 3.0:
+        assert flight.outcome.ended == "timed out"
+    else:
+        assert flight.outcome.reason == "this app hung for more than 3.0 s; its watchdog requested landing"
+    hung = [truth for truth in flight.truths if 13.5e6 < truth.time_us < 14.0e6]
+    assert max(abs(truth.velocity_arena_m_s[2]) for truth in hung) < 0.1  # it stands
+    assert came_down(flight)
+
+
+def test_an_app_that_hangs_for_good_lands(tmp_path):
+    flight = fly(tmp_path, events=[(12.0, lambda vehicle: vehicle.hang(40.0))])
+    down_s = next(t.time_us for t in flight.truths if t.time_us > 12e6 and not t.motors_on) / 1e6
+    assert down_s < 35.0
+    assert came_down(flight)
+
+
+def test_an_app_that_is_stopped_and_continued_leaves_the_landing_to_the_vehicle(tmp_path):
+    """As SIGSTOP and SIGCONT: nothing is sent for five seconds, then the app finds the drone landing."""
+
+    def stop(vehicle):
+        up, beats, watchdog = vehicle.up, vehicle.beats, vehicle.watchdog
+        vehicle.up = vehicle.beats = Direction(SILENT, Random(0))
+        vehicle.watchdog = None  # its thread is stopped, too
+        vehicle.hang(5.0)
+        vehicle.up, vehicle.beats, vehicle.watchdog = up, beats, watchdog
+        watchdog.beat(vehicle.time_s())
+
+    flight = fly(tmp_path, events=[(12.0, stop)])
+    assert flight.outcome.reason.startswith("the pilot or a failsafe took over: mode LAND")
+    assert came_down(flight)
+
+
+def test_hold_on_abort_holds_without_an_operator(tmp_path):
     scenario = hall(limit_s=6.0)
     safety = SafetyRules("hold")
     flight = fly_over(GOOD, scenario, runaway(tmp_path, UP), safety=safety, caps=Caps(), after_s=10.0)
