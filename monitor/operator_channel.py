@@ -1,7 +1,8 @@
-"""`/ws/operator`: the operator's buttons, between the pages of those who may fly and the flight that they stop.
+"""`/ws/operator`: the operator's buttons, between the pages of those who may fly and the flight.
 
 A flight connects to a local socket that only this user may open. What it sends is passed on to all pages, and
-their demands to the flight with who made them; it decides what they mean (`offboard/safety/operator_pages.py`).
+their demands to the flight with who made them; the flight decides what they mean (`operator_pages.py` of
+`offboard/safety/`).
 """
 
 from __future__ import annotations

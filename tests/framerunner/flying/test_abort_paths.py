@@ -12,17 +12,20 @@ from mavsdk.exceptions import MavsdkError
 
 from firmware_py.status import FlightMode
 from framerunner.flying.plan import FlightPlan
+from framerunner.preflight.keys import KeyReader
 from offboard.mission import load_mission
 from offboard.pilot import Pilot
 from offboard.safety.caps import Caps
 from offboard.safety.failsafes import failsafe_rows
 from offboard.safety.fence import flight_fence
 from offboard.safety.operator import Operator
+from offboard.safety.operator_pages import OperatorPages
 from offboard.safety.rules import SafetyRules
 from scenarios.faults.parse import parse_fault
 from scenarios.loader import load_scenario
 from tests.framerunner.simulated_link import Direction, Impairment, fly_over
 from tests.offboard.fakes import runaway
+from wire.operator_messages import PageMessage
 
 GOOD = Impairment()
 SILENT = Impairment(silent_s=(0.0, 1e9))
@@ -363,3 +366,85 @@ def test_hold_on_abort_holds_without_an_operator(tmp_path):
     safety = SafetyRules("hold")
     flight = fly_over(GOOD, scenario, runaway(tmp_path, UP), safety=safety, caps=Caps(), after_s=10.0)
     assert (flight.mode, flight.armed) == (FlightMode.HOLD, True)
+
+
+FLIGHT = "test-case-1 7"
+
+
+class PageHand:
+    """An operator's page beside a flight, in the flight's time: events for `fly`."""
+
+    def __init__(self, *, alone=True):
+        self.operator = Operator(hint="hold Go on the page")
+        self.pages = OperatorPages(self.operator, FLIGHT, alone=alone)
+        self.beat = -1
+
+    def events(self, script, to_s=60.0):
+        """What the page says, ten times a second.
+
+        Args:
+            script: from a time in seconds on: `here`, `go`, `stop`, `stop_motors`, or None: it is lost.
+            to_s: end of the events.
+        """
+        times = [step / 10 for step in range(round(to_s * 10))]
+        return [
+            (at_s, self._event([what for from_s, what in script if from_s <= at_s][-1])) for at_s in times
+        ]
+
+    def _event(self, what):
+        def happen(vehicle):
+            now_s = vehicle.time_s()
+            self.pages.check(now_s)
+            if what is not None:
+                self.beat = self.pages.beat(now_s)
+                for each in ("here", what):
+                    message = PageMessage(page=1, name="Ada", what=each, beat=self.beat, flight=FLIGHT)
+                    self.pages.take(message, now_s)
+
+        return happen
+
+
+def test_a_page_gives_the_go_and_lands(tmp_path):
+    page = PageHand()
+    script = [(0.0, "here"), (12.0, "go"), (13.5, "here"), (22.0, "stop"), (22.5, "here")]
+    flight = fly(tmp_path, operator=page.operator, events=page.events(script))
+    on_s = next(truth.time_us for truth in flight.truths if truth.motors_on) / 1e6
+    assert 13.0 < on_s < 16.0
+    assert flight.outcome.reason == "stopped by the operator (Ada, on the page)"
+    assert came_down(flight)
+
+
+def test_the_pages_second_control_stops_the_motors(tmp_path):
+    page = PageHand()
+    script = [(0.0, "here"), (12.0, "go"), (13.5, "here"), (22.0, "stop"), (23.0, "stop_motors")]
+    flight = fly(tmp_path, operator=page.operator, events=page.events(script))
+    assert flight.outcome.reason.endswith("(Ada, on the page); the operator stopped the motors")
+    off_s = max(truth.time_us for truth in flight.truths if truth.motors_on) / 1e6
+    assert off_s == pytest.approx(23.0, abs=0.1)
+
+
+def test_a_page_that_is_lost_before_the_go_arms_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr("offboard.app.GO_LIMIT_US", 12_000_000)
+    page = PageHand()
+    script = [(0.0, "here"), (12.0, "go"), (12.9, None)]
+    flight = fly(tmp_path, operator=page.operator, events=page.events(script))
+    assert flight.outcome.reason.startswith("no go within")
+    assert not any(truth.motors_on for truth in flight.truths)
+
+
+def test_a_page_that_is_lost_in_flight_without_a_terminal_lands(tmp_path):
+    page = PageHand()
+    script = [(0.0, "here"), (12.0, "go"), (13.5, "here"), (20.0, None)]
+    flight = fly(tmp_path, operator=page.operator, events=page.events(script))
+    assert flight.outcome.reason == "stopped by the operator (no operator's page was connected)"
+    assert came_down(flight)
+
+
+def test_the_terminal_stops_what_the_page_has_armed(tmp_path):
+    page = PageHand(alone=False)
+    keys = KeyReader(page.operator)
+    script = [(0.0, "here"), (12.0, "go"), (13.5, None)]
+    events = [*page.events(script), (22.0, lambda vehicle: keys.take(" ", vehicle.time_s()))]
+    flight = fly(tmp_path, operator=page.operator, events=sorted(events, key=lambda each: each[0]))
+    assert flight.outcome.reason == "stopped by the operator"
+    assert came_down(flight)
