@@ -82,6 +82,7 @@ class OperatorPage {
     if (this.#flight?.flight !== flight.flight) setText(this.#parts.answer, "");
     this.#flight = flight;
     this.#ended = "";
+    if (this.#beat === null) this.#beatAt = performance.now(); // an app that hangs never sends the first one
     this.#parts.card.replaceChildren(...cardOf(flight.sections));
     this.#show();
   }
@@ -147,7 +148,7 @@ class OperatorPage {
       open: this.#open,
       refused: this.#refused,
       hasFlight,
-      age_ms: this.#beat ? performance.now() - this.#beatAt : 0,
+      age_ms: performance.now() - this.#beatAt,
       delay_ms: own?.delay_ms ?? null,
       others: (this.#beat?.pages.length ?? 1) - 1,
     });
@@ -174,7 +175,7 @@ class OperatorPage {
       mode: status?.mode || "–",
       motors: status ? (status.armed ? "on" : "off") : "–",
     };
-    for (const [name, value] of Object.entries(figures)) setText(this.#parts[name], value);
+    for (const [name, value] of Object.entries(figures)) setText(this.#parts.figures[name], value);
   }
 }
 
@@ -189,11 +190,12 @@ function layOut(root) {
     land: make("button", { type: "button", class: "o-land" }, make("span", {}, "Land"), make("small", {}, "at once, where it is")),
     motors: make("button", { type: "button", class: "o-motors" }, make("span", {}, "Stop motors"), make("small", {}, "after Land; it falls")),
     card: make("section", { class: "o-card", "aria-label": "Flight card" }),
+    figures: /** @type {Object<string, HTMLElement>} */ ({}),
     login: make("a", { href: "/login", class: "o-login", hidden: true }, "Log in"),
   };
   const figures = FIGURES.map(([name, title]) => {
-    parts[name] = make("dd", {}, "–");
-    return make("div", {}, make("dt", {}, title), parts[name]);
+    parts.figures[name] = make("dd", {}, "–");
+    return make("div", {}, make("dt", {}, title), parts.figures[name]);
   });
   root.append(
     parts.link,
