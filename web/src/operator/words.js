@@ -20,12 +20,13 @@ const PHASES = {
 export function stateOf(flight, beat, ended) {
   if (ended) return { phase: "ended", head: "Ended", words: ended };
   if (!flight) return { phase: "none", head: "No flight", words: "none is waiting for an operator" };
-  const phase = beat?.phase ?? "checks";
+  if (!beat) return { phase: "none", head: "Not known", words: "the flight has not said yet what it does" };
+  const { phase } = beat;
   const [head, words] = PHASES[phase] ?? [phase, ""];
   if (phase === "checks" && flight.failed.length) {
     return { phase, head: "Not armed", words: `failed: ${flight.failed.join(", ")}` };
   }
-  return { phase, head, words: [beat?.words, words].filter(Boolean).join("; ") };
+  return { phase, head, words: [beat.words, words].filter(Boolean).join("; ") };
 }
 
 /**
