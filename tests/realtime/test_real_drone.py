@@ -114,7 +114,7 @@ def test_the_operators_page_arms_and_lands_without_a_terminal(tmp_path, instance
     (tmp_path / "app").mkdir()
     socket, link = tmp_path / "operator.sock", f"127.0.0.1:{14570 + instance}"
     arguments = ("fly", "test-case-1", *drone(instance), "--set-parameters", "--operator-socket", str(socket))
-    shared = ("--mission", "explorer_soft_landing", "--monitor-link", f"udpout://{link}")
+    shared = ("--mission", "explorer_soft_landing", "--monitor-link", f"udpout://{link}", "--accept", "all")
     monitor_options = ("--port", "0", "--drone", f"udpin://{link}", "--operator-socket", str(socket))
     with (
         simulator(tmp_path, instance, "--scenario", "test-case-1"),
