@@ -155,7 +155,7 @@ async def _safety(
     link = None
     if socket is not None:
         title = f"{plan.title}, {'dry run' if hardware.dry_run else 'flight'}"
-        link = OperatorLink(socket, operator, title, terminal=has_terminal() or not hardware.needs_go)
+        link = OperatorLink(socket, operator, title, terminal=has_terminal() or operator.has_go)
         await stack.enter_async_context(link)
     checks = PreflightSettings(
         drone_url,

@@ -43,7 +43,7 @@ class OperatorLink:
         path: of the monitor's socket.
         operator: of the flight.
         title: of the flight, for people.
-        terminal: the flight has a terminal, which can stop it, too.
+        terminal: the flight has a terminal, which can stop it, too, or needs no operator.
         clock: seconds that never go back.
     """
 
@@ -63,7 +63,6 @@ class OperatorLink:
         self._flight = FlightMessage(flight=f"{title} {time.time():.3f}", title=title)
         self._pages = OperatorPages(operator, self._flight.flight, alone=not terminal)
         self._writer: asyncio.StreamWriter | None = None
-        self._words = ""
         self._tasks: list[asyncio.Task[None]] = []
 
     async def __aenter__(self) -> OperatorLink:
@@ -90,8 +89,9 @@ class OperatorLink:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        ended = str(error) if isinstance(error, Exception) else self._words
-        self._send(EndMessage(flight=self._flight.flight, words=ended or "the flight has ended"))
+        ended = self._operator.stop_words if self._operator.stops else "the flight is over"
+        words = str(error) if isinstance(error, Exception) else ended
+        self._send(EndMessage(flight=self._flight.flight, words=words))
         if self._writer is not None:
             with contextlib.suppress(OSError, TimeoutError):
                 async with asyncio.timeout(1.0):
@@ -106,10 +106,6 @@ class OperatorLink:
         )
         self._flight = self._flight.model_copy(update={"sections": sections, "failed": failed})
         self._send(self._flight)
-
-    def say(self, words: str) -> None:
-        """Show what the flight does, such as why it was stopped."""
-        self._words = words
 
     async def _open(self) -> asyncio.StreamReader:
         reader, self._writer = await asyncio.open_unix_connection(str(self._path), limit=MAX_LINE_BYTES)
@@ -154,7 +150,7 @@ class OperatorLink:
                     asks=operator.asks,
                     stops=operator.stops,
                     terminal=self._terminal,
-                    words=self._words or operator.stopped_by,
+                    words=operator.stop_words if operator.stops else "",
                     pages=self._pages.states(now_s),
                 )
             )
