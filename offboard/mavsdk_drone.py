@@ -114,8 +114,7 @@ class MavsdkDrone:
         self._recorder: TlogRecorder | None = None
         self._companion: Companion | None = None
         self._watchdog = Watchdog(self._stand_still, self._stop_from_watchdog, hang_report)
-        self._when_hung = when_hung
-        self._asked_when_hung = "stopped sending"
+        self._when_hung, self._asked_when_hung = when_hung, "stopped sending"
         self._shared_with: list[str] = []
         self._box = box
         self._caps = None if caps is None else CapKeeper(caps, box)
@@ -421,9 +420,8 @@ class MavsdkDrone:
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s
         if hung_s and self._commanding:  # afterwards the vehicle is only watched
-            raise DroneError(
-                f"this app hung for more than {hung_s:.1f} s; its watchdog {self._asked_when_hung}"
-            )
+            did = self._asked_when_hung
+            raise DroneError(f"this app hung for more than {hung_s:.1f} s; its watchdog {did}")
         if self._ticks.waits:
             if not tick_received:
                 raise DroneError("link lost: the simulator runs, but its telemetry does not arrive")
@@ -496,9 +494,7 @@ class MavsdkDrone:
         with contextlib.suppress(Exception):  # without setpoints the vehicle's failsafe acts
             if not self._in_offboard:
                 self._stream.end()
-            elif self._when_hung == "land":
-                self._asked_when_hung = "requested landing"
-                self._stream.request_land_blocking()
-            else:
-                self._asked_when_hung = "requested hold"
-                self._stream.request_hold_blocking()
+                return
+            lands = self._when_hung == "land"
+            self._asked_when_hung = "requested landing" if lands else "requested hold"
+            (self._stream.request_land_blocking if lands else self._stream.request_hold_blocking)()

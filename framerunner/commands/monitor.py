@@ -32,6 +32,10 @@ COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 _TrustedProxy = Annotated[
     tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
 ]
+_CameraHost = Annotated[
+    tuple[str, ...],
+    Parameter(help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"),
+]
 _OperatorSocket = Annotated[
     Path | None,
     Parameter(help="local socket at which it listens for flights with an operator (fly --operator-socket)"),
@@ -57,12 +61,7 @@ def monitor(
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
     missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
     pilot: PilotOption = None,
-    camera_host: Annotated[
-        tuple[str, ...],
-        Parameter(
-            help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"
-        ),
-    ] = (),
+    camera_host: _CameraHost = (),
     trusted_proxy: _TrustedProxy = (),
     operator_socket: _OperatorSocket = None,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,

@@ -15,7 +15,7 @@ from framerunner.flying.timing import flight_timing
 from framerunner.runs.recorder import RecordingCamera, RunRecords
 from framerunner.runs.run_folder import warn
 from offboard.app import MissionEnd
-from offboard.safety.rules import SIMULATED, AbortAction, SafetyRules
+from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.result import Timing
 from vision.types import CameraFrame
 from wire.simulator_api import SimulatorApi
@@ -25,7 +25,6 @@ if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow t
     from framerunner.flying.mission_reporter import MissionReporter
     from framerunner.flying.simulator_process import SitlProcess
     from framerunner.preflight.settings import HardwareSettings
-    from offboard.link.companion import Companion
     from offboard.mavsdk_drone import MavsdkDrone
     from offboard.perception import CameraPerception
 
@@ -95,13 +94,8 @@ async def fly_in_real_time(
         stack.push_async_callback(companion.close)
         source = records.folder.mission.read_text(encoding="utf-8")
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
-        dry_run = settings.hardware is not None and settings.hardware.dry_run
-        drone = _drone(
-            *(plan, vehicle, records, stack, companion),
-            dry_run=dry_run,
-            system_id=system_id,
-            when_hung=safety.abort,
-        )
+        drone = _drone(plan, vehicle, records, stack, safety, hardware=settings.hardware, system_id=system_id)
+        drone.use_companion(companion)
         camera = await _camera(plan, vehicle, records, stack, reporter)
         perception = _perception(plan, vehicle, judge, camera)
         perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
@@ -202,17 +196,17 @@ def _drone(
     vehicle: _Endpoints,
     records: RunRecords,
     stack: AsyncExitStack,
-    companion: Companion,
+    safety: SafetyRules,
     *,
-    dry_run: bool,
+    hardware: HardwareSettings | None,
     system_id: int | None,
-    when_hung: AbortAction,
 ) -> MavsdkDrone:
     """The drone on its link, which is closed with the stack; in a dry run it is never armed."""
     from offboard.dry_run import DryRunDrone
     from offboard.mavsdk_drone import MavsdkDrone
 
     hang_report = stack.enter_context(records.folder.hang_report.open("w", encoding="utf-8"))
+    dry_run = hardware is not None and hardware.dry_run
     drone = (DryRunDrone if dry_run else MavsdkDrone)(
         vehicle.drone_url,
         start_arena=plan.start_pose,
@@ -221,11 +215,10 @@ def _drone(
         corrects=plan.corrects_commands,
         caps=plan.caps,
         system_id=system_id,
-        when_hung=when_hung,
+        when_hung=safety.abort,
     )
     drone.record_to(records.folder.tlog)
     stack.callback(lambda: warn(drone.recording_problem))
-    drone.use_companion(companion)
     if vehicle.sitl is not None:
         drone.use_clock(vehicle.sitl.clock, vehicle.sitl.system_id)
     if vehicle.shared_with is not None:
