@@ -50,6 +50,8 @@ class FlightAbort:
         if operator is None:
             return await self._end()
         while not operator.kills:
+            if operator.stops:
+                logger.warning("the operator stops the flight: the drone lands; K stops its motors")
             stops = operator.stops
             work = asyncio.ensure_future(self._end_and_attend())
             operator.on_stop(work.cancel)  # not this task: a stop while the work ends must not be lost
@@ -140,5 +142,6 @@ class FlightAbort:
             except DroneError as error:
                 problem = f"stopping the motors: {error}"
             else:
+                logger.warning("the operator stopped the motors")
                 return "the operator stopped the motors"
         return problem

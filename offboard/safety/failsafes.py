@@ -62,8 +62,9 @@ class FailsafeRow(BaseModel):
         return self
 
     def wanted(self, fence: FlightFence) -> float:
-        """The value to set for a flight."""
-        return _number(self.set_to, fence)
+        """The value to set for a flight: not more than a fence allows that is lower."""
+        value = _number(self.set_to, fence)
+        return value if self.most is None else min(value, _number(self.most, fence))
 
     def strict(self, abort: AbortAction) -> FailsafeRow:
         """The row for flights that end so when they are aborted."""

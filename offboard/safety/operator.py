@@ -23,10 +23,11 @@ class Operator:
     A key, a page or a test calls `give_go` and `press_stop`; the flight reads them and is told of each stop.
 
     Args:
-        needs_go: the flight waits for a go before it arms.
+        needs_go: the flight waits for a go before it arms; not in a dry run.
         hint: how to give the go and to stop, for people.
 
     Attributes:
+        needs_go: see above.
         has_go: the go was given, or none is needed.
         asks: the flight waits for the go now.
         stops: how often stop was pressed: once lands, twice stops the motors.
@@ -35,7 +36,7 @@ class Operator:
     """
 
     def __init__(self, *, needs_go: bool = True, hint: str = "") -> None:
-        self._needs_go = needs_go
+        self.needs_go = needs_go
         self.has_go = not needs_go
         self.asks = False
         self.hint = hint
@@ -56,7 +57,7 @@ class Operator:
 
     def ask_for_go(self) -> None:
         """Forget a go that was given before: nobody had been told that the drone is ready."""
-        self.has_go, self.asks = not self._needs_go, self._needs_go
+        self.has_go, self.asks = not self.needs_go, self.needs_go
 
     def give_go(self) -> None:
         """Let the flight arm; ignored after a stop."""
