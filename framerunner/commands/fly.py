@@ -79,7 +79,7 @@ _Response = Annotated[
     ),
 ]
 _MonitorLink = Annotated[
-    str | None, Parameter(show=False, help="MAVLink URL by which the simulated drone also sends")
+    str | None, Parameter(help="MAVLink URL at which a monitor that is open gets the drone's messages, too")
 ]
 _Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input ends")]
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]

@@ -11,10 +11,12 @@ from math import isfinite
 
 from framerunner.doctor import ardupilot
 from framerunner.doctor.findings import Finding, Findings, Level
-from framerunner.doctor.findings import good as _good
-from framerunner.doctor.findings import missing as _missing
-from framerunner.doctor.findings import note as _note
 from framerunner.doctor.listen import Record
+from framerunner.doctor.subjects import Subject
+from framerunner.doctor.subjects import finding as _finding
+from framerunner.doctor.subjects import good as _good
+from framerunner.doctor.subjects import missing as _missing
+from framerunner.doctor.subjects import note as _note
 from wire.dialect import Message, mavlink
 from wire.px4_modes import OFFBOARD
 
@@ -93,6 +95,14 @@ def examine(record: Record) -> list[Finding]:
     return [finding for check in checks for finding in check(record)]
 
 
+def _one_vehicle(record: Record) -> Findings:
+    """Whether all packets of the system id are of one vehicle."""
+    problem = record.senders.problem
+    if problem:
+        advice = "switch the other one off, or give it another id (MAV_SYS_ID; ArduPilot: SYSID_THISMAV)"
+        yield _missing("one vehicle", problem, advice)
+
+
 def _autopilot(record: Record) -> Findings:
     heartbeat = record.latest["HEARTBEAT"]
     if heartbeat.autopilot != mavlink.MAV_AUTOPILOT_PX4:
@@ -165,7 +175,7 @@ def _sensors(record: Record) -> Findings:
     words += [f"not on {_names(idle)}"] if idle else []
     words += [f"{_names(failing)} {'fails' if failing.bit_count() == 1 else 'fail'}"] if failing else []
     advice = "correct what fails before flying" if failing else ""
-    yield Finding(Level.NOTE if failing else Level.GOOD, "sensors", "; ".join(words), advice)
+    yield _finding(Level.NOTE if failing else Level.GOOD, "sensors", "; ".join(words), advice)
 
 
 def _innovations(record: Record) -> Findings:
@@ -212,7 +222,11 @@ def _offboard(record: Record) -> Findings:
 
 
 def _streams(record: Record) -> Findings:
-    for kinds, what in ((_ATTITUDES, "attitude"), (("LOCAL_POSITION_NED",), "local position")):
+    streams: tuple[tuple[tuple[str, ...], Subject], ...] = (
+        (_ATTITUDES, "attitude"),
+        (("LOCAL_POSITION_NED",), "local position"),
+    )
+    for kinds, what in streams:
         rate_hz = max(record.rate_hz(kind) for kind in kinds)
         if rate_hz == 0.0:
             advice = "give it GPS, optical flow, vision or motion capture; wait for its estimate"
@@ -254,12 +268,13 @@ def _limits(record: Record) -> Findings:
     if not parameters:
         yield _note("parameters", "no parameter was received", "check that the link is not read-only")
         return
-    for name, minimum, unit in (
+    slowest: tuple[tuple[Subject, float, str], ...] = (
         ("MPC_XY_VEL_MAX", 1.0, "m/s"),
         ("MPC_Z_VEL_MAX_UP", 1.0, "m/s"),
         ("MPC_Z_VEL_MAX_DN", 1.0, "m/s"),
         ("MC_YAWRATE_MAX", 60.0, "deg/s"),
-    ):
+    )
+    for name, minimum, unit in slowest:
         value = parameters.get(name)
         if value is not None and value < minimum:
             yield _missing(name, f"{value:g} {unit}", f"set it to {minimum:g} or more")
@@ -272,7 +287,10 @@ def _limits(record: Record) -> Findings:
 
 def _fence(record: Record) -> Findings:
     parameters = record.parameters
-    limits = (("GF_MAX_VER_DIST", CHALLENGE_HEIGHT_M), ("GF_MAX_HOR_DIST", CHALLENGE_REACH_M))
+    limits: tuple[tuple[Subject, float], ...] = (
+        ("GF_MAX_VER_DIST", CHALLENGE_HEIGHT_M),
+        ("GF_MAX_HOR_DIST", CHALLENGE_REACH_M),
+    )
     if not parameters.get("GF_ACTION") or not any(parameters.get(name, 0.0) > 0.0 for name, _ in limits):
         return
     status = record.latest.get("ESTIMATOR_STATUS")
@@ -302,7 +320,7 @@ def _failsafes(record: Record) -> Findings:
         elif action == 3:
             words += climbs
         advice = "under a roof set COM_OBL_RC_ACT to 4 (land)" if "return" in words else ""
-        yield Finding(Level.NOTE if advice else Level.GOOD, "setpoints lost", f"{words}{after}", advice)
+        yield _finding(Level.NOTE if advice else Level.GOOD, "setpoints lost", f"{words}{after}", advice)
     if loss_s is not None and loss_s < 0.5:
         yield _missing(
             "COM_OF_LOSS_T", f"{loss_s:g} s", "set it to 1: the app's watchdog needs half a second"
@@ -359,7 +377,7 @@ def _height(record: Record) -> Findings:
     if reference is None:
         fine = accuracy_m <= ACCURATE_M
         advice = "" if fine else f"take height from vision or a range finder: {_GUIDE}"
-        yield Finding(Level.GOOD if fine else Level.MISSING, "height", accuracy, advice)
+        yield _finding(Level.GOOD if fine else Level.MISSING, "height", accuracy, advice)
         return
     requested = _HEIGHT_SOURCE.get(int(reference), "unknown means")
     source = _height_source(record, status, requested)
@@ -435,6 +453,7 @@ def _height_source(record: Record, status: Message, requested: str) -> str:
 
 
 _CHECKS: tuple[Callable[[Record], Findings], ...] = (
+    _one_vehicle,
     _autopilot,
     _armed,
     _health,
@@ -452,6 +471,7 @@ _CHECKS: tuple[Callable[[Record], Findings], ...] = (
     _failsafes,
 )
 _ARDUPILOT_CHECKS: tuple[Callable[[Record], Findings], ...] = (
+    _one_vehicle,
     ardupilot.autopilot,
     _armed,
     ardupilot.health,
