@@ -33,6 +33,7 @@ MODULES = (
     "monitor.live_channel",
     "monitor.video_proxy",
     "monitor.pilot_channel",
+    "monitor.operator_channel",
     "monitor.replay_api",
     "monitor.extensions",
     "monitor.competition.api",

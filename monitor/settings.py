@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from errors import UserError
 from monitor.addresses import is_address_or_network
@@ -42,6 +43,7 @@ class MonitorSettings:
         trusted_proxies: addresses or networks whose X-Forwarded-For and X-Forwarded-Proto are used.
         limits: of connections.
         qr_codes: print addresses as QR codes too.
+        operator_socket: local socket at which flights with an operator connect; None: none does.
     """
 
     bind: str = "127.0.0.1"
@@ -51,6 +53,7 @@ class MonitorSettings:
     trusted_proxies: tuple[str, ...] = ()
     limits: ConnectionLimits = ConnectionLimits()
     qr_codes: bool = False
+    operator_socket: Path | None = None
 
     def check(self) -> None:
         """Raise `MonitorError` if a value is out of its range."""

@@ -26,6 +26,7 @@ from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
 from offboard.safety.caps import CapKeeper, Caps
+from offboard.safety.rules import AbortAction
 from wire.transports.sockets import check_free
 from wire.transports.urls import LinkError, parse_url
 
@@ -65,6 +66,7 @@ class MavsdkDrone:
         corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
         caps: no command exceeds them, and none leads out of the box; None: there are none.
         system_id: of the vehicle that was checked, by MAVLink; no other one is flown. None: any.
+        when_hung: what is requested for a vehicle in offboard when this app hangs.
 
     Attributes:
         recording_problem: why recording ended before the flight; set by `disconnect`.
@@ -85,6 +87,7 @@ class MavsdkDrone:
         corrects: bool = True,
         caps: Caps | None = None,
         system_id: int | None = None,
+        when_hung: AbortAction = "hold",
     ) -> None:
         self.recording_problem = ""
         self._url = parse_url(url)
@@ -111,6 +114,7 @@ class MavsdkDrone:
         self._recorder: TlogRecorder | None = None
         self._companion: Companion | None = None
         self._watchdog = Watchdog(self._stand_still, self._stop_from_watchdog, hang_report)
+        self._when_hung, self._asked_when_hung = when_hung, "stopped sending"
         self._shared_with: list[str] = []
         self._box = box
         self._caps = None if caps is None else CapKeeper(caps, box)
@@ -415,8 +419,8 @@ class MavsdkDrone:
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s
-        if hung_s:
-            did = "stopped sending" if self._stream.ended else "requested hold"
+        if hung_s and self._commanding:  # afterwards the vehicle is only watched
+            did = self._asked_when_hung
             raise DroneError(f"this app hung for more than {hung_s:.1f} s; its watchdog {did}")
         if self._ticks.waits:
             if not tick_received:
@@ -483,12 +487,14 @@ class MavsdkDrone:
                 await self._ticks.next(0.05)
 
     def _stop_from_watchdog(self) -> None:
-        """On the watchdog's thread: end the native stream and, in offboard, request hold.
+        """On the watchdog's thread: end the native stream and, in offboard, request hold or landing.
 
         A vehicle that a pilot has must not be given back to a hung app, so the stream ends permanently.
         """
         with contextlib.suppress(Exception):  # without setpoints the vehicle's failsafe acts
-            if self._in_offboard:
-                self._stream.request_hold_blocking()
-            else:
+            if not self._in_offboard:
                 self._stream.end()
+                return
+            lands = self._when_hung == "land"
+            self._asked_when_hung = "requested landing" if lands else "requested hold"
+            (self._stream.request_land_blocking if lands else self._stream.request_hold_blocking)()

@@ -141,7 +141,7 @@ class ServedDrone:
     async def close(self) -> None:
         """Finish the log, save the parameters, stop the video and close the links."""
         self._recorder.finish(self.simulation.autopilot)
-        self._album.stop_video()
+        self._album.close()
         if self._keeper is not None:
             await self._keeper.close()
         await self._video.close()

@@ -13,7 +13,7 @@ from firmware_py.measurements import ExternalPose, Readings
 from firmware_py.parameters import Parameters
 from firmware_py.types import GeodeticPoint, MotorSpeeds, Sensors
 from geometry.vectors import Vec3
-from scenarios.models import CameraMotion, Scenario, ground_height
+from scenarios.models import Scenario, ground_height
 from scenarios.referee import Referee
 from scenarios.result import BegunFault, FailsafeText, FaultFacts
 from sitl.battery import Battery
@@ -176,7 +176,7 @@ class SimulatedVehicle(ABC):
 
     def _turn_camera(self, gimbal: SimulatedGimbal) -> None:
         gimbal.step(CONTROL_PERIOD_US / 1e6, self._sensors.attitude)
-        self.truth.camera = CameraMotion(gimbal.attitude_arena, gimbal.rate_frd_rad_s)
+        self.truth.camera = gimbal.motion
 
     def _change_arming(self, armed: bool) -> None:
         if not armed:

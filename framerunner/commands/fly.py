@@ -86,7 +86,7 @@ _Response = Annotated[
     ),
 ]
 _MonitorLink = Annotated[
-    str | None, Parameter(show=False, help="MAVLink URL by which the simulated drone also sends")
+    str | None, Parameter(help="MAVLink URL at which a monitor that is open gets the drone's messages, too")
 ]
 _Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input ends")]
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
@@ -148,10 +148,9 @@ def fly(
     chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep, px4=px4)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
-    delay_s = plan.camera_delay_s if camera_delay is None else camera_delay
-    real_time = RealTimeSettings(drone, camera, api, speed, instance, px4, delay_s, procedure)
-    ends = (plan, None if lockstep else real_time, out, record, video, monitor, monitor_link)
-    return _run(FlightSettings(*ends), lifeline=lifeline)
+    ends, delay_s = (drone, camera, api, speed, instance, px4), plan.camera_delay_s(camera_delay)
+    flown = None if lockstep else RealTimeSettings(*ends, delay_s, procedure)
+    return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
 
 
 def _run(settings: FlightSettings, *, lifeline: bool) -> int:

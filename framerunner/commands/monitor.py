@@ -32,6 +32,14 @@ COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 _TrustedProxy = Annotated[
     tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
 ]
+_CameraHost = Annotated[
+    tuple[str, ...],
+    Parameter(help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"),
+]
+_OperatorSocket = Annotated[
+    Path | None,
+    Parameter(help="local socket at which it listens for flights with an operator (fly --operator-socket)"),
+]
 PilotOption = Annotated[
     Path | None, Parameter(help="Python file with primitives of your own, for the editor; it is executed")
 ]
@@ -53,13 +61,9 @@ def monitor(
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
     missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
     pilot: PilotOption = None,
-    camera_host: Annotated[
-        tuple[str, ...],
-        Parameter(
-            help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"
-        ),
-    ] = (),
+    camera_host: _CameraHost = (),
     trusted_proxy: _TrustedProxy = (),
+    operator_socket: _OperatorSocket = None,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.
@@ -88,7 +92,9 @@ def monitor(
     flown = None if scenario is None else load_scenario(scenario)
     given = equipment(drone, flown, runs, camera_host, missions=missions, pilot=pilot)
     password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()
-    settings = MonitorSettings(bind, port, database, password, trusted_proxy, qr_codes=qr_codes)
+    settings = MonitorSettings(
+        bind, port, database, password, trusted_proxy, qr_codes=qr_codes, operator_socket=operator_socket
+    )
     _allow_many_files()
     if lifeline:
         os.nice(_NICENESS)

@@ -122,11 +122,11 @@ class FlightPlan:
             }
         )
 
-    @property
-    def camera_delay_s(self) -> float:
-        """Age of an image that arrives without a time stamp, if nobody says more."""
+    def camera_delay_s(self, given_s: float | None) -> float:
+        """Age of an image that arrives without a time stamp: as given, else the calibration's, else usual."""
         measured_s = None if self.calibration is None else self.calibration.delay_s
-        return CAMERA_DELAY_S if measured_s is None else measured_s
+        known = (each for each in (given_s, measured_s) if each is not None)
+        return next(known, CAMERA_DELAY_S)
 
     @property
     def box(self) -> Box:

@@ -183,6 +183,16 @@ async def test_a_px4_that_ends_at_once_is_reported_with_its_error(tmp_path):
     assert "PX4_SIM_MODEL=none_iris" in process.log.read_text()
 
 
+async def test_a_px4_that_is_restarted_goes_on_with_its_log(tmp_path):
+    script = "if [ -f was ]; then exit 4; fi; touch was; echo 'ERROR [init] the first start'"
+    process = Px4Process(build_of(tmp_path, script), 2, tmp_path / "files", {})
+    await process.start()
+    assert (await process.ended()).endswith("ERROR [init] the first start")
+    await process.start()
+    assert await process.ended() == "PX4 ended with code 4"  # not the words of the start before
+    assert "the first start" in process.log.read_text()
+
+
 def test_a_folder_is_given_to_px4_by_its_absolute_path(tmp_path):
     command = Px4Process(tmp_path, 0, Path("drone-files/px4-0"), {}).command()
     assert Path("drone-files/px4-0").absolute() == Path(command[command.index("-w") + 1])
