@@ -80,12 +80,12 @@ def missing_for(movement: Movement, fit: MountingFit | None) -> tuple[str, ...]:
         return ("let the camera see frames: nothing that was seen stays at one place and has a frame's size",)
     roll, pitch, yaw = (degrees(each) for each in fit.std.angles_frd_rad)
     if roll > MAX_ANGLE_STD_DEG:
-        words.append(f"yaw the drone further with frames in view: roll is uncertain by {roll:.1f} degrees")
+        words.append(f"yaw the drone further with frames in view: roll is uncertain by {roll:.2f} degrees")
     uncertain = {"pitch": pitch, "yaw": yaw}
     for name, deg in uncertain.items():
         if deg > MAX_ANGLE_STD_DEG:
             words.append(
                 f"fly towards frames and away from them, and past them to the side, by a metre: {name} is "
-                f"uncertain by {deg:.1f} degrees"
+                f"uncertain by {deg:.2f} degrees"
             )
     return tuple(words)
