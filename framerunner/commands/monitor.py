@@ -32,6 +32,12 @@ COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 _TrustedProxy = Annotated[
     tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
 ]
+_Certificate = Annotated[
+    Path | None, Parameter(help="PEM file: serve https:// with it, and the pages' WebSockets as wss://")
+]
+_Key = Annotated[
+    Path | None, Parameter(help="PEM file of the certificate's private key, if that is not in the same file")
+]
 PilotOption = Annotated[
     Path | None, Parameter(help="Python file with primitives of your own, for the editor; it is executed")
 ]
@@ -60,6 +66,8 @@ def monitor(
         ),
     ] = (),
     trusted_proxy: _TrustedProxy = (),
+    certificate: _Certificate = None,
+    key: _Key = None,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.
@@ -73,6 +81,8 @@ def monitor(
         framerunner monitor
 
         framerunner monitor --bind 0.0.0.0 --port 80
+
+        framerunner monitor --bind 0.0.0.0 --certificate monitor.crt --key monitor.key
 
         framerunner monitor --drone serial:///dev/ttyUSB0:57600 --scenario test-case-1
     """
@@ -88,7 +98,12 @@ def monitor(
     flown = None if scenario is None else load_scenario(scenario)
     given = equipment(drone, flown, runs, camera_host, missions=missions, pilot=pilot)
     password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()
-    settings = MonitorSettings(bind, port, database, password, trusted_proxy, qr_codes=qr_codes)
+    settings = MonitorSettings(
+        *(bind, port, database, password, trusted_proxy),
+        qr_codes=qr_codes,
+        certificate=certificate,
+        key=key,
+    )
     _allow_many_files()
     if lifeline:
         os.nice(_NICENESS)
