@@ -26,6 +26,7 @@ from monitor.addresses import Places
 from monitor.connections import Connections, Gate
 from monitor.settings import ConnectionLimits, MonitorError
 from monitor.urls import url_of
+from wire.transports.urls import is_loopback
 
 HTTPS_PORT = 443
 _HANDSHAKE = 0x16  # first byte of a TLS connection: the content type of its first record (RFC 8446, 5.1)
@@ -56,7 +57,8 @@ class Certificate:
             urls: of this machine's addresses.
             port: TCP port, for URLs of the names that the certificate is for.
         """
-        names = [url_of(host, port, "https") for host in self.hosts if not _is_address(host)]
+        named = [host for host in self.hosts if not _is_address(host) and not is_loopback(host)]
+        names = [url_of(host, port, "https") for host in named]
         known = [url for url in urls if self._is_for(url)]
         return [*known, *names, *(url for url in urls if url not in known)]
 
