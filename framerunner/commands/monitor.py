@@ -29,6 +29,15 @@ SYSTEM_ID = 250
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 
 
+_Drone = Annotated[str, Parameter(help="MAVLink URL: where drones send to ground stations")]
+_Scenario = Annotated[
+    str | None, Parameter(help="name or file; for a drone without a referee, such as a real one")
+]
+_Bind = Annotated[str, Parameter(help="address to listen on; 0.0.0.0 lets other machines in")]
+_CameraHosts = Annotated[
+    tuple[str, ...],
+    Parameter(help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"),
+]
 _TrustedProxy = Annotated[
     tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
 ]
@@ -45,26 +54,15 @@ PilotOption = Annotated[
 
 def monitor(
     *,
-    drone: Annotated[
-        str, Parameter(help="MAVLink URL: where drones send to ground stations")
-    ] = "udpin://127.0.0.1:14550",
-    scenario: Annotated[
-        str | None, Parameter(help="name or file; for a drone without a referee, such as a real one")
-    ] = None,
-    bind: Annotated[
-        str, Parameter(help="address to listen on; 0.0.0.0 lets other machines in")
-    ] = "127.0.0.1",
+    drone: _Drone = "udpin://127.0.0.1:14550",
+    scenario: _Scenario = None,
+    bind: _Bind = "127.0.0.1",
     port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8080,
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
     missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
     pilot: PilotOption = None,
-    camera_host: Annotated[
-        tuple[str, ...],
-        Parameter(
-            help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"
-        ),
-    ] = (),
+    camera_host: _CameraHosts = (),
     trusted_proxy: _TrustedProxy = (),
     certificate: _Certificate = None,
     key: _Key = None,
