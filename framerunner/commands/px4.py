@@ -33,6 +33,7 @@ def params(
     env: Annotated[
         bool, Parameter(help="as environment variables, by which PX4 takes them at its start")
     ] = False,
+    transmitter: Annotated[bool, Parameter(help="for a pilot's remote control, too")] = False,
 ) -> int:
     """Print the parameters by which PX4 flies an airframe here: one `NAME VALUE` a line.
 
@@ -48,7 +49,8 @@ def params(
     from sitl.px4.parameters import all_parameters
     from sitl.sensors.suite import load_suite
 
-    values = all_parameters(load_airframe(airframe), load_suite(sensors), speed)
+    frame, suite = load_airframe(airframe), load_suite(sensors)
+    values = all_parameters(frame, suite, speed, transmitter=transmitter)
     lines = (
         [f"{name}={text}" for name, text in environment(values).items()]
         if env
@@ -92,6 +94,7 @@ def px4_server(
     fault: tuple[str, ...],
     *,
     px4: Path | None,
+    transmitter: str | None,
     seed: int,
     grants: TimeGrants | None,
 ) -> Px4Server:
@@ -99,11 +102,13 @@ def px4_server(
     from scenarios.loader import load_scenario
     from sitl.px4.server import Px4Server
     from sitl.px4.simulation import Px4Simulation
+    from sitl.px4.transmitter import open_transmitter
 
+    sticks = None if transmitter is None else open_transmitter(transmitter)
     chosen = with_faults(for_px4(with_sensors(load_scenario(scenario), onboard.sensors)), fault)
 
     def new_simulation() -> Px4Simulation:
-        return Px4Simulation(chosen, seed=seed)
+        return Px4Simulation(chosen, seed=seed, transmitter=sticks)
 
     simulation = new_simulation()  # so that what is wrong with it is said first
     start = _start(simulation, settings, px4)
@@ -119,11 +124,14 @@ def _start(simulation: Px4Simulation, settings: ServerSettings, px4: Path | None
     scenario = simulation.scenario
     command = (
         f"env $(framerunner px4 params {scenario.airframe} --sensors {scenario.sensors} --speed "
-        f"{settings.speed:g} --env) build/px4_sitl_default/bin/px4 -i {settings.instance}"
+        f"{settings.speed:g}{' --transmitter' if simulation.has_transmitter else ''} --env) "
+        f"build/px4_sitl_default/bin/px4 -i {settings.instance}"
     )
     if px4 is None:
         return AutopilotStart(None, command)
     build = find_build(px4)
-    values = all_parameters(simulation.world.airframe, load_suite(scenario.sensors), settings.speed)
+    suite = load_suite(scenario.sensors)
+    chosen = (simulation.world.airframe, suite, settings.speed)
+    values = all_parameters(*chosen, transmitter=simulation.has_transmitter)
     folder = None if settings.storage is None else settings.storage / f"px4-{settings.instance}"
     return AutopilotStart(Px4Process(build, settings.instance, folder, values), command)

@@ -16,6 +16,7 @@ from firmware_py.measurements import (
 )
 from firmware_py.types import GeodeticPoint, Sensors
 from sitl.px4.messages import Packer
+from sitl.px4.transmitter import Channels
 from sitl.sensors.specs import RangeFinderSpec
 from wire.dialect import degrees_e7, mavlink, millimetres, whole
 
@@ -23,6 +24,10 @@ _ACCELEROMETER_AND_GYROSCOPE = 0b111_111
 _MAGNETOMETER = 0b111 << 6
 _BAROMETER = 1 << 9 | 1 << 11 | 1 << 12  # absolute pressure, pressure altitude, temperature
 _TRUTH_PERIOD_US = 20_000
+RC_PERIOD_US = 20_000
+_RC_FIELDS = 18
+_NO_CHANNEL = 0xFFFF
+_FULL_SIGNAL = 100
 _STANDARD_GRAVITY_M_S2 = 9.80665
 _NO_COVARIANCE = (nan,) * 21
 
@@ -48,16 +53,20 @@ class SensorMessages:
         self._odometry = Packer(mavlink.MAVLINK_MSG_ID_ODOMETRY)
         self._distance = Packer(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
         self._flow = Packer(mavlink.MAVLINK_MSG_ID_HIL_OPTICAL_FLOW)
+        self._rc = Packer(mavlink.MAVLINK_MSG_ID_RC_CHANNELS)
         self._imu: ImuSample | None = None
         self._started = False
 
-    def pack(self, readings: Readings, pose: ExternalPose | None, true: Sensors) -> bytes:
+    def pack(
+        self, readings: Readings, pose: ExternalPose | None, true: Sensors, rc: Channels | None = None
+    ) -> bytes:
         """All messages of a tick; the last one is its HIL_SENSOR.
 
         Args:
             readings: what the sensors deliver.
             pose: of motion capture, if one has arrived.
             true: the true state, for PX4's log.
+            rc: what the receiver of the remote control delivers now; None: nothing.
         """
         sensor = self._pack_sensor(readings)
         if not self._started:
@@ -74,6 +83,8 @@ class SensorMessages:
             packets += self._pack_flow(readings.optical_flow)
         if readings.time_us % _TRUTH_PERIOD_US == 0:
             packets += self._pack_truth(true)
+        if rc is not None:
+            packets += self._pack_rc(readings.time_us, rc)
         return packets + sensor
 
     def _pack_sensor(self, readings: Readings) -> bytes:
@@ -141,6 +152,10 @@ class SensorMessages:
             *(flow.time_us, flow.integration_us, *flow.flow_rad, *flow.gyro_rad, nan),
             *(0, -1.0, 0, 0, flow.quality),
         )
+
+    def _pack_rc(self, time_us: int, channels: Channels) -> bytes:
+        unused = (_NO_CHANNEL,) * (_RC_FIELDS - len(channels))
+        return self._rc.pack(time_us // 1000, *channels, *unused, len(channels), _FULL_SIGNAL)
 
     def _pack_truth(self, true: Sensors) -> bytes:
         place = self._projection.to_geodetic(true.position_ned_m)
