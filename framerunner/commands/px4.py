@@ -12,6 +12,7 @@ from framerunner.commands import say, with_faults, with_sensors
 
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
+    from framerunner.evaluation.plan import Plan
     from scenarios.models import Scenario
     from sitl.autopilots.process import AutopilotStart
     from sitl.px4.server import Px4Server
@@ -68,6 +69,33 @@ def for_px4(scenario: Scenario) -> Scenario:
     if chosen is not scenario:
         say(f"PX4 takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
     return chosen
+
+
+def plan_for_px4(plan: Plan, folder: Path) -> Plan:
+    """An evaluation's plan for PX4, without scenarios with a fault of the link; says what is changed.
+
+    Raises:
+        SettingError: nothing is left, or there is no PX4.
+    """
+    from scenarios.faults.declaration import FaultPart
+    from sitl.px4.build import version_of
+    from sitl.px4.simulation import SUITE_INSTEAD_OF_IDEAL, with_sensors_for_px4
+
+    flown, ideal = [], 0
+    for scenario in plan.scenarios:
+        if all(fault.part is not FaultPart.LINK for fault in scenario.faults):
+            flown.append(with_sensors_for_px4(scenario))
+            ideal += flown[-1] is not scenario
+    left_out = len(plan) - len(flown)
+    if not flown:
+        raise SettingError(f"--px4 {folder}: all flights have a fault of the link, which is PX4's own")
+    if left_out:
+        say(
+            f"PX4 has its own link to the app: {left_out} of {len(plan)} flights have a fault of it, left out"
+        )
+    if ideal:
+        say(f"PX4 takes no true state: drones with ideal sensors have {SUITE_INSTEAD_OF_IDEAL}")
+    return plan.flown_by(version_of(folder), flown)
 
 
 def check_px4_flight(px4: Path | None, *, drone: str | None, lockstep: bool) -> None:

@@ -1,7 +1,7 @@
 """What goes between simulator and PX4 beside the simulator interface: the battery to it, its words from it.
 
-PX4 takes a battery from a component of its own MAVLink system, on any of its links; the one to a gimbal is
-used, UDP 13030 plus the instance. On it PX4 sends its heartbeats, too.
+PX4 takes a battery from a component of its own MAVLink system. Its link to a camera is used, UDP 14280 plus
+the instance: nobody else is its partner there, and that to a gimbal takes few messages.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from wire.framing import HEADER_BYTES_V2, MARKER_V2
 from wire.px4_modes import px4_name
 
 PERIOD_US = 100_000
-GIMBAL_PORT = 13030  # of PX4's instance 0
-_PARTNER_PORT = 13280  # to which it sends
+CAMERA_PORT = 14280  # of PX4's instance 0
 _HEARTBEAT = Struct("<IBBBBB")  # custom mode, type, autopilot, base mode, system status, version
 _UNKNOWN_CELL = 0xFFFF
 _UNKNOWN_TEMPERATURE = 0x7FFF
@@ -45,9 +44,7 @@ class SideLink:
         self._packer = Packer(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, self._system_id, _BATTERY)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        with contextlib.suppress(OSError):  # another program is PX4's gimbal
-            self._socket.bind(("127.0.0.1", _PARTNER_PORT + instance))
-        self._px4 = ("127.0.0.1", GIMBAL_PORT + instance)
+        self._px4 = ("127.0.0.1", CAMERA_PORT + instance)
         self._output = None if output is None else _Output(output)
 
     def step(self, simulation: Px4Simulation) -> None:
