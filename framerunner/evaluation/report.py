@@ -122,9 +122,9 @@ def write_report(
 
 
 def replay_command(
-    path: Path, mission: str, pilot: str | None, seed: int, response: str = "", px4: Path | None = None
+    path: Path, mission: str, pilot: str | None, seed: int, response: str = "", *, px4: Path | None = None
 ) -> str:
-    """The command that flies the scenario of a file again: the same to the last bit, but for PX4's flights."""
+    """The command that flies the scenario of a file again, in lockstep the same to the last bit."""
     words = ["framerunner", "fly", str(path), "--mission", mission]
     words += ["--pilot", pilot] if pilot else []
     words += ["--seed", str(seed)] if seed else []
@@ -158,8 +158,8 @@ def _failures(
                 plot = _track_plot(folder, row)
                 done += 1
             file = folder.scenario_file(row.scenario)
-            flown = (page.mission, page.pilot, row.seed or 0, row.response, page.px4)
-            command = replay_command(file, *flown)
+            flown = (page.mission, page.pilot, row.seed or 0, row.response)
+            command = replay_command(file, *flown, px4=page.px4)
             failures.append(Failure(row, command, plot, _traceback(folder, row)))
         groups.append((cause.verdict, cause.ended_in, failures))
     return groups
