@@ -15,7 +15,7 @@ from framerunner.commands.px4 import plan_for_px4
 
 if TYPE_CHECKING:
     from framerunner.evaluation.plan import Plan
-    from framerunner.flying.px4_flight import Px4Use
+    from framerunner.evaluation.px4_flight import Px4Use
     from offboard.mission import Mission
 
 _COUNT, _SEED = 100, 1
@@ -132,7 +132,7 @@ def _px4_use(
         raise SettingError(f"--response {response}: changes our autopilot's flights; leave it out with --px4")
     if backend != "loky":
         raise SettingError(f"--backend {backend}: PX4 is started on this machine; leave it out with --px4")
-    from framerunner.flying.px4_flight import INSTANCES, Px4Use
+    from framerunner.evaluation.px4_flight import INSTANCES, Px4Use
     from sitl.px4.build import find_build
 
     check_range("--speed", speed, 0.01, _MAX_PX4_SPEED)

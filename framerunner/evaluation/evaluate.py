@@ -13,13 +13,13 @@ from errors import SettingError
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
 from framerunner.evaluation.plan import Plan
+from framerunner.evaluation.px4_flight import Px4Use
 from framerunner.evaluation.rows import Row, csv_text
 from framerunner.evaluation.runner import Terms, fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
 from framerunner.evaluation.terminal import EvaluationProgress, print_comparison, print_summary
 from framerunner.extras import install_advice, is_installed
-from framerunner.flying.px4_flight import Px4Use
 from scenarios.verdict import Verdict
 
 EXIT_INTERRUPTED = 130

@@ -20,10 +20,10 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from framerunner.evaluation.backends import Pool, Workers, is_lost_worker, open_pool
+from framerunner.evaluation.px4_flight import Px4Use, fly_with_px4
 from framerunner.evaluation.rows import Row
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
-from framerunner.flying.px4_flight import Px4Use, fly_with_px4
 from framerunner.runs.chart_record import ChartRecord
 from framerunner.runs.track import Track
 from offboard.mission import Mission

@@ -46,6 +46,7 @@ RC_PARAMETERS: dict[str, Value] = {
 _MIN_THRUST_SHARE = 0.25  # of the hover thrust, in the air
 _MAX_PX4_MIN_THRUST = 0.12  # PX4's default
 _HORIZON_RESERVE_MS = 24  # with less, poses come too late for their time and the estimate lags by 20 ms
+_MAX_GPS_DRIFT_M_S = 0.3  # on the ground
 _ARRIVAL_EARLY_MS = 4  # a pose or fix is stamped with the clock of the tick before that of its arrival
 
 
@@ -132,6 +133,7 @@ def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
         values |= {"SYS_HAS_GPS": 0, "EKF2_GPS_CTRL": 0, "EKF2_GPS_DELAY": 0}
     else:
         values["EKF2_GPS_DELAY"] = _delay_ms(suite.gps.delay_s)
+        values["EKF2_REQ_HDRIFT"] = _MAX_GPS_DRIFT_M_S  # the noise of the suite's GPS passes 0.1 now and then
     pose = suite.external_pose
     if pose is not None:
         values |= {
@@ -145,6 +147,16 @@ def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
             "EKF2_OF_DELAY": 20,
             "EKF2_TAU_POS": 0.1,
             "EKF2_TAU_VEL": 0.1,
+        }
+    flow = suite.optical_flow
+    if flow is not None and pose is None and suite.gps is None:
+        values |= {
+            "EKF2_RNG_CTRL": 1,  # flow is a velocity only with a distance to the ground
+            "EKF2_HGT_REF": 0,
+            "EKF2_OF_DELAY": 0,
+            "SENS_FLOW_MINHGT": flow.min_distance_m,
+            "SENS_FLOW_MAXHGT": flow.max_distance_m,
+            "SENS_FLOW_MAXR": flow.max_flow_rad_s,
         }
     return values
 

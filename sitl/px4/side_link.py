@@ -1,7 +1,8 @@
 """What goes between simulator and PX4 beside the simulator interface: the battery to it, its words from it.
 
-PX4 takes a battery from a component of its own MAVLink system. Its link to a camera is used, UDP 14280 plus
-the instance: nobody else is its partner there, and that to a gimbal takes few messages.
+PX4 takes a battery from a component of its own MAVLink system, and without GPS the place on Earth of its
+local frame, which its mode hold needs. Its link to a camera is used, UDP 14280 plus the instance: nobody else
+is its partner there, and that to a gimbal takes few messages.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import BinaryIO
 from firmware_py.types import BatteryState
 from sitl.px4.messages import Packer
 from sitl.px4.simulation import Px4Simulation
-from wire.dialect import mavlink, whole
+from wire.dialect import degrees_e7, mavlink, millimetres, whole
 from wire.framing import HEADER_BYTES_V2, MARKER_V2
 from wire.px4_modes import px4_name
 
@@ -27,6 +28,9 @@ _UNKNOWN_CELL = 0xFFFF
 _UNKNOWN_TEMPERATURE = 0x7FFF
 _MAX_CELLS = 10
 _BATTERY = int(mavlink.MAV_COMP_ID_BATTERY)
+_ORIGIN_PERIODS = 10
+_HEARTBEAT_ID = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+_ORIGIN_ID = int(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 _CRITICAL = int(mavlink.MAV_STATE_CRITICAL)
 _PACKETS_AT_ONCE = 200
 
@@ -42,6 +46,8 @@ class SideLink:
     def __init__(self, instance: int, output: Path | None) -> None:
         self._system_id = instance + 1
         self._packer = Packer(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, self._system_id, _BATTERY)
+        self._origin_packer = Packer(mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN)
+        self._placed: Px4Simulation | None = None  # the one whose PX4 knows the place of its local frame
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._px4 = ("127.0.0.1", CAMERA_PORT + instance)
@@ -51,20 +57,42 @@ class SideLink:
         """Send the battery's state, and take what PX4 has said; to be called each `PERIOD_US`."""
         battery = simulation.measured_battery()
         if battery is not None:
-            with contextlib.suppress(OSError):
-                self._socket.sendto(self._pack(battery), self._px4)
+            self._send(self._pack(battery))
         time_us, words = simulation.time_us, simulation.words
+        if self._lacks_origin(simulation) and time_us // PERIOD_US % _ORIGIN_PERIODS == 0:
+            self._send_origin(simulation)
         if self._output is not None:
             for line in self._output.new_lines():
                 words.printed(time_us, line)
-        for custom_mode, status in self._heartbeats():
-            words.heartbeat(time_us, px4_name(custom_mode), critical=status >= _CRITICAL)
+        for message_id, payload in self._received():
+            if message_id == _ORIGIN_ID:
+                self._placed = simulation
+            elif message_id == _HEARTBEAT_ID and len(payload) >= _HEARTBEAT.size:
+                custom_mode, *_, status, _ = _HEARTBEAT.unpack_from(payload)
+                words.heartbeat(time_us, px4_name(custom_mode), critical=status >= _CRITICAL)
 
     def close(self) -> None:
         """Close the socket and the file."""
         self._socket.close()
         if self._output is not None:
             self._output.close()
+
+    def _lacks_origin(self, simulation: Px4Simulation) -> bool:
+        """Whether PX4 cannot know where on Earth it is, and has not said that it was told."""
+        return not simulation.has_gps and not simulation.armed and self._placed is not simulation
+
+    def _send_origin(self, simulation: Px4Simulation) -> None:
+        origin = simulation.scenario.origin
+        self._send(
+            self._origin_packer.pack(
+                *(degrees_e7(origin.latitude_deg), degrees_e7(origin.longitude_deg)),
+                *(millimetres(origin.altitude_m), self._system_id, 0),
+            )
+        )
+
+    def _send(self, packet: bytes) -> None:
+        with contextlib.suppress(OSError):  # PX4 has not started
+            self._socket.sendto(packet, self._px4)
 
     def _pack(self, battery: BatteryState) -> bytes:
         cells = min(max(battery.cells, 1), _MAX_CELLS)
@@ -79,19 +107,17 @@ class SideLink:
             *(0, battery.warning, 0, 0, 0, 0, 0, 0),
         )
 
-    def _heartbeats(self) -> Iterator[tuple[int, int]]:
-        """Custom mode and system status of PX4's heartbeats that have arrived."""
+    def _received(self) -> Iterator[tuple[int, bytes]]:
+        """Number and payload of PX4's messages that have arrived."""
         for _ in range(_PACKETS_AT_ONCE):
             try:
                 packet = self._socket.recv(2048)
             except OSError:
                 return
-            if len(packet) < HEADER_BYTES_V2 + _HEARTBEAT.size or packet[0] != MARKER_V2:
+            if len(packet) < HEADER_BYTES_V2 or packet[0] != MARKER_V2:
                 continue
-            if packet[7:10] != b"\0\0\0" or packet[5:7] != bytes((self._system_id, 1)):
-                continue
-            mode, *_, status, _ = _HEARTBEAT.unpack_from(packet, HEADER_BYTES_V2)
-            yield mode, status
+            if packet[5:7] == bytes((self._system_id, 1)):
+                yield int.from_bytes(packet[7:10], "little"), packet[HEADER_BYTES_V2:]
 
 
 class _Output:

@@ -93,6 +93,11 @@ class Px4Simulation(SimulatedVehicle):
         """Where PX4's local frame has its origin: that of motion capture; with GPS it is not known here."""
         return ZERO3 if self._suite.external_pose is not None else None
 
+    @property
+    def has_gps(self) -> bool:
+        """Whether the drone has GPS."""
+        return self._suite.gps is not None
+
     def sense(self) -> bytes:
         """The messages of this tick; begins it."""
         true = self._begin_tick()

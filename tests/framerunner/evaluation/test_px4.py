@@ -9,11 +9,10 @@ import pytest
 
 from errors import SettingError
 from framerunner.cli import run
-from framerunner.evaluation import runner
+from framerunner.evaluation import px4_flight, runner
 from framerunner.evaluation.plan import plan_files
-from framerunner.flying import px4_flight
+from framerunner.evaluation.px4_flight import claimed_instance
 from framerunner.flying.lockstep import fly_lockstep
-from framerunner.flying.px4_flight import claimed_instance
 from offboard.mission import load_mission
 from scenarios.faults.parse import parse_fault
 from scenarios.loader import dump_yaml, load_scenario
