@@ -10,17 +10,17 @@ from firmware_py.measurements import (
     ExternalPose,
     FlowSample,
     GpsSample,
-    ImuSample,
     RangeSample,
     Readings,
 )
 from firmware_py.types import GeodeticPoint, Sensors
+from geometry.vectors import ZERO3
 from sitl.px4.messages import Packer
 from sitl.px4.transmitter import Channels
 from sitl.sensors.specs import RangeFinderSpec
 from wire.dialect import degrees_e7, mavlink, millimetres, whole
 
-_ACCELEROMETER_AND_GYROSCOPE = 0b111_111
+_ACCELEROMETER, _GYROSCOPE = 0b111, 0b111 << 3
 _MAGNETOMETER = 0b111 << 6
 _BAROMETER = 1 << 9 | 1 << 11 | 1 << 12  # absolute pressure, pressure altitude, temperature
 _TRUTH_PERIOD_US = 20_000
@@ -54,7 +54,7 @@ class SensorMessages:
         self._distance = Packer(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
         self._flow = Packer(mavlink.MAVLINK_MSG_ID_HIL_OPTICAL_FLOW)
         self._rc = Packer(mavlink.MAVLINK_MSG_ID_RC_CHANNELS)
-        self._imu: ImuSample | None = None
+        self._acceleration = self._rates = ZERO3  # the last ones that were delivered
         self._started = False
 
     def pack(
@@ -88,15 +88,17 @@ class SensorMessages:
         return packets + sensor
 
     def _pack_sensor(self, readings: Readings) -> bytes:
-        """HIL_SENSOR; an IMU that delivers nothing is not flagged as updated, but PX4's clock advances."""
+        """HIL_SENSOR; a sensor that delivers nothing is not flagged as updated, but PX4's clock advances."""
         flags = 0
         imu = readings.imu
         if imu is not None:
-            self._imu = imu
-            flags = _ACCELEROMETER_AND_GYROSCOPE
-        acceleration = rates = field = (0.0, 0.0, 0.0)
-        if self._imu is not None:
-            acceleration, rates = self._imu.specific_force_frd_m_s2, self._imu.angular_rate_frd_rad_s
+            if not isnan(imu.specific_force_frd_m_s2[0]):
+                self._acceleration = imu.specific_force_frd_m_s2
+                flags = _ACCELEROMETER
+            if not isnan(imu.angular_rate_frd_rad_s[0]):
+                self._rates = imu.angular_rate_frd_rad_s
+                flags |= _GYROSCOPE
+        acceleration, rates, field = self._acceleration, self._rates, ZERO3
         if readings.magnetometer is not None:
             field = readings.magnetometer.field_frd_gauss
             flags |= _MAGNETOMETER
@@ -167,6 +169,12 @@ class SensorMessages:
             *(degrees_e7(place.latitude_deg), degrees_e7(place.longitude_deg)),
             *(millimetres(place.altitude_m), *velocity, speed, speed, *force),
         )
+
+
+def has_whole_imu(readings: Readings) -> bool:
+    """Whether gyroscope and accelerometer both deliver numbers."""
+    imu = readings.imu
+    return imu is not None and not isnan(imu.specific_force_frd_m_s2[0] + imu.angular_rate_frd_rad_s[0])
 
 
 def _covariance(position: tuple[float, float, float], turn: tuple[float, float, float]) -> tuple[float, ...]:

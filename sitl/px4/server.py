@@ -168,7 +168,7 @@ class Px4Server:
         link.send(simulation.sense())
         self._video.step()  # while PX4 computes
         controls = link.answer(time_us)
-        if controls is None and link.in_lockstep:
+        if controls is None and link.in_lockstep and simulation.is_answered:
             controls = await link.late_answer(time_us)
         simulation.move(controls)
         if time_us % PERIOD_US == 0 and self._side_link is not None:

@@ -17,7 +17,7 @@ from typing import BinaryIO
 from firmware_py.types import BatteryState
 from sitl.px4.messages import Packer
 from sitl.px4.simulation import Px4Simulation
-from wire.dialect import degrees_e7, mavlink, millimetres, whole
+from wire.dialect import degrees_e7, mavlink, whole
 from wire.framing import HEADER_BYTES_V2, MARKER_V2
 from wire.px4_modes import px4_name
 
@@ -86,7 +86,7 @@ class SideLink:
         self._send(
             self._origin_packer.pack(
                 *(degrees_e7(origin.latitude_deg), degrees_e7(origin.longitude_deg)),
-                *(millimetres(origin.altitude_m), self._system_id, 0),
+                *(0, self._system_id, 0),  # its altitude 0: another one would not fit the barometer's offset
             )
         )
 

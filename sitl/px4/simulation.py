@@ -10,7 +10,7 @@ from scenarios.faults.declaration import FaultKind, FaultPart
 from scenarios.faults.parse import FaultError
 from scenarios.models import Scenario
 from sitl.px4.messages import ActuatorControls
-from sitl.px4.sensor_messages import RC_PERIOD_US, SensorMessages
+from sitl.px4.sensor_messages import RC_PERIOD_US, SensorMessages, has_whole_imu
 from sitl.px4.transmitter import CENTRED, Channels, Sticks, centred
 from sitl.px4.words import FailsafeWords
 from sitl.vehicle import SimulatedVehicle
@@ -56,6 +56,7 @@ class Px4Simulation(SimulatedVehicle):
     Attributes:
         messages: packs what `sense` returns.
         words: what PX4 does about failures.
+        is_answered: PX4 answers the HIL_SENSOR of this tick; without rates and forces it computes no outputs.
     """
 
     autopilot_name = "PX4"
@@ -76,6 +77,8 @@ class Px4Simulation(SimulatedVehicle):
         super().__init__(scenario, airframe, seed)
         self._monitor = BatteryMonitor(self.world.airframe, self.parameters)
         self._measured = (0.0, 0.0)
+        self._last: ActuatorControls | None = None
+        self.is_answered = True
         self.words = FailsafeWords()
         self.messages = SensorMessages(self._suite.range_finder, self._place)
         self._armed = False
@@ -103,6 +106,7 @@ class Px4Simulation(SimulatedVehicle):
         true = self._begin_tick()
         readings, pose = self._read_sensors(true)
         self._measured = (readings.battery_voltage_v, readings.battery_current_a)
+        self.is_answered = has_whole_imu(readings)
         rc = None
         if self._transmitter is not None and readings.time_us % RC_PERIOD_US == 0:
             rc = self._received(self._transmitter)
@@ -133,6 +137,9 @@ class Px4Simulation(SimulatedVehicle):
 
         A motor's speed is proportional to its output (PX4's THR_MDL_FAC is 1 then); NaN stops it.
         """
+        if controls is None and not self.is_answered:
+            controls = self._last  # the outputs stay as they are
+        self._last = controls
         self.words.set_armed(controls is not None and controls.armed)
         if controls is None or not controls.armed:
             self._armed = False
