@@ -68,7 +68,8 @@ class Px4Server:
         settings = self._settings
         self.link = Px4Link((settings.bind, FIRST_PORT + settings.instance), self._notice)
         process = self._px4.process
-        self._side_link = SideLink(settings.instance, None if process is None else process.log)
+        output = None if process is None else process.log
+        self._side_link = SideLink(settings, self._simulation.scenario.camera, output)
         try:
             await self._video.open()
             self._notice(self._greeting())

@@ -2,7 +2,8 @@
 
 PX4 takes a battery from a component of its own MAVLink system, and without GPS the place on Earth of its
 local frame, which its mode hold needs. Its link to a camera is used, UDP 14280 plus the instance: nobody else
-is its partner there, and that to a gimbal takes few messages.
+is its partner there, and that to a gimbal takes few messages. The camera is on it, too; PX4
+forwards what it and ground stations send to each other.
 """
 
 from __future__ import annotations
@@ -15,8 +16,12 @@ from struct import Struct
 from typing import BinaryIO
 
 from firmware_py.types import BatteryState
+from scenarios.models import Camera
+from sitl.px4.camera_component import CameraComponent
 from sitl.px4.messages import Packer
 from sitl.px4.simulation import Px4Simulation
+from sitl.server_settings import ServerSettings
+from sitl.streaming.streams import video_streams
 from wire.dialect import degrees_e7, mavlink, whole
 from wire.framing import HEADER_BYTES_V2, MARKER_V2
 from wire.px4_modes import px4_name
@@ -28,7 +33,8 @@ _UNKNOWN_CELL = 0xFFFF
 _UNKNOWN_TEMPERATURE = 0x7FFF
 _MAX_CELLS = 10
 _BATTERY = int(mavlink.MAV_COMP_ID_BATTERY)
-_ORIGIN_PERIODS = 10
+_SECOND = 10  # periods
+_COMMAND_ID = int(mavlink.MAVLINK_MSG_ID_COMMAND_LONG)
 _HEARTBEAT_ID = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
 _ORIGIN_ID = int(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 _CRITICAL = int(mavlink.MAV_STATE_CRITICAL)
@@ -39,12 +45,16 @@ class SideLink:
     """The link beside the simulator interface; lost packets do no harm.
 
     Args:
-        instance: of PX4.
+        settings: of the drone; its instance is PX4's.
+        camera: of the scenario.
         output: file to which PX4's output goes; None: it is not known.
     """
 
-    def __init__(self, instance: int, output: Path | None) -> None:
+    def __init__(self, settings: ServerSettings, camera: Camera, output: Path | None) -> None:
+        instance = settings.instance
         self._system_id = instance + 1
+        self._camera = CameraComponent(self._system_id, video_streams(settings, camera))
+        self._mode = 0
         self._packer = Packer(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, self._system_id, _BATTERY)
         self._origin_packer = Packer(mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN)
         self._placed: Px4Simulation | None = None  # the one whose PX4 knows the place of its local frame
@@ -59,17 +69,24 @@ class SideLink:
         if battery is not None:
             self._send(self._pack(battery))
         time_us, words = simulation.time_us, simulation.words
-        if self._lacks_origin(simulation) and time_us // PERIOD_US % _ORIGIN_PERIODS == 0:
-            self._send_origin(simulation)
+        if time_us // PERIOD_US % _SECOND == 0:
+            self._send(self._camera.heartbeat(self._mode))
+            if self._lacks_origin(simulation):
+                self._send_origin(simulation)
         if self._output is not None:
             for line in self._output.new_lines():
                 words.printed(time_us, line)
-        for message_id, payload in self._received():
-            if message_id == _ORIGIN_ID:
+        for message_id, sender, payload in self._received():
+            if message_id == _COMMAND_ID:
+                for packet in self._camera.answers(payload, sender):
+                    self._send(packet)
+            elif sender != (self._system_id, 1):
+                continue
+            elif message_id == _ORIGIN_ID:
                 self._placed = simulation
             elif message_id == _HEARTBEAT_ID and len(payload) >= _HEARTBEAT.size:
-                custom_mode, *_, status, _ = _HEARTBEAT.unpack_from(payload)
-                words.heartbeat(time_us, px4_name(custom_mode), critical=status >= _CRITICAL)
+                self._mode, *_, status, _ = _HEARTBEAT.unpack_from(payload)
+                words.heartbeat(time_us, px4_name(self._mode), critical=status >= _CRITICAL)
 
     def close(self) -> None:
         """Close the socket and the file."""
@@ -107,17 +124,16 @@ class SideLink:
             *(0, battery.warning, 0, 0, 0, 0, 0, 0),
         )
 
-    def _received(self) -> Iterator[tuple[int, bytes]]:
-        """Number and payload of PX4's messages that have arrived."""
+    def _received(self) -> Iterator[tuple[int, tuple[int, int], bytes]]:
+        """Number, system and component id of the sender, and payload of what has arrived."""
         for _ in range(_PACKETS_AT_ONCE):
             try:
                 packet = self._socket.recv(2048)
             except OSError:
                 return
-            if len(packet) < HEADER_BYTES_V2 or packet[0] != MARKER_V2:
-                continue
-            if packet[5:7] == bytes((self._system_id, 1)):
-                yield int.from_bytes(packet[7:10], "little"), packet[HEADER_BYTES_V2:]
+            if len(packet) >= HEADER_BYTES_V2 and packet[0] == MARKER_V2:
+                number, end = int.from_bytes(packet[7:10], "little"), HEADER_BYTES_V2 + packet[1]
+                yield number, (packet[5], packet[6]), packet[HEADER_BYTES_V2:end]
 
 
 class _Output:

@@ -3,6 +3,7 @@
 import socket
 import time
 
+import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from scenarios.faults.parse import parse_fault
@@ -11,6 +12,7 @@ from sitl.px4.messages import ActuatorControls
 from sitl.px4.side_link import CAMERA_PORT, PERIOD_US, SideLink
 from sitl.px4.simulation import Px4Simulation
 from sitl.px4.words import FailsafeWords
+from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 
 LAND = 0x06040000
@@ -29,9 +31,9 @@ class Flight:
         self.px4 = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.px4.bind(("127.0.0.1", CAMERA_PORT + instance))
         self.px4.settimeout(5.0)
-        self.link = SideLink(instance, self.output)
+        self.link = SideLink(ServerSettings(instance=instance), scenario.camera, self.output)
         self.sender = mavlink.MAVLink(None, srcSystem=instance + 1, srcComponent=1)
-        self.batteries = []
+        self.others = {}
 
     def fly(self, seconds):
         simulation = self.simulation
@@ -51,10 +53,15 @@ class Flight:
                 data, self.peer = self.px4.recvfrom(2048)
             except BlockingIOError:
                 return found
-            (found,) = mavlink.MAVLink(None).parse_buffer(data)
+            (message,) = mavlink.MAVLink(None).parse_buffer(data)
+            self.others[message.get_type()] = message
+            if message.get_type() == "BATTERY_STATUS":
+                found = message
 
     def heartbeat(self, custom_mode, status):
-        message = self.sender.heartbeat_encode(2, 12, 157, custom_mode, status)
+        self.send(self.sender.heartbeat_encode(2, 12, 157, custom_mode, status))
+
+    def send(self, message):
         self.px4.sendto(message.pack(self.sender), self.peer)
         time.sleep(0.05)
 
@@ -119,3 +126,32 @@ def test_a_px4_whose_output_is_unknown_shows_the_mode_alone():
     assert len(words.failsafes) == 2
     words.set_armed(True)
     assert words.failsafes == []
+
+
+def test_ground_stations_find_the_video_and_px4_learns_its_place(tmp_path):
+    flight = Flight(tmp_path)
+    flight.link.step(flight.simulation)
+    flight.battery()
+    assert flight.others["HEARTBEAT"].get_srcComponent() == 100
+    origin = flight.others["SET_GPS_GLOBAL_ORIGIN"]
+    assert origin.latitude == pytest.approx(flight.simulation.scenario.origin.latitude_deg * 1e7, abs=1)
+    assert (origin.altitude, origin.target_system) == (0, flight.sender.srcSystem)
+    ground = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+    system_id, peer = flight.sender.srcSystem, flight.sender
+    for component, message_id in ((100, 269), (100, 259), (1, 269)):
+        flight.others.clear()
+        flight.sender = ground
+        flight.send(ground.command_long_encode(system_id, component, 512, 0, message_id, 0, 0, 0, 0, 0, 0))
+        flight.sender = peer
+        flight.link.step(flight.simulation)
+        flight.battery()
+        answer = flight.others.get("COMMAND_ACK")
+        stream = flight.others.get("VIDEO_STREAM_INFORMATION")
+        if (component, message_id) == (100, 269):
+            assert (answer.result, answer.target_system) == (0, 255)
+            assert stream.uri.rstrip("\0").endswith("/video")
+        elif component == 100:
+            assert (answer.result, stream) == (3, None)
+        else:
+            assert (answer, stream) == (None, None)
+    flight.close()
