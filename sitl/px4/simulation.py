@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
+from errors import UserError
 from firmware_py.airframe import Airframe
 from firmware_py.battery import BatteryMonitor
 from firmware_py.types import BatteryState
@@ -24,6 +27,10 @@ def with_sensors_for_px4(scenario: Scenario) -> Scenario:
     if scenario.sensors != "ideal":
         return scenario
     return scenario.model_copy(update={"sensors": SUITE_INSTEAD_OF_IDEAL})
+
+
+class MotionError(UserError):
+    """The drone's motion cannot be simulated on; the message is one line for people."""
 
 
 def has_rc_fault(scenario: Scenario) -> bool:
@@ -136,7 +143,13 @@ class Px4Simulation(SimulatedVehicle):
         """End the tick with PX4's outputs; None: there are none, and the motors stand.
 
         A motor's speed is proportional to its output (PX4's THR_MDL_FAC is 1 then); NaN stops it.
+
+        Raises:
+            MotionError: the physics has diverged.
         """
+        if not isfinite(sum(self.truth.position_arena_m)):
+            time_s = self.time_us / 1e6
+            raise MotionError(f"at {time_s:.1f} s the drone turned too fast to be simulated; its try ends")
         if controls is None and not self.is_answered:
             controls = self._last  # the outputs stay as they are
         self._last = controls

@@ -1,4 +1,4 @@
-"""A pilot's remote control: what a joystick sends, and what PX4 gets of it with and without faults."""
+"""A drone that PX4 flies: its remote control, and faults of what PX4 gets."""
 
 import os
 import struct
@@ -95,3 +95,23 @@ def test_a_device_that_is_not_there_is_one_line():
     assert open_transmitter("centred")() == CENTRED
     with pytest.raises(SettingError, match=r"--transmitter /dev/no: cannot be read .* or centred"):
         open_transmitter("/dev/no")
+
+
+def test_a_gyroscope_that_is_off_is_not_flagged_and_its_tick_is_not_answered():
+    scenario = load_scenario("test-case-1").model_copy(
+        update={"sensors": "mocap", "faults": (parse_fault("gyroscope off at 0.5 s"),)}
+    )
+    simulation = Px4Simulation(scenario)
+    flags, speeds = {}, []
+    for _ in range(200):
+        time_us = simulation.time_us
+        for message in mavlink.MAVLink(None).parse_buffer(simulation.sense()):
+            if message.get_type() == "HIL_SENSOR":
+                flags[simulation.is_answered] = message.fields_updated & 0b111_111
+                assert message.xgyro == message.xgyro  # a number
+        answer = ActuatorControls(time_us, (0.5,) * 16, armed=True, lockstep=True)
+        simulation.move(answer if simulation.is_answered else None)
+        speeds.append(simulation.world.dynamics.motor_speeds_rad_s()[0])
+    assert flags == {True: 0b111_111, False: 0b111}
+    assert speeds[-1] == pytest.approx(speeds[110], rel=0.01)  # the motors go on
+    assert simulation.armed
