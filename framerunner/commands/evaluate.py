@@ -14,6 +14,7 @@ from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load
 from framerunner.commands.px4 import plan_for_px4
 
 if TYPE_CHECKING:
+    from framerunner.evaluation.backends import Backend, Pool
     from framerunner.evaluation.plan import Plan
     from framerunner.evaluation.px4_flight import Px4Use
     from offboard.mission import Mission
@@ -72,7 +73,6 @@ def evaluate(
 
     Every flight is saved as soon as it is over. Ctrl-C loses none of them: the same command continues where
     it stopped, and ends with the same results. With --px4 a genuine PX4 flies, whose flights do not repeat.
-
     Exit code 0: all were flown, 1: a fault of the program ended some of them, 2: bad input.
 
     **Examples**
@@ -95,20 +95,13 @@ def evaluate(
     _check(scenarios, level, count, seed)
     use = _px4_use(px4, speed, jobs, response=response, backend=backend)
 
-    from joblib import cpu_count
+    from framerunner.evaluation import evaluate as module
 
-    from framerunner.commands.named_numbers import response_of
-    from framerunner.evaluation.backends import Pool
-    from framerunner.evaluation.evaluate import EvaluationSettings
-    from framerunner.evaluation.evaluate import evaluate as evaluate_all
-
-    plan = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
-    plan = plan if response is None else plan.answering_late(response_of(response))
-    plan = plan if use is None else plan_for_px4(plan, use.folder)
-    at_once = 1 if use is not None else cpu_count()
-    settings = EvaluationSettings(
+    drawn = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
+    plan = _flown_by(drawn, response, use)
+    settings = module.EvaluationSettings(
         plan=plan,
-        pool=Pool(backend, at_once if jobs is None else jobs, address),
+        pool=_pool(backend, jobs, address, use),
         out=plan.default_out if out is None else out,
         again=again,
         against=compare,
@@ -117,7 +110,26 @@ def evaluate(
         command=_command(scenarios, given),
         px4=use,
     )
-    return evaluate_all(settings)
+    return module.evaluate(settings)
+
+
+def _flown_by(plan: Plan, response: str | None, use: Px4Use | None) -> Plan:
+    """The plan with a vehicle that answers late, or that PX4 flies."""
+    if response is not None:
+        from framerunner.commands.named_numbers import response_of
+
+        return plan.answering_late(response_of(response))
+    return plan if use is None else plan_for_px4(plan, use.folder)
+
+
+def _pool(backend: Backend, jobs: int | None, address: str | None, use: Px4Use | None) -> Pool:
+    """Where flights are flown: on all cores, but with PX4 one after another."""
+    from joblib import cpu_count
+
+    from framerunner.evaluation.backends import Pool
+
+    at_once = cpu_count() if use is None else 1
+    return Pool(backend, at_once if jobs is None else jobs, address)
 
 
 def _px4_use(
