@@ -59,8 +59,9 @@ class FailsafeRow(BaseModel):
         return self
 
     def wanted(self, fence: FlightFence) -> float:
-        """The value to set for a flight."""
-        return _number(self.set_to, fence)
+        """The value to set for a flight: not more than a fence allows that is lower."""
+        value = _number(self.set_to, fence)
+        return value if self.most is None else min(value, _number(self.most, fence))
 
     def allows(self, value: float, fence: FlightFence) -> bool:
         """Whether a value passes."""
