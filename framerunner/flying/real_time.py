@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,6 +42,7 @@ class RealTimeSettings:
     camera_delay_s: float = 0.1  # age of an image on arrival, for a camera that sends no time stamps
     hardware: HardwareSettings | None = None  # of a drone that may be a real one; None: it is simulated
     monitor_socket: Path | None = None  # of the monitor that was started here
+    unattended: bool = False  # one of many flights: nothing is shown, and there is no video
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +97,7 @@ async def fly_in_real_time(
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         drone = _drone(plan, vehicle, records, stack, safety, hardware=settings.hardware, system_id=system_id)
         drone.use_companion(companion)
-        camera = await _camera(plan, vehicle, records, stack, reporter)
+        camera = await _camera(plan, vehicle, records, stack, reporter, video=not settings.unattended)
         perception = _perception(plan, vehicle, judge, camera)
         perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
@@ -105,7 +106,7 @@ async def fly_in_real_time(
         display = FlightDisplay(plan.title, plan.limit_s, records.recorder, judge)
 
         async def run(flight: Coroutine[Any, Any, MissionEnd]) -> MissionEnd:
-            async with display:
+            async with nullcontext() if settings.unattended else display:
                 task = asyncio.create_task(flight)
                 outcome = await (task if vehicle.sitl is None else vehicle.sitl.guard(task))
             camera.close()
@@ -233,6 +234,8 @@ async def _camera(
     records: RunRecords,
     stack: AsyncExitStack,
     reporter: MissionReporter,
+    *,
+    video: bool,
 ) -> RecordingCamera:
     """The camera, whose images are recorded; closed with the stack."""
     from vision.sources import open_source
@@ -242,7 +245,8 @@ async def _camera(
         reporter.see_frame(frame)
 
     source = await stack.enter_async_context(open_source(vehicle.camera_url, size_px=vehicle.image_size_px))
-    camera = RecordingCamera(source, records.folder.video, plan.scenario.camera.rate_hz, keep)
+    path = records.folder.video if video else None
+    camera = RecordingCamera(source, path, plan.scenario.camera.rate_hz, keep)
     stack.callback(camera.close)
     return camera
 

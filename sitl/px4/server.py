@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
+from sitl.px4.side_link import PERIOD_US, SideLink
 from sitl.px4.simulation import Px4Simulation
 from sitl.server import BURST_TICKS, LagNotices, Pacer
 from sitl.server_settings import ServerSettings
@@ -52,6 +53,7 @@ class Px4Server:
         self._settings, self._px4, self._notice, self._grants = settings, px4, notice, grants
         self._video = DroneVideo(self._simulation, settings)
         self.link: Px4Link | None = None
+        self._side_link: SideLink | None = None
         self._simulation.faults.notice = notice
 
     async def run(self) -> None:
@@ -65,12 +67,16 @@ class Px4Server:
         """
         settings = self._settings
         self.link = Px4Link((settings.bind, FIRST_PORT + settings.instance), self._notice)
+        process = self._px4.process
+        output = None if process is None else process.log
+        self._side_link = SideLink(settings, self._simulation.scenario.camera, output)
         try:
             await self._video.open()
             self._notice(self._greeting())
             await self._serve(self.link)
         finally:
             self.link.close()
+            self._side_link.close()
             if self._px4.process is not None:
                 await self._px4.process.stop()
             if self._grants is not None:
@@ -163,9 +169,11 @@ class Px4Server:
         link.send(simulation.sense())
         self._video.step()  # while PX4 computes
         controls = link.answer(time_us)
-        if controls is None and link.in_lockstep:
+        if controls is None and link.in_lockstep and simulation.is_answered:
             controls = await link.late_answer(time_us)
         simulation.move(controls)
+        if time_us % PERIOD_US == 0 and self._side_link is not None:
+            self._side_link.step(simulation)
 
     async def _hold(self, grants: TimeGrants) -> None:
         """Wait until simulated time may advance."""
