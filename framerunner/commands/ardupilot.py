@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from sitl.ardupilot.simulation import ArduPilotSimulation
     from sitl.autopilots.process import AutopilotStart
     from sitl.server_settings import ServerSettings
+    from sitl.time_grants import TimeGrants
 
 app = App(name="ardupilot", help="What a genuine ArduCopter needs to fly in the simulated world.")
 
@@ -43,6 +44,7 @@ def ardupilot_server(
     *,
     ardupilot: Path | None,
     seed: int,
+    grants: TimeGrants | None,
 ) -> ArduPilotServer:
     """The simulator with ArduPilot, by the options of `framerunner sim`."""
     from scenarios.loader import load_scenario
@@ -56,7 +58,7 @@ def ardupilot_server(
 
     simulation = new_simulation()  # so that what is wrong with it is said first
     start = _start(simulation, settings, ardupilot)
-    return ArduPilotServer(new_simulation, settings, start, notice=say)
+    return ArduPilotServer(new_simulation, settings, start, notice=say, grants=grants)
 
 
 def _start(

@@ -21,11 +21,12 @@ from framerunner.commands import (
     with_sensors,
 )
 from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
-from framerunner.commands.px4 import check_px4_flight, for_px4
+from framerunner.commands.px4 import for_px4
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from framerunner.flying.run import FlightSettings
+    from framerunner.flying.simulator_process import GenuineAutopilot
     from offboard.mission import Mission
     from scenarios.models import Scenario
     from wire.simulator_api import SimulatorApi
@@ -53,12 +54,13 @@ _Lockstep = Annotated[
 ]
 _Seed = Annotated[
     WholeNumber | None,
-    Parameter(help="of everything random in a lockstep flight, or with --px4; 0 if not given"),
+    Parameter(help="of everything random in a lockstep flight, or with --px4 or --ardupilot; 0 if not given"),
 ]
 _Px4 = Annotated[
     Path | None,
     Parameter(help="folder of a PX4 built for SITL: it flies the simulated drone instead of our autopilot"),
 ]
+_ArduPilot = Annotated[Path | None, Parameter(help="likewise, of an ArduPilot built for SITL")]
 _Record = Annotated[bool, Parameter(help="write flight.mcap as well, for `framerunner replay` and Foxglove")]
 _Video = Annotated[
     bool, Parameter(help="write video.avi also in lockstep; in real time it is always written")
@@ -97,6 +99,7 @@ def fly(
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     px4: _Px4 = None,
+    ardupilot: _ArduPilot = None,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
     sensors: Sensors = None,
@@ -124,6 +127,8 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --record --sensors mocap
 
+        framerunner fly test-case-1 --ardupilot ../ardupilot --speed 3
+
         framerunner fly --dry-run --drone serial:///dev/ttyUSB0:57600 --camera 0
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
@@ -131,17 +136,20 @@ def fly(
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    _check(drone, camera, speed, instance, lockstep=lockstep, px4=px4)
-    seed, procedure = _checked_seed(seed, monitor, lockstep, px4), hardware_of(hardware, drone)
+    autopilot = _genuine(px4, ardupilot, drone=drone, lockstep=lockstep)
+    _check(drone, camera, speed, instance, lockstep=lockstep)
+    repeats = lockstep or autopilot is not None
+    seed, procedure = _checked_seed(seed, monitor, lockstep, repeats), hardware_of(hardware, drone)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
 
     loaded = load_mission_with(mission, pilot)
-    chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep, px4=px4)
+    chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep)
+    chosen = chosen if px4 is None else for_px4(chosen)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
-    real_time = RealTimeSettings(drone, camera, api, speed, instance, px4, camera_delay, procedure)
+    real_time = RealTimeSettings(drone, camera, api, speed, instance, autopilot, camera_delay, procedure)
     ends = (plan, None if lockstep else real_time, out, record, video, monitor, monitor_link)
     return _run(FlightSettings(*ends), lifeline=lifeline)
 
@@ -162,7 +170,6 @@ def _scenario(
     *,
     starts: bool,
     lockstep: bool,
-    px4: Path | None,
 ) -> Scenario:
     """The scenario that the options describe; `starts`: a simulated drone is started."""
     from scenarios.loader import load_scenario
@@ -179,7 +186,7 @@ def _scenario(
             f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
             "add --lockstep, or start framerunner sim and fly it with --drone"
         )
-    return scenario if px4 is None else for_px4(scenario)
+    return scenario
 
 
 def _calibrated(plan: FlightPlan, path: Path | None, drone: str | None) -> FlightPlan:
@@ -248,11 +255,35 @@ def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
         raise SettingError(f"--simulator {error}") from None
 
 
-def _check(
-    drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool, px4: Path | None
-) -> None:
+def _genuine(
+    px4: Path | None, ardupilot: Path | None, *, drone: str | None, lockstep: bool
+) -> GenuineAutopilot | None:
+    """The autopilot of the user's that flies the simulated drone, if one is given."""
+    from framerunner.flying.simulator_process import GenuineAutopilot
+
+    if px4 is not None and ardupilot is not None:
+        raise SettingError(f"--ardupilot {ardupilot}: one autopilot flies; leave it or --px4 out")
+    if px4 is not None:
+        from sitl.px4.build import find_build
+
+        chosen = GenuineAutopilot("px4", px4)
+    elif ardupilot is not None:
+        from sitl.ardupilot.build import find_build
+
+        chosen = GenuineAutopilot("ardupilot", ardupilot)
+    else:
+        return None
+    option = f"--{chosen.name} {chosen.folder}"
+    if drone is not None:
+        raise SettingError(f"{option}: flies a simulator that is started; leave it out with --drone")
+    if lockstep:
+        raise SettingError(f"{option}: it is another process; leave out --lockstep")
+    find_build(chosen.folder)
+    return chosen
+
+
+def _check(drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool) -> None:
     """Refuse options that do not go together."""
-    check_px4_flight(px4, drone=drone, lockstep=lockstep)
     if drone is not None and camera is None:
         raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")
     if drone is None and camera is not None:
@@ -269,13 +300,13 @@ def _check(
     check_range("--instance", instance, 0, 9)
 
 
-def _checked_seed(seed: int | None, monitor: bool, lockstep: bool, px4: Path | None) -> int | None:
-    """The seed of a flight in lockstep or of one with PX4; None in real time."""
+def _checked_seed(seed: int | None, monitor: bool, lockstep: bool, repeats: bool) -> int | None:
+    """The seed of a flight in lockstep or of one with a genuine autopilot; None in real time."""
     if monitor and lockstep:
         raise SettingError("--monitor: shows flights in real time; leave it out with --lockstep")
     if seed is None:
-        return 0 if lockstep or px4 is not None else None
-    if not lockstep and px4 is None:
+        return 0 if repeats else None
+    if not repeats:
         raise SettingError(
             f"--seed {seed}: only a flight in lockstep repeats; add --lockstep or leave it out"
         )

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from errors import SettingError
 from framerunner.commands import say, with_faults, with_sensors
 
 if TYPE_CHECKING:
@@ -66,23 +65,6 @@ def for_px4(scenario: Scenario) -> Scenario:
     if chosen is not scenario:
         say(f"PX4 takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
     return chosen
-
-
-def check_px4_flight(px4: Path | None, *, drone: str | None, lockstep: bool) -> None:
-    """Refuse options of `framerunner fly` that do not go with PX4.
-
-    Raises:
-        SettingError: one of them.
-    """
-    if px4 is None:
-        return
-    if drone is not None:
-        raise SettingError(f"--px4 {px4}: flies a simulator that is started; leave it out with --drone")
-    if lockstep:
-        raise SettingError(f"--px4 {px4}: PX4 is another process; leave out --lockstep")
-    from sitl.px4.build import find_build
-
-    find_build(px4)
 
 
 def px4_server(

@@ -220,7 +220,7 @@ def _server(
     if flown_by.autopilot == "px4":
         return px4_server(*flown, px4=flown_by.px4, seed=seed, grants=grants)
     if flown_by.autopilot == "ardupilot":
-        return ardupilot_server(*flown, ardupilot=flown_by.ardupilot, seed=seed)
+        return ardupilot_server(*flown, ardupilot=flown_by.ardupilot, seed=seed, grants=grants)
     return _own_server(*flown, count=count, seed=seed, grants=grants)
 
 

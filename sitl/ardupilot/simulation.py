@@ -34,6 +34,7 @@ class ArduPilotSimulation(SimulatedVehicle):
         motor = self.world.airframe.motor
         self._rotors = len(self.world.airframe.rotors)
         self._speed_a_pulse = motor.max_speed_rad_s / (PULSE_MAX_US - PULSE_MIN_US)
+        self._standing = (PULSE_MIN_US,) * self._rotors
         self._steps = 0  # of the physics, since the last end of a control period
         self._range_m: float | None = None
         self._imu: ImuSample | None = None
@@ -48,6 +49,17 @@ class ArduPilotSimulation(SimulatedVehicle):
     def local_origin_arena_m(self) -> Vec3 | None:
         """None: ArduPilot's local frame begins where its estimator first had a position."""
         return None
+
+    @property
+    def is_at_control_tick(self) -> bool:
+        """Whether a control period has ended and the next one has not begun."""
+        return self._steps == 0
+
+    def coast(self) -> None:
+        """Advance to the end of the control period with standing motors."""
+        self.step(self._standing)
+        while not self.is_at_control_tick:
+            self.step(self._standing)
 
     def step(self, pulses_us: tuple[int, ...]) -> bytes:
         """Advance by one step of the physics with these pulse widths; returns the line with the state then.
