@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from framerunner.commands import say, with_faults, with_sensors
+from framerunner.commands import for_genuine, say, with_faults, with_sensors
 
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
@@ -22,7 +22,13 @@ app = App(name="ardupilot", help="What a genuine ArduCopter needs to fly in the 
 
 
 @app.command
-def params(airframe: Annotated[str, Parameter(help="name or file of the airframe")] = "x500") -> int:
+def params(
+    airframe: Annotated[str, Parameter(help="name or file of the airframe")] = "x500",
+    *,
+    sensors: Annotated[
+        str, Parameter(help="sensor suite: mocap for poses of motion capture, outdoor for GPS, or a file")
+    ] = "mocap",
+) -> int:
     """Print the parameters by which ArduCopter flies an airframe here: one `NAME VALUE` a line.
 
     **Examples**
@@ -31,8 +37,9 @@ def params(airframe: Annotated[str, Parameter(help="name or file of the airframe
     """
     from firmware_py.airframe import load_airframe
     from sitl.ardupilot.parameters import all_parameters, file_of
+    from sitl.sensors.suite import load_suite
 
-    print(file_of(all_parameters(load_airframe(airframe))), end="")
+    print(file_of(all_parameters(load_airframe(airframe), load_suite(sensors))), end="")
     return 0
 
 
@@ -51,7 +58,9 @@ def ardupilot_server(
     from sitl.ardupilot.server import ArduPilotServer
     from sitl.ardupilot.simulation import ArduPilotSimulation
 
-    chosen = with_faults(with_sensors(load_scenario(scenario), onboard.sensors), fault)
+    chosen = with_faults(
+        for_genuine("ArduPilot", with_sensors(load_scenario(scenario), onboard.sensors)), fault
+    )
 
     def new_simulation() -> ArduPilotSimulation:
         return ArduPilotSimulation(chosen, seed=seed)
@@ -64,22 +73,21 @@ def ardupilot_server(
 def _start(
     simulation: ArduPilotSimulation, settings: ServerSettings, ardupilot: Path | None
 ) -> AutopilotStart:
-    from firmware_py.types import GeodeticPoint
     from sitl.ardupilot.build import ArduPilotProcess, find_build, options
     from sitl.ardupilot.parameters import all_parameters
     from sitl.autopilots.process import AutopilotStart
+    from sitl.sensors.suite import load_suite
 
-    scenario = simulation.scenario
-    origin = scenario.origin
-    home = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
-    values = all_parameters(simulation.world.airframe)
+    scenario, home, takes_poses = simulation.scenario, simulation.place, simulation.sends_poses
+    values = all_parameters(simulation.world.airframe, load_suite(scenario.sensors))
     file = f"{simulation.world.airframe.name}.parm"
     command = (
-        f"framerunner ardupilot params {scenario.airframe} > {file}; "
-        f"arducopter {shlex.join(options(settings, home, file))}"
+        f"framerunner ardupilot params {scenario.airframe} --sensors {scenario.sensors} > {file}; "
+        f"arducopter {shlex.join(options(settings, home, file, takes_poses=takes_poses))}"
     )
     if ardupilot is None:
         return AutopilotStart(None, command)
     folder = None if settings.storage is None else settings.storage / f"ardupilot-{settings.instance}"
     program = find_build(ardupilot)
-    return AutopilotStart(ArduPilotProcess(program, settings, home, values, folder), command)
+    process = ArduPilotProcess(program, settings, home, values, folder, takes_poses=takes_poses)
+    return AutopilotStart(process, command)

@@ -16,12 +16,12 @@ from framerunner.commands import (
     Sensors,
     WholeNumber,
     check_range,
+    for_genuine,
     load_mission_with,
     with_faults,
     with_sensors,
 )
 from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
-from framerunner.commands.px4 import for_px4
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -146,7 +146,7 @@ def fly(
 
     loaded = load_mission_with(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep)
-    chosen = chosen if px4 is None else for_px4(chosen)
+    chosen = chosen if autopilot is None else for_genuine(autopilot.title, chosen)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
     real_time = RealTimeSettings(drone, camera, api, speed, instance, autopilot, camera_delay, procedure)

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from framerunner.commands import say, with_faults, with_sensors
+from framerunner.commands import for_genuine, say, with_faults, with_sensors
 
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
-    from scenarios.models import Scenario
     from sitl.autopilots.process import AutopilotStart
     from sitl.px4.server import Px4Server
     from sitl.px4.simulation import Px4Simulation
@@ -57,16 +56,6 @@ def params(
     return 0
 
 
-def for_px4(scenario: Scenario) -> Scenario:
-    """A scenario with sensors from which PX4 can estimate its state; says so if they are others."""
-    from sitl.px4.simulation import with_sensors_for_px4
-
-    chosen = with_sensors_for_px4(scenario)
-    if chosen is not scenario:
-        say(f"PX4 takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
-    return chosen
-
-
 def px4_server(
     scenario: str,
     settings: ServerSettings,
@@ -82,7 +71,7 @@ def px4_server(
     from sitl.px4.server import Px4Server
     from sitl.px4.simulation import Px4Simulation
 
-    chosen = with_faults(for_px4(with_sensors(load_scenario(scenario), onboard.sensors)), fault)
+    chosen = with_faults(for_genuine("PX4", with_sensors(load_scenario(scenario), onboard.sensors)), fault)
 
     def new_simulation() -> Px4Simulation:
         return Px4Simulation(chosen, seed=seed)

@@ -39,6 +39,11 @@ class GenuineAutopilot:
     name: Literal["px4", "ardupilot"]  # as an option of `framerunner sim`
     folder: Path
 
+    @property
+    def title(self) -> str:
+        """For people."""
+        return {"px4": "PX4", "ardupilot": "ArduPilot"}[self.name]
+
 
 class SitlProcess(ChildProcess):
     """`framerunner sim` as a child process, with its options.

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
+from sitl.ardupilot.poses import POSE_PORT, PoseLink
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.server import AutopilotServer
@@ -29,7 +30,6 @@ class FrameExchange:
 
     Args:
         simulation: of the drone.
-        moved: called at the end of each control period.
         clock: monotonic wall time, seconds.
 
     Attributes:
@@ -40,10 +40,9 @@ class FrameExchange:
     def __init__(
         self,
         simulation: ArduPilotSimulation,
-        moved: Callable[[], object] = lambda: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._simulation, self._moved, self._clock = simulation, moved, clock
+        self._simulation, self._clock = simulation, clock
         self.steps = self.repeated = 0
         self._number = -1  # of the last frame; negative: none was received
         self._answer = b""
@@ -67,8 +66,6 @@ class FrameExchange:
             self._number = frame.number
             self._answer = self._simulation.step(frame.pulses_us)
             self.steps += 1
-            if self._simulation.is_at_control_tick:
-                self._moved()
         self._answered_s = self._clock()
         return self._answer
 
@@ -100,8 +97,9 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         grants: TimeGrants | None = None,
     ) -> None:
         super().__init__(new_simulation, settings, ardupilot, notice, grants)
-        self.exchange = FrameExchange(self._simulation, self._video.step)
+        self.exchange = FrameExchange(self._simulation)
         self._link: UdpSocket | None = None
+        self._poses: PoseLink | None = None
         self._waiting: tuple[ServoFrame, Address] | None = None  # the last frame and its sender
         self._frame_s = 0.0  # wall time of the last frame
         self._connected = asyncio.Event()
@@ -110,9 +108,15 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         self._failed: asyncio.Future[None] | None = None
 
     def _open(self) -> None:
-        self._link = bind_udp((self._settings.bind, self._port), "choose another --instance")
+        bind, instance = self._settings.bind, self._settings.instance
+        self._link = bind_udp((bind, self._port), "choose another --instance")
+        if self._simulation.sends_poses:
+            port, place = POSE_PORT + PORTS_AN_INSTANCE * instance, self._simulation.place
+            self._poses = PoseLink(bind, port, instance + 1, place)
 
     def _close(self) -> None:
+        if self._poses is not None:
+            self._poses.close()
         if self._link is not None:
             self._link.close()
 
@@ -173,9 +177,15 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         assert self._waiting is not None
         assert self._link is not None
         frame, peer = self._waiting
+        is_new, simulation = self.exchange.is_new(frame), self._simulation
         line = self.exchange.answer(frame)
-        if line is not None:
-            self._link.write(line, peer)
+        if line is None:
+            return
+        if is_new and simulation.pose is not None and self._poses is not None:
+            self._poses.send(simulation.pose)  # before the answer that lets ArduPilot's time advance
+        self._link.write(line, peer)
+        if is_new and simulation.is_at_control_tick:
+            self._video.step()  # while ArduPilot computes
 
     async def _answer_when_granted(self) -> None:
         try:
@@ -201,7 +211,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
 
     def _renew(self) -> None:
         super()._renew()
-        self.exchange = FrameExchange(self._simulation, self._video.step)
+        self.exchange = FrameExchange(self._simulation)
 
     def _coast(self) -> None:
         self._simulation.coast()

@@ -9,16 +9,6 @@ from sitl.px4.messages import ActuatorControls
 from sitl.px4.sensor_messages import SensorMessages
 from sitl.vehicle import SimulatedVehicle
 
-SUITE_INSTEAD_OF_IDEAL = "mocap"
-"""PX4 estimates its state from sensors; it cannot be given the true one."""
-
-
-def with_sensors_for_px4(scenario: Scenario) -> Scenario:
-    """The scenario, with motion capture and the usual errors if its sensors are ideal."""
-    if scenario.sensors != "ideal":
-        return scenario
-    return scenario.model_copy(update={"sensors": SUITE_INSTEAD_OF_IDEAL})
-
 
 class Px4Simulation(SimulatedVehicle):
     """One drone in one scenario, flown by PX4; see `SimulatedVehicle`. Its sensors must not be ideal.
