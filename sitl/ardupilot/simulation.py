@@ -51,7 +51,7 @@ class ArduPilotSimulation(SimulatedVehicle):
 
     @property
     def local_origin_arena_m(self) -> Vec3 | None:
-        """That of motion capture; with GPS ArduPilot's frame begins where its estimator first had a position."""
+        """That of motion capture; with GPS it is where ArduPilot's estimator first had a position."""
         return ZERO3 if self._suite.external_pose is not None else None
 
     @property
