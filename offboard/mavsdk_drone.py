@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
+from math import inf
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -168,7 +169,8 @@ class MavsdkDrone:
                 component.announce(system_id)
         self._telemetry = TelemetryAsync(system)
         self._direct = MavlinkDirectAsync(system)
-        self._dialect = await open_dialect(system, self._direct, self._feed)
+        room_m = inf if self._box is None else self._box.high_m[2] - self._start_arena.position_m[2]
+        self._dialect = await open_dialect(system, self._direct, self._feed, room_m)
         telemetry = synchronous(self._telemetry)
         self._feed.subscribe(telemetry, synchronous(self._direct), self._dialect.numbered_modes)
         await self._requests.wait(self._dialect.request_streams())
@@ -364,10 +366,12 @@ class MavsdkDrone:
         self._send(command if self._caps is None else self._caps.limit(command, latest))
 
     async def close(self) -> None:
-        """End all commanding and, without a companion, disconnect."""
+        """End all commanding, let a disarmed vehicle hold and, without a companion, disconnect."""
         self._commanding = False
         self._watchdog.stop()
         self._ticks.release()
+        if self._dialect is not None and self._in_offboard and self._feed.armed is False:
+            await self._hold_on_ground()
         await self._requests.wait_for_all()
         if self._companion is None:
             await self.disconnect()

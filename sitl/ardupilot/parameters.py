@@ -15,9 +15,21 @@ _HOVER_SHARE = 0.25  # of full thrust, at least; ArduCopter's estimate of it has
 _RATE_BANDWIDTH_RAD_S = 20.0  # of roll and pitch, with motors that are fast enough
 _MOTOR_SHARE = 0.6  # of the motors' bandwidth that the rate controllers use at most
 _DERIVATIVE_SHARE = 0.02
+_SHARES_OF_BANDWIDTH = {  # each loop slower than the one inside it
+    "ATC_ANG_RLL_P": 0.4,
+    "ATC_ANG_PIT_P": 0.4,
+    "PSC_VELXY_P": 0.2,
+    "PSC_VELXY_I": 0.1,
+    "PSC_VELXY_D": 0.015,
+    "PSC_POSXY_P": 0.1,
+    "PSC_VELZ_P": 0.4,
+    "PSC_POSZ_P": 0.15,
+}
 _YAW_BANDWIDTH_RAD_S = 4.0
 _YAW_INTEGRAL_SHARE = 0.1  # of P, by ArduCopter's defaults 0.18 and 0.018
 _EXTERNAL_NAVIGATION = 6
+_ARRIVAL_EARLY_MS = 12
+"""ArduPilot counts an arrival as so much earlier than it is: measured; without it the estimate is ahead."""
 _POSE_NOISE_M, _POSE_NOISE_RAD = 0.02, 0.05
 _FACTOR = 0.5  # of each motor in roll, pitch and yaw, as ArduCopter normalises them
 _PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1))  # of rotors in X, as PX4 orders them: forward, right
@@ -78,7 +90,7 @@ def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
         }
     return {
         "VISO_TYPE": 1,
-        "VISO_DELAY_MS": round(pose.delay_s * 1000),
+        "VISO_DELAY_MS": max(0, round(pose.delay_s * 1000) - _ARRIVAL_EARLY_MS),
         "VISO_POS_M_NSE": _POSE_NOISE_M,
         "VISO_YAW_M_NSE": _POSE_NOISE_RAD,
         "EK3_SRC1_POSXY": _EXTERNAL_NAVIGATION,
@@ -100,6 +112,14 @@ def flight_parameters() -> dict[str, Value]:
         "LAND_SPEED": 30,
         "RTL_ALT": 200,
         "FS_GCS_ENABLE": 0,
+        "ATC_INPUT_TC": 0.05,  # s; velocities are followed as soon as the loops can
+        "PSC_JERK_XY": 20,  # m/s³
+        "PSC_JERK_Z": 20,
+        "PSC_VELXY_FLTE": 20,  # Hz
+        "PSC_VELXY_FLTD": 20,
+        "WPNAV_ACCEL": 500,  # cm/s²; in GUIDED, too
+        "WPNAV_ACCEL_Z": 250,
+        "WPNAV_SPEED_DN": 150,  # cm/s
     }
 
 
@@ -125,11 +145,12 @@ def airframe_parameters(airframe: Airframe) -> dict[str, Value]:
         "MOT_THST_HOVER": hover,
         "MOT_HOVER_LEARN": 0,
         "MOT_BAT_VOLT_MAX": 0,
-        "PSC_ACCZ_P": hover,
-        "PSC_ACCZ_I": 2 * hover,
+        "PSC_ACCZ_P": 2 * hover,
+        "PSC_ACCZ_I": 4 * hover,
     }
     fastest = _MOTOR_SHARE / motor.time_constant_s if motor.time_constant_s > 0.0 else _RATE_BANDWIDTH_RAD_S
     bandwidth = min(_RATE_BANDWIDTH_RAD_S, fastest)
+    values |= {name: share * bandwidth for name, share in _SHARES_OF_BANDWIDTH.items()}
     for axis, index, arm in (("RLL", 0, 1), ("PIT", 1, 0)):
         moment_nm = _FACTOR * full_n * sum(abs(rotor.position_frd_m[arm]) for rotor in airframe.rotors)
         gain = bandwidth * inertia[index] / moment_nm
