@@ -413,9 +413,10 @@ class MavsdkDrone:
         assert self._alignment is not None, "ready() comes first"
         sample = self._feed.sample
         missed = [before for before in self._feed.take_samples() if before.time_us < sample.time_us]
-        mode = self._stream.modes.offboard
-        states = tuple(reported_state(before, self._feed, self._alignment, mode) for before in missed)
-        return reported_state(sample, self._feed, self._alignment, mode, states)
+        mode, known = self._stream.modes.offboard, self._stream.loops_known
+        fixed = (self._feed, self._alignment, mode)
+        states = tuple(reported_state(before, *fixed, loops_known=known) for before in missed)
+        return reported_state(sample, *fixed, states, loops_known=known)
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s

@@ -29,6 +29,10 @@ if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow t
     from offboard.perception import CameraPerception
 
 
+CAMERA_LIMIT_S = 5.0  # wall time without an image after which the camera has failed
+PATIENT_CAMERA_LIMIT_S = 60.0  # likewise, when vehicle time waits for this program
+
+
 @dataclass(frozen=True, slots=True)
 class RealTimeSettings:
     """What is flown in real time."""
@@ -230,7 +234,9 @@ async def _camera(
         records.see_frame(frame)
         reporter.see_frame(frame)
 
-    source = await stack.enter_async_context(open_source(vehicle.camera_url, size_px=vehicle.image_size_px))
+    limit_s = CAMERA_LIMIT_S if vehicle.sitl is None else PATIENT_CAMERA_LIMIT_S
+    opened = open_source(vehicle.camera_url, timeout_s=limit_s, size_px=vehicle.image_size_px)
+    source = await stack.enter_async_context(opened)
     camera = RecordingCamera(source, records.folder.video, plan.scenario.camera.rate_hz, keep)
     stack.callback(camera.close)
     return camera

@@ -74,6 +74,7 @@ class ArduPilotDialect:
 
     modes = ARDUPILOT_MODES
     numbered_modes = ardupilot_modes.NAMES
+    loops_known = False
     checks_in_offboard = True
     ready_limit_s = 90.0  # its estimator uses GPS some 40 s after its start
 

@@ -16,7 +16,6 @@ from sitl.time_grants import TimeGrants
 from wire.transports.sockets import Address, UdpSocket, bind_udp
 
 _SILENCE_S = 2.0  # wall time without a frame that is reported
-_MIN_LIFE_S = 5.0  # wall time; an ArduPilot that ends sooner is not started again
 _LOST_S = 0.5  # wall time after which an answer to a frame that is repeated was lost
 
 
@@ -240,7 +239,6 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
             await self._open_grants()
             return
         while True:
-            began_s = time.monotonic()
             await process.start()
             ended = asyncio.create_task(process.ended())
             opened = asyncio.create_task(self._open_grants())
@@ -250,7 +248,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
                 for task in (ended, opened):
                     task.cancel()
                 await asyncio.gather(ended, opened, return_exceptions=True)
-            if time.monotonic() - began_s < _MIN_LIFE_S or not self._connected.is_set():
+            if not self._connected.is_set():
                 raise AutopilotEndedError(f"{reason} (its output: {process.log})")
             self._connected.clear()
             self._is_falling = True
