@@ -88,7 +88,7 @@ ARDUPILOT_GOOD = {row.name: row.wanted(FENCE) for row in ARDUPILOT}
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        *(("GUID_TIMEOUT", 3), ("FS_GCS_ENABLE", 1), ("MAV_GCS_SYSID", 255), ("FS_GCS_TIMEOUT", 60)),
+        *(("GUID_TIMEOUT", 3), ("FS_GCS_ENABLE", 0), ("MAV_GCS_SYSID", 255), ("FS_GCS_TIMEOUT", 60)),
         *(("FS_THR_ENABLE", 0), ("FS_THR_ENABLE", 1), ("FS_OPTIONS", 4), ("FS_EKF_ACTION", 0)),
         *(("FS_EKF_THRESH", 2), ("FS_DR_ENABLE", 2), ("BATT_FS_LOW_ACT", 2), ("BATT_FS_CRT_ACT", 5)),
         *(("RTL_ALT", 1500), ("RTL_ALT", 351), ("FENCE_ENABLE", 0), ("FENCE_TYPE", 3), ("FENCE_ACTION", 1)),
@@ -102,7 +102,7 @@ def test_each_dangerous_value_of_ardupilot_fails_and_is_set(name, value):
     assert wanted == {name: ARDUPILOT_GOOD[name]}
 
 
-@pytest.mark.parametrize(("name", "value"), [("RTL_ALT", 350), ("FS_GCS_ENABLE", 0), ("FENCE_ACTION", 4)])
+@pytest.mark.parametrize(("name", "value"), [("RTL_ALT", 350), ("FS_EKF_ACTION", 3), ("FENCE_ACTION", 4)])
 def test_other_safe_values_of_ardupilot_pass(name, value):
     good = ARDUPILOT_GOOD | {name: value}
     assert values_to_set(good, FENCE, has_global_position=True, rows=ARDUPILOT) == {}
