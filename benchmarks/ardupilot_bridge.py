@@ -47,20 +47,20 @@ def time_steps() -> None:
 
     def timed_encode(*arguments: object, **named: object) -> bytes:
         nonlocal packed_s
-        began_s = time.perf_counter()
+        began_s = time.thread_time()
         line = encode(*arguments, **named)  # type: ignore[arg-type]
-        packed_s += time.perf_counter() - began_s
+        packed_s += time.thread_time() - began_s
         return line
 
     simulated.encode_state = timed_encode
-    began_s = time.perf_counter()
+    began_s = time.thread_time()
     for packet in packets:
-        read_began_s = time.perf_counter()
+        read_began_s = time.thread_time()
         frame = decode_frame(packet)
-        read_s += time.perf_counter() - read_began_s
+        read_s += time.thread_time() - read_began_s
         assert frame is not None
         exchange.answer(frame)
-    all_s = time.perf_counter() - began_s
+    all_s = time.thread_time() - began_s
     for name, seconds in (("packing", packed_s), ("reading", read_s), ("all of a step", all_s)):
         print(f"{name}: {1e6 * seconds / STEPS:.1f} us")
 
