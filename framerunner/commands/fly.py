@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,11 +56,6 @@ _Seed = Annotated[
     WholeNumber | None,
     Parameter(help="of everything random in a lockstep flight, or with --px4 or --ardupilot; 0 if not given"),
 ]
-_Px4 = Annotated[
-    Path | None,
-    Parameter(help="folder of a PX4 built for SITL: it flies the simulated drone instead of our autopilot"),
-]
-_ArduPilot = Annotated[Path | None, Parameter(help="likewise, of an ArduPilot built for SITL")]
 _Record = Annotated[bool, Parameter(help="write flight.mcap as well, for `framerunner replay` and Foxglove")]
 _Video = Annotated[
     bool, Parameter(help="write video.avi also in lockstep; in real time it is always written")
@@ -87,6 +82,25 @@ _Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class GenuineOptions:
+    """A genuine autopilot, as the command line gives it."""
+
+    px4: Annotated[
+        Path | None,
+        Parameter(
+            help="folder of a PX4 built for SITL: it flies the simulated drone instead of our autopilot"
+        ),
+    ] = None
+    ardupilot: Annotated[
+        Path | None, Parameter(help="folder of an ArduPilot built for SITL, which flies it likewise")
+    ] = None
+
+
+_OWN = GenuineOptions()
+
+
 def fly(
     scenario: Annotated[str, Parameter(help="name or file of the scenario")] = "test-case-1",
     *,
@@ -98,8 +112,7 @@ def fly(
     simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
-    px4: _Px4 = None,
-    ardupilot: _ArduPilot = None,
+    genuine: GenuineOptions = _OWN,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
     sensors: Sensors = None,
@@ -127,26 +140,21 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --record --sensors mocap
 
-        framerunner fly test-case-1 --ardupilot ../ardupilot --speed 3
-
         framerunner fly --dry-run --drone serial:///dev/ttyUSB0:57600 --camera 0
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
-    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    autopilot = _genuine(px4, ardupilot, drone=drone, lockstep=lockstep)
-    _check(drone, camera, speed, instance, lockstep=lockstep)
-    repeats = lockstep or autopilot is not None
-    seed, procedure = _checked_seed(seed, monitor, lockstep, repeats), hardware_of(hardware, drone)
+    autopilot = _genuine(genuine, drone=drone, lockstep=lockstep)
+    _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
+    seed, procedure = _checked_seed(seed, monitor, lockstep, autopilot), hardware_of(hardware, drone)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
 
     loaded = load_mission_with(mission, pilot)
-    chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep)
-    chosen = chosen if autopilot is None else for_genuine(autopilot.title, chosen)
+    chosen = _scenario(scenario, sensors, fault, hardware, autopilot, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
     real_time = RealTimeSettings(drone, camera, api, speed, instance, autopilot, camera_delay, procedure)
@@ -167,6 +175,7 @@ def _scenario(
     sensors: str | None,
     fault: tuple[str, ...],
     hardware: HardwareOptions,
+    autopilot: GenuineAutopilot | None,
     *,
     starts: bool,
     lockstep: bool,
@@ -186,7 +195,7 @@ def _scenario(
             f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
             "add --lockstep, or start framerunner sim and fly it with --drone"
         )
-    return scenario
+    return scenario if autopilot is None else for_genuine(autopilot.title, scenario)
 
 
 def _calibrated(plan: FlightPlan, path: Path | None, drone: str | None) -> FlightPlan:
@@ -255,12 +264,11 @@ def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
         raise SettingError(f"--simulator {error}") from None
 
 
-def _genuine(
-    px4: Path | None, ardupilot: Path | None, *, drone: str | None, lockstep: bool
-) -> GenuineAutopilot | None:
+def _genuine(given: GenuineOptions, *, drone: str | None, lockstep: bool) -> GenuineAutopilot | None:
     """The autopilot of the user's that flies the simulated drone, if one is given."""
     from framerunner.flying.simulator_process import GenuineAutopilot
 
+    px4, ardupilot = given.px4, given.ardupilot
     if px4 is not None and ardupilot is not None:
         raise SettingError(f"--ardupilot {ardupilot}: one autopilot flies; leave it or --px4 out")
     if px4 is not None:
@@ -282,8 +290,11 @@ def _genuine(
     return chosen
 
 
-def _check(drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool) -> None:
-    """Refuse options that do not go together."""
+def _check(
+    drone: str | None, camera: str | None, delay_s: float, speed: float, instance: int, *, lockstep: bool
+) -> None:
+    """Refuse options that do not go together, and numbers out of range."""
+    check_range("--camera-delay", delay_s, 0.0, 0.5)
     if drone is not None and camera is None:
         raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")
     if drone is None and camera is not None:
@@ -300,13 +311,15 @@ def _check(drone: str | None, camera: str | None, speed: float, instance: int, *
     check_range("--instance", instance, 0, 9)
 
 
-def _checked_seed(seed: int | None, monitor: bool, lockstep: bool, repeats: bool) -> int | None:
+def _checked_seed(
+    seed: int | None, monitor: bool, lockstep: bool, autopilot: GenuineAutopilot | None
+) -> int | None:
     """The seed of a flight in lockstep or of one with a genuine autopilot; None in real time."""
     if monitor and lockstep:
         raise SettingError("--monitor: shows flights in real time; leave it out with --lockstep")
     if seed is None:
-        return 0 if repeats else None
-    if not repeats:
+        return 0 if lockstep or autopilot is not None else None
+    if not lockstep and autopilot is None:
         raise SettingError(
             f"--seed {seed}: only a flight in lockstep repeats; add --lockstep or leave it out"
         )

@@ -34,7 +34,6 @@ _GENUINE_ANSWER_US = {"px4": 20_000, "ardupilot": 28_000}
 _GENUINE_START_US = {"px4": 0, "ardupilot": 10_000_000}
 """A flight begins at a multiple of this: the autopilot has then been running for the same time each time."""
 _STEP_US = 500_000
-_TELEMETRY_S = 0.005  # wall time in which telemetry that a genuine autopilot has sent is received
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,12 +173,8 @@ class SimulatorClock:
         )
         if held.setpoint_missed:
             self.setpoints_missed += 1
-        loop = asyncio.get_running_loop()
-        received_s = loop.time() + (_TELEMETRY_S if self.answers_take_time else 0.0)
         if self._perception is not None and not await self._perception.seen(held.image_us, IMAGE_S):
             self.images_missed += 1
-        if (left_s := received_s - loop.time()) > 0.0:
-            await asyncio.sleep(left_s)
 
     def release(self) -> None:
         """Let time run freely."""
