@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import Callable
 
 from offboard.drone import Drone, DroneError, DroneState
@@ -12,6 +13,7 @@ from offboard.safety.rules import SafetyRules
 ATTEND_US = 120_000_000  # vehicle time for which an operator may stop the motors after an abort
 LINK_LOSSES = 10  # a second each, after which the drone is not watched any more
 KILL_ATTEMPTS = 3  # a link may lose the request or its answer
+logger = logging.getLogger(__name__)
 
 
 class FlightAbort:
@@ -42,6 +44,8 @@ class FlightAbort:
         if operator is None:
             return await self._end()
         while not operator.kills:
+            if operator.stops:
+                logger.warning("the operator stops the flight: the drone lands; K stops its motors")
             stops = operator.stops
             work = asyncio.ensure_future(self._end_and_attend())
             operator.on_stop(work.cancel)  # not this task: a stop while the work ends must not be lost
@@ -99,5 +103,6 @@ class FlightAbort:
             except DroneError as error:
                 problem = f"stopping the motors: {error}"
             else:
+                logger.warning("the operator stopped the motors")
                 return "the operator stopped the motors"
         return problem

@@ -410,6 +410,9 @@ class _Flight:
         """Stop commanding, and hold or land."""
         if self._motors_requested:
             self._flying = False
+            operator = self._operator
+            if operator is not None and operator.needs_go and not operator.stops:
+                logger.warning("the flight is aborted: %s; SPACE lands, then K stops the motors", reason)
 
             def see(state: DroneState) -> None:
                 self._observe(state, STILL, Detections())

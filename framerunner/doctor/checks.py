@@ -26,7 +26,7 @@ CHALLENGE_HEIGHT_M = 3.0  # frames are at up to 2 m, the mission climbs from the
 CHALLENGE_REACH_M = 8.0
 ACCURATE_M = 0.1  # standard deviation; PX4 reports 0.3 with GPS, 0.01 with motion capture
 WANDER_M = 0.1
-_GUIDE = "docs/real-drone.md, section 3"
+_GUIDE = "docs/real-drone.md, step 6"
 _EV_POSITION, _EV_HEIGHT = 1, 2  # bits of EKF2_EV_CTRL
 _SLOW_ESTIMATOR = (
     # name, upper limit, unit
@@ -132,7 +132,9 @@ def _health(record: Record) -> Findings:
     ready = status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK
     mode = record.mode_name.lower()
     if not ready and not record.armed and record.arming.ready_for_offboard:
-        yield _good("pre-arm checks", f"passed for offboard, where fly arms it; not in {mode}")
+        words = "passed for offboard, where fly arms it"
+        also = "" if mode == "offboard" else f"; not in {mode}"  # in it they fail until setpoints come
+        yield _good("pre-arm checks", words + also)
     elif not ready and not record.armed:
         reasons = "; ".join((*record.arming.failures, *((unhealthy_names,) if unhealthy_names else ())))
         words = f"not passed in {mode}" + (f": {reasons}" if reasons else "")
@@ -386,7 +388,7 @@ def _vision_settings(record: Record) -> Findings:
     ]
     if slow:
         text = f"follows vision too slowly for the frames: {', '.join(slow)}"
-        advice = "set what docs/real-drone.md, section 7.3, advises, then restart the drone"
+        advice = "set what docs/real-drone.md, step 6, advises, then restart the drone"
         yield _missing("estimator", text, advice)
 
 

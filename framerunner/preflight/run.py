@@ -7,7 +7,7 @@ import sys
 import threading
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 
@@ -282,7 +282,7 @@ def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
     caps = plan.caps
     if caps is None:
         return Check("caps", Outcome.FAIL, "none", "", "give --max-speed")
-    value = f"{caps.words}; {height_m:.1f} m above the start"
+    value = f"{replace(caps, height_m=None).words}, {height_m:.1f} m above the start"
     limit = f"below the fence, {fence.height_m:g} m"
     if height_m >= fence.height_m:
         return Check("caps", Outcome.FAIL, value, limit, "give a lower --max-height")

@@ -69,8 +69,9 @@ class FailsafeRow(BaseModel):
         return (self.name, self.older_name) if self.older_name else (self.name,)
 
     def wanted(self, fence: FlightFence) -> float:
-        """The value to set for a flight."""
-        return self._number(self.set_to, fence)
+        """The value to set for a flight: not more than a fence allows that is lower."""
+        value = self._number(self.set_to, fence)
+        return value if self.most is None else min(value, self._number(self.most, fence))
 
     def allows(self, value: float, fence: FlightFence) -> bool:
         """Whether a value passes."""

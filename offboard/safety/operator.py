@@ -14,16 +14,17 @@ class Operator:
     A key, a page or a test calls `give_go` and `press_stop`; the flight reads them and is told of each stop.
 
     Args:
-        needs_go: the flight waits for a go before it arms.
+        needs_go: the flight waits for a go before it arms; not in a dry run.
         hint: how to give the go and to stop, for people.
 
     Attributes:
+        needs_go: see above.
         has_go: the go was given, or none is needed.
         stops: how often stop was pressed: once lands, twice stops the motors.
     """
 
     def __init__(self, *, needs_go: bool = True, hint: str = "") -> None:
-        self._needs_go = needs_go
+        self.needs_go = needs_go
         self.has_go = not needs_go
         self.hint = hint
         self.stops = 0
@@ -36,7 +37,7 @@ class Operator:
 
     def ask_for_go(self) -> None:
         """Forget a go that was given before: nobody had been told that the drone is ready."""
-        self.has_go = not self._needs_go
+        self.has_go = not self.needs_go
 
     def give_go(self) -> None:
         """Let the flight arm; ignored after a stop."""
