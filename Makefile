@@ -101,8 +101,8 @@ parameters: $(VENV)/installed-dev ## write docs/parameters.md from the declarati
 	$(BIN)/python -m firmware_py.parameters.reference > docs/parameters.md
 
 .PHONY: failsafes
-failsafes: $(VENV)/installed-dev ## write the table of failsafes in docs/real-drone.md from its data
-	$(BIN)/python -m offboard.safety.failsafes docs/real-drone.md
+failsafes: $(VENV)/installed-dev ## write the tables of failsafes in the documents from their data
+	$(BIN)/python -m offboard.safety.failsafes
 
 .PHONY: messages
 messages: $(VENV)/installed-dev ## generate wire/extra_messages.py again from wire/extra_messages.xml

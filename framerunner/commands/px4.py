@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from errors import SettingError
-from framerunner.commands import say, with_faults, with_sensors
+from framerunner.commands import for_genuine, say, with_faults, with_sensors
 
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
     from framerunner.evaluation.plan import Plan
-    from scenarios.models import Scenario
     from sitl.autopilots.process import AutopilotStart
     from sitl.px4.server import Px4Server
     from sitl.px4.simulation import Px4Simulation
@@ -61,16 +60,6 @@ def params(
     return 0
 
 
-def for_px4(scenario: Scenario) -> Scenario:
-    """A scenario with sensors from which PX4 can estimate its state; says so if they are others."""
-    from sitl.px4.simulation import with_sensors_for_px4
-
-    chosen = with_sensors_for_px4(scenario)
-    if chosen is not scenario:
-        say(f"PX4 takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
-    return chosen
-
-
 def plan_for_px4(plan: Plan, folder: Path) -> Plan:
     """An evaluation's plan for PX4, without scenarios with a fault of the link; says what is changed.
 
@@ -78,13 +67,13 @@ def plan_for_px4(plan: Plan, folder: Path) -> Plan:
         SettingError: nothing is left, or there is no PX4.
     """
     from scenarios.faults.declaration import FaultPart
+    from sitl.autopilots.sensors import SUITE_INSTEAD_OF_IDEAL, with_estimable_sensors
     from sitl.px4.build import version_of
-    from sitl.px4.simulation import SUITE_INSTEAD_OF_IDEAL, with_sensors_for_px4
 
     flown, ideal = [], 0
     for scenario in plan.scenarios:
         if all(fault.part is not FaultPart.LINK for fault in scenario.faults):
-            flown.append(with_sensors_for_px4(scenario))
+            flown.append(with_estimable_sensors(scenario))
             ideal += flown[-1] is not scenario
     left_out = len(plan) - len(flown)
     if not flown:
@@ -96,23 +85,6 @@ def plan_for_px4(plan: Plan, folder: Path) -> Plan:
     if ideal:
         say(f"PX4 takes no true state: drones with ideal sensors have {SUITE_INSTEAD_OF_IDEAL}")
     return plan.flown_by(version_of(folder), flown)
-
-
-def check_px4_flight(px4: Path | None, *, drone: str | None, lockstep: bool) -> None:
-    """Refuse options of `framerunner fly` that do not go with PX4.
-
-    Raises:
-        SettingError: one of them.
-    """
-    if px4 is None:
-        return
-    if drone is not None:
-        raise SettingError(f"--px4 {px4}: flies a simulator that is started; leave it out with --drone")
-    if lockstep:
-        raise SettingError(f"--px4 {px4}: PX4 is another process; leave out --lockstep")
-    from sitl.px4.build import find_build
-
-    find_build(px4)
 
 
 def px4_server(
@@ -133,7 +105,7 @@ def px4_server(
     from sitl.px4.transmitter import open_transmitter
 
     sticks = None if transmitter is None else open_transmitter(transmitter)
-    chosen = with_faults(for_px4(with_sensors(load_scenario(scenario), onboard.sensors)), fault)
+    chosen = with_faults(for_genuine("PX4", with_sensors(load_scenario(scenario), onboard.sensors)), fault)
 
     def new_simulation() -> Px4Simulation:
         return Px4Simulation(chosen, seed=seed, transmitter=sticks)

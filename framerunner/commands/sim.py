@@ -231,7 +231,7 @@ def _server(
         px4, transmitter = flown_by.px4, flown_by.transmitter
         return px4_server(*flown, px4=px4, transmitter=transmitter, seed=seed, grants=grants)
     if flown_by.autopilot == "ardupilot":
-        return ardupilot_server(*flown, ardupilot=flown_by.ardupilot, seed=seed)
+        return ardupilot_server(*flown, ardupilot=flown_by.ardupilot, seed=seed, grants=grants)
     return _own_server(*flown, count=count, seed=seed, grants=grants)
 
 

@@ -15,6 +15,7 @@ from errors import SettingError
 from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
+from framerunner.flying.simulator_process import GenuineAutopilot
 from framerunner.runs.recorder import RunRecords
 from framerunner.runs.run_folder import RunFolder
 from sitl.px4.link import FIRST_PORT
@@ -50,7 +51,8 @@ def fly_with_px4(plan: FlightPlan, use: Px4Use) -> FinishedFlight:
     with claimed_instance() as instance, TemporaryDirectory(prefix="framerunner-") as out:
         folder = RunFolder(Path(out), plan.scenario.name)
         folder.write_plan(plan.scenario, plan.chart)
-        settings = RealTimeSettings(speed=use.speed, instance=instance, px4=use.folder, unattended=True)
+        px4 = GenuineAutopilot("px4", use.folder)
+        settings = RealTimeSettings(speed=use.speed, instance=instance, autopilot=px4, unattended=True)
         return asyncio.run(fly_in_real_time(plan, settings, RunRecords(folder, None), None))
 
 

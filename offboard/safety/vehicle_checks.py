@@ -28,7 +28,7 @@ class BatteryFacts:
 
 @dataclass(frozen=True, slots=True)
 class EstimatorFacts:
-    """ESTIMATOR_STATUS of a vehicle that stands.
+    """What the estimator of a vehicle that stands reports.
 
     Attributes:
         reported: it was received; without it the other fields mean nothing.
@@ -36,6 +36,7 @@ class EstimatorFacts:
         has_position: likewise, horizontally, relative or absolute.
         has_height: likewise.
         largest_ratio: the largest of the innovations' test ratios.
+        message: that reports it.
     """
 
     reported: bool
@@ -43,6 +44,7 @@ class EstimatorFacts:
     has_position: bool = False
     has_height: bool = False
     largest_ratio: float = 0.0
+    message: str = "ESTIMATOR_STATUS"
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +98,7 @@ def estimator_check(facts: EstimatorFacts) -> Check:
     """Whether the estimator knows where the drone is, and its measurements agree."""
     name, limit = "estimator", f"ratios up to {MAX_RATIO:g}"
     if not facts.reported:
-        return Check(name, Outcome.FAIL, "no ESTIMATOR_STATUS is received", limit, "let the link carry it")
+        return Check(name, Outcome.FAIL, f"no {facts.message} is received", limit, "let the link carry it")
     known = {
         "attitude": facts.has_attitude,
         "position": facts.has_position,

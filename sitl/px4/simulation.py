@@ -18,16 +18,6 @@ from sitl.px4.transmitter import CENTRED, Channels, Sticks, centred
 from sitl.px4.words import FailsafeWords
 from sitl.vehicle import SimulatedVehicle
 
-SUITE_INSTEAD_OF_IDEAL = "mocap"
-"""PX4 estimates its state from sensors; it cannot be given the true one."""
-
-
-def with_sensors_for_px4(scenario: Scenario) -> Scenario:
-    """The scenario, with motion capture and the usual errors if its sensors are ideal."""
-    if scenario.sensors != "ideal":
-        return scenario
-    return scenario.model_copy(update={"sensors": SUITE_INSTEAD_OF_IDEAL})
-
 
 class MotionError(UserError):
     """The drone's motion cannot be simulated on; the message is one line for people."""

@@ -11,10 +11,11 @@ from pymavlink import mavutil
 
 from scenarios.loader import load_scenario
 from sitl.autopilots.process import AutopilotStart
+from sitl.autopilots.sensors import with_estimable_sensors
 from sitl.px4.build import Px4Process, find_build
 from sitl.px4.parameters import all_parameters
 from sitl.px4.server import Px4Server
-from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
+from sitl.px4.simulation import Px4Simulation
 from sitl.px4.transmitter import CENTRED
 from sitl.sensors.suite import load_suite
 from sitl.server_settings import ServerSettings
@@ -26,7 +27,7 @@ pytestmark = pytest.mark.skipif(not PX4_DIR, reason="no genuine PX4: make test-p
 
 
 async def test_lockstep_loses_and_doubles_no_step(tmp_path):
-    scenario, instance, lines = with_sensors_for_px4(load_scenario("test-case-1")), free_instance(), []
+    scenario, instance, lines = with_estimable_sensors(load_scenario("test-case-1")), free_instance(), []
     values = all_parameters(Px4Simulation(scenario).world.airframe, load_suite(scenario.sensors), 10.0)
     process = Px4Process(find_build(Path(PX4_DIR)), instance, tmp_path, values)
     settings = ServerSettings(instance=instance, speed=10.0)

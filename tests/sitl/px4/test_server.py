@@ -16,11 +16,12 @@ import pytest
 from errors import SettingError
 from scenarios.loader import load_scenario
 from sitl.autopilots.process import AutopilotStart
+from sitl.autopilots.sensors import with_estimable_sensors
 from sitl.px4.build import Px4Process, find_build
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
 from sitl.px4.messages import ActuatorControls
 from sitl.px4.server import Px4Server
-from sitl.px4.simulation import MotionError, Px4Simulation, with_sensors_for_px4
+from sitl.px4.simulation import MotionError, Px4Simulation
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.sitl.px4.fake_px4 import FakePx4
@@ -29,7 +30,7 @@ FAKE = Path(__file__).with_name("fake_px4.py")
 
 
 def new_simulation():
-    return Px4Simulation(with_sensors_for_px4(load_scenario("test-case-1")))
+    return Px4Simulation(with_estimable_sensors(load_scenario("test-case-1")))
 
 
 def serving(lines, speed=20.0):
