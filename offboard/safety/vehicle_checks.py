@@ -14,6 +14,7 @@ MAX_ROUND_TRIP_S = 0.25
 MIN_ANSWERS = 5
 MAX_RATIO = 0.5  # of an innovation to what its gate lets pass; PX4 does not arm above it
 MAX_CAMERA_AGE_S = 0.3
+CLOCK_TOLERANCE_S = 0.05  # of the vehicle's clock as the link shows it
 MIN_CAMERA_RATE_HZ = 8.0
 MAX_CAMERA_GAP_S = 0.5
 
@@ -148,5 +149,9 @@ def camera_checks(facts: CameraFacts) -> list[Check]:
         good = 0.0 <= facts.assumed_age_s <= MAX_CAMERA_AGE_S
         value = f"{facts.assumed_age_s:g} s by --camera-delay; its images have no time stamps"
         return [rate, passed("camera delay", good, value, limit, "use a camera with less delay")]
+    if facts.age_s < -CLOCK_TOLERANCE_S:
+        value = f"{facts.age_s:.2f} s: from the future"
+        advice = "its clock is not the vehicle's; check what stamps the images"
+        return [rate, Check("camera delay", Outcome.FAIL, value, limit, advice)]
     good = facts.age_s <= MAX_CAMERA_AGE_S
     return [rate, passed("camera delay", good, f"{facts.age_s:.2f} s", limit, "use a camera with less delay")]
