@@ -101,8 +101,8 @@ parameters: $(VENV)/installed-dev ## write docs/parameters.md from the declarati
 	$(BIN)/python -m firmware_py.parameters.reference > docs/parameters.md
 
 .PHONY: failsafes
-failsafes: $(VENV)/installed-dev ## write the table of failsafes in docs/real-drone.md from its data
-	$(BIN)/python -m offboard.safety.failsafes docs/real-drone.md
+failsafes: $(VENV)/installed-dev ## write the tables of failsafes in the documents from their data
+	$(BIN)/python -m offboard.safety.failsafes
 
 .PHONY: messages
 messages: $(VENV)/installed-dev ## generate wire/extra_messages.py again from wire/extra_messages.xml
@@ -132,6 +132,10 @@ lock: ## choose newer versions of everything installed (needs uv)
 	$(LOCK_PROJECT) --constraint locks/dev.txt --extra all -o locks/framerunner.txt
 	$(LOCK_PROJECT) --constraint locks/dev.txt --extra all --extra dask --extra gym --extra postgresql -o locks/extras.txt
 	$(LOCK) --upgrade locks/mavproxy.in --override locks/mavproxy-without.txt -o locks/mavproxy.txt
+
+.PHONY: check-pi
+check-pi: $(VENV)/installed-dev ## ask the registry whether a Raspberry Pi can install it without a compiler
+	$(BIN)/python -m tests.locks.check_wheels locks/framerunner.txt
 
 .PHONY: clean
 clean: ## remove what was installed and built; runs/ is kept

@@ -8,8 +8,9 @@ from __future__ import annotations
 import time
 
 from scenarios.loader import load_scenario
+from sitl.autopilots.sensors import with_estimable_sensors
 from sitl.px4.messages import ActuatorControls, ControlsReader, Packer
-from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
+from sitl.px4.simulation import Px4Simulation
 from wire.dialect import mavlink
 
 STEPS = 20_000
@@ -18,7 +19,7 @@ HOVER = 0.26
 
 def main() -> None:
     """Print the mean times, microseconds a step."""
-    simulation = Px4Simulation(with_sensors_for_px4(load_scenario("test-case-1")))
+    simulation = Px4Simulation(with_estimable_sensors(load_scenario("test-case-1")))
     packer = Packer(mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS)
     reader = ControlsReader()
     packed_s = read_s = 0.0

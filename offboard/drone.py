@@ -35,6 +35,7 @@ class DroneState:
     position_age_s: float = 0.0  # how much older the position and the velocity are than `time_us`
     attitude_arena: Quaternion = (1.0, 0.0, 0.0, 0.0)  # body FLU to arena, with the heading `yaw`
     camera_attitude_arena: Quaternion | None = None  # of a camera on a gimbal, forward-left-up to arena
+    loops_known: bool = True  # it may be this project's autopilot, whose velocity loops can be inverted
     missed: tuple[DroneState, ...] = ()  # at the ticks that were skipped before this one, oldest first
 
     @property

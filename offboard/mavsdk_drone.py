@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
+from math import inf
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -172,7 +173,8 @@ class MavsdkDrone:
                 component.announce(system_id)
         self._telemetry = TelemetryAsync(system)
         self._direct = MavlinkDirectAsync(system)
-        self._dialect = await open_dialect(system, self._direct, self._feed)
+        room_m = inf if self._box is None else self._box.high_m[2] - self._start_arena.position_m[2]
+        self._dialect = await open_dialect(system, self._direct, self._feed, room_m)
         telemetry = synchronous(self._telemetry)
         self._feed.subscribe(telemetry, synchronous(self._direct), self._dialect.numbered_modes)
         await self._requests.wait(self._dialect.request_streams())
@@ -368,10 +370,12 @@ class MavsdkDrone:
         self._send(command if self._caps is None else self._caps.limit(command, latest))
 
     async def close(self) -> None:
-        """End all commanding and, without a companion, disconnect."""
+        """End all commanding, let a disarmed vehicle hold and, without a companion, disconnect."""
         self._commanding = False
         self._watchdog.stop()
         self._ticks.release()
+        if self._dialect is not None and self._in_offboard and self._feed.armed is False:
+            await self._hold_on_ground()
         await self._requests.wait_for_all()
         if self._companion is None:
             await self.disconnect()
@@ -413,9 +417,10 @@ class MavsdkDrone:
         assert self._alignment is not None, "ready() comes first"
         sample = self._feed.sample
         missed = [before for before in self._feed.take_samples() if before.time_us < sample.time_us]
-        mode = self._stream.modes.offboard
-        states = tuple(reported_state(before, self._feed, self._alignment, mode) for before in missed)
-        return reported_state(sample, self._feed, self._alignment, mode, states)
+        mode, known = self._stream.modes.offboard, self._stream.loops_known
+        fixed = (self._feed, self._alignment, mode)
+        states = tuple(reported_state(before, *fixed, loops_known=known) for before in missed)
+        return reported_state(sample, *fixed, states, loops_known=known)
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s

@@ -63,7 +63,8 @@ class Response:
     Attributes:
         turning: its velocity follows in level axes that turn with its heading, so that a turn at speed needs
             commands ahead; else in axes that do not turn.
-        late: so late that the motion must be predicted.
+        late: so late that the motion must be predicted; or it is not the simulated drone, whose loops can be
+            inverted.
         own_lag_s: a second lag in plan, after the first, in axes that turn; 0 if there is none.
         share: of a command in plan that the velocity follows so; it follows the rest only slowly.
     """
@@ -131,6 +132,7 @@ class ResponseEstimate:
         self._errors = np.zeros(shape)
         self._energies = np.zeros(len(_GROUPS))
         self._late_choices = 0  # in a row
+        self._loops_known = True
         self._others_before: tuple[object, ...] = (None, None, 1.0)  # what was chosen of the other models
         self._second = SecondLag(shape[:2], STEP_S, _WINDOW)
         self._slow = SlowShare(shape[:2], STEP_S, _WINDOW)
@@ -157,6 +159,8 @@ class ResponseEstimate:
             state: of the drone now.
             sent: the command that it has had since the last tick; None if it had none, or it is not known.
         """
+        if not state.loops_known and not self.response.late:
+            self._loops_known, self.response = False, self._as_response()
         now_s = state.time_us * 1e-6
         if sent is None or self._last_s is None or not 0.0 <= now_s - self._last_s <= _MAX_STEPS * STEP_S:
             self._restart()
@@ -243,6 +247,7 @@ class ResponseEstimate:
         seems_late = self._seems_late(errors)
         self._late_choices = self._late_choices + 1 if seems_late else 0
         is_late = seems_late and (self.response.late or self._late_choices >= _SURE)
+        is_late = is_late or not self._loops_known
         if is_late != self.response.late or (self._turning, self._others_before, *self._chosen) != before:
             self.response = self._as_response() if is_late else Response()
 

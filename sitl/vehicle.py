@@ -95,7 +95,9 @@ class SimulatedVehicle(ABC):
         self.parameters = Parameters(defaults={**airframe.parameters, **parameter_defaults(suite)})
         self.referee = Referee(scenario, airframe.envelope_m)
         self.battery = Battery(airframe, self.parameters)
-        self.faults = Faults(scenario.faults, suite, self.world, self.battery, seed)
+        self.faults = Faults(
+            scenario.faults, suite, self.world, self.battery, seed, has_transmitter=self.has_transmitter
+        )
         settings = scenario.camera.gimbal
         self.gimbal = None if settings is None else SimulatedGimbal(settings)
         self._battery_due_us = 0
@@ -104,6 +106,9 @@ class SimulatedVehicle(ABC):
         if self.gimbal is not None:
             self._turn_camera(self.gimbal)
         self.referee.update(self.truth)
+
+    autopilot_name = ""  # of a genuine autopilot; empty: our own flies
+    has_transmitter = False  # a pilot's remote control, which can fail
 
     @property
     @abstractmethod
@@ -132,6 +137,7 @@ class SimulatedVehicle(ABC):
                 BegunFault(fault=str(each.fault), began_us=each.time_us, ended_us=each.ended_us)
                 for each in self.faults.begun
             ),
+            autopilot=self.autopilot_name,
             failsafes=tuple(FailsafeText(time_us=time_us, text=text) for time_us, text in self.failsafes),
         )
 

@@ -46,6 +46,16 @@ def with_sensors(scenario: Scenario, sensors: str | None) -> Scenario:
     return scenario.model_copy(update={"sensors": sensors})
 
 
+def for_genuine(autopilot: str, scenario: Scenario) -> Scenario:
+    """A scenario with sensors from which a genuine autopilot can estimate its state; says so if changed."""
+    from sitl.autopilots.sensors import with_estimable_sensors
+
+    chosen = with_estimable_sensors(scenario)
+    if chosen is not scenario:
+        say(f"{autopilot} takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
+    return chosen
+
+
 def check_range(option: str, value: float | None, low: float, high: float) -> None:
     """Raise SettingError for a number outside low to high, or not a number; None is an option not given."""
     if value is not None and not low <= value <= high:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from framerunner.commands import say, with_faults, with_sensors
+from framerunner.commands import for_genuine, say, with_faults, with_sensors
 
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
@@ -16,12 +16,19 @@ if TYPE_CHECKING:
     from sitl.ardupilot.simulation import ArduPilotSimulation
     from sitl.autopilots.process import AutopilotStart
     from sitl.server_settings import ServerSettings
+    from sitl.time_grants import TimeGrants
 
 app = App(name="ardupilot", help="What a genuine ArduCopter needs to fly in the simulated world.")
 
 
 @app.command
-def params(airframe: Annotated[str, Parameter(help="name or file of the airframe")] = "x500") -> int:
+def params(
+    airframe: Annotated[str, Parameter(help="name or file of the airframe")] = "x500",
+    *,
+    sensors: Annotated[
+        str, Parameter(help="sensor suite: mocap for poses of motion capture, outdoor for GPS, or a file")
+    ] = "mocap",
+) -> int:
     """Print the parameters by which ArduCopter flies an airframe here: one `NAME VALUE` a line.
 
     **Examples**
@@ -30,8 +37,9 @@ def params(airframe: Annotated[str, Parameter(help="name or file of the airframe
     """
     from firmware_py.airframe import load_airframe
     from sitl.ardupilot.parameters import all_parameters, file_of
+    from sitl.sensors.suite import load_suite
 
-    print(file_of(all_parameters(load_airframe(airframe))), end="")
+    print(file_of(all_parameters(load_airframe(airframe), load_suite(sensors))), end="")
     return 0
 
 
@@ -43,41 +51,43 @@ def ardupilot_server(
     *,
     ardupilot: Path | None,
     seed: int,
+    grants: TimeGrants | None,
 ) -> ArduPilotServer:
     """The simulator with ArduPilot, by the options of `framerunner sim`."""
     from scenarios.loader import load_scenario
     from sitl.ardupilot.server import ArduPilotServer
     from sitl.ardupilot.simulation import ArduPilotSimulation
 
-    chosen = with_faults(with_sensors(load_scenario(scenario), onboard.sensors), fault)
+    chosen = with_faults(
+        for_genuine("ArduPilot", with_sensors(load_scenario(scenario), onboard.sensors)), fault
+    )
 
     def new_simulation() -> ArduPilotSimulation:
         return ArduPilotSimulation(chosen, seed=seed)
 
     simulation = new_simulation()  # so that what is wrong with it is said first
     start = _start(simulation, settings, ardupilot)
-    return ArduPilotServer(new_simulation, settings, start, notice=say)
+    return ArduPilotServer(new_simulation, settings, start, notice=say, grants=grants)
 
 
 def _start(
     simulation: ArduPilotSimulation, settings: ServerSettings, ardupilot: Path | None
 ) -> AutopilotStart:
-    from firmware_py.types import GeodeticPoint
     from sitl.ardupilot.build import ArduPilotProcess, find_build, options
     from sitl.ardupilot.parameters import all_parameters
     from sitl.autopilots.process import AutopilotStart
+    from sitl.sensors.suite import load_suite
 
-    scenario = simulation.scenario
-    origin = scenario.origin
-    home = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
-    values = all_parameters(simulation.world.airframe)
+    scenario, home, takes_poses = simulation.scenario, simulation.place, simulation.sends_poses
+    values = all_parameters(simulation.world.airframe, load_suite(scenario.sensors))
     file = f"{simulation.world.airframe.name}.parm"
     command = (
-        f"framerunner ardupilot params {scenario.airframe} > {file}; "
-        f"arducopter {shlex.join(options(settings, home, file))}"
+        f"framerunner ardupilot params {scenario.airframe} --sensors {scenario.sensors} > {file}; "
+        f"arducopter {shlex.join(options(settings, home, file, takes_poses=takes_poses))}"
     )
     if ardupilot is None:
         return AutopilotStart(None, command)
     folder = None if settings.storage is None else settings.storage / f"ardupilot-{settings.instance}"
     program = find_build(ardupilot)
-    return AutopilotStart(ArduPilotProcess(program, settings, home, values, folder), command)
+    process = ArduPilotProcess(program, settings, home, values, folder, takes_poses=takes_poses)
+    return AutopilotStart(process, command)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,16 +16,17 @@ from framerunner.commands import (
     Sensors,
     WholeNumber,
     check_range,
+    for_genuine,
     load_mission_with,
     with_faults,
     with_sensors,
 )
 from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
-from framerunner.commands.px4 import check_px4_flight, for_px4
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from framerunner.flying.run import FlightSettings
+    from framerunner.flying.simulator_process import GenuineAutopilot
     from offboard.mission import Mission
     from scenarios.models import Scenario
     from wire.simulator_api import SimulatorApi
@@ -60,11 +61,7 @@ _Lockstep = Annotated[
 ]
 _Seed = Annotated[
     WholeNumber | None,
-    Parameter(help="of everything random in a lockstep flight, or with --px4; 0 if not given"),
-]
-_Px4 = Annotated[
-    Path | None,
-    Parameter(help="folder of a PX4 built for SITL: it flies the simulated drone instead of our autopilot"),
+    Parameter(help="of everything random in a lockstep flight, or with --px4 or --ardupilot; 0 if not given"),
 ]
 _Record = Annotated[bool, Parameter(help="write flight.mcap as well, for `framerunner replay` and Foxglove")]
 _Video = Annotated[
@@ -86,10 +83,30 @@ _Response = Annotated[
     ),
 ]
 _MonitorLink = Annotated[
-    str | None, Parameter(help="MAVLink URL at which a monitor that is open gets the drone's messages, too")
+    str | None,
+    Parameter(help="MAVLink URL of a monitor that runs already, such as udpout://127.0.0.1:14550"),
 ]
 _Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input ends")]
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class GenuineOptions:
+    """A genuine autopilot, as the command line gives it."""
+
+    px4: Annotated[
+        Path | None,
+        Parameter(
+            help="folder of a PX4 built for SITL: it flies the simulated drone instead of our autopilot"
+        ),
+    ] = None
+    ardupilot: Annotated[
+        Path | None, Parameter(help="folder of an ArduPilot built for SITL, which flies it likewise")
+    ] = None
+
+
+_OWN = GenuineOptions()
 
 
 def fly(
@@ -103,7 +120,7 @@ def fly(
     simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
-    px4: _Px4 = None,
+    genuine: GenuineOptions = _OWN,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
     sensors: Sensors = None,
@@ -135,20 +152,20 @@ def fly(
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
-    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    _check(drone, camera, speed, instance, lockstep=lockstep, px4=px4)
-    seed, procedure = _checked_seed(seed, monitor, lockstep, px4), hardware_of(hardware, drone)
+    autopilot = _genuine(genuine, drone=drone, lockstep=lockstep)
+    _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
+    seed, procedure = _checked_seed(seed, monitor, lockstep, autopilot), hardware_of(hardware, drone)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
 
     loaded = load_mission_with(mission, pilot)
-    chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep, px4=px4)
+    chosen = _scenario(scenario, sensors, fault, hardware, autopilot, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
-    ends, delay_s = (drone, camera, api, speed, instance, px4), plan.camera_delay_s(camera_delay)
+    ends, delay_s = (drone, camera, api, speed, instance, autopilot), plan.camera_delay_s(camera_delay)
     flown = None if lockstep else RealTimeSettings(*ends, delay_s, procedure)
     return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
 
@@ -166,10 +183,10 @@ def _scenario(
     sensors: str | None,
     fault: tuple[str, ...],
     hardware: HardwareOptions,
+    autopilot: GenuineAutopilot | None,
     *,
     starts: bool,
     lockstep: bool,
-    px4: Path | None,
 ) -> Scenario:
     """The scenario that the options describe; `starts`: a simulated drone is started."""
     from scenarios.loader import load_scenario
@@ -186,7 +203,7 @@ def _scenario(
             f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
             "add --lockstep, or start framerunner sim and fly it with --drone"
         )
-    return scenario if px4 is None else for_px4(scenario)
+    return scenario if autopilot is None else for_genuine(autopilot.title, scenario)
 
 
 def _calibrated(plan: FlightPlan, path: Path | None) -> FlightPlan:
@@ -253,11 +270,37 @@ def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
         raise SettingError(f"--simulator {error}") from None
 
 
+def _genuine(given: GenuineOptions, *, drone: str | None, lockstep: bool) -> GenuineAutopilot | None:
+    """The autopilot of the user's that flies the simulated drone, if one is given."""
+    from framerunner.flying.simulator_process import GenuineAutopilot
+
+    px4, ardupilot = given.px4, given.ardupilot
+    if px4 is not None and ardupilot is not None:
+        raise SettingError(f"--ardupilot {ardupilot}: one autopilot flies; leave it or --px4 out")
+    if px4 is not None:
+        from sitl.px4.build import find_build
+
+        chosen = GenuineAutopilot("px4", px4)
+    elif ardupilot is not None:
+        from sitl.ardupilot.build import find_build
+
+        chosen = GenuineAutopilot("ardupilot", ardupilot)
+    else:
+        return None
+    option = f"--{chosen.name} {chosen.folder}"
+    if drone is not None:
+        raise SettingError(f"{option}: flies a simulator that is started; leave it out with --drone")
+    if lockstep:
+        raise SettingError(f"{option}: it is another process; leave out --lockstep")
+    find_build(chosen.folder)
+    return chosen
+
+
 def _check(
-    drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool, px4: Path | None
+    drone: str | None, camera: str | None, delay_s: float, speed: float, instance: int, *, lockstep: bool
 ) -> None:
-    """Refuse options that do not go together."""
-    check_px4_flight(px4, drone=drone, lockstep=lockstep)
+    """Refuse options that do not go together, and numbers out of range."""
+    check_range("--camera-delay", delay_s, 0.0, 0.5)
     if drone is not None and camera is None:
         raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")
     if drone is None and camera is not None:
@@ -274,13 +317,15 @@ def _check(
     check_range("--instance", instance, 0, 9)
 
 
-def _checked_seed(seed: int | None, monitor: bool, lockstep: bool, px4: Path | None) -> int | None:
-    """The seed of a flight in lockstep or of one with PX4; None in real time."""
+def _checked_seed(
+    seed: int | None, monitor: bool, lockstep: bool, autopilot: GenuineAutopilot | None
+) -> int | None:
+    """The seed of a flight in lockstep or of one with a genuine autopilot; None in real time."""
     if monitor and lockstep:
         raise SettingError("--monitor: shows flights in real time; leave it out with --lockstep")
     if seed is None:
-        return 0 if lockstep or px4 is not None else None
-    if not lockstep and px4 is None:
+        return 0 if lockstep or autopilot is not None else None
+    if not lockstep and autopilot is None:
         raise SettingError(
             f"--seed {seed}: only a flight in lockstep repeats; add --lockstep or leave it out"
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -65,6 +66,8 @@ class HardwareOptions:
 
 
 NONE = HardwareOptions()
+SERVICE_VARIABLE = "FRAMERUNNER_SERVICE"
+"""Set by systemd/framerunner-fly.service: nobody may be near the drone when a service starts."""
 
 
 def caps_of(options: HardwareOptions, drone: str | None) -> Caps | None:
@@ -103,6 +106,9 @@ def hardware_of(options: HardwareOptions, drone: str | None) -> HardwareSettings
         if used:
             raise SettingError(f"{used[0]}: is for a drone given by --drone; leave it out")
         return None
+    if os.environ.get(SERVICE_VARIABLE) and (options.yes or options.simulated):
+        name = "--yes" if options.yes else "--simulated"
+        raise SettingError(f"{name}: a service never flies without an operator's go; leave it out")
     if options.simulated:
         if used:
             raise SettingError(

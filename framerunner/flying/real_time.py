@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,10 +23,14 @@ from wire.simulator_api import SimulatorApi
 if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow to import
     from framerunner.flying.judges import Judge
     from framerunner.flying.mission_reporter import MissionReporter
-    from framerunner.flying.simulator_process import SitlProcess
+    from framerunner.flying.simulator_process import GenuineAutopilot, SitlProcess
     from framerunner.preflight.settings import HardwareSettings
     from offboard.mavsdk_drone import MavsdkDrone
     from offboard.perception import CameraPerception
+
+
+CAMERA_LIMIT_S = 5.0  # wall time without an image after which the camera has failed
+PATIENT_CAMERA_LIMIT_S = 60.0  # likewise, when vehicle time waits for this program
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +42,11 @@ class RealTimeSettings:
     simulator: SimulatorApi | None = None  # of the running drone, if the user named it
     speed: float = 1.0  # of the simulator that is started: simulated seconds a second
     instance: int = 0  # of the simulator that is started: shifts its ports
-    px4: Path | None = None  # folder of a PX4 that flies in the simulator that is started; None: our own does
+    autopilot: GenuineAutopilot | None = None  # flies in the simulator that is started; None: our own does
     camera_delay_s: float = CAMERA_DELAY_S  # age on arrival of an image without a time stamp
     hardware: HardwareSettings | None = None  # of a drone that may be a real one; None: it is simulated
     monitor_socket: Path | None = None  # of the monitor that was started here
+    unattended: bool = False  # one of many flights: nothing is shown, and there is no video
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +101,15 @@ async def fly_in_real_time(
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         drone = _drone(plan, vehicle, records, stack, safety, hardware=settings.hardware, system_id=system_id)
         drone.use_companion(companion)
-        camera = await _camera(plan, vehicle, records, stack, reporter, vehicle_time_us=drone.vehicle_time_us)
+        camera = await _camera(
+            plan,
+            vehicle,
+            records,
+            stack,
+            reporter,
+            vehicle_time_us=drone.vehicle_time_us,
+            video=not settings.unattended,
+        )
         perception = _perception(plan, vehicle, judge, camera)
         perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
@@ -105,7 +118,7 @@ async def fly_in_real_time(
         display = FlightDisplay(plan.title, plan.limit_s, records.recorder, judge)
 
         async def run(flight: Coroutine[Any, Any, MissionEnd]) -> MissionEnd:
-            async with display:
+            async with nullcontext() if settings.unattended else display:
                 task = asyncio.create_task(flight)
                 outcome = await (task if vehicle.sitl is None else vehicle.sitl.guard(task))
             camera.close()
@@ -180,14 +193,14 @@ async def _vehicle(
     from framerunner.flying.simulator_process import SitlProcess
 
     # The simulator reads the scenario that was checked here, even if the user's file changes.
-    scenario_file, px4 = str(records.folder.scenario), settings.px4
-    links = () if monitor_url is None or px4 is not None else (monitor_url,)  # PX4 has its own links
-    storage = None if px4 is None else records.folder.path
+    scenario_file, autopilot = str(records.folder.scenario), settings.autopilot
+    links = () if monitor_url is None or autopilot is not None else (monitor_url,)  # others have their own
+    storage = None if autopilot is None else records.folder.path
     chosen = (scenario_file, settings.speed, settings.instance, links, plan.seed or 0)
-    sitl = await stack.enter_async_context(SitlProcess(*chosen, px4=px4, storage=storage))
+    sitl = await stack.enter_async_context(SitlProcess(*chosen, autopilot=autopilot, storage=storage))
     camera = plan.scenario.camera
     size_px = (camera.width_px, camera.height_px)
-    shared = None if px4 is None else monitor_url
+    shared = None if autopilot is None else monitor_url
     return _Endpoints(sitl.drone_url, sitl.api.video_url, sitl.api, size_px, sitl, shared_with=shared)
 
 
@@ -235,6 +248,7 @@ async def _camera(
     reporter: MissionReporter,
     *,
     vehicle_time_us: Callable[[float], int | None],
+    video: bool,
 ) -> RecordingCamera:
     """The camera, whose images are recorded; closed with the stack."""
     from vision.sources import open_source
@@ -245,8 +259,11 @@ async def _camera(
         records.see_frame(replace(frame, time_us=time_us))
         reporter.see_frame(frame)
 
-    source = await stack.enter_async_context(open_source(vehicle.camera_url, size_px=vehicle.image_size_px))
-    camera = RecordingCamera(source, records.folder.video, plan.scenario.camera.rate_hz, keep)
+    limit_s = CAMERA_LIMIT_S if vehicle.sitl is None else PATIENT_CAMERA_LIMIT_S
+    opened = open_source(vehicle.camera_url, timeout_s=limit_s, size_px=vehicle.image_size_px)
+    source = await stack.enter_async_context(opened)
+    path = records.folder.video if video else None
+    camera = RecordingCamera(source, path, plan.scenario.camera.rate_hz, keep)
     stack.callback(camera.close)
     return camera
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 
 from errors import SettingError
 from framerunner.child_process import ChildProcess
@@ -27,13 +28,38 @@ _LAST_LINE_S = 3.0
 IMAGE_S = 2.0  # wall time for an image to arrive and be processed
 _ANSWER_US = CONTROL_PERIOD_US + TELEMETRY_DELAY_US - 1
 """From a multiple of 50 ms to the last control tick before the one that applies the answer."""
-_PX4_ANSWER_US = 20_000  # likewise; PX4 sends an attitude each 10 ms, when it comes to it
+_GENUINE_ANSWER_US = {"px4": 20_000, "ardupilot": 28_000}
+"""Likewise; PX4 sends an attitude each 10 ms, ArduPilot each 20 ms, when it comes to it."""
+
+_GENUINE_START_US = {"px4": 0, "ardupilot": 10_000_000}
+"""A flight begins at a multiple of this: the autopilot has then been running for the same time each time."""
+_STEP_US = 500_000
+
+
+@dataclass(frozen=True, slots=True)
+class GenuineAutopilot:
+    """An autopilot that the user has built, which flies the simulated drone instead of our own."""
+
+    name: Literal["px4", "ardupilot"]  # as an option of `framerunner sim`
+    folder: Path
+
+    @property
+    def title(self) -> str:
+        """For people."""
+        return {"px4": "PX4", "ardupilot": "ArduPilot"}[self.name]
 
 
 class SitlProcess(ChildProcess):
     """`framerunner sim` as a child process, with its options.
 
-    `px4` is the folder of a PX4 that flies instead of our own autopilot, `storage` that of the drone's files.
+    Args:
+        scenario: name or file.
+        speed: simulated seconds a second.
+        instance: shifts ports and system id.
+        links: MAVLink URLs besides the usual ones.
+        seed: of everything random.
+        autopilot: that flies instead of our own; None: our own does.
+        storage: folder of the drone's files; None: in memory.
     """
 
     def __init__(
@@ -44,7 +70,7 @@ class SitlProcess(ChildProcess):
         links: tuple[str, ...] = (),
         seed: int = 0,
         *,
-        px4: Path | None = None,
+        autopilot: GenuineAutopilot | None = None,
         storage: Path | None = None,
     ) -> None:
         here, there = socket.socketpair()
@@ -53,11 +79,16 @@ class SitlProcess(ChildProcess):
             *("--speed", f"{speed:g}", "--instance", str(instance), "--video-rtp", "off"),
             *("--time-grants", str(there.fileno())),
             *(word for link in links for word in ("--link", link)),
-            *(() if px4 is None else ("--autopilot", "px4", "--px4", str(px4))),
+            *(() if autopilot is None else ("--autopilot", autopilot.name)),
+            *(() if autopilot is None else (f"--{autopilot.name}", str(autopilot.folder))),
             *(() if storage is None else ("--storage", str(storage))),
         ]
         super().__init__("the simulator", arguments, inherited=there)
-        self.clock = SimulatorClock(here, _PX4_ANSWER_US if px4 else _ANSWER_US, answers_take_time=bool(px4))
+        answer_us = _ANSWER_US if autopilot is None else _GENUINE_ANSWER_US[autopilot.name]
+        start_us = 0 if autopilot is None else _GENUINE_START_US[autopilot.name]
+        self.clock = SimulatorClock(
+            here, answer_us, answers_take_time=autopilot is not None, start_us=start_us
+        )
         self.system_id = instance + 1  # MAVLink id of its drone
         self.drone_url = f"udpin://127.0.0.1:{14540 + instance}"
         self.api = SimulatorApi(f"http://127.0.0.1:{VIDEO_PORT + instance}")
@@ -85,11 +116,18 @@ class SimulatorClock:
         channel: to the simulator.
         answer_us: simulated time from a tick until the telemetry of the tick has been sent.
         answers_take_time: the autopilot answers requests only while simulated time goes on.
+        start_us: time stops at a multiple of this; 0: at once.
     """
 
     def __init__(
-        self, channel: socket.socket, answer_us: int = _ANSWER_US, *, answers_take_time: bool = False
+        self,
+        channel: socket.socket,
+        answer_us: int = _ANSWER_US,
+        *,
+        answers_take_time: bool = False,
+        start_us: int = 0,
     ) -> None:
+        self._start_us = start_us
         self.answers_take_time = answers_take_time
         self._answer_us = answer_us
         self.images_missed = 0  # ticks whose image did not arrive in time
@@ -116,7 +154,12 @@ class SimulatorClock:
 
     async def stop(self) -> int:
         """Stop vehicle time; returns that of the last control tick, microseconds."""
-        return (await self._granted(Grant(0))).time_us
+        time_us = (await self._granted(Grant(0))).time_us
+        period_us = self._start_us or 1
+        start_us = -(-time_us // period_us) * period_us
+        while time_us < start_us:
+            time_us = (await self._granted(Grant(min(time_us + _STEP_US, start_us)))).time_us
+        return time_us
 
     async def advance(self, tick_us: int, command: VelocityCommand | None) -> None:
         """Grant time up to a tick and the control period after it; then wait for the image.

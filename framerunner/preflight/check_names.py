@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import get_args
 
 from framerunner.doctor.subjects import Subject
-from offboard.safety.failsafes import failsafe_rows
+from offboard.safety.failsafes import DOCUMENTS, failsafe_rows
+
+_FAILSAFES = tuple(name for autopilot in DOCUMENTS for row in failsafe_rows(autopilot) for name in row.names)
 
 REPLACED = frozenset(
     # Findings of the doctor that checks with a limit replace.
     (
         *("battery", "link", "innovations", "setpoints lost", "ground station lost", "battery low", "fence"),
-        *(row.name for row in failsafe_rows()),
+        *_FAILSAFES,
     )
 )
 RENAMED = {"estimator": "estimator settings"}
@@ -22,7 +24,7 @@ _OF_RUN = ("failsafes", "fence", "caps")
 CHECK_NAMES = frozenset(
     (
         *(RENAMED.get(each, each) for each in get_args(Subject) if each not in REPLACED),
-        *(row.name for row in failsafe_rows()),
+        *_FAILSAFES,
         *_OWN,
         *_OF_RUN,
     )

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from math import isnan, nan
+from math import nan
 from pathlib import Path
 
 from errors import UserError
@@ -20,6 +20,7 @@ from framerunner.doctor.listen import Record
 from framerunner.flying.plan import CAMERA_DELAY_S, FlightPlan
 from framerunner.preflight.camera import CameraTimes, measure_camera
 from framerunner.preflight.check_names import CHECK_NAMES, RENAMED, REPLACED
+from framerunner.preflight.estimator import estimator_facts, has_global_position
 from framerunner.preflight.fence_upload import (
     FenceItem,
     Vertex,
@@ -34,13 +35,12 @@ from framerunner.preflight.session import TIME_REQUESTS, VehicleSession, open_li
 from geometry.axes import Alignment, Pose
 from offboard.drone import DroneError
 from offboard.safety.check import Check, Outcome, accept, check_names, failures, passed
-from offboard.safety.failsafes import failsafe_checks, failsafe_rows, values_to_set
+from offboard.safety.failsafes import failsafe_checks, failsafe_rows, rows_by_known_names, values_to_set
 from offboard.safety.fence import FlightFence, flight_fence
 from offboard.safety.rules import AbortAction
 from offboard.safety.vehicle_checks import (
     BatteryFacts,
     CalibrationFacts,
-    EstimatorFacts,
     LinkFacts,
     battery_check,
     calibration_check,
@@ -48,9 +48,11 @@ from offboard.safety.vehicle_checks import (
     estimator_check,
     link_checks,
 )
-from wire.dialect import degrees_e7, mavlink
+from wire.dialect import degrees_e7
 
 LISTEN_S = 5.0
+FENCED = ("px4", "ardupilot")
+"""Autopilots that take a fence as mission items."""
 CAMERA_S = 3.0
 KEPT_PARAMETERS = "parameters-before{}.params"
 _OUTCOMES = {Level.GOOD: Outcome.PASS, Level.NOTE: Outcome.NOTE, Level.MISSING: Outcome.FAIL}
@@ -132,6 +134,7 @@ class _Measured:
 
     record: Record
     system_id: int
+    autopilot: str
     link: LinkFacts
     checks: tuple[Check, ...]
     changes: tuple[ParameterChange, ...]
@@ -162,7 +165,7 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
     record = measured.record
     checks = [
         *_doctors(examine(record)),
-        estimator_check(_estimator(record)),
+        estimator_check(estimator_facts(record, measured.autopilot)),
         battery_check(_battery(record)),
         *link_checks(measured.link),
         *measured.checks,
@@ -211,13 +214,14 @@ def _measure(
         session.listen(LISTEN_S)
         record = session.record
         facts = LinkFacts(record.packets.lost_share, session.round_trips_s(), TIME_REQUESTS)
-        has_position = has_global_position(record)
+        has_position = has_global_position(record, session.autopilot)
         checks: list[Check] = []
         rows = failsafe_rows(session.autopilot, settings.abort)
         if not rows:
             advice = "check them by hand, then accept it by --accept failsafes"
             checks.append(Check("failsafes", Outcome.FAIL, "no table for this autopilot", "", advice))
-        values = read_parameters(session, [row.name for row in rows])
+        values = read_parameters(session, [name for row in rows for name in row.names])
+        rows = rows_by_known_names(rows, values)
         wanted: dict[str, float] = {}
         if settings.set_parameters and not record.armed:
             numbers = {name: each.value for name, each in values.items()}
@@ -231,7 +235,7 @@ def _measure(
         numbers = {name: each.value for name, each in values.items()}
         checks += failsafe_checks(numbers, fence, has_global_position=has_position, rows=rows)
         checks.append(upload.check())
-    return _Measured(record, session.system_id, facts, tuple(checks), changes, kept)
+    return _Measured(record, session.system_id, session.autopilot, facts, tuple(checks), changes, kept)
 
 
 def _keep(
@@ -262,13 +266,6 @@ def _unused(folder: Path) -> Path:
     numbers = ("", *(f"-{number}" for number in range(2, 1000)))
     paths = (folder / KEPT_PARAMETERS.format(number) for number in numbers)
     return next(path for path in paths if not path.exists())
-
-
-def has_global_position(record: Record) -> bool:
-    """Whether the vehicle knows where on Earth it is, so that its fence has an effect."""
-    status = record.latest.get("ESTIMATOR_STATUS")
-    known = status is not None and bool(status.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS)
-    return known and "GPS_GLOBAL_ORIGIN" in record.latest
 
 
 def fence_vertices(record: Record, plan: FlightPlan, fence: FlightFence) -> tuple[Vertex, ...] | None:
@@ -326,10 +323,10 @@ class _FenceUpload:
         record, name, limit = self._session.record, "fence", self._limit
         if record.armed:
             return Check(name, Outcome.FAIL, "not uploaded to an armed vehicle", limit, "land and disarm it")
-        if not self._session.is_px4:
-            advice = "set it by hand (docs/ardupilot.md, section 5), then accept it by --accept fence"
-            return Check(name, Outcome.FAIL, "not uploaded: only PX4's is known", limit, advice)
-        if not has_global_position(record):
+        if self._session.autopilot not in FENCED:
+            advice = "set one by hand, then accept it by --accept fence"
+            return Check(name, Outcome.FAIL, "not uploaded: this autopilot's is not known", limit, advice)
+        if not has_global_position(record, self._session.autopilot):
             words = "the vehicle has no global position, so its fence has no effect"
             advice = "only the app's box and a net keep it in; put up a net"
             return Check(name, Outcome.NOTE, words, limit, advice)
@@ -377,22 +374,6 @@ def _battery(record: Record) -> BatteryFacts:
     percent = nan if status.battery_remaining < 0 else float(status.battery_remaining)
     volts = nan if status.voltage_battery in (0, 65535) else status.voltage_battery / 1000
     return BatteryFacts(percent, volts)
-
-
-def _estimator(record: Record) -> EstimatorFacts:
-    status = record.latest.get("ESTIMATOR_STATUS")
-    if status is None:
-        return EstimatorFacts(reported=False)
-    flags = status.flags
-    ratios = (status.vel_ratio, status.pos_horiz_ratio, status.pos_vert_ratio, status.mag_ratio)
-    absolute, relative = mavlink.ESTIMATOR_POS_HORIZ_ABS, mavlink.ESTIMATOR_POS_HORIZ_REL
-    return EstimatorFacts(
-        reported=True,
-        has_attitude=bool(flags & mavlink.ESTIMATOR_ATTITUDE),
-        has_position=bool(flags & (absolute | relative)),
-        has_height=bool(flags & mavlink.ESTIMATOR_POS_VERT_ABS),
-        largest_ratio=max((ratio for ratio in ratios if not isnan(ratio)), default=0.0),
-    )
 
 
 def _vehicle_words(record: Record) -> str:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from framerunner.doctor.listen import COMPONENT_ID, FIND_S, SYSTEM_ID, Record, find, listen
+from framerunner.doctor.listen import COMPONENT_ID, FIND_S, Record, find, listen
 from offboard.drone import DroneError
 from wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
@@ -20,6 +20,8 @@ from wire.dialect import (
 from wire.transports.vehicle_link import VehicleLink
 from wire.vehicle_identity import is_simulator, vehicle_uid
 
+SYSTEM_ID = 245
+"""MAVSDK's, so the app's: ArduPilot does not arm while it misses the ground station that flew it last."""
 ANSWER_S = 0.5
 TRIES = 6
 TIME_REQUESTS = 20

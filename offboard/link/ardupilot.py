@@ -20,6 +20,7 @@ import asyncio
 import contextlib
 import json
 import threading
+from math import inf
 from typing import Any
 
 from mavsdk.asyncio import MavsdkError
@@ -33,6 +34,7 @@ from wire import ardupilot_modes
 from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 
 TAKEOFF_HEIGHT_M = 1.0  # requested; velocities take over as soon as the drone is off the ground
+TAKEOFF_SHARE = 0.7  # likewise, of the room below the ceiling at most
 TAKEOFF_CLIMB_M_S = 0.05  # a command on the ground to climb faster than this is a take-off
 TAKEOFF_AGAIN_US = 5_000_000  # vehicle time; arming takes 2 s and the motors' start half a second
 _STREAMS_HZ = {
@@ -67,14 +69,24 @@ class ArduPilotDialect:
         direct: MAVSDK's asyncio plugin.
         feed: the vehicle's telemetry, which shows whether it is on the ground.
         system_id: the vehicle's.
+        room_above_m: from the start to the ceiling, which its take-off must not reach.
     """
 
     modes = ARDUPILOT_MODES
     numbered_modes = ardupilot_modes.NAMES
+    loops_known = False
     checks_in_offboard = True
     ready_limit_s = 90.0  # its estimator uses GPS some 40 s after its start
 
-    def __init__(self, action: Any, direct: Any, feed: TelemetryFeed, system_id: int) -> None:  # noqa: ANN401
+    def __init__(
+        self,
+        action: Any,  # noqa: ANN401 - MAVSDK is untyped
+        direct: Any,  # noqa: ANN401
+        feed: TelemetryFeed,
+        system_id: int,
+        room_above_m: float = inf,
+    ) -> None:
+        self._takeoff_height_m = min(TAKEOFF_HEIGHT_M, TAKEOFF_SHARE * room_above_m)
         self.ended = False
         self._action = action
         self._direct = synchronous(direct)
@@ -161,7 +173,7 @@ class ArduPilotDialect:
         now_us = self._feed.time_us
         if self._takeoff_us is None or now_us - self._takeoff_us > TAKEOFF_AGAIN_US:
             self._takeoff_us = now_us
-            fields = self._command_fields(mavlink.MAV_CMD_NAV_TAKEOFF, *(0.0,) * 6, TAKEOFF_HEIGHT_M)
+            fields = self._command_fields(mavlink.MAV_CMD_NAV_TAKEOFF, *(0.0,) * 6, self._takeoff_height_m)
             self._send("COMMAND_LONG", fields)
 
     async def _set_mode(self, number: int) -> None:

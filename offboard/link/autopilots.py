@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 from mavsdk.asyncio import Autopilot, Vehicle
@@ -14,13 +15,19 @@ from offboard.link.dialect import Dialect, Px4Dialect
 from offboard.link.telemetry import TelemetryFeed
 
 
-async def open_dialect(system: Any, direct: Any, feed: TelemetryFeed) -> Dialect:  # noqa: ANN401
+async def open_dialect(
+    system: Any,  # noqa: ANN401
+    direct: Any,  # noqa: ANN401
+    feed: TelemetryFeed,
+    room_above_m: float = inf,
+) -> Dialect:
     """The dialect of one of MAVSDK's systems, by the autopilot in its HEARTBEAT.
 
     Args:
         system: MAVSDK's asyncio system.
         direct: its asyncio plugin `mavlink_direct`.
         feed: the vehicle's telemetry.
+        room_above_m: from the start to the ceiling under which the vehicle must stay.
 
     Raises:
         DroneError: it is ArduPilot, but no multicopter: the numbers of its modes mean others.
@@ -30,5 +37,5 @@ async def open_dialect(system: Any, direct: Any, feed: TelemetryFeed) -> Dialect
         kind = await system.vehicle_type()
         if kind in (Vehicle.FIXED_WING, Vehicle.ROVER, Vehicle.SUBMARINE):
             raise DroneError(f"the vehicle is a {kind.name.lower().replace('_', ' ')}; use a multicopter")
-        return ArduPilotDialect(action, direct, feed, await system.get_system_id())
+        return ArduPilotDialect(action, direct, feed, await system.get_system_id(), room_above_m)
     return Px4Dialect(OffboardAsync(system), action)

@@ -43,12 +43,14 @@ class Dialect(Protocol):
         numbered_modes: names by HEARTBEAT.custom_mode; empty: MAVSDK's names are used.
         ended: no setpoint is sent any more.
         ready_limit_s: wall time until it can be armed, usually.
+        loops_known: it may be this project's autopilot, which presents itself as PX4.
         checks_in_offboard: its pre-arm checks are those of its mode, so it must enter offboard to be ready.
     """
 
     modes: ModeNames
     numbered_modes: Mapping[int, str]
     ended: bool
+    loops_known: bool
     checks_in_offboard: bool
     ready_limit_s: float
 
@@ -91,6 +93,7 @@ class Px4Dialect(SetpointStream):
 
     modes = PX4_MODES
     numbered_modes: Mapping[int, str] = MappingProxyType({})
+    loops_known = True
     checks_in_offboard = False
     ready_limit_s = 30.0
 

@@ -13,6 +13,8 @@ def reported_state(
     alignment: Alignment,
     offboard_mode: str,
     missed: tuple[DroneState, ...] = (),
+    *,
+    loops_known: bool = True,
 ) -> DroneState:
     """The state at a tick.
 
@@ -22,6 +24,7 @@ def reported_state(
         alignment: from the vehicle's local axes to the arena's.
         offboard_mode: name of the mode in which the vehicle follows this app's setpoints.
         missed: states at the ticks that were skipped before this one, oldest first.
+        loops_known: as `DroneState` has it.
     """
     pose = alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
     camera_ned = sample.camera_attitude_ned
@@ -39,5 +42,6 @@ def reported_state(
         position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
         attitude_arena=alignment.attitude(sample.attitude_ned),
         camera_attitude_arena=None if camera_ned is None else alignment.attitude(camera_ned),
+        loops_known=loops_known,
         missed=missed,
     )

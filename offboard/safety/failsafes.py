@@ -1,12 +1,11 @@
 """The failsafe parameters of a vehicle: one table for the checks, for setting them and for the documentation.
 
-The table is `failsafes.yaml`. Run as a program, this writes it into docs/real-drone.md (`make failsafes`).
+The tables are in `failsafes.yaml`. Run as a program, this writes them into the documents (`make failsafes`).
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Literal
@@ -20,6 +19,8 @@ from offboard.safety.rules import AbortAction
 
 TABLE = Path(__file__).with_name("failsafes.yaml")
 BEGIN, END = "<!-- failsafes: written by `make failsafes` -->\n", "<!-- end of failsafes -->\n"
+DOCUMENTS = {"px4": "docs/real-drone.md", "ardupilot": "docs/ardupilot.md"}
+"""Those with the tables, by autopilot."""
 TOLERANCE = 1e-3
 """Of a comparison: parameters are single precision, and people round."""
 
@@ -31,10 +32,12 @@ class FailsafeRow(BaseModel):
 
     Attributes:
         name: of the parameter.
+        older_name: that it has in older versions of the autopilot; empty: the same.
         set_to: the value to set.
         accepted: other values that pass.
         least: with `most`: values between them pass.
         most: see `least`.
+        per_m: units of the value, a metre; for what the fence sets.
         unit: of the value.
         values: what each value means.
         needs: what the vehicle must have for the parameter to matter.
@@ -45,10 +48,12 @@ class FailsafeRow(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
+    older_name: str = ""
     set_to: float | OfFence
     accepted: tuple[float, ...] = ()
     least: float | None = None
     most: float | OfFence | None = None
+    per_m: float = 1.0
     unit: str = ""
     values: dict[int, str] = {}
     needs: Literal["global position"] | None = None
@@ -61,10 +66,15 @@ class FailsafeRow(BaseModel):
             raise ValueError(f"{self.name}: give both least and most, or neither")
         return self
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Those that the parameter may have."""
+        return (self.name, self.older_name) if self.older_name else (self.name,)
+
     def wanted(self, fence: FlightFence) -> float:
         """The value to set for a flight: not more than a fence allows that is lower."""
-        value = _number(self.set_to, fence)
-        return value if self.most is None else min(value, _number(self.most, fence))
+        value = self._number(self.set_to, fence)
+        return value if self.most is None else min(value, self._number(self.most, fence))
 
     def strict(self, abort: AbortAction) -> FailsafeRow:
         """The row for flights that end so when they are aborted."""
@@ -78,14 +88,14 @@ class FailsafeRow(BaseModel):
             return True
         if self.least is None or self.most is None:
             return False
-        return self.least - TOLERANCE <= value <= _number(self.most, fence) + TOLERANCE
+        return self.least - TOLERANCE <= value <= self._number(self.most, fence) + TOLERANCE
 
     def allowed(self, fence: FlightFence | None = None) -> str:
         """The values that pass, for people; without a flight the fence's are named."""
         if self.least is not None and self.most is not None:
             if fence is None and isinstance(self.most, str):
                 return f"{self.least:g}{self._unit} to the {self.most}"
-            return f"{self.least:g} to {_number(self.most, fence):g}{self._unit}"
+            return f"{self.least:g} to {self._number(self.most, fence):g}{self._unit}"
         good = [self.set_to, *self.accepted]
         return " or ".join(each if isinstance(each, str) else self.shown(each) for each in good)
 
@@ -93,6 +103,12 @@ class FailsafeRow(BaseModel):
         """A value with its unit or its meaning."""
         meaning = self.values.get(round(value))
         return f"{value:g} ({meaning})" if meaning else f"{value:g}{self._unit}"
+
+    def _number(self, value: float | OfFence, fence: FlightFence | None) -> float:
+        if not isinstance(value, str):
+            return value
+        assert fence is not None, "a value of the fence needs a flight"
+        return self.per_m * (fence.height_m if value == "fence height" else fence.radius_m)
 
     @property
     def _unit(self) -> str:
@@ -104,6 +120,16 @@ def failsafe_rows(autopilot: str = "px4", abort: AbortAction = "land") -> tuple[
     """The table of an autopilot, for flights that end so when they are aborted; empty if there is none."""
     rows = yaml.safe_load(TABLE.read_text(encoding="utf-8")).get(autopilot, ())
     return tuple(FailsafeRow.model_validate(row).strict(abort) for row in rows)
+
+
+def rows_by_known_names(rows: Sequence[FailsafeRow], parameters: Container[str]) -> tuple[FailsafeRow, ...]:
+    """A table with the names that a vehicle's version of the autopilot has, by the parameters received."""
+    return tuple(
+        row.model_copy(update={"name": row.older_name})
+        if row.name not in parameters and row.older_name in parameters
+        else row
+        for row in rows
+    )
 
 
 def failsafe_checks(
@@ -155,8 +181,8 @@ def markdown_table(rows: Sequence[FailsafeRow]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def with_table(text: str) -> str:
-    """A document with its table written anew.
+def with_table(text: str, autopilot: str = "px4") -> str:
+    """A document with the table of an autopilot written anew.
 
     Raises:
         ValueError: it has no place for the table.
@@ -165,7 +191,7 @@ def with_table(text: str) -> str:
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise ValueError(f"the document has no lines {BEGIN.strip()} and {END.strip()}")
-    return f"{before}{begin}{markdown_table(failsafe_rows())}{end}{after}"
+    return f"{before}{begin}{markdown_table(failsafe_rows(autopilot))}{end}{after}"
 
 
 def _check(row: FailsafeRow, value: float | None, fence: FlightFence) -> Check:
@@ -177,13 +203,7 @@ def _check(row: FailsafeRow, value: float | None, fence: FlightFence) -> Check:
     return Check(row.name, outcome, row.shown(value), limit, advice if outcome is Outcome.FAIL else "")
 
 
-def _number(value: float | OfFence, fence: FlightFence | None) -> float:
-    if isinstance(value, str):
-        assert fence is not None, "a value of the fence needs a flight"
-        return fence.height_m if value == "fence height" else fence.radius_m
-    return value
-
-
 if __name__ == "__main__":
-    document = Path(sys.argv[1])
-    document.write_text(with_table(document.read_text(encoding="utf-8")), encoding="utf-8")
+    for autopilot, name in DOCUMENTS.items():
+        document = Path(name)
+        document.write_text(with_table(document.read_text(encoding="utf-8"), autopilot), encoding="utf-8")

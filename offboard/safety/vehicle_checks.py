@@ -14,6 +14,7 @@ MAX_ROUND_TRIP_S = 0.25
 MIN_ANSWERS = 5
 MAX_RATIO = 0.5  # of an innovation to what its gate lets pass; PX4 does not arm above it
 MAX_CAMERA_AGE_S = 0.3
+CLOCK_TOLERANCE_S = 0.05  # of the vehicle's clock as the link shows it
 MIN_CAMERA_RATE_HZ = 8.0
 MAX_CAMERA_GAP_S = 0.5
 
@@ -28,7 +29,7 @@ class BatteryFacts:
 
 @dataclass(frozen=True, slots=True)
 class EstimatorFacts:
-    """ESTIMATOR_STATUS of a vehicle that stands.
+    """What the estimator of a vehicle that stands reports.
 
     Attributes:
         reported: it was received; without it the other fields mean nothing.
@@ -36,6 +37,7 @@ class EstimatorFacts:
         has_position: likewise, horizontally, relative or absolute.
         has_height: likewise.
         largest_ratio: the largest of the innovations' test ratios.
+        message: that reports it.
     """
 
     reported: bool
@@ -43,6 +45,7 @@ class EstimatorFacts:
     has_position: bool = False
     has_height: bool = False
     largest_ratio: float = 0.0
+    message: str = "ESTIMATOR_STATUS"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +114,7 @@ def estimator_check(facts: EstimatorFacts) -> Check:
     """Whether the estimator knows where the drone is, and its measurements agree."""
     name, limit = "estimator", f"ratios up to {MAX_RATIO:g}"
     if not facts.reported:
-        return Check(name, Outcome.FAIL, "no ESTIMATOR_STATUS is received", limit, "let the link carry it")
+        return Check(name, Outcome.FAIL, f"no {facts.message} is received", limit, "let the link carry it")
     known = {
         "attitude": facts.has_attitude,
         "position": facts.has_position,
@@ -161,6 +164,10 @@ def camera_checks(facts: CameraFacts) -> list[Check]:
         good = 0.0 <= facts.assumed_age_s <= MAX_CAMERA_AGE_S
         value = f"{facts.assumed_age_s:g} s by --camera-delay; its images have no time stamps"
         return [rate, passed("camera delay", good, value, limit, "use a camera with less delay")]
+    if facts.age_s < -CLOCK_TOLERANCE_S:
+        value = f"{facts.age_s:.2f} s: from the future"
+        advice = "its clock is not the vehicle's; check what stamps the images"
+        return [rate, Check("camera delay", Outcome.FAIL, value, limit, advice)]
     good = facts.age_s <= MAX_CAMERA_AGE_S
     return [rate, passed("camera delay", good, f"{facts.age_s:.2f} s", limit, "use a camera with less delay")]
 

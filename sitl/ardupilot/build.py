@@ -7,7 +7,9 @@ from pathlib import Path
 
 from errors import SettingError
 from firmware_py.types import GeodeticPoint
+from sitl.ardupilot.json_interface import PORTS_AN_INSTANCE
 from sitl.ardupilot.parameters import file_of
+from sitl.ardupilot.poses import POSE_PORT
 from sitl.autopilots.parameters import Value
 from sitl.autopilots.process import AutopilotProcess
 from sitl.links import UdpAddresses
@@ -34,20 +36,23 @@ def find_build(folder: Path) -> Path:
     )
 
 
-def options(settings: ServerSettings, home: GeodeticPoint, defaults: str) -> list[str]:
+def options(settings: ServerSettings, home: GeodeticPoint, defaults: str, *, takes_poses: bool) -> list[str]:
     """The options by which ArduCopter flies here, with MAVLink on this simulator's usual ports.
 
     Args:
         settings: instance, ports and speed.
         home: the scenario's origin.
         defaults: file of parameters.
+        takes_poses: the simulator sends those of motion capture.
     """
     instance = settings.instance
+    poses = f"udpclient:{settings.bind}:{POSE_PORT + PORTS_AN_INSTANCE * instance}"
     return [
         *("--model", f"JSON:{settings.bind}", "-I", str(instance), "--sysid", str(instance + 1)),
         *("--home", f"{home.latitude_deg:.9f},{home.longitude_deg:.9f},{home.altitude_m:.3f},0"),
         *("--speedup", f"{settings.speed:g}", "--defaults", defaults),
         *("--serial0", _udp(settings.onboard), "--serial1", _udp(settings.ground)),
+        *(("--serial2", poses) if takes_poses else ()),
     ]
 
 
@@ -66,6 +71,7 @@ class ArduPilotProcess(AutopilotProcess):
         home: the scenario's origin.
         parameters: for its start; in a folder that is kept, those that were changed in flight win.
         folder: where it runs and keeps parameters and logs. None: a temporary one.
+        takes_poses: the simulator sends those of motion capture.
     """
 
     def __init__(
@@ -75,12 +81,16 @@ class ArduPilotProcess(AutopilotProcess):
         home: GeodeticPoint,
         parameters: dict[str, Value],
         folder: Path | None,
+        *,
+        takes_poses: bool,
     ) -> None:
         super().__init__("ArduPilot", "--ardupilot", folder, {})
+        self._takes_poses = takes_poses
         self._program, self._settings, self._home = program, settings, home
         self._parameters = parameters
 
     def command(self) -> list[str]:
         """ArduCopter's own options."""
         (self.folder / PARAMETER_FILE).write_text(file_of(self._parameters), encoding="ascii")
-        return [str(self._program), *options(self._settings, self._home, PARAMETER_FILE)]
+        chosen = options(self._settings, self._home, PARAMETER_FILE, takes_poses=self._takes_poses)
+        return [str(self._program), *chosen]

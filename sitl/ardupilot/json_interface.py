@@ -18,6 +18,11 @@ _FRAMES = {  # by their magic number, the first field: rate in Hz, number, pulse
     18458: struct.Struct("<HHI16H"),
     29569: struct.Struct("<HHI32H"),
 }
+_VECTOR, _QUATERNION = "[%.9g,%.9g,%.9g]", "[%.9g,%.9g,%.9g,%.9g]"
+_LINE = (
+    f'\n{{"timestamp":%.6f,"imu":{{"gyro":{_VECTOR},"accel_body":{_VECTOR}}},"position":{_VECTOR},'
+    f'"quaternion":{_QUATERNION},"velocity":{_VECTOR}%s}}\n'
+)
 _MAGIC = struct.Struct("<H")
 
 
@@ -62,13 +67,9 @@ def encode_state(
         attitude: body FRD to NED.
         range_m: of a range finder that looks down, below zero if it measures none; None: there is none.
     """
-    ranges = "" if range_m is None else f',"rng_1":{range_m:.4f}'
-    return (
-        f'\n{{"timestamp":{time_us * 1e-6:.6f},"imu":{{"gyro":{_array(angular_rate_frd_rad_s)},'
-        f'"accel_body":{_array(specific_force_frd_m_s2)}}},"position":{_array(position_ned_m)},'
-        f'"quaternion":{_array(attitude)},"velocity":{_array(velocity_ned_m_s)}{ranges}}}\n'
-    ).encode("ascii")
-
-
-def _array(values: tuple[float, ...]) -> str:
-    return f"[{','.join([f'{value:.9g}' for value in values])}]"
+    line = _LINE % (
+        *(time_us * 1e-6, *angular_rate_frd_rad_s, *specific_force_frd_m_s2),
+        *(*position_ned_m, *attitude, *velocity_ned_m_s),
+        "" if range_m is None else f',"rng_1":{range_m:.4f}',
+    )
+    return line.encode("ascii")

@@ -8,14 +8,29 @@ from errors import SettingError
 from firmware_py.airframe import Airframe
 from sitl.ardupilot.simulation import PULSE_MAX_US, PULSE_MIN_US
 from sitl.autopilots.parameters import Value, text_of
+from sitl.sensors.specs import SuiteSpec
 from sitl.world import PHYSICS_RATE_HZ
 
 _HOVER_SHARE = 0.25  # of full thrust, at least; ArduCopter's estimate of it has a lower limit of 0.125
 _RATE_BANDWIDTH_RAD_S = 20.0  # of roll and pitch, with motors that are fast enough
 _MOTOR_SHARE = 0.6  # of the motors' bandwidth that the rate controllers use at most
 _DERIVATIVE_SHARE = 0.02
+_SHARES_OF_BANDWIDTH = {  # each loop slower than the one inside it
+    "ATC_ANG_RLL_P": 0.4,
+    "ATC_ANG_PIT_P": 0.4,
+    "PSC_VELXY_P": 0.2,
+    "PSC_VELXY_I": 0.1,
+    "PSC_VELXY_D": 0.015,
+    "PSC_POSXY_P": 0.1,
+    "PSC_VELZ_P": 0.4,
+    "PSC_POSZ_P": 0.15,
+}
 _YAW_BANDWIDTH_RAD_S = 4.0
 _YAW_INTEGRAL_SHARE = 0.1  # of P, by ArduCopter's defaults 0.18 and 0.018
+_EXTERNAL_NAVIGATION = 6
+_ARRIVAL_EARLY_MS = 12
+"""ArduPilot counts an arrival as so much earlier than it is: measured; without it the estimate is ahead."""
+_POSE_NOISE_M, _POSE_NOISE_RAD = 0.02, 0.05
 _FACTOR = 0.5  # of each motor in roll, pitch and yaw, as ArduCopter normalises them
 _PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1))  # of rotors in X, as PX4 orders them: forward, right
 _FRAMES = (  # FRAME_TYPE, how the rotors turn, ArduCopter's motors at their places
@@ -24,7 +39,7 @@ _FRAMES = (  # FRAME_TYPE, how the rotors turn, ArduCopter's motors at their pla
 )
 
 
-def all_parameters(airframe: Airframe) -> dict[str, Value]:
+def all_parameters(airframe: Airframe, suite: SuiteSpec) -> dict[str, Value]:
     """All parameters that differ from ArduCopter's defaults.
 
     The rate controllers get the same bandwidth with each airframe: P is the bandwidth over the angular
@@ -34,7 +49,8 @@ def all_parameters(airframe: Airframe) -> dict[str, Value]:
     Raises:
         SettingError: the drone is no quadrotor in X.
     """
-    return simulation_parameters() | airframe_parameters(airframe) | flight_parameters()
+    values = simulation_parameters() | suite_parameters(suite)
+    return values | airframe_parameters(airframe) | flight_parameters()
 
 
 def simulation_parameters() -> dict[str, Value]:
@@ -44,11 +60,6 @@ def simulation_parameters() -> dict[str, Value]:
         "SIM_RATE_HZ": PHYSICS_RATE_HZ,
         "FS_THR_ENABLE": 0,
         "SIM_BARO_RND": 0,
-        "SIM_GPS1_ACC": 0.05,
-        "SIM_GPS1_HZ": 10,
-        "GPS1_RATE_MS": 100,
-        "SIM_GPS1_LAG_MS": 100,
-        "GPS1_DELAY_MS": 100,  # by default the estimator assumes 120 or 220: 2 to 12 cm at 1 m/s
         "SIM_DRIFT_SPEED": 0,
         "BATT_MONITOR": 0,
         "FENCE_ENABLE": 0,
@@ -66,6 +77,33 @@ def simulation_parameters() -> dict[str, Value]:
     }
 
 
+def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
+    """What ArduPilot's estimator uses with a suite: the poses of motion capture, or its own simulated GPS."""
+    pose = suite.external_pose
+    if pose is None:
+        return {
+            "SIM_GPS1_ACC": 0.05,
+            "SIM_GPS1_HZ": 10,
+            "GPS1_RATE_MS": 100,
+            "SIM_GPS1_LAG_MS": 100,
+            "GPS1_DELAY_MS": 100,  # by default the estimator assumes 120 or 220: 2 to 12 cm at 1 m/s
+        }
+    return {
+        "VISO_TYPE": 1,
+        "VISO_DELAY_MS": max(0, round(pose.delay_s * 1000) - _ARRIVAL_EARLY_MS),
+        "VISO_POS_M_NSE": _POSE_NOISE_M,
+        "VISO_YAW_M_NSE": _POSE_NOISE_RAD,
+        "EK3_SRC1_POSXY": _EXTERNAL_NAVIGATION,
+        "EK3_SRC1_VELXY": 0,  # motion capture measures no velocity
+        "EK3_SRC1_POSZ": _EXTERNAL_NAVIGATION,
+        "EK3_SRC1_VELZ": 0,
+        "EK3_SRC1_YAW": _EXTERNAL_NAVIGATION,
+        "GPS1_TYPE": 0,
+        "COMPASS_ENABLE": 0,
+        "MAV3_OPTIONS": 2,  # poses are not forwarded to the other links
+    }
+
+
 def flight_parameters() -> dict[str, Value]:
     """How it flies in an arena of ten metres."""
     return {
@@ -74,6 +112,14 @@ def flight_parameters() -> dict[str, Value]:
         "LAND_SPEED": 30,
         "RTL_ALT": 200,
         "FS_GCS_ENABLE": 0,
+        "ATC_INPUT_TC": 0.05,  # s; velocities are followed as soon as the loops can
+        "PSC_JERK_XY": 20,  # m/s³
+        "PSC_JERK_Z": 20,
+        "PSC_VELXY_FLTE": 20,  # Hz
+        "PSC_VELXY_FLTD": 20,
+        "WPNAV_ACCEL": 500,  # cm/s²; in GUIDED, too
+        "WPNAV_ACCEL_Z": 250,
+        "WPNAV_SPEED_DN": 150,  # cm/s
     }
 
 
@@ -99,11 +145,12 @@ def airframe_parameters(airframe: Airframe) -> dict[str, Value]:
         "MOT_THST_HOVER": hover,
         "MOT_HOVER_LEARN": 0,
         "MOT_BAT_VOLT_MAX": 0,
-        "PSC_ACCZ_P": hover,
-        "PSC_ACCZ_I": 2 * hover,
+        "PSC_ACCZ_P": 2 * hover,
+        "PSC_ACCZ_I": 4 * hover,
     }
     fastest = _MOTOR_SHARE / motor.time_constant_s if motor.time_constant_s > 0.0 else _RATE_BANDWIDTH_RAD_S
     bandwidth = min(_RATE_BANDWIDTH_RAD_S, fastest)
+    values |= {name: share * bandwidth for name, share in _SHARES_OF_BANDWIDTH.items()}
     for axis, index, arm in (("RLL", 0, 1), ("PIT", 1, 0)):
         moment_nm = _FACTOR * full_n * sum(abs(rotor.position_frd_m[arm]) for rotor in airframe.rotors)
         gain = bandwidth * inertia[index] / moment_nm

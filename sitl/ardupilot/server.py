@@ -7,71 +7,70 @@ import time
 from collections.abc import Callable
 
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
-from sitl.ardupilot.simulation import PULSE_MIN_US, ArduPilotSimulation
+from sitl.ardupilot.poses import POSE_PORT, PoseLink
+from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
+from sitl.autopilots.server import AutopilotServer
 from sitl.server_settings import ServerSettings
-from sitl.streaming.drone_video import DroneVideo
-from sitl.world import PHYSICS_PERIOD_US
+from sitl.time_grants import TimeGrants
 from wire.transports.sockets import Address, UdpSocket, bind_udp
 
 _SILENCE_S = 2.0  # wall time without a frame that is reported
-_FALL_US = 5_000_000  # for which a drone without its autopilot is simulated on
-_MIN_LIFE_S = 5.0  # wall time; an ArduPilot that ends sooner is not started again
-_STANDING = (PULSE_MIN_US,) * 16
+_LOST_S = 0.5  # wall time after which an answer to a frame that is repeated was lost
 
 
 class FrameExchange:
     """Steps a simulation with ArduPilot's frames, one step for each.
 
     ArduPilot sends a frame again when it has waited a second for the answer, and counts from zero when it
-    starts. Of frames that wait together only the newest is answered: the others are repetitions, and a
-    second answer to one of them would be read as the answer to the next.
+    starts. An answer that it gets twice would be read as the answer to its next frame, and all later ones
+    would be late by a step. So of frames that wait together only the newest is answered, and one that was
+    answered is answered again only when the answer must have been lost.
 
     Args:
-        new_simulation: makes the simulation anew, for an ArduPilot that has started again.
-        moved: called at the end of each control period, with the simulation.
+        simulation: of the drone.
+        clock: monotonic wall time, seconds.
 
     Attributes:
-        simulation: the present one.
-        steps: taken since its start.
-        repeated: frames that were answered as before, without a step.
+        steps: how many were taken.
+        repeated: frames that came again after their answer.
     """
 
     def __init__(
         self,
-        new_simulation: Callable[[], ArduPilotSimulation],
-        moved: Callable[[ArduPilotSimulation], None] = lambda simulation: None,
+        simulation: ArduPilotSimulation,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._new_simulation, self._moved = new_simulation, moved
-        self.simulation = new_simulation()
+        self._simulation, self._clock = simulation, clock
         self.steps = self.repeated = 0
-        self._number: int | None = None  # of the last frame; None: none was received
+        self._number = -1  # of the last frame; negative: none was received
         self._answer = b""
+        self._answered_s = 0.0
 
-    def answer(self, frame: ServoFrame) -> bytes:
-        """The line for a frame."""
-        last = self._number
-        if last == frame.number:
+    def is_new(self, frame: ServoFrame) -> bool:
+        """Whether a frame asks for a step."""
+        return frame.number != self._number
+
+    def is_restart(self, frame: ServoFrame) -> bool:
+        """Whether ArduPilot has started again."""
+        return frame.number < self._number
+
+    def answer(self, frame: ServoFrame) -> bytes | None:
+        """The line for a frame; None: it has been answered."""
+        if not self.is_new(frame):
             self.repeated += 1
-            return self._answer
-        if last is not None and frame.number < last:
-            self.restart()
-        self._number = frame.number
-        time_us = self.simulation.time_us
-        self._answer = self.simulation.step(frame.pulses_us)
-        self.steps += 1
-        if self.simulation.time_us != time_us:
-            self._moved(self.simulation)
+            if self._clock() - self._answered_s < _LOST_S:
+                return None
+        else:
+            self._number = frame.number
+            self._answer = self._simulation.step(frame.pulses_us)
+            self.steps += 1
+        self._answered_s = self._clock()
         return self._answer
 
-    def restart(self) -> None:
-        """Put a new drone on the start, at time zero."""
-        self._number, self.steps, self._answer = None, 0, b""
-        self.simulation = self._new_simulation()
 
-
-class ArduPilotServer:
-    """Runs a drone that ArduPilot flies, until cancelled.
+class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
+    """Runs a drone that ArduPilot flies, until cancelled; see `AutopilotServer`.
 
     ArduPilot sets the pace: it sends a frame when the time for a step has come, and waits for the answer.
 
@@ -80,7 +79,13 @@ class ArduPilotServer:
         settings: ports and speed; MAVLink is ArduPilot's own.
         ardupilot: how it is started.
         notice: called with lines for people.
+        grants: how far simulated time may advance; None: without a limit.
+
+    Attributes:
+        exchange: with the present ArduPilot.
     """
+
+    NAME = "ArduPilot"
 
     def __init__(
         self,
@@ -88,72 +93,57 @@ class ArduPilotServer:
         settings: ServerSettings,
         ardupilot: AutopilotStart,
         notice: Callable[[str], None] = lambda line: None,
+        grants: TimeGrants | None = None,
     ) -> None:
-        self._settings, self._ardupilot, self._notice = settings, ardupilot, notice
-        self._new = new_simulation
-        self._exchange = FrameExchange(self._new_simulation, self._step_video)
-        self._video = DroneVideo(self._exchange.simulation, settings)
-        self._shown = self._exchange.simulation
-        self._frame_s: float | None = None  # wall time of the last frame; None: ArduPilot has sent none yet
+        super().__init__(new_simulation, settings, ardupilot, notice, grants)
+        self.exchange = FrameExchange(self._simulation)
+        self._link: UdpSocket | None = None
+        self._poses: PoseLink | None = None
+        self._waiting: tuple[ServoFrame, Address] | None = None  # the last frame and its sender
+        self._frame_s = 0.0  # wall time of the last frame
+        self._connected = asyncio.Event()
         self._is_falling = False  # ArduPilot has ended: its last frames are not answered
+        self._holding: asyncio.Task[None] | None = None  # until time is granted
         self._failed: asyncio.Future[None] | None = None
 
-    def _new_simulation(self) -> ArduPilotSimulation:
-        simulation = self._new()
-        simulation.faults.notice = self._notice
-        return simulation
+    def _open(self) -> None:
+        bind, instance = self._settings.bind, self._settings.instance
+        self._link = bind_udp((bind, self._port), "choose another --instance")
+        if self._simulation.sends_poses:
+            port, place = POSE_PORT + PORTS_AN_INSTANCE * instance, self._simulation.place
+            self._poses = PoseLink(bind, port, instance + 1, place)
 
-    def _step_video(self, simulation: ArduPilotSimulation) -> None:
-        if simulation is not self._shown:
-            self._shown = simulation
-            self._video.show(simulation)
-        self._video.step()
+    def _close(self) -> None:
+        if self._poses is not None:
+            self._poses.close()
+        if self._link is not None:
+            self._link.close()
 
-    async def run(self) -> None:
-        """Open the ports, then run until cancelled.
-
-        Raises:
-            LinkError: ArduPilot's port is in use.
-            VideoError: the port of the video is in use.
-            SettingError: ArduPilot cannot be started.
-            AutopilotEndedError: it ended soon after its start.
-        """
-        loop, port = asyncio.get_running_loop(), self._port
-        link = bind_udp((self._settings.bind, port), "choose another --instance")
+    async def _serve(self) -> None:
+        loop, link = asyncio.get_running_loop(), self._link
+        assert link is not None, "it was opened"
         self._failed = loop.create_future()
+        loop.add_reader(link, self._receive)
+        tasks = [asyncio.ensure_future(self._failed), asyncio.create_task(self._watch())]
+        tasks.append(asyncio.create_task(self._run_process()))
         try:
-            await self._video.open()
-            self._notice(self._greeting())
-            loop.add_reader(link, self._receive, link)
-            tasks = [asyncio.ensure_future(self._failed), asyncio.create_task(self._watch())]
-            tasks.append(asyncio.create_task(self._run_process()))
-            try:
-                await asyncio.gather(*tasks)
-            finally:
-                for task in tasks:
-                    task.cancel()
-                await asyncio.gather(*tasks, return_exceptions=True)
+            await asyncio.gather(*tasks)
         finally:
             loop.remove_reader(link)
-            link.close()
-            if self._ardupilot.process is not None:
-                await self._ardupilot.process.stop()
-            await self._video.close()
+            if self._holding is not None:
+                tasks.append(self._holding)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
 
     @property
     def _port(self) -> int:
         return FIRST_PORT + PORTS_AN_INSTANCE * self._settings.instance
 
-    def _greeting(self) -> str:
-        scenario, settings = self._exchange.simulation.scenario, self._settings
-        page = f"http://{settings.bind}:{settings.http_port}/"
-        return (
-            f"{scenario.airframe} with ArduPilot in {scenario.name}: ArduPilot's MAVLink on UDP "
-            f"{14540 + settings.instance} and 14550, video on {page} (Ctrl-C stops)"
-        )
-
-    def _receive(self, link: UdpSocket) -> None:
-        """Answer the newest frame that has arrived."""
+    def _receive(self) -> None:
+        """Answer the newest frame that has arrived, as soon as time is granted."""
+        link = self._link
+        assert link is not None, "it was opened"
         newest: tuple[ServoFrame, Address] | None = None
         while packet := link.read():
             frame = decode_frame(packet)
@@ -161,60 +151,112 @@ class ArduPilotServer:
                 newest = frame, link.peer
         if newest is None or self._is_falling:
             return
-        if self._frame_s is None:
+        self._waiting, self._frame_s = newest, time.monotonic()
+        if not self._connected.is_set():
+            self._connected.set()
             self._notice("ArduPilot is connected")
-        self._frame_s = time.monotonic()
+        if self._holding is not None:
+            return
         try:
-            before = self._exchange.simulation
-            link.write(self._exchange.answer(newest[0]), newest[1])
-            if self._exchange.simulation is not before:
-                self._notice(
-                    "ArduPilot counts its frames from zero again: a new drone is on the start, at time zero"
-                )
+            self._take(newest[0])
         except Exception as error:  # it would be lost in the event loop
-            assert self._failed is not None
-            if not self._failed.done():
-                self._failed.set_exception(error)
+            self._fail(error)
+
+    def _take(self, frame: ServoFrame) -> None:
+        if self.exchange.is_restart(frame):
+            self._restart()
+        simulation = self._simulation
+        is_due = simulation.time_us > self._until_us and simulation.is_at_control_tick
+        if is_due and self.exchange.is_new(frame):
+            self._holding = asyncio.create_task(self._answer_when_granted())
+        else:
+            self._answer()
+
+    def _answer(self) -> None:
+        assert self._waiting is not None
+        assert self._link is not None
+        frame, peer = self._waiting
+        is_new, simulation = self.exchange.is_new(frame), self._simulation
+        line = self.exchange.answer(frame)
+        if line is None:
+            return
+        if is_new and simulation.pose is not None and self._poses is not None:
+            self._poses.send(simulation.pose)  # before the answer that lets ArduPilot's time advance
+        self._link.write(line, peer)
+        if is_new and simulation.is_at_control_tick:
+            self._video.step()  # while ArduPilot computes
+
+    async def _answer_when_granted(self) -> None:
+        try:
+            while self._simulation.time_us > self._until_us:
+                await self._hold()
+            self._holding = None
+            self._answer()
+        except Exception as error:  # nobody waits for this task
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        assert self._failed is not None
+        if not self._failed.done():
+            self._failed.set_exception(error)
+
+    def _restart(self) -> None:
+        reason = "ArduPilot counts its frames from zero again"
+        if self._grants is not None:
+            at_s = self._simulation.time_us / 1e6
+            raise AutopilotEndedError(f"{reason} at {at_s:.1f} s of simulated time")
+        self._renew()
+        self._notice(f"{reason}: a new drone is on the start, at time zero")
+
+    def _renew(self) -> None:
+        super()._renew()
+        self.exchange = FrameExchange(self._simulation)
+
+    def _coast(self) -> None:
+        self._simulation.coast()
 
     async def _watch(self) -> None:
         """Report when ArduPilot is silent, and when it sends again."""
         silent = False
         while True:
             await asyncio.sleep(_SILENCE_S / 2)
-            was_silent, frame_s = silent, self._frame_s
-            silent = frame_s is not None and time.monotonic() - frame_s > _SILENCE_S
-            if silent and not was_silent:
-                held_s = self._exchange.simulation.time_us / 1e6
+            was_silent = silent
+            silent = self._connected.is_set() and time.monotonic() - self._frame_s > _SILENCE_S
+            if silent and not was_silent and self._holding is None:
+                held_s = self._simulation.time_us / 1e6
                 self._notice(
                     f"ArduPilot has sent no outputs for {_SILENCE_S:g} s; simulated time waits for it at "
                     f"{held_s:.3f} s"
                 )
-            elif was_silent and not silent and frame_s is not None:
+            elif was_silent and not silent and self._connected.is_set():
                 self._notice("ArduPilot sends again; no step was skipped")
 
     async def _run_process(self) -> None:
         """Start ArduPilot, and again when it has ended; without a build, say how."""
-        process = self._ardupilot.process
+        process = self._autopilot.process
         if process is None:
-            self._notice(f"waiting for ArduPilot on UDP {self._port}; start it: {self._ardupilot.command}")
+            self._notice(f"waiting for ArduPilot on UDP {self._port}; start it: {self._autopilot.command}")
+            await self._open_grants()
             return
         while True:
-            began_s = time.monotonic()
             await process.start()
-            reason = await process.ended()
-            if time.monotonic() - began_s < _MIN_LIFE_S or self._frame_s is None:
+            ended = asyncio.create_task(process.ended())
+            opened = asyncio.create_task(self._open_grants())
+            try:
+                reason = await ended
+            finally:
+                for task in (ended, opened):
+                    task.cancel()
+                await asyncio.gather(ended, opened, return_exceptions=True)
+            if not self._connected.is_set():
                 raise AutopilotEndedError(f"{reason} (its output: {process.log})")
-            self._notice(f"{reason}; at {self._exchange.simulation.time_us / 1e6:.1f} s the motors stop")
-            self._frame_s, self._is_falling = None, True
-            await self._fall()
-            self._exchange.restart()
+            self._connected.clear()
+            self._is_falling = True
+            await self._end_try(reason)
             self._is_falling = False
 
-    async def _fall(self) -> None:
-        """Simulate on with standing motors, so that the try ends as it must."""
-        simulation = self._exchange.simulation
-        end_us = simulation.time_us + _FALL_US
-        while simulation.time_us < end_us:
-            simulation.step(_STANDING)
-            self._step_video(simulation)
-            await asyncio.sleep(PHYSICS_PERIOD_US / 1e6 / self._settings.speed)
+    async def _open_grants(self) -> None:
+        """Once ArduPilot is connected, let the program that started this one grant time."""
+        await self._connected.wait()
+        if self._grants is not None:
+            await self._grants.open()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import isnan
 
 from firmware_py.airframe import Airframe
-from firmware_py.measurements import ImuSample
-from firmware_py.types import Sensors
-from geometry.vectors import Vec3
+from firmware_py.measurements import ExternalPose, ImuSample
+from firmware_py.types import GeodeticPoint, Sensors
+from geometry.vectors import ZERO3, Vec3
 from scenarios.models import Scenario
 from sitl.ardupilot.json_interface import encode_state
 from sitl.vehicle import SimulatedVehicle
@@ -21,12 +21,17 @@ class ArduPilotSimulation(SimulatedVehicle):
     """One drone in one scenario, flown by ArduPilot; see `SimulatedVehicle`.
 
     ArduPilot simulates GPS, barometer and compass itself, from the true position and attitude. Of the
-    scenario's sensors it gets the inertial ones and the range finder, with their errors and faults; with
-    ideal sensors, the true motion.
+    scenario's sensors it gets the inertial ones, the range finder and the poses of motion capture, with their
+    errors and faults; with ideal sensors, the true motion.
 
     It is stepped at the rate of the physics, twice a control period: ArduPilot takes one sample of its
     gyroscopes a step, and needs 1.8 times as many as loops.
+
+    Attributes:
+        pose: of motion capture that has arrived with the last step; None: none.
     """
+
+    autopilot_name = "ArduPilot"
 
     def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
         super().__init__(scenario, airframe, seed)
@@ -34,9 +39,11 @@ class ArduPilotSimulation(SimulatedVehicle):
         motor = self.world.airframe.motor
         self._rotors = len(self.world.airframe.rotors)
         self._speed_a_pulse = motor.max_speed_rad_s / (PULSE_MAX_US - PULSE_MIN_US)
+        self._standing = (PULSE_MIN_US,) * self._rotors
         self._steps = 0  # of the physics, since the last end of a control period
         self._range_m: float | None = None
         self._imu: ImuSample | None = None
+        self.pose: ExternalPose | None = None
         self._true = self._begin_tick()
 
     @property
@@ -46,8 +53,30 @@ class ArduPilotSimulation(SimulatedVehicle):
 
     @property
     def local_origin_arena_m(self) -> Vec3 | None:
-        """None: ArduPilot's local frame begins where its estimator first had a position."""
-        return None
+        """That of motion capture; with GPS it is where ArduPilot's estimator first had a position."""
+        return ZERO3 if self._suite.external_pose is not None else None
+
+    @property
+    def place(self) -> GeodeticPoint:
+        """The scenario's origin on Earth."""
+        return self._place
+
+    @property
+    def sends_poses(self) -> bool:
+        """Whether it has a simulated motion capture."""
+        pose = self._suite.external_pose
+        return pose is not None and pose.source == "simulated"
+
+    @property
+    def is_at_control_tick(self) -> bool:
+        """Whether a control period has ended and the next one has not begun."""
+        return self._steps == 0
+
+    def coast(self) -> None:
+        """Advance to the end of the control period with standing motors."""
+        self.step(self._standing)
+        while not self.is_at_control_tick:
+            self.step(self._standing)
 
     def step(self, pulses_us: tuple[int, ...]) -> bytes:
         """Advance by one step of the physics with these pulse widths; returns the line with the state then.
@@ -55,6 +84,7 @@ class ArduPilotSimulation(SimulatedVehicle):
         The first pulses are the motors'. A motor's speed is proportional to its pulse above the minimum
         (ArduPilot's MOT_THST_EXPO is 1 then).
         """
+        self.pose = None
         world, scale = self.world, self._speed_a_pulse
         speeds = tuple(
             [scale * max(0, min(pulse, PULSE_MAX_US) - PULSE_MIN_US) for pulse in pulses_us[: self._rotors]]
@@ -84,7 +114,7 @@ class ArduPilotSimulation(SimulatedVehicle):
         return self._line(Sensors(time_us, dynamics.position_ned_m(), velocity, attitude, rate, force))
 
     def _take_readings(self) -> None:
-        readings, _pose = self._read_sensors(self._true)
+        readings, self.pose = self._read_sensors(self._true)
         self._imu = readings.imu or self._imu
         if readings.range_finder is not None:
             distance_m = readings.range_finder.distance_m

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -34,6 +35,16 @@ def find_build(folder: Path) -> Path:
     raise SettingError(
         f"--px4 {folder}: has no bin/px4; give PX4's folder after `make px4_sitl_default`, or its build"
     )
+
+
+def version_of(folder: Path) -> str:
+    """PX4 and the hash of its program, which differs between builds.
+
+    Raises:
+        SettingError: there is no PX4.
+    """
+    with (find_build(folder) / "bin" / "px4").open("rb") as program:
+        return f"PX4 {hashlib.file_digest(program, 'sha256').hexdigest()[:12]}"
 
 
 class Px4Process(AutopilotProcess):

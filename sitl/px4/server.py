@@ -8,36 +8,33 @@ import time
 from collections.abc import Callable
 
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
+from sitl.autopilots.server import AutopilotServer
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
+from sitl.px4.side_link import PERIOD_US, SideLink
 from sitl.px4.simulation import Px4Simulation
 from sitl.server import BURST_TICKS, LagNotices, Pacer
 from sitl.server_settings import ServerSettings
-from sitl.streaming.drone_video import DroneVideo
-from sitl.time_grants import FREE_US, TimeGrants
+from sitl.time_grants import TimeGrants
 from sitl.world import CONTROL_PERIOD_US
 
-_FALL_US = 3_000_000  # for which a drone without its autopilot is simulated on
-_SETPOINT_S = 0.002  # wall time in which PX4 takes a setpoint that was sent before time was granted
 _ENDING_S = 1.0  # wall time in which a PX4 that has closed the connection ends
 
 
-class Px4Server:
-    """Runs a drone that PX4 flies, until cancelled.
-
-    When PX4 has gone, the drone falls and the try ends. A PX4 that connects then gets a new drone on its
-    start, at time zero.
+class Px4Server(AutopilotServer[Px4Simulation]):
+    """Runs a drone that PX4 flies, until cancelled; see `AutopilotServer`.
 
     Args:
         new_simulation: makes the simulation anew.
         settings: ports and speed; MAVLink is PX4's own.
         px4: how it is started.
         notice: called with lines for people.
-        grants: how far simulated time may advance; None: without a limit. With them the end of PX4 ends the
-            server.
+        grants: how far simulated time may advance; None: without a limit.
 
     Attributes:
         link: to PX4; None before `run`.
     """
+
+    NAME = "PX4"
 
     def __init__(
         self,
@@ -47,69 +44,40 @@ class Px4Server:
         notice: Callable[[str], None] = lambda line: None,
         grants: TimeGrants | None = None,
     ) -> None:
-        self._new_simulation = new_simulation
-        self._simulation = new_simulation()
-        self._settings, self._px4, self._notice, self._grants = settings, px4, notice, grants
-        self._video = DroneVideo(self._simulation, settings)
+        super().__init__(new_simulation, settings, px4, notice, grants)
         self.link: Px4Link | None = None
-        self._simulation.faults.notice = notice
+        self._side_link: SideLink | None = None
 
-    async def run(self) -> None:
-        """Open the ports, then run until cancelled.
-
-        Raises:
-            LinkError: PX4's port is in use.
-            VideoError: the port of the video is in use.
-            SettingError: PX4 cannot be started.
-            AutopilotEndedError: it ended, and time is granted by another program.
-        """
-        settings = self._settings
+    def _open(self) -> None:
+        settings, process = self._settings, self._autopilot.process
         self.link = Px4Link((settings.bind, FIRST_PORT + settings.instance), self._notice)
-        try:
-            await self._video.open()
-            self._notice(self._greeting())
-            await self._serve(self.link)
-        finally:
+        output = None if process is None else process.log
+        self._side_link = SideLink(settings, self._simulation.scenario.camera, output)
+
+    def _close(self) -> None:
+        if self.link is not None:
             self.link.close()
-            if self._px4.process is not None:
-                await self._px4.process.stop()
-            if self._grants is not None:
-                await self._grants.close()
-            await self._video.close()
+        if self._side_link is not None:
+            self._side_link.close()
 
-    def _greeting(self) -> str:
-        scenario, settings = self._simulation.scenario, self._settings
-        page = f"http://{settings.bind}:{settings.http_port}/"
-        return (
-            f"{scenario.airframe} with PX4 and sensors {scenario.sensors} in {scenario.name}: "
-            f"PX4's MAVLink on UDP {14540 + settings.instance} and 14550, video on {page} (Ctrl-C stops)"
-        )
-
-    async def _serve(self, link: Px4Link) -> None:
+    async def _serve(self) -> None:
+        link = self.link
+        assert link is not None, "it was opened"
         while True:
             await self._start(link)
             self._notice("PX4 is connected")
             with contextlib.suppress(Px4GoneError):
                 await self._run_paced(link)
             link.drop()
-            reason = await self._reason()
-            self._notice(f"{reason}; at {self._simulation.time_us / 1e6:.1f} s the motors stop")
-            if self._grants is not None:
-                raise AutopilotEndedError(
-                    f"{reason} at {self._simulation.time_us / 1e6:.1f} s of simulated time"
-                )
-            await self._fall(link)
-            self._simulation = self._new_simulation()
-            self._simulation.faults.notice = self._notice
-            self._video.show(self._simulation)
+            await self._end_try(await self._reason(), link.try_connect)
 
     async def _start(self, link: Px4Link) -> None:
         """Start PX4, or say how, and wait until it has connected."""
-        process = self._px4.process
+        process = self._autopilot.process
         if process is None:
             if not link.is_connected:
                 port = FIRST_PORT + self._settings.instance
-                self._notice(f"waiting for PX4 on TCP {port}; start it: {self._px4.command}")
+                self._notice(f"waiting for PX4 on TCP {port}; start it: {self._autopilot.command}")
                 await link.connected()
             return
         await process.stop()
@@ -125,7 +93,7 @@ class Px4Server:
 
     async def _reason(self) -> str:
         """Why PX4 is no longer connected."""
-        process = self._px4.process
+        process = self._autopilot.process
         if process is not None:
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(_ENDING_S):
@@ -153,7 +121,7 @@ class Px4Server:
             if started:
                 notices.lag(lost_s, now_s)
             if self._grants is not None and simulation.time_us > self._until_us:
-                await self._hold(self._grants)
+                await self._hold()
                 continue
             await asyncio.sleep(pacer.wait_s(now_s, simulation.time_us + CONTROL_PERIOD_US))
 
@@ -163,32 +131,12 @@ class Px4Server:
         link.send(simulation.sense())
         self._video.step()  # while PX4 computes
         controls = link.answer(time_us)
-        if controls is None and link.in_lockstep:
+        if controls is None and link.in_lockstep and simulation.is_answered:
             controls = await link.late_answer(time_us)
         simulation.move(controls)
+        if time_us % PERIOD_US == 0 and self._side_link is not None:
+            self._side_link.step(simulation)
 
-    async def _hold(self, grants: TimeGrants) -> None:
-        """Wait until simulated time may advance."""
-        held_us = self._simulation.time_us - CONTROL_PERIOD_US
-        await grants.hold(held_us, self._video.image_us, lambda: grants.setpoint)
-        if grants.setpoint is not None:
-            await asyncio.sleep(_SETPOINT_S)
-
-    async def _fall(self, link: Px4Link) -> None:
-        """Simulate on without an autopilot, until a new PX4 connects or three seconds have passed."""
-        simulation = self._simulation
-        pacer = Pacer(self._settings.speed, time.monotonic(), simulation.time_us)
-        end_us = simulation.time_us + _FALL_US
-        while simulation.time_us < end_us and not link.try_connect():
-            target_us = pacer.target_us(time.monotonic())
-            for _ in range(BURST_TICKS):
-                if simulation.time_us + CONTROL_PERIOD_US > target_us:
-                    break
-                simulation.sense()
-                self._video.step()
-                simulation.move(None)
-            await asyncio.sleep(pacer.wait_s(time.monotonic(), simulation.time_us + CONTROL_PERIOD_US))
-
-    @property
-    def _until_us(self) -> int:
-        return FREE_US if self._grants is None else self._grants.until_us
+    def _coast(self) -> None:
+        self._simulation.sense()
+        self._simulation.move(None)

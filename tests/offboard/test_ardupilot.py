@@ -10,6 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from offboard.drone import DroneError, VelocityCommand
+from offboard.keep_in_box import Box
 from offboard.mavsdk_drone import MavsdkDrone
 from tests.free_ports import free_port
 from tests.offboard.udp_arducopter import BRAKE, GUIDED, LOITER, UdpArduCopter
@@ -72,6 +73,21 @@ async def test_a_climb_on_the_ground_is_a_take_off_and_velocities_follow_in_the_
         assert turned.yaw > after.yaw + 0.3  # to the left
         await drone.land()
         assert not copter.armed
+
+
+async def test_a_take_off_stays_below_the_ceiling(copter):
+    low = Box((-5.0, -5.0, 0.0), (5.0, 5.0, START[2] + 0.6), START[:2])
+    async with connected(copter, box=low) as drone:
+        await drone.motors_on()
+        await fly(drone, drone.ticks(), UP, lambda state: not state.landed)
+        assert copter.takeoffs == [pytest.approx(0.42)]
+        await drone.motors_off()
+
+
+async def test_a_drone_that_was_ready_and_not_armed_does_not_stay_in_guided(copter):
+    async with connected(copter):
+        assert copter.mode[0] == GUIDED  # its checks are those of this mode
+    assert (copter.mode[0], copter.armed) == (BRAKE, False)
 
 
 async def test_a_take_off_that_had_no_effect_is_requested_again(copter):

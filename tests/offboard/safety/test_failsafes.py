@@ -4,7 +4,14 @@ import pytest
 
 from framerunner.flying.plan import FlightPlan
 from offboard.safety.check import Outcome
-from offboard.safety.failsafes import failsafe_checks, failsafe_rows, values_to_set, with_table
+from offboard.safety.failsafes import (
+    DOCUMENTS,
+    failsafe_checks,
+    failsafe_rows,
+    rows_by_known_names,
+    values_to_set,
+    with_table,
+)
 from offboard.safety.fence import FlightFence, flight_fence
 from scenarios.loader import load_scenario
 
@@ -18,9 +25,10 @@ def outcome_of(name, value, *, has_global_position=True):
     return next(check.outcome for check in checks if check.name == name)
 
 
-def test_the_documents_table_is_written_from_the_data():
-    text = (ROOT / "docs" / "real-drone.md").read_text(encoding="utf-8")
-    assert with_table(text) == text, "run: make failsafes"
+@pytest.mark.parametrize("autopilot", DOCUMENTS)
+def test_the_documents_table_is_written_from_the_data(autopilot):
+    text = (ROOT / DOCUMENTS[autopilot]).read_text(encoding="utf-8")
+    assert with_table(text, autopilot) == text, "run: make failsafes"
 
 
 def test_what_is_set_passes():
@@ -78,3 +86,37 @@ def test_the_fence_is_around_the_box_and_above_the_start():
     assert fence.corners_arena_m[0] == (-6.3, -6.3)
     assert fence.height_m == pytest.approx(plan.box.high_m[2] + 0.3 - plan.start_pose[2], abs=0.01)
     assert fence.radius_m == pytest.approx(13.15, abs=0.01)  # from (-3, -3) to (6.3, 6.3)
+
+
+ARDUPILOT = failsafe_rows("ardupilot")
+ARDUPILOT_GOOD = {row.name: row.wanted(FENCE) for row in ARDUPILOT}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("GUID_TIMEOUT", 3), ("FS_GCS_ENABLE", 0), ("MAV_GCS_SYSID", 255), ("FS_GCS_TIMEOUT", 60)),
+        *(("FS_THR_ENABLE", 0), ("FS_THR_ENABLE", 1), ("FS_OPTIONS", 4), ("FS_EKF_ACTION", 0)),
+        *(("FS_EKF_THRESH", 2), ("FS_DR_ENABLE", 2), ("BATT_FS_LOW_ACT", 2), ("BATT_FS_CRT_ACT", 5)),
+        *(("RTL_ALT", 1500), ("RTL_ALT", 351), ("FENCE_ENABLE", 0), ("FENCE_TYPE", 3), ("FENCE_ACTION", 1)),
+        *(("FENCE_ALT_MAX", 100), ("FENCE_RADIUS", 300), ("FENCE_MARGIN", 2), ("DISARM_DELAY", 2)),
+    ],
+)
+def test_each_dangerous_value_of_ardupilot_fails_and_is_set(name, value):
+    checks = failsafe_checks(ARDUPILOT_GOOD | {name: value}, FENCE, has_global_position=True, rows=ARDUPILOT)
+    assert [check.name for check in checks if check.outcome is Outcome.FAIL] == [name]
+    wanted = values_to_set(ARDUPILOT_GOOD | {name: value}, FENCE, has_global_position=True, rows=ARDUPILOT)
+    assert wanted == {name: ARDUPILOT_GOOD[name]}
+
+
+@pytest.mark.parametrize(("name", "value"), [("RTL_ALT", 350), ("FS_EKF_ACTION", 3), ("FENCE_ACTION", 4)])
+def test_other_safe_values_of_ardupilot_pass(name, value):
+    good = ARDUPILOT_GOOD | {name: value}
+    assert values_to_set(good, FENCE, has_global_position=True, rows=ARDUPILOT) == {}
+
+
+def test_a_parameter_is_found_by_the_name_that_it_has_in_an_older_version():
+    old = {name: value for name, value in ARDUPILOT_GOOD.items() if name != "MAV_GCS_SYSID"}
+    old["SYSID_MYGCS"] = 255.0
+    rows = rows_by_known_names(ARDUPILOT, old)
+    assert values_to_set(old, FENCE, has_global_position=True, rows=rows) == {"SYSID_MYGCS": 245.0}

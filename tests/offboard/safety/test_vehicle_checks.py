@@ -74,6 +74,8 @@ def test_a_bad_link_fails(changed, names):
         ({"rate_hz": 5.0}, ["camera"]),
         ({"longest_gap_s": 0.7}, ["camera"]),
         ({"age_s": 0.4}, ["camera delay"]),
+        ({"age_s": -0.01}, []),
+        ({"age_s": -4.6}, ["camera delay"]),
         ({"age_s": nan, "assumed_age_s": 0.4}, ["camera delay"]),
         ({"age_s": nan}, []),
         ({"problem": "no image within 5 s"}, ["camera"]),

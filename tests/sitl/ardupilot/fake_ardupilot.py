@@ -6,6 +6,8 @@ Its parser is as strict as ArduPilot's: no spaces, and a line counts only after 
 import re
 import socket
 import struct
+import sys
+import time
 
 LAYOUTS = {16: (18458, struct.Struct("<HHI16H")), 32: (29569, struct.Struct("<HHI32H"))}
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
@@ -53,3 +55,20 @@ class FakeArduPilot:
 
     def close(self):
         self.socket.close()
+
+
+def run(instance):
+    """Step for ever, sending a frame again after a second without an answer, as ArduPilot does."""
+    fake = FakeArduPilot(9002 + 10 * instance)
+    fake.socket.settimeout(1.0)
+    while True:
+        fake.send([1400] * 4 if fake.number > 250 else [1000] * 4)
+        try:
+            fake.receive()
+        except TimeoutError:
+            continue
+        time.sleep(0.0005)
+
+
+if __name__ == "__main__":
+    run(int(sys.argv[sys.argv.index("-I") + 1]))

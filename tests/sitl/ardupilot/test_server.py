@@ -1,31 +1,65 @@
 """The simulator with a fake ArduPilot at its JSON interface, over UDP."""
 
 import asyncio
+import os
+import signal
+import socket
+import sys
+import time
 from contextlib import asynccontextmanager
+from pathlib import Path
 
+import pytest
+
+from firmware_py.types import GeodeticPoint
 from scenarios.loader import load_scenario
+from sitl.ardupilot.build import ArduPilotProcess, find_build
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE
+from sitl.ardupilot.poses import POSE_PORT
 from sitl.ardupilot.server import ArduPilotServer
 from sitl.ardupilot.simulation import ArduPilotSimulation
-from sitl.autopilots.process import AutopilotStart
+from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.server_settings import ServerSettings
+from sitl.time_grants import Grant, Held, TimeGrants
 from tests.processes import free_instance
 from tests.sitl.ardupilot.fake_ardupilot import FakeArduPilot
+from wire.dialect import mavlink
+from wire.framing import PacketReader
 
 STILL, CLIMB = [1000] * 4, [1400] * 4
+FAKE = Path(__file__).with_name("fake_ardupilot.py")
 
 
-@asynccontextmanager
-async def serving(channels=16):
-    """A running simulator, the lines that it says, and a fake ArduPilot."""
-    instance, lines, made = free_instance(), [], []
+async def until(condition, limit_s=20.0):
+    async with asyncio.timeout(limit_s):
+        while not condition():  # noqa: ASYNC110 - what is awaited has no event
+            await asyncio.sleep(0.01)
+
+
+async def stopped(task):
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+def server_with(lines, made, *, process=None, sensors="ideal", grants=None, instance=None):
+    """A simulator, and its instance."""
+    instance = free_instance() if instance is None else instance
+    scenario = load_scenario("test-case-1").model_copy(update={"sensors": sensors})
 
     def make():
-        made.append(ArduPilotSimulation(load_scenario("test-case-1")))
+        made.append(ArduPilotSimulation(scenario))
         return made[-1]
 
     settings = ServerSettings(instance=instance)
-    server = ArduPilotServer(make, settings, AutopilotStart(None, "arducopter"), notice=lines.append)
+    start = AutopilotStart(process, "arducopter")
+    return ArduPilotServer(make, settings, start, notice=lines.append, grants=grants), instance
+
+
+@asynccontextmanager
+async def serving(channels=16, **options):
+    """A running simulator, the lines that it says, and a fake ArduPilot."""
+    lines, made = [], []
+    server, instance = server_with(lines, made, **options)
     task = asyncio.create_task(server.run())
     async with asyncio.timeout(20):
         while not any("waiting for ArduPilot" in line for line in lines):
@@ -36,8 +70,7 @@ async def serving(channels=16):
         yield fake, lines, made
     finally:
         fake.close()
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+        await stopped(task)
 
 
 async def test_it_flies_by_the_fakes_pulses_in_lockstep():
@@ -79,3 +112,98 @@ async def test_other_packets_are_ignored():
     async with serving() as (fake, _lines, _made):
         fake.socket.sendto(b"no frame", fake.place)
         assert (await asyncio.to_thread(fake.step, STILL))["timestamp"] == 0.002
+
+
+async def test_poses_of_motion_capture_and_the_origin_are_sent_by_mavlink():
+    async with serving(sensors="mocap") as (fake, _lines, _made):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as serial:
+            serial.settimeout(5.0)
+            port = POSE_PORT + fake.place[1] - FIRST_PORT
+            beat = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 3, 3)
+            serial.sendto(beat.pack(mavlink.MAVLink(None, srcSystem=1, srcComponent=1)), ("127.0.0.1", port))
+            for _ in range(60):
+                await asyncio.to_thread(fake.step, STILL)
+            reader = PacketReader()
+            found = [message for _ in range(3) for message in reader.feed(serial.recv(2048))]
+    assert [each.get_type() for each in found][:2] == ["SET_GPS_GLOBAL_ORIGIN", "VISION_POSITION_ESTIMATE"]
+    assert found[0].latitude == pytest.approx(473977420)
+    pose = found[1]
+    start = fake.answers[0]["position"]
+    assert (pose.x, pose.y, pose.z) == pytest.approx(start, abs=0.03)
+    assert pose.covariance[0] == pytest.approx(1e-6)
+
+
+async def test_frames_wait_until_time_is_granted():
+    here, there = socket.socketpair()
+    lines, made = [], []
+    server, instance = server_with(lines, made, grants=TimeGrants(there))
+    task = asyncio.create_task(server.run())
+    await until(lambda: any("waiting for ArduPilot" in line for line in lines))
+    fake = FakeArduPilot(FIRST_PORT + PORTS_AN_INSTANCE * instance)
+    reader, writer = await asyncio.open_connection(sock=here)
+    await asyncio.to_thread(fake.step, STILL)
+    assert await reader.readline() == b"up\n"
+    writer.write(Grant(20_000).line())
+    while fake.number < 12:  # up to the control tick at 20 ms, and its period
+        await asyncio.to_thread(fake.step, STILL)
+    for _ in range(3):
+        fake.send(STILL)  # as after a second without an answer
+    held = Held.parse(await reader.readline())
+    assert (held.time_us, made[-1].time_us) == (20_000, 24_000)
+    writer.write(Grant(40_000).line())
+    assert (await asyncio.to_thread(fake.receive))["timestamp"] == 0.026
+    assert (await asyncio.to_thread(fake.step, STILL))["timestamp"] == 0.028
+    fake.number = 0
+    fake.send(STILL)
+    with pytest.raises(AutopilotEndedError, match="counts its frames from zero again"):
+        await task
+    fake.close()
+    writer.close()
+
+
+def fake_process(tmp_path, instance):
+    """A fake ArduPilot that is started as a genuine one."""
+    program = tmp_path / "arducopter"
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} {FAKE} "$@"\n')
+    program.chmod(0o755)
+    settings, home = ServerSettings(instance=instance), GeodeticPoint(47.0, 8.0, 400.0)
+    options = (find_build(tmp_path), settings, home, {}, tmp_path / "files")
+    return ArduPilotProcess(*options, takes_poses=False)
+
+
+def child_of(process):
+    return process._process.pid
+
+
+async def test_an_ardupilot_that_is_killed_ends_the_try_and_the_next_one_gets_a_new_drone(tmp_path):
+    lines, made, instance = [], [], free_instance()
+    process = fake_process(tmp_path, instance)
+    server, _ = server_with(lines, made, process=process, instance=instance)
+    task = asyncio.create_task(server.run())
+    await until(lambda: made[-1].truth.position_arena_m[2] > 1.0)
+    flown = made[-1]
+    os.kill(child_of(process), signal.SIGKILL)
+    began_s = time.monotonic()
+    await until(lambda: len(made) == 2 and made[-1].time_us > 500_000)
+    assert time.monotonic() - began_s < 5.0
+    assert not flown.truth.motors_on
+    assert any(line.startswith("ArduPilot was ended by signal 9; at") for line in lines)
+    await stopped(task)
+
+
+async def test_an_ardupilot_that_stands_still_changes_nothing(tmp_path):
+    lines, made, instance = [], [], free_instance()
+    process = fake_process(tmp_path, instance)
+    server, _ = server_with(lines, made, process=process, instance=instance)
+    task = asyncio.create_task(server.run())
+    await until(lambda: made[-1].time_us > 100_000)
+    os.kill(child_of(process), signal.SIGSTOP)
+    await asyncio.sleep(0.1)
+    standing = server.exchange.steps
+    await until(lambda: any("ArduPilot has sent no outputs for 2 s" in line for line in lines))
+    assert server.exchange.steps == standing
+    os.kill(child_of(process), signal.SIGCONT)
+    await until(lambda: any("no step was skipped" in line for line in lines))
+    assert len(made) == 1
+    assert 2000 * server.exchange.steps - made[-1].time_us in (0, 2000)
+    await stopped(task)

@@ -35,7 +35,10 @@ class FakePx4:
     def serve(self, steps=None):
         """Answer until the simulator goes, or this many sensors have come."""
         while steps is None or len(self.times_us) < steps:
-            data = self.connection.recv(4096)
+            try:
+                data = self.connection.recv(4096)
+            except ConnectionResetError:
+                return
             if not data:
                 return
             for message in self.mav.parse_buffer(data) or ():

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
@@ -15,11 +16,12 @@ import pytest
 from errors import SettingError
 from scenarios.loader import load_scenario
 from sitl.autopilots.process import AutopilotStart
+from sitl.autopilots.sensors import with_estimable_sensors
 from sitl.px4.build import Px4Process, find_build
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
 from sitl.px4.messages import ActuatorControls
 from sitl.px4.server import Px4Server
-from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
+from sitl.px4.simulation import MotionError, Px4Simulation
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.sitl.px4.fake_px4 import FakePx4
@@ -28,7 +30,7 @@ FAKE = Path(__file__).with_name("fake_px4.py")
 
 
 def new_simulation():
-    return Px4Simulation(with_sensors_for_px4(load_scenario("test-case-1")))
+    return Px4Simulation(with_estimable_sensors(load_scenario("test-case-1")))
 
 
 def serving(lines, speed=20.0):
@@ -146,6 +148,14 @@ def test_an_output_that_is_no_number_stops_its_motor():
     speeds_rad_s = simulation.world.dynamics.motor_speeds_rad_s()
     assert speeds_rad_s[0] == 0.0
     assert min(speeds_rad_s[1:]) > 0.0
+
+
+def test_a_motion_that_is_no_number_ends_in_words():
+    simulation = new_simulation()
+    simulation.sense()
+    simulation.truth = replace(simulation.truth, position_arena_m=(nan, 0.0, 1.0))
+    with pytest.raises(MotionError, match="turned too fast to be simulated"):
+        simulation.move(None)
 
 
 async def test_an_answer_to_another_sensor_is_counted():

@@ -1,0 +1,69 @@
+"""The poses of the simulated motion capture as ArduPilot takes them: VISION_POSITION_ESTIMATE over MAVLink.
+
+ArduPilot's JSON interface has no field for them, so they take a serial port of its own, as in a hall. Its
+ODOMETRY must have a velocity, which motion capture does not measure. Without GPS its estimator has no origin
+until somebody sets it, so that is done here, too.
+"""
+
+from __future__ import annotations
+
+from firmware_py.measurements import ExternalPose
+from firmware_py.types import GeodeticPoint
+from geometry.rotations import euler_from_quaternion
+from wire.dialect import degrees_e7, mavlink, millimetres
+from wire.transports.vehicle_link import VehicleLink
+
+POSE_PORT = 9006
+"""UDP port of instance 0, between those of the JSON interface."""
+_COMPONENT_ID = int(mavlink.MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY)
+_ORIGIN_PERIOD_US = 1_000_000
+
+
+class PoseLink:
+    """Sends poses to an ArduPilot that sends to this port.
+
+    Args:
+        bind: address.
+        port: UDP port.
+        system_id: of the vehicle.
+        origin: where on Earth the poses' frame is.
+
+    Raises:
+        LinkError: the port is in use.
+    """
+
+    def __init__(self, bind: str, port: int, system_id: int, origin: GeodeticPoint) -> None:
+        self._link = VehicleLink(f"udpin://{bind}:{port}", system_id=system_id, component_id=_COMPONENT_ID)
+        self._origin = mavlink.MAVLink_set_gps_global_origin_message(
+            system_id,
+            degrees_e7(origin.latitude_deg),
+            degrees_e7(origin.longitude_deg),
+            millimetres(origin.altitude_m),
+        )
+        self._origin_due_us = 0
+
+    def send(self, pose: ExternalPose) -> None:
+        """Send a pose; once a second of its time the origin, which ArduPilot takes once."""
+        if not 0 <= self._origin_due_us - pose.time_us <= _ORIGIN_PERIOD_US:
+            self._origin_due_us = pose.time_us + _ORIGIN_PERIOD_US
+            while self._link.receive(0.0):  # ArduPilot's address
+                pass
+            self._link.send(self._origin)
+        attitude = (0.0, 0.0, 0.0) if pose.attitude is None else euler_from_quaternion(pose.attitude)
+        variances = (*pose.position_variance_m2, *pose.attitude_variance_rad2)
+        self._link.send(
+            mavlink.MAVLink_vision_position_estimate_message(
+                *(pose.time_us, *pose.position_ned_m, *attitude),
+                _covariance(variances),
+                pose.reset_counter & 0xFF,
+            )
+        )
+
+    def close(self) -> None:
+        """Close the port."""
+        self._link.close()
+
+
+def _covariance(variances: tuple[float, ...]) -> tuple[float, ...]:
+    """Upper right triangle of a 6 x 6 matrix with these variances on its diagonal, row by row."""
+    return tuple(variances[row] if column == row else 0.0 for row in range(6) for column in range(row, 6))
