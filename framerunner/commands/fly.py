@@ -297,7 +297,13 @@ def _genuine(given: GenuineOptions, *, drone: str | None, lockstep: bool) -> Gen
 
 
 def _check(
-    drone: str | None, camera: str | None, delay_s: float, speed: float, instance: int, *, lockstep: bool
+    drone: str | None,
+    camera: str | None,
+    delay_s: float | None,
+    speed: float,
+    instance: int,
+    *,
+    lockstep: bool,
 ) -> None:
     """Refuse options that do not go together, and numbers out of range."""
     check_range("--camera-delay", delay_s, 0.0, 0.5)
