@@ -37,6 +37,7 @@ HOLD_ATTEMPTS = 3
 HOLD_SHOWN_S = 1.5  # wall time until a heartbeat, one a second, shows the new mode
 LAND_LIMIT_S = 120.0  # vehicle time
 STREAM_BEFORE_OFFBOARD_S = 0.3  # PX4 enters offboard only with fresh setpoints
+START_US = 10_000_000  # a flight with a vehicle that steps begins at a multiple of this
 FIRST_MODE_S = 8.0  # wall time for PX4's checks to pass in the mode it starts in
 
 
@@ -168,14 +169,19 @@ class MavsdkDrone:
                 component.announce(system_id)
         self._telemetry = TelemetryAsync(system)
         self._direct = MavlinkDirectAsync(system)
-        self._dialect = await open_dialect(system, self._direct, self._feed)
+        self._dialect = await open_dialect(system, self._direct, self._feed, stepped=self._ticks.steps)
         telemetry = synchronous(self._telemetry)
         self._feed.subscribe(telemetry, synchronous(self._direct), self._dialect.numbered_modes)
-        await self._requests.wait(self._dialect.request_streams())
+        if self._dialect.exchange is None:
+            await self._requests.wait(self._dialect.request_streams())
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then determine the axes."""
-        limit_s = self._ready_limit_s or self._stream.ready_limit_s
+        limit_s, exchange = self._ready_limit_s or self._stream.ready_limit_s, self._stream.exchange
+        if exchange is not None:
+            await self._ticks.begin_on_grid(START_US)
+            self._ticks.exchange = exchange
+            await self._ticks.until_done(self._requests.wait(self._stream.request_streams()))
         try:
             await self._wait_for_checks(limit_s)
         except TimeoutError:
@@ -188,7 +194,8 @@ class MavsdkDrone:
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
         feed = self._feed
-        await request_rates(feed, self._telemetry)
+        if exchange is None:
+            await request_rates(feed, self._telemetry)
         self._alignment = Alignment(self._start_arena, Pose(feed.position_ned_m, feed.yaw_ned_rad))
         await self._ticks.begin()
 
@@ -205,8 +212,9 @@ class MavsdkDrone:
                     with contextlib.suppress(MavsdkError):  # refused without a position
                         await self._requests.wait(self._stream.request_offboard())
                     await self._becomes(lambda: self._in_offboard, HOLD_SHOWN_S)
+        first_s = 0.0 if self._stream.exchange else min(FIRST_MODE_S, limit_s / 2)  # started long ago then
         with contextlib.suppress(TimeoutError):
-            await self._until(lambda: not self._feed.missing(), min(FIRST_MODE_S, limit_s / 2))
+            await self._until(lambda: not self._feed.missing(), first_s)
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
             await self._request("offboard mode", self._stream.request_offboard())

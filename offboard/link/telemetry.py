@@ -26,7 +26,8 @@ from mavsdk.asyncio import MavsdkError
 from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Quaternion, Vec3
 from offboard.arming import Arming
-from offboard.drone import VelocityCommand
+from offboard.drone import DroneError, VelocityCommand
+from offboard.link.dialect import TickExchange
 from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
 from wire.dialect import AUTOPILOT_COMPONENT_ID
 from wire.mission_tunnel import TEXT_PREFIX
@@ -346,12 +347,14 @@ class TickSource:
         late: ticks that were skipped, or lost on the link, in flight.
         in_flight: ticks in flight, late ones included.
         waits: vehicle time waits for the app now.
+        exchange: around each tick that is waited for; None: what is sent needs no waiting.
     """
 
     def __init__(self, feed: TelemetryFeed) -> None:
         self.late = 0
         self.in_flight = 0
         self.waits = False
+        self.exchange: TickExchange | None = None
         self._feed = feed
         self._clock: VehicleClock | None = None
         self._number = 0
@@ -361,11 +364,24 @@ class TickSource:
         """Let vehicle time wait for the app, from `begin` to `release`."""
         self._clock = clock
 
+    @property
+    def steps(self) -> bool:
+        """Vehicle time can wait, and the vehicle answers only while it goes on; see `SteppedPx4Dialect`."""
+        return self._clock is not None and self._clock.answers_take_time
+
     async def begin(self) -> None:
         """Let vehicle time wait from now on, if it can."""
-        if self._clock is not None:
+        if self._clock is not None and not self.waits:
             self._number = await self._clock.stop() // TICK_US
             self.waits = True
+
+    async def begin_on_grid(self, period_us: int) -> None:
+        """As `begin`, then let time pass to a multiple of a period: so all flights begin at the same time."""
+        await self.begin()
+        clock, end_us = self._clock, -(-self._number * TICK_US // period_us) * period_us
+        while clock is not None and self._number * TICK_US < end_us:
+            self._number += 1
+            await clock.advance(self._number * TICK_US, None)
 
     async def next(self, timeout_s: float, command: VelocityCommand | None = None) -> bool:
         """Wait for the next tick; the feed's `sample` belongs to it then. False if there was none.
@@ -380,7 +396,11 @@ class TickSource:
         for _ in range(_MAX_LOST_IN_A_ROW):
             self._number += 1
             self.in_flight += command is not None
+            if self.exchange is not None:
+                await self.exchange.before_tick()
             await clock.advance(self._number * TICK_US, command)
+            if self.exchange is not None:
+                await self.exchange.after_tick()
             if await self._feed.tick(self._number, TICK_LOST_S):
                 return True
             self.late += 1

@@ -7,6 +7,7 @@ import contextlib
 import time
 from collections.abc import Callable
 
+from sitl.autopilots.idle import IdleCheck
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
 from sitl.px4.simulation import Px4Simulation
@@ -17,7 +18,10 @@ from sitl.time_grants import FREE_US, TimeGrants
 from sitl.world import CONTROL_PERIOD_US
 
 _FALL_US = 3_000_000  # for which a drone without its autopilot is simulated on
-_SETPOINT_S = 0.002  # wall time in which PX4 takes a setpoint that was sent before time was granted
+_IDLE_S = 0.01  # wall time for which a step waits until PX4's threads have done their work
+_IDLE_START_S = 5.0  # likewise, while it starts
+_READY_US = 7_000_000  # by which PX4 can be armed
+_WAITING_SPEED = 0.2  # simulated seconds a second; a heartbeat still comes every 5 s
 _ENDING_S = 1.0  # wall time in which a PX4 that has closed the connection ends
 
 
@@ -52,6 +56,7 @@ class Px4Server:
         self._settings, self._px4, self._notice, self._grants = settings, px4, notice, grants
         self._video = DroneVideo(self._simulation, settings)
         self.link: Px4Link | None = None
+        self._idle: IdleCheck | None = None  # of the PX4 that was started here
         self._simulation.faults.notice = notice
 
     async def run(self) -> None:
@@ -114,6 +119,7 @@ class Px4Server:
             return
         await process.stop()
         await process.start()
+        self._idle = None if process.process_id is None else IdleCheck(process.process_id)
         ended = asyncio.create_task(process.ended())
         connected = asyncio.create_task(link.connected())
         done, _ = await asyncio.wait({ended, connected}, return_when=asyncio.FIRST_COMPLETED)
@@ -133,16 +139,18 @@ class Px4Server:
         return "PX4 has closed the connection"
 
     async def _run_paced(self, link: Px4Link) -> None:
-        settings, simulation = self._settings, self._simulation
-        pacer = Pacer(1.0, time.monotonic(), simulation.time_us)
-        notices = LagNotices(self._notice, settings.speed)
-        started = False
+        """Step until PX4 has gone."""
+        simulation, grants = self._simulation, self._grants
+        speed, opened = 0.0, False
         while True:
-            if link.in_lockstep and not started:
-                started = True
-                pacer = Pacer(settings.speed, time.monotonic(), simulation.time_us)
-                if self._grants is not None:
-                    await self._grants.open()
+            if self._has_started(link) and not opened:
+                opened = True
+                if grants is not None:
+                    await grants.open()
+            if speed != (wanted := self._wanted_speed(opened=opened)):
+                speed = wanted
+                pacer = Pacer(speed, time.monotonic(), simulation.time_us)
+                notices = LagNotices(self._notice, speed)
             target_us = pacer.target_us(time.monotonic())
             for _ in range(BURST_TICKS):
                 if simulation.time_us + CONTROL_PERIOD_US > target_us or simulation.time_us > self._until_us:
@@ -150,29 +158,54 @@ class Px4Server:
                 await self._tick(link)
             now_s = time.monotonic()
             lost_s = pacer.give_up_lag(now_s, simulation.time_us)
-            if started:
+            if opened:
                 notices.lag(lost_s, now_s)
-            if self._grants is not None and simulation.time_us > self._until_us:
-                await self._hold(self._grants)
+            if grants is not None and simulation.time_us > self._until_us:
+                await self._hold(grants)
                 continue
             await asyncio.sleep(pacer.wait_s(now_s, simulation.time_us + CONTROL_PERIOD_US))
+
+    def _wanted_speed(self, *, opened: bool) -> float:
+        """Simulated seconds a second: real time while PX4 starts, and until a program that grants time is ready.
+
+        PX4 is ready itself after some seconds. Then time passes slowly, as such a program begins its flight at
+        a whole multiple of ten seconds.
+        """
+        speed, grants = self._settings.speed, self._grants
+        if opened and (grants is None or grants.used):
+            return speed
+        return min(1.0 if self._simulation.time_us < _READY_US else _WAITING_SPEED, speed)
+
+    def _has_started(self, link: Px4Link) -> bool:
+        return link.in_lockstep and not (self._idle is not None and self._idle.starting)
 
     async def _tick(self, link: Px4Link) -> None:
         simulation = self._simulation
         time_us = simulation.time_us
-        link.send(simulation.sense())
+        packets = simulation.sense()
+        self._wait_idle()
+        link.send(packets)
         self._video.step()  # while PX4 computes
         controls = link.answer(time_us)
         if controls is None and link.in_lockstep:
             controls = await link.late_answer(time_us)
         simulation.move(controls)
 
+    def _wait_idle(self) -> None:
+        """Let PX4's threads that its lockstep does not wait for finish, so that each step is the same."""
+        idle = self._idle
+        if idle is None:
+            return
+        if idle.starting:
+            idle.wait_started(_IDLE_START_S)
+        else:
+            idle.wait(_IDLE_S)
+
     async def _hold(self, grants: TimeGrants) -> None:
-        """Wait until simulated time may advance."""
+        """Wait until simulated time may advance; what PX4 sends before that has been sent then."""
+        self._wait_idle()
         held_us = self._simulation.time_us - CONTROL_PERIOD_US
         await grants.hold(held_us, self._video.image_us, lambda: grants.setpoint)
-        if grants.setpoint is not None:
-            await asyncio.sleep(_SETPOINT_S)
 
     async def _fall(self, link: Px4Link) -> None:
         """Simulate on without an autopilot, until a new PX4 connects or three seconds have passed."""
