@@ -26,7 +26,7 @@ from mavsdk.asyncio import MavsdkError
 from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Quaternion, Vec3
 from offboard.arming import Arming
-from offboard.drone import DroneError, VelocityCommand
+from offboard.drone import VelocityCommand
 from offboard.link.dialect import TickExchange
 from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
 from wire.dialect import AUTOPILOT_COMPONENT_ID

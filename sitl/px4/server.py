@@ -18,7 +18,10 @@ from sitl.time_grants import FREE_US, TimeGrants
 from sitl.world import CONTROL_PERIOD_US
 
 _FALL_US = 3_000_000  # for which a drone without its autopilot is simulated on
-_IDLE_S = 0.01  # wall time for which a step waits until PX4's threads have done their work
+_OWN_TIME = ("commander", "mavlink_if1")
+"""Threads that PX4's lockstep does not wait for: its state machine, and what sends to UDP 14540."""
+_IDLE_S = 0.1  # wall time for which a step waits until PX4's threads have done their work
+_FIRST_S = 0.3  # wall time in which its start-up script comes to waiting for them
 _IDLE_START_S = 5.0  # likewise, while it starts
 _READY_US = 7_000_000  # by which PX4 can be armed
 _WAITING_SPEED = 0.2  # simulated seconds a second; a heartbeat still comes every 5 s
@@ -119,7 +122,7 @@ class Px4Server:
             return
         await process.stop()
         await process.start()
-        self._idle = None if process.process_id is None else IdleCheck(process.process_id)
+        self._idle = None if process.process_id is None else IdleCheck(process.process_id, _OWN_TIME)
         ended = asyncio.create_task(process.ended())
         connected = asyncio.create_task(link.connected())
         done, _ = await asyncio.wait({ended, connected}, return_when=asyncio.FIRST_COMPLETED)
@@ -166,10 +169,10 @@ class Px4Server:
             await asyncio.sleep(pacer.wait_s(now_s, simulation.time_us + CONTROL_PERIOD_US))
 
     def _wanted_speed(self, *, opened: bool) -> float:
-        """Simulated seconds a second: real time while PX4 starts, and until a program that grants time is ready.
+        """Simulated seconds a second: real time while PX4 starts, and until a program grants time.
 
-        PX4 is ready itself after some seconds. Then time passes slowly, as such a program begins its flight at
-        a whole multiple of ten seconds.
+        When PX4 can be armed, time passes slowly until then, because that program begins its flight at a
+        whole multiple of ten seconds.
         """
         speed, grants = self._settings.speed, self._grants
         if opened and (grants is None or grants.used):
@@ -196,8 +199,10 @@ class Px4Server:
         idle = self._idle
         if idle is None:
             return
-        if idle.starting:
+        if idle.starting and self._simulation.time_us > 0:  # until its first sensors, PX4 waits by polling
             idle.wait_started(_IDLE_START_S)
+        elif idle.starting:
+            time.sleep(_FIRST_S)
         else:
             idle.wait(_IDLE_S)
 
