@@ -130,3 +130,25 @@ def test_vehicle_time_at_a_wall_time_is_that_of_the_quickest_message_within_limi
     now_s = 103.0  # the vehicle's clock stood still, or is slower
     attitude(feed, attitude_us)
     assert feed.time_at_us(103.0) == attitude_us + round(MAX_JITTER_S * 1e6)
+
+
+async def test_what_was_sent_is_exchanged_before_and_after_each_tick(feed):
+    clock, source, order = Clock(feed), TickSource(feed), []
+
+    async def note(what):
+        order.append((what, len(clock.granted)))
+
+    source.use_clock(clock)
+    await source.begin()
+    source.exchange = SimpleNamespace(before_tick=lambda: note("before"), after_tick=lambda: note("after"))
+    assert await source.next(1.0)
+    assert order == [("before", 0), ("after", 1)]
+
+
+async def test_a_flight_can_begin_at_a_multiple_of_a_period_whenever_the_app_is_ready(feed):
+    clock, source = Clock(feed), TickSource(feed)
+    source.use_clock(clock)
+    await source.begin_on_grid(2_000_000)
+    assert clock.granted[-1] == (2_000_000, None)
+    assert await source.next(1.0)
+    assert feed.sample.time_us == 2_050_000
