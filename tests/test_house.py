@@ -6,6 +6,7 @@ import re
 import shlex
 import tomllib
 from collections import Counter, defaultdict
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,11 @@ LARGE_CLASSES = {
     "offboard/mavsdk_drone.py MavsdkDrone": "implements the port `Drone`",
 }
 HASHED = re.compile(r"\S+==[^\n]* \\\n( {4}--hash=sha256:[0-9a-f]{64}( \\)?\n)+( {4}#.*\n?)*\Z")
+
+
+@cache
+def parsed(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def name_of(path):
@@ -142,7 +148,7 @@ def test_folders_have_at_most_20_modules():
 def test_classes_have_at_most_20_methods():
     large = set()
     for path in MODULES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.ClassDef):
                 functions = (ast.FunctionDef, ast.AsyncFunctionDef)
                 if len({each.name for each in node.body if isinstance(each, functions)}) > 20:
@@ -154,7 +160,7 @@ def test_functions_are_short():
     too_long = {
         f"{name_of(path)}:{node.lineno} {node.name}": node.end_lineno - node.lineno + 1
         for path in MODULES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
         and node.end_lineno - node.lineno + 1 >= 60
     }
@@ -179,9 +185,7 @@ def imports(node, modules):
 
 def test_no_modules_import_each_other_in_a_circle():
     names = {module_name(path) for path in MODULES}
-    left = {
-        module_name(path): imports(ast.parse(path.read_text(encoding="utf-8")), names) for path in MODULES
-    }
+    left = {module_name(path): imports(parsed(path), names) for path in MODULES}
     # Whoever imports nothing that is left is in no circle, nor is whoever nothing that is left imports.
     while True:
         needed = set().union(*left.values())
@@ -195,7 +199,7 @@ def test_no_modules_import_each_other_in_a_circle():
 
 def names_bound(path):
     """Names that a module binds at its top level, in any branch."""
-    found, waiting = set(), [*ast.parse(path.read_text(encoding="utf-8")).body]
+    found, waiting = set(), [*parsed(path).body]
     while waiting:
         node = waiting.pop()
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
@@ -213,16 +217,15 @@ def test_what_is_imported_exists():
     """Of our own modules, late imports and those of programs that no test runs too."""
     files = [path for folder in (*ROOMS, "benchmarks", "tests") for path in (ROOT / folder).rglob("*.py")]
     bound = {module_name(path): names_bound(path) for path in files}
-    packages = {name.rpartition(".")[0] for name in bound}
+    modules = {*bound, *(name.rpartition(".")[0] for name in bound)}
     missing = [
         f"{name_of(path)}:{node.lineno} {node.module}.{alias.name}"
         for path in files
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.ImportFrom)
         and node.module.partition(".")[0] in {*ROOMS, "benchmarks", "tests"}
         for alias in node.names
-        if alias.name not in bound.get(node.module, set())
-        and not {f"{node.module}.{alias.name}"} & {*bound, *packages}
+        if alias.name not in bound.get(node.module, set()) and f"{node.module}.{alias.name}" not in modules
     ]
     assert missing == []
 
@@ -232,7 +235,7 @@ def test_errors_for_people_are_user_errors():
     strays = [
         f"{name_of(path)}:{node.lineno} {node.name}"
         for path in MODULES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.ClassDef) and "for people" in (ast.get_docstring(node) or "")
         if {ast.unparse(base) for base in node.bases} & {"Exception", "OSError", "RuntimeError", "ValueError"}
     ]
@@ -242,7 +245,7 @@ def test_errors_for_people_are_user_errors():
 def test_no_room_has_two_classes_of_one_name():
     found = defaultdict(list)
     for path in MODULES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.ClassDef):
                 found[module_name(path).partition(".")[0], node.name].append(name_of(path))
     assert {key: places for key, places in found.items() if len(places) > 1} == {}
@@ -253,7 +256,7 @@ def test_nothing_is_decided_by_the_name_of_a_scenario():
     decisions = [
         f"{name_of(path)}:{constant.lineno} {constant.value}"
         for path in MODULES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.Compare | ast.Match | ast.Dict)
         for constant in ast.walk(node)
         if isinstance(constant, ast.Constant) and constant.value in names

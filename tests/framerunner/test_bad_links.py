@@ -7,7 +7,7 @@ from scenarios.loader import load_scenario
 from tests.framerunner.simulated_link import Impairment, fly_over
 from tests.offboard.fakes import runaway
 
-SEEDS = range(20)
+SEEDS = range(6)
 IMPAIRMENTS = {
     "5 % lost": Impairment(loss=0.05),
     "20 % lost": Impairment(loss=0.2),
