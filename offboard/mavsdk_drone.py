@@ -179,8 +179,7 @@ class MavsdkDrone:
         """Wait until the vehicle can be armed; then determine the axes."""
         limit_s, exchange = self._ready_limit_s or self._stream.ready_limit_s, self._stream.exchange
         if exchange is not None:
-            await self._ticks.begin_on_grid(START_US)
-            self._ticks.exchange = exchange
+            await self._ticks.begin_on_grid(START_US, exchange)
             await self._ticks.until_done(self._requests.wait(self._stream.request_streams()))
         try:
             await self._wait_for_checks(limit_s)
@@ -193,10 +192,9 @@ class MavsdkDrone:
             ) from None
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        feed = self._feed
         if exchange is None:
-            await request_rates(feed, self._telemetry)
-        self._alignment = Alignment(self._start_arena, Pose(feed.position_ned_m, feed.yaw_ned_rad))
+            await request_rates(self._feed, self._telemetry)
+        self._alignment = Alignment(self._start_arena, self._feed.pose)
         await self._ticks.begin()
 
     async def _wait_for_checks(self, limit_s: float) -> None:

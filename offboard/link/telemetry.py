@@ -23,6 +23,7 @@ from typing import Any, Protocol
 
 from mavsdk.asyncio import MavsdkError
 
+from geometry.axes import Pose
 from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Quaternion, Vec3
 from offboard.arming import Arming
@@ -129,6 +130,11 @@ class TelemetryFeed:
         plugin.subscribe_landed_state(self._on_landed)
         plugin.subscribe_health(self._on_health)
         plugin.subscribe_status_text(self._on_text)
+
+    @property
+    def pose(self) -> Pose:
+        """Where the vehicle is, in its local NED axes."""
+        return Pose(self.position_ned_m, self.yaw_ned_rad)
 
     async def next_tick(self, timeout_s: float) -> bool:
         """Wait for the next tick; False if there was none within `timeout_s` of wall time.
@@ -375,13 +381,17 @@ class TickSource:
             self._number = await self._clock.stop() // TICK_US
             self.waits = True
 
-    async def begin_on_grid(self, period_us: int) -> None:
-        """As `begin`, then let time pass to a multiple of a period: so all flights begin at the same time."""
+    async def begin_on_grid(self, period_us: int, exchange: TickExchange) -> None:
+        """As `begin`, then let time pass to a multiple of a period: so all flights begin at the same time.
+
+        From then on the exchange goes around each tick.
+        """
         await self.begin()
         clock, end_us = self._clock, -(-self._number * TICK_US // period_us) * period_us
         while clock is not None and self._number * TICK_US < end_us:
             self._number += 1
             await clock.advance(self._number * TICK_US, None)
+        self.exchange = exchange
 
     async def next(self, timeout_s: float, command: VelocityCommand | None = None) -> bool:
         """Wait for the next tick; the feed's `sample` belongs to it then. False if there was none.

@@ -148,7 +148,7 @@ async def test_what_was_sent_is_exchanged_before_and_after_each_tick(feed):
 async def test_a_flight_can_begin_at_a_multiple_of_a_period_whenever_the_app_is_ready(feed):
     clock, source = Clock(feed), TickSource(feed)
     source.use_clock(clock)
-    await source.begin_on_grid(2_000_000)
+    await source.begin_on_grid(2_000_000, None)
     assert clock.granted[-1] == (2_000_000, None)
     assert await source.next(1.0)
     assert feed.sample.time_us == 2_050_000
