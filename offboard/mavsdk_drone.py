@@ -37,7 +37,6 @@ HOLD_ATTEMPTS = 3
 HOLD_SHOWN_S = 1.5  # wall time until a heartbeat, one a second, shows the new mode
 LAND_LIMIT_S = 120.0  # vehicle time
 STREAM_BEFORE_OFFBOARD_S = 0.3  # PX4 enters offboard only with fresh setpoints
-START_US = 10_000_000  # a flight with a vehicle that steps begins at a multiple of this
 FIRST_MODE_S = 8.0  # wall time for PX4's checks to pass in the mode it starts in
 
 
@@ -179,7 +178,7 @@ class MavsdkDrone:
         """Wait until the vehicle can be armed; then determine the axes."""
         limit_s, exchange = self._ready_limit_s or self._stream.ready_limit_s, self._stream.exchange
         if exchange is not None:
-            await self._ticks.begin_on_grid(START_US, exchange)
+            await self._ticks.begin_exchange(exchange)
             await self._ticks.until_done(self._requests.wait(self._stream.request_streams()))
         try:
             await self._wait_for_checks(limit_s)
@@ -194,6 +193,8 @@ class MavsdkDrone:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
         if exchange is None:
             await request_rates(self._feed, self._telemetry)
+        else:
+            await self._ticks.pass_to_arming()
         self._alignment = Alignment(self._start_arena, self._feed.pose)
         await self._ticks.begin()
 
@@ -210,8 +211,8 @@ class MavsdkDrone:
                     with contextlib.suppress(MavsdkError):  # refused without a position
                         await self._requests.wait(self._stream.request_offboard())
                     await self._becomes(lambda: self._in_offboard, HOLD_SHOWN_S)
-        first_s = 0.0 if self._stream.exchange else min(FIRST_MODE_S, limit_s / 2)  # started long ago then
-        with contextlib.suppress(TimeoutError):
+        with contextlib.suppress(TimeoutError):  # with an exchange its checks have had their time
+            first_s = 0.0 if self._stream.exchange else min(FIRST_MODE_S, limit_s / 2)
             await self._until(lambda: not self._feed.missing(), first_s)
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()

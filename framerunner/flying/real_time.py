@@ -30,6 +30,10 @@ if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow t
     from offboard.perception import CameraPerception
 
 
+CAMERA_S = 5.0  # wall time for each image
+PATIENT_CAMERA_S = 20.0  # likewise, where nothing flies while an image is late
+
+
 @dataclass(frozen=True, slots=True)
 class RealTimeSettings:
     """What is flown in real time."""
@@ -231,7 +235,9 @@ async def _camera(
         records.see_frame(frame)
         reporter.see_frame(frame)
 
-    source = await stack.enter_async_context(open_source(vehicle.camera_url, size_px=vehicle.image_size_px))
+    timeout_s = CAMERA_S if vehicle.sitl is None else PATIENT_CAMERA_S
+    source = open_source(vehicle.camera_url, timeout_s=timeout_s, size_px=vehicle.image_size_px)
+    source = await stack.enter_async_context(source)
     camera = RecordingCamera(source, records.folder.video, plan.scenario.camera.rate_hz, keep)
     stack.callback(camera.close)
     return camera

@@ -35,6 +35,8 @@ from wire.mission_tunnel import TEXT_PREFIX
 from wire.vehicle_telemetry import MessageOrder
 
 TICK_US = 50_000
+BEGIN_US = 10_000_000  # vehicle time; the preparation of a vehicle with an exchange begins at a multiple
+ARM_US = 5_000_000  # vehicle time; such a vehicle is armed right after a multiple
 TICK_LOST_S = 0.5  # wall time; a tick whose telemetry has not arrived by then was lost on the link
 _MAX_LOST_IN_A_ROW = 10
 LAG_GROWTH_S = 2e-5  # with each attitude: 1 ms a second, more than clocks differ
@@ -282,6 +284,10 @@ class TelemetryFeed:
             self._loop = None
 
 
+def _next_multiple_us(tick_number: int, period_us: int) -> int:
+    return -(-tick_number * TICK_US // period_us) * period_us
+
+
 def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Any, _user: object) -> None:  # noqa: ANN401
     """Take the mode in an autopilot's HEARTBEAT, of `mavlink_direct`."""
     if heartbeat.component_id == AUTOPILOT_COMPONENT_ID:
@@ -381,17 +387,20 @@ class TickSource:
             self._number = await self._clock.stop() // TICK_US
             self.waits = True
 
-    async def begin_on_grid(self, period_us: int, exchange: TickExchange) -> None:
-        """As `begin`, then let time pass to a multiple of a period: so all flights begin at the same time.
-
-        From then on the exchange goes around each tick.
-        """
+    async def begin_exchange(self, exchange: TickExchange) -> None:
+        """As `begin`, at a multiple of `BEGIN_US`; from then on the exchange goes around each tick."""
         await self.begin()
-        clock, end_us = self._clock, -(-self._number * TICK_US // period_us) * period_us
+        clock, end_us = self._clock, _next_multiple_us(self._number, BEGIN_US)
         while clock is not None and self._number * TICK_US < end_us:
             self._number += 1
             await clock.advance(self._number * TICK_US, None)
         self.exchange = exchange
+
+    async def pass_to_arming(self) -> None:
+        """Let time pass to a multiple of `ARM_US`: so all flights begin at the same time."""
+        end_us = _next_multiple_us(self._number, ARM_US)
+        while self._number * TICK_US < end_us and await self.next(TICK_LOST_S):
+            pass
 
     async def next(self, timeout_s: float, command: VelocityCommand | None = None) -> bool:
         """Wait for the next tick; the feed's `sample` belongs to it then. False if there was none.

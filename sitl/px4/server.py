@@ -22,7 +22,7 @@ _OWN_TIME = ("commander", "mavlink_if1")
 """Threads that PX4's lockstep does not wait for: its state machine, and what sends to UDP 14540."""
 _IDLE_S = 0.1  # wall time for which a step waits until PX4's threads have done their work
 _FIRST_S = 0.3  # wall time in which its start-up script comes to waiting for them
-_IDLE_START_S = 5.0  # likewise, while it starts
+_IDLE_START_S = 2.0  # likewise, while it starts
 _READY_US = 7_000_000  # by which PX4 can be armed
 _WAITING_SPEED = 0.2  # simulated seconds a second; a heartbeat still comes every 5 s
 _ENDING_S = 1.0  # wall time in which a PX4 that has closed the connection ends

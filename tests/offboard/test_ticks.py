@@ -145,10 +145,16 @@ async def test_what_was_sent_is_exchanged_before_and_after_each_tick(feed):
     assert order == [("before", 0), ("after", 1)]
 
 
-async def test_a_flight_can_begin_at_a_multiple_of_a_period_whenever_the_app_is_ready(feed):
+async def test_a_flight_begins_and_arms_at_multiples_of_a_period_whenever_the_app_is_ready(feed):
     clock, source = Clock(feed), TickSource(feed)
+
+    async def nothing():
+        pass
+
     source.use_clock(clock)
-    await source.begin_on_grid(2_000_000, None)
-    assert clock.granted[-1] == (2_000_000, None)
+    await source.begin_exchange(SimpleNamespace(before_tick=nothing, after_tick=nothing))
+    assert clock.granted[-1] == (10_000_000, None)
     assert await source.next(1.0)
-    assert feed.sample.time_us == 2_050_000
+    assert feed.sample.time_us == 10_050_000
+    await source.pass_to_arming()
+    assert feed.sample.time_us == 15_000_000
