@@ -152,8 +152,7 @@ class MavsdkDrone:
         self._recorder = await open_connections(
             self._mavsdk, (*self._shared_with, self._url.text), self._tlog_path, self._companion
         )
-        system: Any = await self._mavsdk.first_autopilot(self._connect_limit_s)
-        if system is None:
+        if (system := await self._mavsdk.first_autopilot(self._connect_limit_s)) is None:
             raise DroneError(
                 f"no vehicle was found on {self._url.text} within {self._connect_limit_s:g} s; "
                 "is it running and sending to this address?"
@@ -176,8 +175,8 @@ class MavsdkDrone:
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then determine the axes."""
-        limit_s, exchange = self._ready_limit_s or self._stream.ready_limit_s, self._stream.exchange
-        if exchange is not None:
+        limit_s = self._ready_limit_s or self._stream.ready_limit_s
+        if (exchange := self._stream.exchange) is not None:
             await self._ticks.begin_exchange(exchange)
             await self._ticks.until_done(self._requests.wait(self._stream.request_streams()))
         try:
@@ -212,8 +211,8 @@ class MavsdkDrone:
                         await self._requests.wait(self._stream.request_offboard())
                     await self._becomes(lambda: self._in_offboard, HOLD_SHOWN_S)
         with contextlib.suppress(TimeoutError):  # with an exchange its checks have had their time
-            first_s = 0.0 if self._stream.exchange else min(FIRST_MODE_S, limit_s / 2)
-            await self._until(lambda: not self._feed.missing(), first_s)
+            first_s = 0.0 if self._stream.exchange else FIRST_MODE_S
+            await self._until(lambda: not self._feed.missing(), min(first_s, limit_s / 2))
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
             await self._request("offboard mode", self._stream.request_offboard())
