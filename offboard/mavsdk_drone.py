@@ -21,7 +21,7 @@ from offboard.link.companion import Companion
 from offboard.link.connections import new_mavsdk, open_connections
 from offboard.link.dialect import Dialect
 from offboard.link.reported_state import reported_state
-from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, request_rates
+from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, pose_of, request_rates
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
@@ -194,7 +194,7 @@ class MavsdkDrone:
             await request_rates(self._feed, self._telemetry)
         else:
             await self._ticks.pass_to_arming()
-        self._alignment = Alignment(self._start_arena, self._feed.pose)
+        self._alignment = Alignment(self._start_arena, pose_of(self._feed))
         await self._ticks.begin()
 
     async def _wait_for_checks(self, limit_s: float) -> None:

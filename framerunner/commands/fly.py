@@ -139,9 +139,8 @@ def fly(
 
     loaded = load_mission_with(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, hardware, starts=drone is None, lockstep=lockstep, px4=px4)
-    plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    plan = _calibrated(plan, calibration, drone)
-    plan = replace(plan, caps=caps_of(hardware, drone), answers_late=px4 is not None)
+    plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits, px4=px4)
+    plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
     real_time = RealTimeSettings(drone, camera, api, speed, instance, px4, camera_delay, procedure)
     ends = (plan, None if lockstep else real_time, out, record, video, monitor, monitor_link)
     return _run(FlightSettings(*ends), lifeline=lifeline)
@@ -207,6 +206,7 @@ def _plan(
     response: str | None,
     drone: str | None,
     drone_limits: str | None,
+    px4: Path | None,
 ) -> FlightPlan:
     """The flight that the options describe; a seed is given in lockstep."""
     from framerunner.commands.named_numbers import limits_of, response_of
@@ -233,6 +233,7 @@ def _plan(
         seed,
         drone_limits=None if drone_limits is None else limits_of(drone_limits),
         response=None if response is None else response_of(response),
+        answers_late=px4 is not None,
     )
 
 

@@ -31,6 +31,38 @@ _POSITIONS_HZ = 50.0
 _FORCED = 21196.0  # disarming in the air
 
 
+class _Echo:
+    """PINGs that PX4 returns in turn with the other messages that it receives."""
+
+    def __init__(self, messages: DirectMessages, direct: Any) -> None:  # noqa: ANN401
+        self._messages = messages
+        self._loop = asyncio.get_running_loop()
+        self._sequence = 0
+        self._echo: asyncio.Future[None] | None = None
+        synchronous(direct).subscribe_message("PING", self._on_ping)
+
+    async def wait(self) -> None:
+        """Send a PING, and wait until it comes back; PX4 returns it in turn."""
+        end_s = time.monotonic() + ECHO_LIMIT_S
+        self._sequence += 1
+        self._echo = echo = self._loop.create_future()
+        while not echo.done():
+            if time.monotonic() > end_s:
+                raise DroneError(f"link lost: PX4 has not returned a PING for {ECHO_LIMIT_S:g} s")
+            self._messages.send_ping(self._sequence)
+            await asyncio.wait((echo,), timeout=_ECHO_AGAIN_S)
+
+    def _on_ping(self, message: Any, _user: object) -> None:  # noqa: ANN401
+        """On MAVSDK's thread. PX4 sends PINGs of its own, too, to nobody."""
+        fields = json.loads(message.fields_json)
+        if fields["target_system"]:
+            self._loop.call_soon_threadsafe(self._returned, fields["seq"])
+
+    def _returned(self, sequence: int) -> None:
+        if self._echo is not None and sequence == self._sequence and not self._echo.done():
+            self._echo.set_result(None)
+
+
 class SteppedPx4Dialect:
     """One PX4, by MAVSDK's plugin `mavlink_direct`; see the module and `Dialect`.
 
@@ -53,12 +85,9 @@ class SteppedPx4Dialect:
         self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
         self._sent_since_tick = False
         self._interval_requested = False  # since the last tick
-        self._sequence = 0
-        self._echo: asyncio.Future[None] | None = None
+        self._echo = _Echo(self._messages, direct)
         self._answers: dict[int, asyncio.Future[int]] = {}  # by the number of the command
-        plugin = synchronous(direct)
-        plugin.subscribe_message("PING", self._on_ping)
-        plugin.subscribe_message("COMMAND_ACK", self._on_answer)
+        synchronous(direct).subscribe_message("COMMAND_ACK", self._on_answer)
 
     @property
     def exchange(self) -> TickExchange:
@@ -74,11 +103,11 @@ class SteppedPx4Dialect:
             self._interval_requested = False
             await asyncio.sleep(_TAKEN_S)
         else:
-            await self._settle()
+            await self._echo.wait()
 
     async def after_tick(self) -> None:
         """Wait until all that PX4 has sent has been taken here."""
-        await self._settle()
+        await self._echo.wait()
         for _ in range(_TURNS):
             await asyncio.sleep(0)
 
@@ -133,17 +162,6 @@ class SteppedPx4Dialect:
         """End the setpoints permanently; from any thread."""
         self.ended, self._command = True, None
 
-    async def _settle(self) -> None:
-        """Send a PING, and wait until it comes back; PX4 returns it in turn."""
-        end_s = time.monotonic() + ECHO_LIMIT_S
-        self._sequence += 1
-        self._echo = echo = self._loop.create_future()
-        while not echo.done():
-            if time.monotonic() > end_s:
-                raise DroneError(f"link lost: PX4 has not returned a PING for {ECHO_LIMIT_S:g} s")
-            self._messages.send_ping(self._sequence)
-            await asyncio.wait((echo,), timeout=_ECHO_AGAIN_S)
-
     def _set_mode(self, mode: Px4Mode) -> Awaitable[None]:
         return self._request(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(mode.main), float(mode.sub))
 
@@ -152,16 +170,6 @@ class SteppedPx4Dialect:
         self._answers[number] = answer
         self._messages.send_command(number, *parameters)
         return _accepted(answer)
-
-    def _on_ping(self, message: Any, _user: object) -> None:  # noqa: ANN401
-        """On MAVSDK's thread. PX4 sends PINGs of its own, too, to nobody."""
-        fields = json.loads(message.fields_json)
-        if fields["target_system"]:
-            self._loop.call_soon_threadsafe(self._returned, fields["seq"])
-
-    def _returned(self, sequence: int) -> None:
-        if self._echo is not None and sequence == self._sequence and not self._echo.done():
-            self._echo.set_result(None)
 
     def _on_answer(self, message: Any, _user: object) -> None:  # noqa: ANN401
         fields = json.loads(message.fields_json)

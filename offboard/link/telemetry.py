@@ -133,11 +133,6 @@ class TelemetryFeed:
         plugin.subscribe_health(self._on_health)
         plugin.subscribe_status_text(self._on_text)
 
-    @property
-    def pose(self) -> Pose:
-        """Where the vehicle is, in its local NED axes."""
-        return Pose(self.position_ned_m, self.yaw_ned_rad)
-
     async def next_tick(self, timeout_s: float) -> bool:
         """Wait for the next tick; False if there was none within `timeout_s` of wall time.
 
@@ -282,6 +277,11 @@ class TelemetryFeed:
             loop.call_soon_threadsafe(self._new_tick.set)
         except RuntimeError:  # closed between the test and the call
             self._loop = None
+
+
+def pose_of(feed: TelemetryFeed) -> Pose:
+    """Where the vehicle is, in its local NED axes."""
+    return Pose(feed.position_ned_m, feed.yaw_ned_rad)
 
 
 def _next_multiple_us(tick_number: int, period_us: int) -> int:
