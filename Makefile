@@ -133,6 +133,10 @@ lock: ## choose newer versions of everything installed (needs uv)
 	$(LOCK_PROJECT) --constraint locks/dev.txt --extra all --extra dask --extra gym --extra postgresql -o locks/extras.txt
 	$(LOCK) --upgrade locks/mavproxy.in --override locks/mavproxy-without.txt -o locks/mavproxy.txt
 
+.PHONY: check-pi
+check-pi: $(VENV)/installed-dev ## ask the registry whether a Raspberry Pi can install it without a compiler
+	$(BIN)/python -m tests.locks.check_wheels locks/framerunner.txt
+
 .PHONY: clean
 clean: ## remove what was installed and built; runs/ is kept
 	rm -rf $(VENV) $(MAVPROXY_VENV) $(BENCH_VENV) web/node_modules build dist *.egg-info

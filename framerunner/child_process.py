@@ -141,7 +141,9 @@ class MonitorProcess(ChildProcess):
         port = _free_port()
         self.link = f"udpout://127.0.0.1:{port}"  # to which the drones' packets are to be sent
         arguments = ["monitor", "--lifeline", "--drone", f"udpin://127.0.0.1:{port}"]
-        self._folder = TemporaryDirectory(prefix="framerunner-monitor-")
+        self._folder = TemporaryDirectory(prefix="framerunner-monitor-")  # only this user may read it
+        self.operator_socket = Path(self._folder.name) / "operator.sock"
+        arguments += ["--operator-socket", str(self.operator_socket)]
         if scenario is not None:
             # It reads the scenario that was checked here, even if the user's file changes.
             path = Path(self._folder.name) / "scenario.yaml"

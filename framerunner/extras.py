@@ -27,8 +27,13 @@ def is_installed(module: str) -> bool:
 def install_advice(module: str) -> str | None:
     """The command that installs a missing module such as "matplotlib.figure", as one clause for people.
 
-    None if the module is in none of this project's extras.
+    None if the module is in none of this project's extras, nor left out on this processor.
     """
     package = module.partition(".")[0]
+    if package == "jsbsim":
+        return (
+            "jsbsim is not installed: the registry has none for this processor, so nothing can be simulated "
+            "here; simulate on another computer, or build it (pip install jsbsim, needs CMake and a compiler)"
+        )
     extra = _EXTRAS.get(package)
     return None if extra is None else f"{package} is not installed; pip install 'framerunner[{extra}]'"

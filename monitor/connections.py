@@ -19,6 +19,7 @@ from uvicorn.server import ServerState
 from monitor.addresses import Places
 from monitor.settings import ConnectionLimits
 
+_UNSENT_BYTES = 1 << 16  # that wait for a slow client until the sender waits, too
 _OTHER_FILES = 200  # file descriptors reserved for links, databases, recordings and libraries
 
 Peer = tuple[str, int]
@@ -98,6 +99,7 @@ class Gate(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Accept or refuse the connection."""
         self._transport = cast(asyncio.Transport, transport)
+        self._transport.set_write_buffer_limits(_UNSENT_BYTES)  # over TLS it would be 512 kB
         peername = transport.get_extra_info("peername")
         if not peername:  # closed already
             self._transport.abort()

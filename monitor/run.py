@@ -39,9 +39,16 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
         await asyncio.to_thread(_import_server)
         from monitor.server import assemble, make_server  # noqa: PLC0415 - see above
 
+        certificate = None
+        if settings.certificate is not None:
+            from monitor.tls import load_certificate  # noqa: PLC0415 - see above
+
+            certificate = load_certificate(settings.certificate, settings.key)
         host, port = listener.getsockname()[:2]
-        reachable = urls_for_people(host, port)
-        urls = reachable or [url_of("127.0.0.1", port)]
+        reachable = urls_for_people(host, port, settings.scheme)
+        urls = reachable or [url_of("127.0.0.1", port, settings.scheme)]
+        if certificate is not None and is_for_others(host):
+            urls = certificate.urls(urls, port)
         qr_codes = settings.qr_codes and bool(reachable) and is_for_others(host)
 
         def invite(secret: str) -> None:
@@ -55,12 +62,18 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
                 say(f"monitor: {url}")
             if not reachable:
                 say("this machine is in no network: phones cannot open it yet")
+            if certificate is not None:
+                for remark in certificate.remarks(urls):
+                    say(f"warning: {remark}")
+            elif is_for_others(host):
+                say("without --certificate, log-ins and sticks are sent as plain text")
             if qr_codes:
                 say(f"viewers' phones read it here, or at {urls[0]}join\n{terminal_code(urls[0])}")
             monitor.access.invite()
 
         monitor = assemble(equipment, settings, (host, port), invite)
-        server = make_server(monitor.web, settings, started)
+        tls = None if certificate is None else certificate.context
+        server = make_server(monitor.web, settings, started, tls)
         await _run(server, listener, [monitor.fleet.run, *monitor.jobs])
 
 

@@ -95,7 +95,7 @@ class Guard:
         if len(headers.getlist("host")) != 1 or not _is_host(host):
             return "the Host header names no host"
         if self._local_only and not _is_local(host):
-            return "the monitor listens on this machine only: open it as http://127.0.0.1 or http://localhost"
+            return "the monitor listens on this machine only: open it as 127.0.0.1 or localhost"
         if self._local_only and any(name in headers for name in _FORWARDED):
             return "a proxy passed this on: start the monitor with --trusted-proxy and the proxy's address"
         origin = headers.get("origin")

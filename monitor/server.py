@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import ssl
 from collections.abc import Callable, Coroutine, Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,12 +20,14 @@ from starlette.types import ASGIApp
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from monitor.access import Access, SessionFile, session_path
+from monitor.addresses import Places
 from monitor.connections import Connections, Gate
 from monitor.fleet import Fleet
 from monitor.pages.static_files import StaticBundles
 from monitor.ports import Equipment
 from monitor.security import Guard
 from monitor.settings import BACKLOG, MonitorSettings
+from monitor.tls import OnlyTls, TlsDoor
 
 Job = Callable[[], Coroutine[Any, Any, None]]
 
@@ -33,6 +36,7 @@ MODULES = (
     "monitor.live_channel",
     "monitor.video_proxy",
     "monitor.pilot_channel",
+    "monitor.operator_channel",
     "monitor.replay_api",
     "monitor.extensions",
     "monitor.competition.api",
@@ -115,6 +119,8 @@ def assemble(
         kept=SessionFile(path, cookie) if path is not None else None,
     )
     web = FastAPI(title="framerunner", docs_url=None, redoc_url=None, openapi_url=None)
+    if settings.certificate is not None:
+        web.add_middleware(OnlyTls, port=place[1])
     web.add_middleware(Guard, local_only=local_only, limits=settings.limits)
     monitor = Monitor(settings, equipment, Fleet(equipment), access, place, web)
     web.mount("/static", StaticBundles())
@@ -123,8 +129,10 @@ def assemble(
     return monitor
 
 
-def make_server(web: ASGIApp, settings: MonitorSettings, started: Callable[[], None]) -> uvicorn.Server:
-    """The server of a web application; `started` is called when it listens."""
+def make_server(
+    web: ASGIApp, settings: MonitorSettings, started: Callable[[], None], tls: ssl.SSLContext | None = None
+) -> uvicorn.Server:
+    """The server of a web application, with TLS if that is given; `started` is called when it listens."""
     proxies = [ip_network(each) for each in settings.trusted_proxies]
 
     def is_proxy(address: str) -> bool:
@@ -133,9 +141,13 @@ def make_server(web: ASGIApp, settings: MonitorSettings, started: Callable[[], N
     connections = Connections(settings.limits, is_proxy)
     if proxies:
         web = cast(ASGIApp, ProxyHeadersMiddleware(cast(Any, web), [str(each) for each in proxies]))
+    gate: Callable[..., asyncio.Protocol] = partial(Gate, connections)
+    if tls is not None:
+        knocking = Places(settings.limits.total, settings.limits.per_address)
+        gate = partial(TlsDoor, tls, connections, knocking)
     config = uvicorn.Config(
         cast(Any, connections.watch(web)),
-        http=cast(Any, partial(Gate, connections)),
+        http=cast(Any, gate),
         log_config=None,
         log_level="critical",
         access_log=False,

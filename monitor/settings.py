@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from errors import UserError
 from monitor.addresses import is_address_or_network
@@ -42,6 +43,9 @@ class MonitorSettings:
         trusted_proxies: addresses or networks whose X-Forwarded-For and X-Forwarded-Proto are used.
         limits: of connections.
         qr_codes: print addresses as QR codes too.
+        operator_socket: local socket at which flights with an operator connect; None: none does.
+        certificate: PEM file with which pages are served over TLS; None: over plain HTTP.
+        key: PEM file of its private key; None: it is in the certificate's file.
     """
 
     bind: str = "127.0.0.1"
@@ -51,6 +55,14 @@ class MonitorSettings:
     trusted_proxies: tuple[str, ...] = ()
     limits: ConnectionLimits = ConnectionLimits()
     qr_codes: bool = False
+    operator_socket: Path | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+
+    @property
+    def scheme(self) -> str:
+        """Of its URLs."""
+        return "http" if self.certificate is None else "https"
 
     def check(self) -> None:
         """Raise `MonitorError` if a value is out of its range."""
@@ -63,6 +75,8 @@ class MonitorSettings:
                 f"monitor: FRAMERUNNER_JUDGE_PASSWORD has {len(self.password)} characters; "
                 f"use at least {SHORTEST_PASSWORD}, or unset it for one-time links"
             )
+        if self.key is not None and self.certificate is None:
+            raise MonitorError(f"monitor: --key {self.key}: give its certificate too, by --certificate")
         for proxy in self.trusted_proxies:
             if not is_address_or_network(proxy):
                 raise MonitorError(

@@ -22,31 +22,32 @@ _WHITE_ON_BLACK = "\x1b[97;40m"
 _PLAIN = "\x1b[0m"
 
 
-def url_of(host: str, port: int) -> str:
+def url_of(host: str, port: int, scheme: str = "http") -> str:
     """URL of the monitor's first page."""
-    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
+    return f"{scheme}://[{host}]:{port}/" if ":" in host else f"{scheme}://{host}:{port}/"
 
 
-def urls_for_people(host: str, port: int) -> list[str]:
+def urls_for_people(host: str, port: int, scheme: str = "http") -> list[str]:
     """The URLs that open the monitor, the best first.
 
     Args:
         host: IP address that it listens on; an unspecified one (0.0.0.0, ::) stands for all networks.
         port: TCP port.
+        scheme: http or https.
 
     Returns:
         One or more; none for an unspecified `host` on a machine without a network.
     """
     if not ip_address(host).is_unspecified:
-        return [url_of(host, port)]
+        return [url_of(host, port, scheme)]
     found = network_addresses(ifaddr.get_adapters(), _default_address())
     usable = [each for each in found if ":" not in each or ":" in host]
-    return [url_of(each, port) for each in usable]
+    return [url_of(each, port, scheme) for each in usable]
 
 
-def urls_for_visitor(host: str, port: int, requested: str) -> list[str]:
+def urls_for_visitor(host: str, port: int, requested: str, scheme: str = "http") -> list[str]:
     """As `urls_for_people`, but first the scheme and host of a visitor's request, unless it is loopback."""
-    urls = urls_for_people(host, port)
+    urls = urls_for_people(host, port, scheme)
     parts = urlsplit(requested)
     theirs = f"{parts.scheme}://{parts.netloc}/"
     if is_loopback(parts.hostname or "localhost"):

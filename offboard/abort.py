@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import Callable
 
 from offboard.drone import Drone, DroneError, DroneState
+from offboard.safety.operator import Phase
 from offboard.safety.rules import SafetyRules
 
 ATTEND_US = 120_000_000  # vehicle time for which an operator may stop the motors after an abort
 LINK_LOSSES = 10  # a second each, after which the drone is not watched any more
 KILL_ATTEMPTS = 3  # a link may lose the request or its answer
+logger = logging.getLogger(__name__)
 
 
 class FlightAbort:
@@ -28,12 +31,17 @@ class FlightAbort:
         self._safety = safety
         self._see = see
         self._end_us: int | None = None  # vehicle time until which the drone is watched
+        self._armed = True  # when it was seen last
+        self._holds = False
+        self._held_mode = ""  # in which it was first seen after hold was requested
+        self._hold_end_us: int | None = None
 
     async def bring_down(self) -> str:
         """Hold or land, as the rules and the operator say.
 
         An operator's first stop lands whatever the rules say, the second one stops the motors. With an
-        operator this returns when the drone is disarmed, when the link stays lost, or after `ATTEND_US`.
+        operator this returns when the drone is disarmed, when the link stays lost, or after `ATTEND_US`, and
+        a drone that holds lands after the rules' time.
 
         Returns:
             What is to be told beside the reason of the abort; empty if nothing.
@@ -42,6 +50,8 @@ class FlightAbort:
         if operator is None:
             return await self._end()
         while not operator.kills:
+            if operator.stops:
+                logger.warning("the operator stops the flight: the drone lands; K stops its motors")
             stops = operator.stops
             work = asyncio.ensure_future(self._end_and_attend())
             operator.on_stop(work.cancel)  # not this task: a stop while the work ends must not be lost
@@ -55,12 +65,26 @@ class FlightAbort:
 
     async def _end_and_attend(self) -> str:
         problem = await self._end()
+        if not await self._attend():
+            return problem
+        hold_s = self._safety.hold_s
+        logger.warning("held for %g s; it lands now", hold_s)
+        self._hold_end_us, self._end_us = None, None
+        self._show("landing")
+        try:
+            await self._drone.land_now(demanded=True)  # it is still in the hold that was requested here
+        except DroneError as error:
+            problem = f"land after {hold_s:g} s of hold: {error}"
         await self._attend()
-        return problem
+        landed = "" if self._armed else f"it held for {hold_s:g} s, then landed"  # a pilot may have it
+        return problem or landed
 
     async def _end(self) -> str:
         operator, abort = self._safety.operator, self._safety.abort
         demanded = operator is not None and operator.stops > 0
+        holds = abort == "hold" and not demanded
+        self._holds = holds and operator is not None
+        self._show("holding" if holds else "landing")
         try:
             if abort == "land" or demanded:
                 await self._drone.land_now(demanded=demanded)
@@ -70,34 +94,54 @@ class FlightAbort:
             return f"{'land' if demanded else abort}: {error}"
         return ""
 
-    async def _attend(self) -> None:
-        """Watch the drone until it is disarmed; a link that is lost may come back."""
+    def _show(self, phase: Phase) -> None:
+        if self._safety.operator is not None:
+            self._safety.operator.phase = phase
+
+    async def _attend(self) -> bool:
+        """Watch the drone until it is disarmed; a link that is lost may come back.
+
+        Returns:
+            Whether it still holds after the time for which it may.
+        """
         for _ in range(LINK_LOSSES):
             with contextlib.suppress(DroneError):
-                await self._watch()
-                return
+                return await self._watch()
+        return False
 
-    async def _watch(self) -> None:
+    async def _watch(self) -> bool:
+        """See the ticks to the end; True: it has held for as long as it may."""
         ticks = self._drone.ticks()
         try:
             async for state in ticks:
                 if self._end_us is None:
                     self._end_us = state.time_us + ATTEND_US
+                if self._holds and self._hold_end_us is None:
+                    self._held_mode = state.mode
+                    self._hold_end_us = state.time_us + round(self._safety.hold_s * 1e6)
+                self._armed = state.armed
                 if not state.armed or state.time_us > self._end_us:
-                    return
+                    return False
+                # A failsafe or a pilot who has taken it keeps it.
+                if self._holds and state.mode == self._held_mode and state.time_us > (self._hold_end_us or 0):
+                    self._holds = False
+                    return True
                 self._see(state)
         finally:
             close = getattr(ticks, "aclose", None)
             if close is not None:
                 await close()
+        return False
 
     async def _kill(self) -> str:
         problem = ""
+        self._show("motors stopped")
         for _ in range(KILL_ATTEMPTS):
             try:
                 await self._drone.motors_off()
             except DroneError as error:
                 problem = f"stopping the motors: {error}"
             else:
+                logger.warning("the operator stopped the motors")
                 return "the operator stopped the motors"
         return problem

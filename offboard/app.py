@@ -19,7 +19,7 @@ from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.view import NavigationView
 from offboard.perception import CameraLostError, CameraSilentError, Perception
 from offboard.pilot import Imu
-from offboard.safety.operator import GO_WORDS, STOPPED
+from offboard.safety.operator import GO_WORDS
 from offboard.safety.rules import SIMULATED, SafetyRules
 from vision.types import Detections
 
@@ -176,10 +176,11 @@ class _Flight:
         operator.on_stop(task.cancel)
         try:
             if operator.stops:
-                return self._outcome("aborted", STOPPED)
+                return self._outcome("aborted", operator.stop_words)
             return await self._run()
         finally:
             operator.on_stop(None)
+            operator.phase = "ended"
 
     async def _run(self) -> MissionEnd:
         try:
@@ -205,7 +206,8 @@ class _Flight:
     @property
     def _interruption(self) -> str:
         """Who has cancelled the flight."""
-        return STOPPED if self._operator is not None and self._operator.stops else INTERRUPTED
+        operator = self._operator
+        return operator.stop_words if operator is not None and operator.stops else INTERRUPTED
 
     async def _wait_for_go(self) -> None:
         """Wait for the operator's go, while link and camera are watched."""
@@ -214,7 +216,9 @@ class _Flight:
             return
         operator.ask_for_go()
         if operator.has_go:
+            operator.phase = "flying"
             return
+        operator.phase = "waiting"
         ticks, began_us = self._drone.ticks(), None
         try:
             async for state in ticks:
@@ -223,6 +227,7 @@ class _Flight:
                 if state.armed:
                     raise DroneError("the vehicle was armed by others while it waited for the go; disarm it")
                 if operator.has_go:
+                    operator.phase = "flying"
                     return
                 began_us = state.time_us if began_us is None else began_us
                 if state.time_us - began_us > GO_LIMIT_US:
@@ -410,6 +415,9 @@ class _Flight:
         """Stop commanding, and hold or land."""
         if self._motors_requested:
             self._flying = False
+            operator = self._operator
+            if operator is not None and operator.needs_go and not operator.stops:
+                logger.warning("the flight is aborted: %s; SPACE lands, then K stops the motors", reason)
 
             def see(state: DroneState) -> None:
                 self._observe(state, STILL, Detections())

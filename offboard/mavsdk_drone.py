@@ -21,11 +21,12 @@ from offboard.link.companion import Companion
 from offboard.link.connections import new_mavsdk, open_connections
 from offboard.link.dialect import Dialect
 from offboard.link.reported_state import reported_state
-from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, pose_of, request_rates
+from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, pose_of
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
 from offboard.safety.caps import CapKeeper, Caps
+from offboard.safety.rules import AbortAction
 from wire.transports.sockets import check_free
 from wire.transports.urls import LinkError, parse_url
 
@@ -65,6 +66,7 @@ class MavsdkDrone:
         corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
         caps: no command exceeds them, and none leads out of the box; None: there are none.
         system_id: of the vehicle that was checked, by MAVLink; no other one is flown. None: any.
+        when_hung: what is requested for a vehicle in offboard when this app hangs.
 
     Attributes:
         recording_problem: why recording ended before the flight; set by `disconnect`.
@@ -85,6 +87,7 @@ class MavsdkDrone:
         corrects: bool = True,
         caps: Caps | None = None,
         system_id: int | None = None,
+        when_hung: AbortAction = "hold",
     ) -> None:
         self.recording_problem = ""
         self._url = parse_url(url)
@@ -111,6 +114,7 @@ class MavsdkDrone:
         self._recorder: TlogRecorder | None = None
         self._companion: Companion | None = None
         self._watchdog = Watchdog(self._stand_still, self._stop_from_watchdog, hang_report)
+        self._when_hung, self._asked_when_hung = when_hung, "stopped sending"
         self._shared_with: list[str] = []
         self._box = box
         self._caps = None if caps is None else CapKeeper(caps, box)
@@ -167,18 +171,15 @@ class MavsdkDrone:
                 component.announce(system_id)
         self._telemetry = TelemetryAsync(system)
         self._direct = MavlinkDirectAsync(system)
-        self._dialect = await open_dialect(system, self._direct, self._feed, stepped=self._ticks.steps)
-        telemetry = synchronous(self._telemetry)
-        self._feed.subscribe(telemetry, synchronous(self._direct), self._dialect.numbered_modes)
-        if self._dialect.exchange is None:
-            await self._requests.wait(self._dialect.request_streams())
+        self._dialect = new = await open_dialect(system, self._direct, self._feed, stepped=self._ticks.steps)
+        self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct), new.numbered_modes)
+        if new.exchange is None:
+            await self._requests.wait(new.request_streams())
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then determine the axes."""
         limit_s = self._ready_limit_s or self._stream.ready_limit_s
-        if (exchange := self._stream.exchange) is not None:
-            await self._ticks.begin_exchange(exchange)
-            await self._ticks.until_done(self._requests.wait(self._stream.request_streams()))
+        await self._ticks.begin_exchange(self._stream, self._requests)
         try:
             await self._wait_for_checks(limit_s)
         except TimeoutError:
@@ -190,10 +191,7 @@ class MavsdkDrone:
             ) from None
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        if exchange is None:
-            await request_rates(self._feed, self._telemetry)
-        else:
-            await self._ticks.pass_to_arming()
+        await self._ticks.before_arming(self._telemetry)
         self._alignment = Alignment(self._start_arena, pose_of(self._feed))
         await self._ticks.begin()
 
@@ -211,8 +209,8 @@ class MavsdkDrone:
                         await self._requests.wait(self._stream.request_offboard())
                     await self._becomes(lambda: self._in_offboard, HOLD_SHOWN_S)
         with contextlib.suppress(TimeoutError):  # with an exchange its checks have had their time
-            first_s = 0.0 if self._stream.exchange else FIRST_MODE_S
-            await self._until(lambda: not self._feed.missing(), min(first_s, limit_s / 2))
+            first_s = 0.0 if self._stream.exchange else min(FIRST_MODE_S, limit_s / 2)
+            await self._until(lambda: not self._feed.missing(), first_s)
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
             await self._request("offboard mode", self._stream.request_offboard())
@@ -421,8 +419,8 @@ class MavsdkDrone:
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s
-        if hung_s:
-            did = "stopped sending" if self._stream.ended else "requested hold"
+        if hung_s and self._commanding:  # afterwards the vehicle is only watched
+            did = self._asked_when_hung
             raise DroneError(f"this app hung for more than {hung_s:.1f} s; its watchdog {did}")
         if self._ticks.waits:
             if not tick_received:
@@ -489,12 +487,14 @@ class MavsdkDrone:
                 await self._ticks.next(0.05)
 
     def _stop_from_watchdog(self) -> None:
-        """On the watchdog's thread: end the native stream and, in offboard, request hold.
+        """On the watchdog's thread: end the native stream and, in offboard, request hold or landing.
 
         A vehicle that a pilot has must not be given back to a hung app, so the stream ends permanently.
         """
         with contextlib.suppress(Exception):  # without setpoints the vehicle's failsafe acts
-            if self._in_offboard:
-                self._stream.request_hold_blocking()
-            else:
+            if not self._in_offboard:
                 self._stream.end()
+                return
+            lands = self._when_hung == "land"
+            self._asked_when_hung = "requested landing" if lands else "requested hold"
+            (self._stream.request_land_blocking if lands else self._stream.request_hold_blocking)()

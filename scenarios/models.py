@@ -11,6 +11,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from errors import UserError
+from geometry.axes import flip_quaternion
+from geometry.rotations import quaternion_from_euler
 from geometry.solids import Solid
 from geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.air import Wind
@@ -425,10 +427,30 @@ class Scenario(Part):
 
 @dataclass(frozen=True, slots=True)
 class CameraMotion:
-    """How a camera on a gimbal looks and turns."""
+    """How a camera on a gimbal looks and turns. Angles are kept; the rest is computed for exposures only.
 
-    attitude_arena: Quaternion  # forward-left-up of the camera to arena
-    rate_frd_rad_s: Vec3  # angular velocity in the camera's axes forward, right, down
+    Attributes:
+        pitch_rad: to the horizon, up is positive.
+        yaw_ned_rad: to north, clockwise from above.
+        pitch_rate_rad_s: of `pitch_rad`.
+        yaw_rate_rad_s: of `yaw_ned_rad`.
+    """
+
+    pitch_rad: float
+    yaw_ned_rad: float
+    pitch_rate_rad_s: float
+    yaw_rate_rad_s: float
+
+    @property
+    def attitude_arena(self) -> Quaternion:
+        """Forward-left-up of the camera to arena axes."""
+        return flip_quaternion(quaternion_from_euler(0.0, self.pitch_rad, self.yaw_ned_rad))
+
+    @property
+    def rate_frd_rad_s(self) -> Vec3:
+        """Angular velocity in the camera's axes forward, right, down."""
+        yaw_rate, pitch_rad = self.yaw_rate_rad_s, self.pitch_rad
+        return (-yaw_rate * sin(pitch_rad), self.pitch_rate_rad_s, yaw_rate * cos(pitch_rad))
 
 
 @dataclass(slots=True)

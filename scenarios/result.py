@@ -174,6 +174,7 @@ class FaultFacts(_Record):
 
     begun: tuple[BegunFault, ...] = Field((), max_length=1000)
     failsafes: tuple[FailsafeText, ...] = Field((), max_length=1000)
+    autopilot: Text = ""  # PX4 or ArduPilot, if a genuine one flies the simulated drone
 
 
 class _Flown(_Record):
@@ -212,6 +213,9 @@ class FlightResult(RefereeReport, _Flown):
     judged_by: Text = Field("", description="source of the referee's states: truth or telemetry")
     response: Text = Field(
         "", description="how late the simulated vehicle answered, as by --response; empty: not late"
+    )
+    autopilot: Text = Field(
+        "", description="PX4 or ArduPilot, if a genuine one flew the simulated drone; empty otherwise"
     )
     faults: tuple[Text, ...] = Field(
         (), max_length=1000, description="faults that began, each as in --fault; its time counts from arming"

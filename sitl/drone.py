@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Callable, Sequence
-from math import degrees
 
-from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
+from firmware_py.mavlink.camera.model import CameraModel
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from geometry.solids import Solid
 from sitl.drone_files import flight_recorder
@@ -17,11 +15,10 @@ from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.storage import open_storage
 from sitl.streaming.drone_video import DroneVideo
+from sitl.streaming.streams import video_streams
 from sitl.time_grants import TimeGrants, Velocity
 from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink
-from wire.simulator_api import VIDEO_PATH
-from wire.transports.urls import is_loopback
 
 
 class ServedDrone:
@@ -65,7 +62,7 @@ class ServedDrone:
                 system_id=settings.instance + 1,
                 boot_unix_us=boot_unix_us,
                 signing_key=settings.signing_key,
-                video=self._streams(),
+                video=video_streams(self._settings, self.simulation.scenario.camera),
                 storage=storage,
                 shell=settings.shell,
                 log_text=self._recorder.hear_text,
@@ -141,7 +138,7 @@ class ServedDrone:
     async def close(self) -> None:
         """Finish the log, save the parameters, stop the video and close the links."""
         self._recorder.finish(self.simulation.autopilot)
-        self._album.stop_video()
+        self._album.close()
         if self._keeper is not None:
             await self._keeper.close()
         await self._video.close()
@@ -156,30 +153,3 @@ class ServedDrone:
         page = f"http://{settings.bind}:{settings.http_port}/"
         rtp = "" if settings.video_rtp is None else f" and as RTP to UDP {settings.video_rtp[1]}"
         return f"{scenario.airframe} in {scenario.name}: MAVLink to UDP {ports}, video on {page}{rtp}"
-
-    def _streams(self) -> tuple[VideoStream, ...]:
-        """The video streams that the camera component offers; QGroundControl takes the first it can show."""
-        settings, camera = self._settings, self.simulation.scenario.camera
-        common = (camera.width_px, camera.height_px, camera.rate_hz, degrees(camera.horizontal_fov_rad))
-        host = _public_address(settings)
-        page = VideoStream(
-            f"http://{host}:{settings.http_port}{VIDEO_PATH}", VideoEncoding.MJPEG_HTTP, *common
-        )
-        if settings.video_rtp is None:
-            return (page,)
-        return (VideoStream(str(settings.video_rtp[1]), VideoEncoding.H264_RTP, *common), page)
-
-
-def _public_address(settings: ServerSettings) -> str:
-    """The address under which a ground station reaches this machine, when all addresses are listened on."""
-    if settings.bind != "0.0.0.0":
-        return settings.bind
-    remote = settings.ground.remote
-    if remote is None or is_loopback(remote[0]):
-        return "127.0.0.1"
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(remote)  # sends nothing; the system chooses the route
-            return str(probe.getsockname()[0])
-        except OSError:
-            return "127.0.0.1"

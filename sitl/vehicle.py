@@ -13,7 +13,7 @@ from firmware_py.measurements import ExternalPose, Readings
 from firmware_py.parameters import Parameters
 from firmware_py.types import GeodeticPoint, MotorSpeeds, Sensors
 from geometry.vectors import Vec3
-from scenarios.models import CameraMotion, Scenario, ground_height
+from scenarios.models import Scenario, ground_height
 from scenarios.referee import Referee
 from scenarios.result import BegunFault, FailsafeText, FaultFacts
 from sitl.battery import Battery
@@ -95,7 +95,9 @@ class SimulatedVehicle(ABC):
         self.parameters = Parameters(defaults={**airframe.parameters, **parameter_defaults(suite)})
         self.referee = Referee(scenario, airframe.envelope_m)
         self.battery = Battery(airframe, self.parameters)
-        self.faults = Faults(scenario.faults, suite, self.world, self.battery, seed)
+        self.faults = Faults(
+            scenario.faults, suite, self.world, self.battery, seed, has_transmitter=self.has_transmitter
+        )
         settings = scenario.camera.gimbal
         self.gimbal = None if settings is None else SimulatedGimbal(settings)
         self._battery_due_us = 0
@@ -104,6 +106,9 @@ class SimulatedVehicle(ABC):
         if self.gimbal is not None:
             self._turn_camera(self.gimbal)
         self.referee.update(self.truth)
+
+    autopilot_name = ""  # of a genuine autopilot; empty: our own flies
+    has_transmitter = False  # a pilot's remote control, which can fail
 
     @property
     @abstractmethod
@@ -132,6 +137,7 @@ class SimulatedVehicle(ABC):
                 BegunFault(fault=str(each.fault), began_us=each.time_us, ended_us=each.ended_us)
                 for each in self.faults.begun
             ),
+            autopilot=self.autopilot_name,
             failsafes=tuple(FailsafeText(time_us=time_us, text=text) for time_us, text in self.failsafes),
         )
 
@@ -176,7 +182,7 @@ class SimulatedVehicle(ABC):
 
     def _turn_camera(self, gimbal: SimulatedGimbal) -> None:
         gimbal.step(CONTROL_PERIOD_US / 1e6, self._sensors.attitude)
-        self.truth.camera = CameraMotion(gimbal.attitude_arena, gimbal.rate_frd_rad_s)
+        self.truth.camera = gimbal.motion
 
     def _change_arming(self, armed: bool) -> None:
         if not armed:

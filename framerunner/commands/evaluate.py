@@ -10,19 +10,25 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import DEFAULT_MISSION, WholeNumber, load_mission_with
+from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load_mission_with
+from framerunner.commands.px4 import plan_for_px4
 
 if TYPE_CHECKING:
+    from framerunner.evaluation.backends import Backend, Pool
     from framerunner.evaluation.plan import Plan
+    from framerunner.evaluation.px4_flight import Px4Use
     from offboard.mission import Mission
 
 _COUNT, _SEED = 100, 1
+_PX4_SPEED, _MAX_PX4_SPEED = 4.0, 100.0
 _Level = Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")]
 _CountOption = Annotated[WholeNumber | None, Parameter(help=f"how many scenarios of the level; {_COUNT}")]
 _SeedOption = Annotated[
     WholeNumber | None, Parameter(help=f"of the first scenario; each next one has one more; {_SEED}")
 ]
-_Jobs = Annotated[WholeNumber | None, Parameter(help="flights at once; as many as there are cores")]
+_Jobs = Annotated[
+    WholeNumber | None, Parameter(help="flights at once; as many as there are cores, with --px4 1")
+]
 _Out = Annotated[
     Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
 ]
@@ -31,6 +37,14 @@ _Response = Annotated[
     Parameter(
         help="a vehicle that answers late, lag=0.6,dead-time=0.15,height-wander=0.05 in seconds and metres"
     ),
+]
+_Px4 = Annotated[
+    Path | None,
+    Parameter(help="folder of a PX4 built for SITL: it flies instead of our autopilot, as in `fly --px4`"),
+]
+_Speed = Annotated[
+    float | None,
+    Parameter(help=f"with --px4: simulated seconds a second, if the machine can; {_PX4_SPEED:g}"),
 ]
 _Again = Annotated[bool, Parameter(help="fly again what is in the folder already")]
 _Backend = Annotated[
@@ -46,6 +60,8 @@ def evaluate(
     mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
     pilot: Annotated[Path | None, Parameter(help="Python file with a subclass of Pilot")] = None,
     response: _Response = None,
+    px4: _Px4 = None,
+    speed: _Speed = None,
     jobs: _Jobs = None,
     out: _Out = None,
     again: _Again = False,
@@ -56,8 +72,7 @@ def evaluate(
     """Fly a mission on many scenarios in lockstep; report how often it lands, how well, and why it fails.
 
     Every flight is saved as soon as it is over. Ctrl-C loses none of them: the same command continues where
-    it stopped, and ends with the same results.
-
+    it stopped, and ends with the same results. With --px4 a genuine PX4 flies, whose flights do not repeat.
     Exit code 0: all were flown, 1: a fault of the program ended some of them, 2: bad input.
 
     **Examples**
@@ -72,31 +87,70 @@ def evaluate(
 
         framerunner evaluate test-case-1 test-case-2 calm-17 --jobs 1
 
+        framerunner evaluate --level calm --count 10 --px4 ../PX4-Autopilot
+
         framerunner evaluate --level calm --backend dask --address tcp://10.0.0.1:8786
     """
     given = dict(locals())
     _check(scenarios, level, count, seed)
+    use = _px4_use(px4, speed, jobs, response=response, backend=backend)
 
-    from joblib import cpu_count
+    from framerunner.evaluation import evaluate as module
 
-    from framerunner.commands.named_numbers import response_of
-    from framerunner.evaluation.backends import Pool
-    from framerunner.evaluation.evaluate import EvaluationSettings
-    from framerunner.evaluation.evaluate import evaluate as evaluate_all
-
-    plan = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
-    plan = plan if response is None else plan.answering_late(response_of(response))
-    settings = EvaluationSettings(
+    drawn = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
+    plan = _flown_by(drawn, response, use)
+    settings = module.EvaluationSettings(
         plan=plan,
-        pool=Pool(backend, cpu_count() if jobs is None else jobs, address),
+        pool=_pool(backend, jobs, address, use),
         out=plan.default_out if out is None else out,
         again=again,
         against=compare,
         mission=mission,
         pilot=None if pilot is None else str(pilot),
         command=_command(scenarios, given),
+        px4=use,
     )
-    return evaluate_all(settings)
+    return module.evaluate(settings)
+
+
+def _flown_by(plan: Plan, response: str | None, use: Px4Use | None) -> Plan:
+    """The plan with a vehicle that answers late, or that PX4 flies."""
+    if response is not None:
+        from framerunner.commands.named_numbers import response_of
+
+        return plan.answering_late(response_of(response))
+    return plan if use is None else plan_for_px4(plan, use.folder)
+
+
+def _pool(backend: Backend, jobs: int | None, address: str | None, use: Px4Use | None) -> Pool:
+    """Where flights are flown: on all cores, but with PX4 one after another."""
+    from joblib import cpu_count
+
+    from framerunner.evaluation.backends import Pool
+
+    at_once = cpu_count() if use is None else 1
+    return Pool(backend, at_once if jobs is None else jobs, address)
+
+
+def _px4_use(
+    px4: Path | None, speed: float | None, jobs: int | None, *, response: str | None, backend: str
+) -> Px4Use | None:
+    """By which PX4 is flown; refuses options that do not go with it."""
+    if px4 is None:
+        if speed is not None:
+            raise SettingError(f"--speed {speed:g}: is for flights with --px4; leave it out")
+        return None
+    if response is not None:
+        raise SettingError(f"--response {response}: changes our autopilot's flights; leave it out with --px4")
+    if backend != "loky":
+        raise SettingError(f"--backend {backend}: PX4 is started on this machine; leave it out with --px4")
+    from framerunner.evaluation.px4_flight import INSTANCES, Px4Use
+    from sitl.px4.build import find_build
+
+    check_range("--speed", speed, 0.01, _MAX_PX4_SPEED)
+    check_range("--jobs", jobs, 1, INSTANCES)
+    find_build(px4)
+    return Px4Use(px4.resolve(), _PX4_SPEED if speed is None else speed)
 
 
 def _plan(

@@ -79,7 +79,8 @@ _Response = Annotated[
     ),
 ]
 _MonitorLink = Annotated[
-    str | None, Parameter(show=False, help="MAVLink URL by which the simulated drone also sends")
+    str | None,
+    Parameter(help="MAVLink URL of a monitor that runs already, such as udpout://127.0.0.1:14550"),
 ]
 _Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input ends")]
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]

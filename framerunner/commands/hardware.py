@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
@@ -52,10 +54,20 @@ class HardwareOptions:
     on_abort: Annotated[
         Literal["land", "hold"], Parameter(help="with --drone: what it does when the flight is aborted")
     ] = "land"
+    hold_time: Annotated[
+        float | None,
+        Parameter(help="with --on-abort hold: s until it lands, 5 to 100; 30 if not given"),
+    ] = None
+    operator_socket: Annotated[
+        Path | None,
+        Parameter(help="with --drone: socket of a monitor with the operator's page; --monitor has its own"),
+    ] = None
     operator: Annotated[str, Parameter(help="with --drone: who flies, for the flight card")] = ""
 
 
 NONE = HardwareOptions()
+SERVICE_VARIABLE = "FRAMERUNNER_SERVICE"
+"""Set by systemd/framerunner-fly.service: nobody may be near the drone when a service starts."""
 
 
 def caps_of(options: HardwareOptions, drone: str | None) -> Caps | None:
@@ -76,6 +88,7 @@ def caps_of(options: HardwareOptions, drone: str | None) -> Caps | None:
 def hardware_of(options: HardwareOptions, drone: str | None) -> HardwareSettings | None:
     """The procedure of a flight; None for a simulated drone. Raises SettingError."""
     from framerunner.preflight.settings import HardwareSettings
+    from offboard.safety.rules import HOLD_TIME_S
 
     given = {
         "--dry-run": options.dry_run,
@@ -83,6 +96,8 @@ def hardware_of(options: HardwareOptions, drone: str | None) -> HardwareSettings
         "--set-parameters": options.set_parameters,
         "--accept": bool(options.accept),
         "--on-abort": options.on_abort != NONE.on_abort,
+        "--hold-time": options.hold_time is not None,
+        "--operator-socket": options.operator_socket is not None,
         "--operator": bool(options.operator),
     }
     used = [name for name, is_given in given.items() if is_given]
@@ -91,20 +106,33 @@ def hardware_of(options: HardwareOptions, drone: str | None) -> HardwareSettings
         if used:
             raise SettingError(f"{used[0]}: is for a drone given by --drone; leave it out")
         return None
+    if os.environ.get(SERVICE_VARIABLE) and (options.yes or options.simulated):
+        name = "--yes" if options.yes else "--simulated"
+        raise SettingError(f"{name}: a service never flies without an operator's go; leave it out")
     if options.simulated:
         if used:
             raise SettingError(
                 f"{used[0]}: a drone that is --simulated is not checked; leave one of them out"
             )
         return None
+    check_range("--hold-time", options.hold_time, 5.0, 100.0)
+    if options.hold_time is not None and options.on_abort != "hold":
+        raise SettingError("--hold-time: is for --on-abort hold; leave it out")
+    if options.accept:
+        from framerunner.preflight.check_names import CHECK_NAMES
+        from offboard.safety.check import check_names
+
+        check_names(options.accept, CHECK_NAMES)
     return HardwareSettings(
         needs_go=not options.yes,
         abort=options.on_abort,
+        hold_s=HOLD_TIME_S if options.hold_time is None else options.hold_time,
         dry_run=options.dry_run,
         set_parameters=options.set_parameters,
         accepted=options.accept,
         operator=options.operator,
         capped=options.max_speed is not None or options.max_height is not None,
+        operator_socket=options.operator_socket,
     )
 
 

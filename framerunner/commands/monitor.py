@@ -29,8 +29,27 @@ SYSTEM_ID = 250
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 
 
+_Drone = Annotated[str, Parameter(help="MAVLink URL: where drones send to ground stations")]
+_Scenario = Annotated[
+    str | None, Parameter(help="name or file; for a drone without a referee, such as a real one")
+]
+_Bind = Annotated[str, Parameter(help="address to listen on; 0.0.0.0 lets other machines in")]
+_CameraHosts = Annotated[
+    tuple[str, ...],
+    Parameter(help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"),
+]
 _TrustedProxy = Annotated[
     tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
+]
+_OperatorSocket = Annotated[
+    Path | None,
+    Parameter(help="local socket at which it listens for flights with an operator (fly --operator-socket)"),
+]
+_Certificate = Annotated[
+    Path | None, Parameter(help="PEM file: serve https:// with it, and the pages' WebSockets as wss://")
+]
+_Key = Annotated[
+    Path | None, Parameter(help="PEM file of the certificate's private key, if that is not in the same file")
 ]
 PilotOption = Annotated[
     Path | None, Parameter(help="Python file with primitives of your own, for the editor; it is executed")
@@ -39,27 +58,19 @@ PilotOption = Annotated[
 
 def monitor(
     *,
-    drone: Annotated[
-        str, Parameter(help="MAVLink URL: where drones send to ground stations")
-    ] = "udpin://127.0.0.1:14550",
-    scenario: Annotated[
-        str | None, Parameter(help="name or file; for a drone without a referee, such as a real one")
-    ] = None,
-    bind: Annotated[
-        str, Parameter(help="address to listen on; 0.0.0.0 lets other machines in")
-    ] = "127.0.0.1",
+    drone: _Drone = "udpin://127.0.0.1:14550",
+    scenario: _Scenario = None,
+    bind: _Bind = "127.0.0.1",
     port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8080,
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
     missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
     pilot: PilotOption = None,
-    camera_host: Annotated[
-        tuple[str, ...],
-        Parameter(
-            help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"
-        ),
-    ] = (),
+    camera_host: _CameraHosts = (),
     trusted_proxy: _TrustedProxy = (),
+    operator_socket: _OperatorSocket = None,
+    certificate: _Certificate = None,
+    key: _Key = None,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.
@@ -73,6 +84,8 @@ def monitor(
         framerunner monitor
 
         framerunner monitor --bind 0.0.0.0 --port 80
+
+        framerunner monitor --bind 0.0.0.0 --certificate monitor.crt --key monitor.key
 
         framerunner monitor --drone serial:///dev/ttyUSB0:57600 --scenario test-case-1
     """
@@ -88,7 +101,13 @@ def monitor(
     flown = None if scenario is None else load_scenario(scenario)
     given = equipment(drone, flown, runs, camera_host, missions=missions, pilot=pilot)
     password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()
-    settings = MonitorSettings(bind, port, database, password, trusted_proxy, qr_codes=qr_codes)
+    settings = MonitorSettings(
+        *(bind, port, database, password, trusted_proxy),
+        qr_codes=qr_codes,
+        operator_socket=operator_socket,
+        certificate=certificate,
+        key=key,
+    )
     _allow_many_files()
     if lifeline:
         os.nice(_NICENESS)

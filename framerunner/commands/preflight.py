@@ -10,11 +10,26 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from errors import SettingError
 from framerunner.commands import DEFAULT_MISSION, check_range, load_mission_with
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.run import PreflightSettings
+_MaxHeight = Annotated[float | None, Parameter(help="cap on the height above the start, m")]
+_SetParameters = Annotated[
+    bool, Parameter(negative="", help="set failsafe parameters that fail, and keep their old values")
+]
+_Restore = Annotated[
+    Path | None,
+    Parameter(help="only return the parameters and the fence of this file, which a check wrote before"),
+]
+_AnyVehicle = Annotated[
+    bool, Parameter(negative="", help="with --restore-parameters: also to another vehicle than they are of")
+]
+_Accept = Annotated[
+    tuple[str, ...], Parameter(negative="", help="name of a check that may fail; may be repeated")
+]
 
 
 def preflight(
@@ -29,22 +44,18 @@ def preflight(
     ] = 0.1,
     mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
     max_speed: Annotated[float, Parameter(help="cap on the level speed, m/s")] = 2.0,
-    max_height: Annotated[float | None, Parameter(help="cap on the height above the start, m")] = None,
-    set_parameters: Annotated[
-        bool, Parameter(negative="", help="set failsafe parameters that fail, and keep their old values")
-    ] = False,
-    restore_parameters: Annotated[
-        Path | None, Parameter(help="only set the parameters of this file, which --set-parameters wrote")
-    ] = None,
-    accept: Annotated[
-        tuple[str, ...], Parameter(negative="", help="name of a check that may fail; may be repeated")
-    ] = (),
+    max_height: _MaxHeight = None,
+    set_parameters: _SetParameters = False,
+    restore_parameters: _Restore = None,
+    any_vehicle: _AnyVehicle = False,
+    accept: _Accept = (),
     out: Annotated[Path, Parameter(help="folder for the flight card and for old parameters")] = Path(),
 ) -> int:
     """Check a real drone as `fly` does before it arms it, and write the flight card; nothing is armed.
 
-    The fence of the flight is uploaded and read back. Parameters are changed only with --set-parameters, and
-    returned by --restore-parameters. Each check is a line: result, name, value, what is allowed, what to do.
+    The fence of the flight is uploaded and read back. Parameters are changed only with --set-parameters. The
+    old fence and old values are kept in a file; --restore-parameters returns them to the vehicle that they
+    are of. Each check is a line: result, name, value, what is allowed, what to do.
 
     Exit code 0: it may be armed, 1: a check has failed, 2: bad input.
 
@@ -58,13 +69,18 @@ def preflight(
     """
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     if restore_parameters is not None:
-        return _restore(drone, restore_parameters)
+        return _restore(drone, restore_parameters, any_vehicle=any_vehicle)
+    if any_vehicle:
+        raise SettingError("--any-vehicle: is for --restore-parameters; leave it out")
 
     from framerunner.commands.hardware import HardwareOptions, caps_of
     from framerunner.flying.plan import FlightPlan
+    from framerunner.preflight.check_names import CHECK_NAMES
     from framerunner.preflight.run import PreflightSettings
+    from offboard.safety.check import check_names
     from scenarios.loader import load_scenario
 
+    check_names(accept, CHECK_NAMES)
     caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission_with(mission, None)
     plan = FlightPlan(load_scenario(scenario), loaded, None, caps=caps)
     return _check(plan, PreflightSettings(drone, camera, camera_delay, set_parameters, accept, out))
@@ -74,26 +90,26 @@ def _check(plan: FlightPlan, settings: PreflightSettings) -> int:
     from framerunner.preflight.card import make_card
     from framerunner.preflight.card_files import write_card
     from framerunner.preflight.run import run_preflight, tell
+    from offboard.safety.rules import SafetyRules
 
     report = asyncio.run(run_preflight(plan, settings))
     tell(report)
     now = datetime.now().astimezone()
-    card = make_card(plan, settings, report, abort="land", operator="", kind="checks only", now=now)
+    card = make_card(
+        plan, settings, report, safety=SafetyRules("land"), operator="", kind="checks only", now=now
+    )
     write_card(card, settings.folder)
     return 0 if report.may_arm else 1
 
 
-def _restore(drone: str, path: Path) -> int:
-    from framerunner.preflight.parameters import load_parameters, set_parameter
+def _restore(drone: str, path: Path, *, any_vehicle: bool) -> int:
+    from framerunner.preflight.kept import check_vehicle, load_kept, restore
     from framerunner.preflight.session import VehicleSession, open_link
-    from offboard.drone import DroneError
 
-    kept = load_parameters(path)
+    kept = load_kept(path)
     with closing(open_link(drone)) as link:
         session = VehicleSession(link)
-        if session.record.armed:
-            raise DroneError("the vehicle is armed; land and disarm it before its parameters are changed")
-        for parameter in kept:
-            set_parameter(session, parameter)
-            print(f"{parameter.name} is {parameter.value:g} again", flush=True)
+        if not any_vehicle:
+            check_vehicle(kept, path, session.uid)
+        restore(session, kept, lambda line: print(line, flush=True))
     return 0

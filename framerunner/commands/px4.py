@@ -12,6 +12,7 @@ from framerunner.commands import say, with_faults, with_sensors
 
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
+    from framerunner.evaluation.plan import Plan
     from scenarios.models import Scenario
     from sitl.autopilots.process import AutopilotStart
     from sitl.px4.server import Px4Server
@@ -33,6 +34,7 @@ def params(
     env: Annotated[
         bool, Parameter(help="as environment variables, by which PX4 takes them at its start")
     ] = False,
+    transmitter: Annotated[bool, Parameter(help="for a pilot's remote control, too")] = False,
 ) -> int:
     """Print the parameters by which PX4 flies an airframe here: one `NAME VALUE` a line.
 
@@ -48,7 +50,8 @@ def params(
     from sitl.px4.parameters import all_parameters
     from sitl.sensors.suite import load_suite
 
-    values = all_parameters(load_airframe(airframe), load_suite(sensors), speed)
+    frame, suite = load_airframe(airframe), load_suite(sensors)
+    values = all_parameters(frame, suite, speed, transmitter=transmitter)
     lines = (
         [f"{name}={text}" for name, text in environment(values).items()]
         if env
@@ -66,6 +69,33 @@ def for_px4(scenario: Scenario) -> Scenario:
     if chosen is not scenario:
         say(f"PX4 takes no true state: the drone has the sensors {chosen.sensors} (see --sensors)")
     return chosen
+
+
+def plan_for_px4(plan: Plan, folder: Path) -> Plan:
+    """An evaluation's plan for PX4, without scenarios with a fault of the link; says what is changed.
+
+    Raises:
+        SettingError: nothing is left, or there is no PX4.
+    """
+    from scenarios.faults.declaration import FaultPart
+    from sitl.px4.build import version_of
+    from sitl.px4.simulation import SUITE_INSTEAD_OF_IDEAL, with_sensors_for_px4
+
+    flown, ideal = [], 0
+    for scenario in plan.scenarios:
+        if all(fault.part is not FaultPart.LINK for fault in scenario.faults):
+            flown.append(with_sensors_for_px4(scenario))
+            ideal += flown[-1] is not scenario
+    left_out = len(plan) - len(flown)
+    if not flown:
+        raise SettingError(f"--px4 {folder}: all flights have a fault of the link, which is PX4's own")
+    if left_out:
+        say(
+            f"PX4 has its own link to the app: {left_out} of {len(plan)} flights have a fault of it, left out"
+        )
+    if ideal:
+        say(f"PX4 takes no true state: drones with ideal sensors have {SUITE_INSTEAD_OF_IDEAL}")
+    return plan.flown_by(version_of(folder), flown)
 
 
 def check_px4_flight(px4: Path | None, *, drone: str | None, lockstep: bool) -> None:
@@ -92,6 +122,7 @@ def px4_server(
     fault: tuple[str, ...],
     *,
     px4: Path | None,
+    transmitter: str | None,
     seed: int,
     grants: TimeGrants | None,
 ) -> Px4Server:
@@ -99,11 +130,13 @@ def px4_server(
     from scenarios.loader import load_scenario
     from sitl.px4.server import Px4Server
     from sitl.px4.simulation import Px4Simulation
+    from sitl.px4.transmitter import open_transmitter
 
+    sticks = None if transmitter is None else open_transmitter(transmitter)
     chosen = with_faults(for_px4(with_sensors(load_scenario(scenario), onboard.sensors)), fault)
 
     def new_simulation() -> Px4Simulation:
-        return Px4Simulation(chosen, seed=seed)
+        return Px4Simulation(chosen, seed=seed, transmitter=sticks)
 
     simulation = new_simulation()  # so that what is wrong with it is said first
     start = _start(simulation, settings, px4)
@@ -119,11 +152,14 @@ def _start(simulation: Px4Simulation, settings: ServerSettings, px4: Path | None
     scenario = simulation.scenario
     command = (
         f"env $(framerunner px4 params {scenario.airframe} --sensors {scenario.sensors} --speed "
-        f"{settings.speed:g} --env) build/px4_sitl_default/bin/px4 -i {settings.instance}"
+        f"{settings.speed:g}{' --transmitter' if simulation.has_transmitter else ''} --env) "
+        f"build/px4_sitl_default/bin/px4 -i {settings.instance}"
     )
     if px4 is None:
         return AutopilotStart(None, command)
     build = find_build(px4)
-    values = all_parameters(simulation.world.airframe, load_suite(scenario.sensors), settings.speed)
+    suite = load_suite(scenario.sensors)
+    chosen = (simulation.world.airframe, suite, settings.speed)
+    values = all_parameters(*chosen, transmitter=simulation.has_transmitter)
     folder = None if settings.storage is None else settings.storage / f"px4-{settings.instance}"
     return AutopilotStart(Px4Process(build, settings.instance, folder, values), command)

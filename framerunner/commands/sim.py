@@ -108,6 +108,14 @@ class FlownBy:
         ),
     ] = None
 
+    transmitter: Annotated[
+        str | None,
+        Parameter(
+            help="with --autopilot px4: a pilot's remote control: `centred`, or a transmitter on USB such as "
+            "/dev/input/js0"
+        ),
+    ] = None
+
     def check(self, count: int, settings: ServerSettings, *, monitor: bool) -> None:
         """Refuse options that the chosen autopilot does not have.
 
@@ -117,6 +125,8 @@ class FlownBy:
         for name, title, folder in (("px4", "PX4", self.px4), ("ardupilot", "ArduPilot", self.ardupilot)):
             if folder is not None and name != self.autopilot:
                 raise SettingError(f"--{name} {folder}: is for {title}; add --autopilot {name}")
+        if self.transmitter is not None and self.autopilot != "px4":
+            raise SettingError(f"--transmitter {self.transmitter}: is for PX4; add --autopilot px4")
         if self.autopilot == "own":
             return
         name = {"px4": "PX4", "ardupilot": "ArduPilot"}[self.autopilot]
@@ -218,7 +228,8 @@ def _server(
 ) -> _Server:
     """The simulator with the chosen autopilot."""
     if flown_by.autopilot == "px4":
-        return px4_server(*flown, px4=flown_by.px4, seed=seed, grants=grants)
+        px4, transmitter = flown_by.px4, flown_by.transmitter
+        return px4_server(*flown, px4=px4, transmitter=transmitter, seed=seed, grants=grants)
     if flown_by.autopilot == "ardupilot":
         return ardupilot_server(*flown, ardupilot=flown_by.ardupilot, seed=seed)
     return _own_server(*flown, count=count, seed=seed, grants=grants)

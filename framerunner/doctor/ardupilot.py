@@ -6,8 +6,9 @@ measurements agree; its sources are parameters, EK3_SRC1_*.
 
 from __future__ import annotations
 
-from framerunner.doctor.findings import Finding, Findings, Level, good, missing, note
+from framerunner.doctor.findings import Findings, Level
 from framerunner.doctor.listen import Record
+from framerunner.doctor.subjects import Subject, finding, good, missing, note
 from wire import ardupilot_modes
 from wire.dialect import mavlink
 
@@ -125,7 +126,12 @@ def limits(record: Record) -> Findings:
     if not parameters:
         yield note("parameters", "no parameter was received", "check that the link is not read-only")
         return
-    for name, minimum in (("WPNAV_SPEED", 100.0), ("WPNAV_SPEED_UP", 100.0), ("WPNAV_SPEED_DN", 50.0)):
+    slowest: tuple[tuple[Subject, float], ...] = (
+        ("WPNAV_SPEED", 100.0),
+        ("WPNAV_SPEED_UP", 100.0),
+        ("WPNAV_SPEED_DN", 50.0),
+    )
+    for name, minimum in slowest:
         value = parameters.get(name)
         if value is not None and value < minimum:
             yield missing(name, f"{value:g} cm/s", f"set it to {minimum:g} or more")
@@ -136,7 +142,11 @@ def limits(record: Record) -> Findings:
         advice = "set GUID_OPTIONS to 0: the app needs position and velocity control"
         yield missing("GUID_OPTIONS", f"{parameters['GUID_OPTIONS']:g}", advice)
     if parameters.get("FENCE_ENABLE"):
-        for name, minimum in (("FENCE_ALT_MAX", _CHALLENGE_HEIGHT_M), ("FENCE_RADIUS", _CHALLENGE_REACH_M)):
+        fences: tuple[tuple[Subject, float], ...] = (
+            ("FENCE_ALT_MAX", _CHALLENGE_HEIGHT_M),
+            ("FENCE_RADIUS", _CHALLENGE_REACH_M),
+        )
+        for name, minimum in fences:
             value = parameters.get(name)
             if value is not None and value < minimum:
                 yield missing(name, f"fence at {value:g} m", f"the challenge needs {minimum:g} m")
@@ -149,7 +159,7 @@ def failsafes(record: Record) -> Findings:
     if timeout_s is not None:
         advice = "" if 0.5 <= timeout_s <= 1.0 else "set GUID_TIMEOUT to 1: until then it flies on"
         level = Level.NOTE if advice else Level.GOOD
-        yield Finding(level, "setpoints lost", f"it stops and hovers after {timeout_s:g} s", advice)
+        yield finding(level, "setpoints lost", f"it stops and hovers after {timeout_s:g} s", advice)
     station = parameters.get("FS_GCS_ENABLE")
     if station is not None:
         climb_m = parameters.get("RTL_ALT", 1500.0) / 100
@@ -160,7 +170,7 @@ def failsafes(record: Record) -> Findings:
             advice = "under a roof set FS_GCS_ENABLE to 5 (land)"
         elif station == 5.0:
             words = "land"
-        yield Finding(Level.NOTE if advice else Level.GOOD, "ground station lost", words, advice)
+        yield finding(Level.NOTE if advice else Level.GOOD, "ground station lost", words, advice)
     if parameters.get("FS_THR_ENABLE") == 1.0:
         advice = "under a roof set FS_THR_ENABLE to 3 (land)"
         yield note("radio control lost", "return, which climbs to RTL_ALT first", advice)

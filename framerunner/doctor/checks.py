@@ -11,10 +11,12 @@ from math import isfinite
 
 from framerunner.doctor import ardupilot
 from framerunner.doctor.findings import Finding, Findings, Level
-from framerunner.doctor.findings import good as _good
-from framerunner.doctor.findings import missing as _missing
-from framerunner.doctor.findings import note as _note
 from framerunner.doctor.listen import Record
+from framerunner.doctor.subjects import Subject
+from framerunner.doctor.subjects import finding as _finding
+from framerunner.doctor.subjects import good as _good
+from framerunner.doctor.subjects import missing as _missing
+from framerunner.doctor.subjects import note as _note
 from wire.dialect import Message, mavlink
 from wire.px4_modes import OFFBOARD
 
@@ -26,7 +28,7 @@ CHALLENGE_HEIGHT_M = 3.0  # frames are at up to 2 m, the mission climbs from the
 CHALLENGE_REACH_M = 8.0
 ACCURATE_M = 0.1  # standard deviation; PX4 reports 0.3 with GPS, 0.01 with motion capture
 WANDER_M = 0.1
-_GUIDE = "docs/real-drone.md, section 3"
+_GUIDE = "docs/real-drone.md, step 6"
 _EV_POSITION, _EV_HEIGHT = 1, 2  # bits of EKF2_EV_CTRL
 _SLOW_ESTIMATOR = (
     # name, upper limit, unit
@@ -93,6 +95,14 @@ def examine(record: Record) -> list[Finding]:
     return [finding for check in checks for finding in check(record)]
 
 
+def _one_vehicle(record: Record) -> Findings:
+    """Whether all packets of the system id are of one vehicle."""
+    problem = record.senders.problem
+    if problem:
+        advice = "switch the other one off, or give it another id (MAV_SYS_ID; ArduPilot: SYSID_THISMAV)"
+        yield _missing("one vehicle", problem, advice)
+
+
 def _autopilot(record: Record) -> Findings:
     heartbeat = record.latest["HEARTBEAT"]
     if heartbeat.autopilot != mavlink.MAV_AUTOPILOT_PX4:
@@ -132,7 +142,9 @@ def _health(record: Record) -> Findings:
     ready = status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK
     mode = record.mode_name.lower()
     if not ready and not record.armed and record.arming.ready_for_offboard:
-        yield _good("pre-arm checks", f"passed for offboard, where fly arms it; not in {mode}")
+        words = "passed for offboard, where fly arms it"
+        also = "" if mode == "offboard" else f"; not in {mode}"  # in it they fail until setpoints come
+        yield _good("pre-arm checks", words + also)
     elif not ready and not record.armed:
         reasons = "; ".join((*record.arming.failures, *((unhealthy_names,) if unhealthy_names else ())))
         words = f"not passed in {mode}" + (f": {reasons}" if reasons else "")
@@ -163,7 +175,7 @@ def _sensors(record: Record) -> Findings:
     words += [f"not on {_names(idle)}"] if idle else []
     words += [f"{_names(failing)} {'fails' if failing.bit_count() == 1 else 'fail'}"] if failing else []
     advice = "correct what fails before flying" if failing else ""
-    yield Finding(Level.NOTE if failing else Level.GOOD, "sensors", "; ".join(words), advice)
+    yield _finding(Level.NOTE if failing else Level.GOOD, "sensors", "; ".join(words), advice)
 
 
 def _innovations(record: Record) -> Findings:
@@ -210,7 +222,11 @@ def _offboard(record: Record) -> Findings:
 
 
 def _streams(record: Record) -> Findings:
-    for kinds, what in ((_ATTITUDES, "attitude"), (("LOCAL_POSITION_NED",), "local position")):
+    streams: tuple[tuple[tuple[str, ...], Subject], ...] = (
+        (_ATTITUDES, "attitude"),
+        (("LOCAL_POSITION_NED",), "local position"),
+    )
+    for kinds, what in streams:
         rate_hz = max(record.rate_hz(kind) for kind in kinds)
         if rate_hz == 0.0:
             advice = "give it GPS, optical flow, vision or motion capture; wait for its estimate"
@@ -252,12 +268,13 @@ def _limits(record: Record) -> Findings:
     if not parameters:
         yield _note("parameters", "no parameter was received", "check that the link is not read-only")
         return
-    for name, minimum, unit in (
+    slowest: tuple[tuple[Subject, float, str], ...] = (
         ("MPC_XY_VEL_MAX", 1.0, "m/s"),
         ("MPC_Z_VEL_MAX_UP", 1.0, "m/s"),
         ("MPC_Z_VEL_MAX_DN", 1.0, "m/s"),
         ("MC_YAWRATE_MAX", 60.0, "deg/s"),
-    ):
+    )
+    for name, minimum, unit in slowest:
         value = parameters.get(name)
         if value is not None and value < minimum:
             yield _missing(name, f"{value:g} {unit}", f"set it to {minimum:g} or more")
@@ -270,7 +287,10 @@ def _limits(record: Record) -> Findings:
 
 def _fence(record: Record) -> Findings:
     parameters = record.parameters
-    limits = (("GF_MAX_VER_DIST", CHALLENGE_HEIGHT_M), ("GF_MAX_HOR_DIST", CHALLENGE_REACH_M))
+    limits: tuple[tuple[Subject, float], ...] = (
+        ("GF_MAX_VER_DIST", CHALLENGE_HEIGHT_M),
+        ("GF_MAX_HOR_DIST", CHALLENGE_REACH_M),
+    )
     if not parameters.get("GF_ACTION") or not any(parameters.get(name, 0.0) > 0.0 for name, _ in limits):
         return
     status = record.latest.get("ESTIMATOR_STATUS")
@@ -300,7 +320,7 @@ def _failsafes(record: Record) -> Findings:
         elif action == 3:
             words += climbs
         advice = "under a roof set COM_OBL_RC_ACT to 4 (land)" if "return" in words else ""
-        yield Finding(Level.NOTE if advice else Level.GOOD, "setpoints lost", f"{words}{after}", advice)
+        yield _finding(Level.NOTE if advice else Level.GOOD, "setpoints lost", f"{words}{after}", advice)
     if loss_s is not None and loss_s < 0.5:
         yield _missing(
             "COM_OF_LOSS_T", f"{loss_s:g} s", "set it to 1: the app's watchdog needs half a second"
@@ -357,7 +377,7 @@ def _height(record: Record) -> Findings:
     if reference is None:
         fine = accuracy_m <= ACCURATE_M
         advice = "" if fine else f"take height from vision or a range finder: {_GUIDE}"
-        yield Finding(Level.GOOD if fine else Level.MISSING, "height", accuracy, advice)
+        yield _finding(Level.GOOD if fine else Level.MISSING, "height", accuracy, advice)
         return
     requested = _HEIGHT_SOURCE.get(int(reference), "unknown means")
     source = _height_source(record, status, requested)
@@ -386,7 +406,7 @@ def _vision_settings(record: Record) -> Findings:
     ]
     if slow:
         text = f"follows vision too slowly for the frames: {', '.join(slow)}"
-        advice = "set what docs/real-drone.md, section 7.3, advises, then restart the drone"
+        advice = "set what docs/real-drone.md, step 6, advises, then restart the drone"
         yield _missing("estimator", text, advice)
 
 
@@ -433,6 +453,7 @@ def _height_source(record: Record, status: Message, requested: str) -> str:
 
 
 _CHECKS: tuple[Callable[[Record], Findings], ...] = (
+    _one_vehicle,
     _autopilot,
     _armed,
     _health,
@@ -450,6 +471,7 @@ _CHECKS: tuple[Callable[[Record], Findings], ...] = (
     _failsafes,
 )
 _ARDUPILOT_CHECKS: tuple[Callable[[Record], Findings], ...] = (
+    _one_vehicle,
     ardupilot.autopilot,
     _armed,
     ardupilot.health,

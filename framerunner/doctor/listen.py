@@ -11,8 +11,9 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from math import dist, isfinite
+from math import dist, inf, isfinite
 
+from framerunner.doctor.senders import Senders
 from wire import ardupilot_modes
 from wire.ardupilot_messages import EKF_STATUS_REPORT_ID, add_ardupilot_messages
 from wire.dialect import (
@@ -188,6 +189,7 @@ class Record:
     places: list[tuple[float, float, float]] = field(default_factory=list)  # local positions, NED metres
     arming: ArmingReport = field(default_factory=ArmingReport)
     telemetry: VehicleTelemetry = field(default_factory=VehicleTelemetry)
+    senders: Senders = field(default_factory=Senders)  # of the autopilot's packets
     _texts: TextAssembler = field(default_factory=TextAssembler)
 
     def take(self, message: Message, now_s: float) -> None:
@@ -198,6 +200,7 @@ class Record:
         if message.get_srcSystem() != self.system_id or message.get_srcComponent() != AUTOPILOT_COMPONENT_ID:
             return
         self.packets.take(message.get_seq())
+        self.senders.take(message)
         self.octets += len(message.get_msgbuf())
         self.latest[kind] = message
         self.counts[kind] = self.counts.get(kind, 0) + 1
@@ -330,11 +333,16 @@ def listen(link: VehicleLink, record: Record, seconds: float, progress: Progress
     beat_s = requested_s = -10.0
     prearm_s = began_s + _PREARM_S
     requests = open_requests(record)
+    identify_s = began_s + seconds / 2  # all senders are heard by then
     while (now_s := time.monotonic()) - began_s < seconds:
         progress("listening and requesting", (now_s - began_s) / seconds)
         if now_s - beat_s >= 1.0:
             beat_s = now_s
             link.send(companion_heartbeat() if record.armed else ground_station_heartbeat())
+        if now_s >= identify_s:
+            identify_s = inf
+            version = request_message(_system_id(record), mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+            link.send_to_all(version)
         if now_s > prearm_s and not record.armed and record.arming.armable_modes is None:
             prearm_s = now_s + _PREARM_AGAIN_S
             link.send(command_long(_system_id(record), mavlink.MAV_CMD_RUN_PREARM_CHECKS))
@@ -347,6 +355,7 @@ def listen(link: VehicleLink, record: Record, seconds: float, progress: Progress
             elif now_s - requested_s >= _ASK_AGAIN_S:
                 requests = open_requests(record)
         _receive(link, record)
+    record.senders.addresses = link.addresses(_system_id(record), AUTOPILOT_COMPONENT_ID)
 
 
 def _receive(link: VehicleLink, record: Record) -> None:

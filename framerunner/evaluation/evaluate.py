@@ -13,8 +13,9 @@ from errors import SettingError
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
 from framerunner.evaluation.plan import Plan
+from framerunner.evaluation.px4_flight import Px4Use
 from framerunner.evaluation.rows import Row, csv_text
-from framerunner.evaluation.runner import fly_all
+from framerunner.evaluation.runner import Terms, fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
 from framerunner.evaluation.terminal import EvaluationProgress, print_comparison, print_summary
@@ -37,6 +38,7 @@ class EvaluationSettings:
         mission: name or file, as given on the command line.
         pilot: a contestant's file, as given; None without one.
         command: continues this evaluation.
+        px4: the genuine PX4 that flies; None: our own autopilot.
     """
 
     plan: Plan
@@ -47,6 +49,7 @@ class EvaluationSettings:
     mission: str
     pilot: str | None
     command: str
+    px4: Px4Use | None = None
 
 
 def evaluate(settings: EvaluationSettings) -> int:
@@ -90,7 +93,7 @@ def _fly_missing(settings: EvaluationSettings, folder: EvaluationFolder) -> None
     not_kept: tuple[Row, SettingError] | None = None
     with (
         EvaluationProgress(len(plan), list(folder.rows().values())) as progress,
-        closing(fly_all(plan.tasks(frozenset(folder.done)), settings.pool)) as rows,
+        closing(fly_all(plan.tasks(frozenset(folder.done)), settings.pool, Terms(px4=settings.px4))) as rows,
     ):
         for row in rows:
             if row.version != folder.identity.version:
@@ -134,7 +137,9 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
             status.update(f"drawing the report, plot {done + 1} of {total}")
 
         plan = settings.plan
-        page = Page(plan.title, settings.mission, settings.pilot, settings.command, summary, comparison)
+        px4 = None if settings.px4 is None else settings.px4.folder
+        named = (plan.title, settings.mission, settings.pilot, settings.command)
+        page = Page(*named, summary, comparison, px4)
         write_report(folder, page, advance)
     print(f"left in {folder.path}/: report.html, results.csv", flush=True)
     return code

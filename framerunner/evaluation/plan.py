@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from errors import SettingError
 from firmware_py.airframe import AirframeError, load_airframe
@@ -36,6 +37,7 @@ class Identity:
         seeds: of everything random in each flight, in the scenarios' order.
         version: of framerunner.
         response: how late the vehicle answers; empty: as its autopilot does.
+        autopilot: a genuine one that flies, with the hash of its program; empty: our own.
     """
 
     scenarios: Mapping[str, str]
@@ -46,16 +48,25 @@ class Identity:
     seeds: tuple[int, ...]
     version: str
     response: str
+    autopilot: str = ""
 
     @property
     def sha256(self) -> str:
         """Over all fields."""
-        return _sha256(json.dumps(asdict(self)))
+        return _sha256(json.dumps(self.as_data()))
+
+    def as_data(self) -> dict[str, Any]:
+        """The fields as plain data; `autopilot` only if a genuine one flies."""
+        data = asdict(self)
+        if not self.autopilot:
+            del data["autopilot"]
+        return data
 
     def difference(self, other: Identity) -> str:
         """The first difference in a few words; empty if there is none."""
-        for what in ("mission", "pilot", "version", "response"):
-            ours, theirs = getattr(self, what) or "none", getattr(other, what) or "none"
+        for what in ("mission", "pilot", "version", "response", "autopilot"):
+            missing = "our own" if what == "autopilot" else "none"
+            ours, theirs = getattr(self, what) or missing, getattr(other, what) or missing
             if ours != theirs:
                 return f"{what} {theirs}, not {ours}"
         if self.mission_sha256 != other.mission_sha256:
@@ -83,6 +94,7 @@ class Plan:
         mission: checked.
         seeds: of everything random in each flight; that of a random scenario is its own.
         response: how late the vehicle answers; None: as its autopilot does.
+        autopilot: as in `Identity`.
     """
 
     title: str
@@ -91,6 +103,7 @@ class Plan:
     mission: Mission
     seeds: Sequence[int]
     response: Response | None = None
+    autopilot: str = ""
 
     def __len__(self) -> int:
         return len(self.scenarios)
@@ -109,6 +122,7 @@ class Plan:
             seeds=tuple(self.seeds),
             version=metadata.version("framerunner"),
             response="" if self.response is None else str(self.response),
+            autopilot=self.autopilot,
         )
 
     @property
@@ -119,6 +133,18 @@ class Plan:
     def answering_late(self, response: Response) -> Plan:
         """The same flights by a vehicle that answers late."""
         return replace(self, title=f"{self.title}, response {response}", response=response)
+
+    def flown_by(self, autopilot: str, scenarios: Sequence[Scenario]) -> Plan:
+        """The flights of these scenarios, changed for a genuine autopilot, of which some may be missing."""
+        seeds = dict(zip((each.name for each in self.scenarios), self.seeds, strict=True))
+        return replace(
+            self,
+            title=f"{self.title}, flown by {autopilot.partition(' ')[0]}",
+            label=f"{self.label}-{autopilot.partition(' ')[0].lower()}",
+            scenarios=scenarios,
+            seeds=tuple(seeds[each.name] for each in scenarios),
+            autopilot=autopilot,
+        )
 
     def tasks(self, done: Collection[str] = ()) -> Iterator[FlightPlan]:
         """Flights that are not yet done, in order."""

@@ -70,6 +70,7 @@ class Page:
         command: makes the same evaluation.
         summary: of the flights.
         comparison: with an earlier evaluation; None without.
+        px4: folder of the PX4 that flew; None: our own autopilot did.
     """
 
     title: str
@@ -78,6 +79,7 @@ class Page:
     command: str
     summary: Summary
     comparison: Comparison | None
+    px4: Path | None = None
 
 
 def write_report(
@@ -119,13 +121,15 @@ def write_report(
     folder.write(REPORT, text)
 
 
-def replay_command(path: Path, mission: str, pilot: str | None, seed: int, response: str = "") -> str:
-    """The command that flies the scenario of a file again, the same to the last bit."""
+def replay_command(
+    path: Path, mission: str, pilot: str | None, seed: int, response: str = "", *, px4: Path | None = None
+) -> str:
+    """The command that flies the scenario of a file again, in lockstep the same to the last bit."""
     words = ["framerunner", "fly", str(path), "--mission", mission]
     words += ["--pilot", pilot] if pilot else []
     words += ["--seed", str(seed)] if seed else []
     words += ["--response", response] if response else []
-    return shlex.join([*words, "--lockstep"])
+    return shlex.join([*words, *(["--lockstep"] if px4 is None else ["--px4", str(px4)])])
 
 
 def picked_for_plots(summary: Summary, count: int) -> set[str]:
@@ -154,7 +158,8 @@ def _failures(
                 plot = _track_plot(folder, row)
                 done += 1
             file = folder.scenario_file(row.scenario)
-            command = replay_command(file, page.mission, page.pilot, row.seed or 0, row.response)
+            flown = (page.mission, page.pilot, row.seed or 0, row.response)
+            command = replay_command(file, *flown, px4=page.px4)
             failures.append(Failure(row, command, plot, _traceback(folder, row)))
         groups.append((cause.verdict, cause.ended_in, failures))
     return groups

@@ -122,7 +122,7 @@ def open_folder(path: Path, identity: Identity, *, again: bool = False) -> Itera
         with _writing(path):
             if is_new:
                 _clear(path)
-                data = {"format": FORMAT, **asdict(identity)}
+                data = {"format": FORMAT, **identity.as_data()}
                 _replace(path / IDENTITY, json.dumps(data, indent=2) + "\n")
             for name in _FOLDERS:
                 (path / name).mkdir(exist_ok=True)
@@ -168,7 +168,7 @@ def _identity(path: Path, option: str) -> Identity | None:
         data: dict[str, Any] = json.loads((path / IDENTITY).read_text(encoding="utf-8"))
         if data.pop("format") != FORMAT:
             raise SettingError(f"{option} {path}: was made by another version of framerunner; choose another")
-        if set(data) != {each.name for each in fields(Identity)}:
+        if set(data) | {"autopilot"} != {each.name for each in fields(Identity)}:
             raise ValueError("other fields")
         return TypeAdapter(Identity).validate_python(data)
     except (FileNotFoundError, NotADirectoryError):

@@ -9,6 +9,7 @@ from math import degrees, dist, pi, remainder
 from framerunner.runs.track import Track
 from offboard.app import MissionEnd, Moment
 from offboard.navigation.view import NavigationView
+from offboard.safety.operator import STOPPED
 from scenarios.crossing import Boundary
 from scenarios.models import COLOURS, Frame, Scenario
 from scenarios.result import FlightResult, RefereeReport
@@ -60,6 +61,8 @@ class CauseWatch:
             parts.append(_wrong_order(flown))
         elif report.verdict is Verdict.CRASHED:
             parts.append(f"crashed {_at(track, report.try_time_s)}")
+            if flown.end.reason.startswith(STOPPED):  # other reasons follow from the crash
+                parts.append(flown.end.reason)
         elif not report.completed:
             parts.append(_end(flown))
             parts.append(self._hindrance(flown))

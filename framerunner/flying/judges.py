@@ -50,13 +50,27 @@ class Judge(Protocol):
 class TruthJudge:
     """The simulator's referee, which sees the true state of every control tick, over HTTP.
 
-    If the simulator ends, the verdict is made from the telemetry seen so far.
+    If the simulator ends, the verdict is made from the telemetry seen so far; likewise if the referee still
+    has the try of an earlier flight, because in this one the motors were never on.
+
+    Args:
+        api: of the simulator.
+        session: for the requests.
+        plan: of the flight.
+        source: the states that it judges by.
+        earlier_us: vehicle time at which a try began that is already over; None: there is none.
     """
 
     def __init__(
-        self, api: SimulatorApi, session: aiohttp.ClientSession, plan: FlightPlan, source: str = "truth"
+        self,
+        api: SimulatorApi,
+        session: aiohttp.ClientSession,
+        plan: FlightPlan,
+        source: str = "truth",
+        earlier_us: int | None = None,
     ) -> None:
         self.source = source
+        self._earlier_us = earlier_us
         self._api = api
         self._session = session
         self._substitute = TelemetryJudge(plan.new_referee())
@@ -68,7 +82,7 @@ class TruthJudge:
     async def standing(self) -> RefereeSnapshot | None:
         """As of now, or None without a valid answer."""
         answer = await ask_referee(self._api, self._session)
-        return None if answer is None else answer.snapshot
+        return None if answer is None or self._is_earlier(answer) else answer.snapshot
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Request the report once the drone is at rest.
@@ -80,7 +94,7 @@ class TruthJudge:
         await self._settle(motors_stopped=ended is None)
         parameters = {"state": mission_state, **({"ended": ended} if ended else {})}
         answer = await ask_referee(self._api, self._session, parameters)
-        if answer is None:
+        if answer is None or self._is_earlier(answer):
             self.source = self._substitute.source
             return await self._substitute.report(mission_state, ended)
         return answer.report
@@ -89,6 +103,10 @@ class TruthJudge:
         """As the simulator tells; nothing without a valid answer."""
         answer = await ask_referee(self._api, self._session)
         return FaultFacts() if answer is None else answer.faults
+
+    def _is_earlier(self, answer: Standing) -> bool:
+        """Whether an answer is about the try of an earlier flight."""
+        return self._earlier_us is not None and answer.snapshot.began_us == self._earlier_us
 
     async def _settle(self, *, motors_stopped: bool) -> None:
         """Wait until the referee sees the drone at rest, for 5 s of vehicle time at most.
@@ -182,7 +200,8 @@ async def choose_judge(
     answer = None if api is None else await ask_referee(api, session)
     if api is not None and answer is not None and answer.scenario == plan.scenario.name:
         plan = plan.lifted(answer.lift_m)
-        return TruthJudge(api, session, plan, answer.source), plan
+        earlier_us = answer.snapshot.began_us if answer.snapshot.over else None
+        return TruthJudge(api, session, plan, answer.source, earlier_us), plan
     if api is not None and named:
         raise SettingError(
             f"--simulator {api.url}: "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,6 @@ if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow t
     from framerunner.flying.mission_reporter import MissionReporter
     from framerunner.flying.simulator_process import SitlProcess
     from framerunner.preflight.settings import HardwareSettings
-    from offboard.link.companion import Companion
     from offboard.mavsdk_drone import MavsdkDrone
     from offboard.perception import CameraPerception
 
@@ -46,6 +45,8 @@ class RealTimeSettings:
     px4: Path | None = None  # folder of a PX4 that flies in the simulator that is started; None: our own does
     camera_delay_s: float = 0.1  # age of an image on arrival, for a camera that sends no time stamps
     hardware: HardwareSettings | None = None  # of a drone that may be a real one; None: it is simulated
+    monitor_socket: Path | None = None  # of the monitor that was started here
+    unattended: bool = False  # one of many flights: nothing is shown, and there is no video
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +99,9 @@ async def fly_in_real_time(
         stack.push_async_callback(companion.close)
         source = records.folder.mission.read_text(encoding="utf-8")
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
-        dry_run = settings.hardware is not None and settings.hardware.dry_run
-        drone = _drone(plan, vehicle, records, stack, companion, dry_run=dry_run, system_id=system_id)
-        camera = await _camera(plan, vehicle, records, stack, reporter)
+        drone = _drone(plan, vehicle, records, stack, safety, hardware=settings.hardware, system_id=system_id)
+        drone.use_companion(companion)
+        camera = await _camera(plan, vehicle, records, stack, reporter, video=not settings.unattended)
         perception = _perception(plan, vehicle, judge, camera)
         perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
@@ -109,7 +110,7 @@ async def fly_in_real_time(
         display = FlightDisplay(plan.title, plan.limit_s, records.recorder, judge)
 
         async def run(flight: Coroutine[Any, Any, MissionEnd]) -> MissionEnd:
-            async with display:
+            async with nullcontext() if settings.unattended else display:
                 task = asyncio.create_task(flight)
                 outcome = await (task if vehicle.sitl is None else vehicle.sitl.guard(task))
             camera.close()
@@ -143,10 +144,18 @@ async def _safety(
         simulated_id = await own_simulator_id(drone_url, settings.camera_url)
         if simulated_id is not None:
             return replace(plan, caps=plan.caps if hardware.capped else None), SIMULATED, simulated_id
-    from framerunner.preflight.keys import TerminalKeys
-    from framerunner.preflight.prepare import prepare
+    from framerunner.preflight.keys import TerminalKeys, has_terminal
+    from framerunner.preflight.operator_link import OperatorLink
+    from framerunner.preflight.prepare import new_operator, prepare
     from framerunner.preflight.run import PreflightSettings
 
+    socket = hardware.operator_socket or settings.monitor_socket
+    operator = new_operator(hardware, has_page=socket is not None)
+    link = None
+    if socket is not None:
+        title = f"{plan.title}, {'dry run' if hardware.dry_run else 'flight'}"
+        link = OperatorLink(socket, operator, title, terminal=has_terminal() or operator.has_go)
+        await stack.enter_async_context(link)
     checks = PreflightSettings(
         drone_url,
         settings.camera_url,
@@ -154,10 +163,11 @@ async def _safety(
         set_parameters=hardware.set_parameters,
         accepted=hardware.accepted,
         folder=records.folder.path,
+        abort=hardware.abort,
     )
-    safety, system_id = await prepare(plan, checks, hardware)
-    if safety.operator is not None:
-        await stack.enter_async_context(TerminalKeys(safety.operator))
+    show = {} if link is None else {"show": link.show_card}
+    safety, system_id = await prepare(plan, checks, hardware, operator, **show)
+    await stack.enter_async_context(TerminalKeys(operator))
     return plan, safety, system_id
 
 
@@ -191,9 +201,9 @@ def _drone(
     vehicle: _Endpoints,
     records: RunRecords,
     stack: AsyncExitStack,
-    companion: Companion,
+    safety: SafetyRules,
     *,
-    dry_run: bool,
+    hardware: HardwareSettings | None,
     system_id: int | None,
 ) -> MavsdkDrone:
     """The drone on its link, which is closed with the stack; in a dry run it is never armed."""
@@ -201,6 +211,7 @@ def _drone(
     from offboard.mavsdk_drone import MavsdkDrone
 
     hang_report = stack.enter_context(records.folder.hang_report.open("w", encoding="utf-8"))
+    dry_run = hardware is not None and hardware.dry_run
     drone = (DryRunDrone if dry_run else MavsdkDrone)(
         vehicle.drone_url,
         start_arena=plan.start_pose,
@@ -209,10 +220,10 @@ def _drone(
         corrects=plan.corrects_commands,
         caps=plan.caps,
         system_id=system_id,
+        when_hung=safety.abort,
     )
     drone.record_to(records.folder.tlog)
     stack.callback(lambda: warn(drone.recording_problem))
-    drone.use_companion(companion)
     if vehicle.sitl is not None:
         drone.use_clock(vehicle.sitl.clock, vehicle.sitl.system_id)
     if vehicle.shared_with is not None:
@@ -227,6 +238,8 @@ async def _camera(
     records: RunRecords,
     stack: AsyncExitStack,
     reporter: MissionReporter,
+    *,
+    video: bool,
 ) -> RecordingCamera:
     """The camera, whose images are recorded; closed with the stack."""
     from vision.sources import open_source
@@ -238,7 +251,8 @@ async def _camera(
     timeout_s = CAMERA_S if vehicle.sitl is None else PATIENT_CAMERA_S
     source = open_source(vehicle.camera_url, timeout_s=timeout_s, size_px=vehicle.image_size_px)
     source = await stack.enter_async_context(source)
-    camera = RecordingCamera(source, records.folder.video, plan.scenario.camera.rate_hz, keep)
+    path = records.folder.video if video else None
+    camera = RecordingCamera(source, path, plan.scenario.camera.rate_hz, keep)
     stack.callback(camera.close)
     return camera
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import AbstractContextManager, closing, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
@@ -53,7 +53,8 @@ async def fly_once(settings: FlightSettings) -> int:
     scenario = None if settings.real_time.drone_url is None else settings.plan.scenario
     async with MonitorProcess(scenario, settings.out, _camera_hosts(settings.real_time)) as monitor:
         await monitor.opened()
-        code = await _fly_and_judge(settings, monitor.link)
+        real_time = replace(settings.real_time, monitor_socket=monitor.operator_socket)
+        code = await _fly_and_judge(replace(settings, real_time=real_time), monitor.link)
         if code != _INTERRUPTED_CODE:
             await monitor.stay()
     return code

@@ -130,6 +130,8 @@ def _fused(facts: Facts) -> Iterator[Finding]:
         advice = "set VISO_TYPE to 1 and EK3_SRC1_POSXY, EK3_SRC1_POSZ and EK3_SRC1_YAW to 6"
     elif control is not None and control & _WANTED != _WANTED:
         advice = f"EKF2_EV_CTRL is {control}: set it to 15, then restart the vehicle"
+    elif facts.sent == 0:
+        advice = "let the source send"
     else:
         advice = "see the innovation ratio and the axes below; has its estimator started? Restart it"
     if fused is None:
@@ -157,7 +159,7 @@ def _near(facts: Facts) -> Iterator[Finding]:
     if isnan(distance_m):
         yield _note("position", "the vehicle reports none that could be compared", "")
     elif distance_m > NEAR_M:
-        advice = "it follows something else, or too slowly: docs/real-drone.md, section 7.3"
+        advice = "it follows something else, or too slowly: docs/real-drone.md, step 6"
         yield _missing("position", f"{distance_m:.2f} m from the pose of the same time", advice)
     else:
         yield _good("position", f"{distance_m * 100:.1f} cm from the pose of the same time")

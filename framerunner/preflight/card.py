@@ -14,11 +14,11 @@ from offboard.safety.check import Outcome
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.run import PreflightSettings
-    from offboard.safety.rules import AbortAction
+    from offboard.safety.rules import SafetyRules
 
 PROCEDURE = (
-    "Stop: press SPACE. The drone lands where it is.",
-    "Stop the motors at once: press SPACE, then K. The drone falls.",
+    "Stop: press SPACE in the terminal, or Land on the operator's page. The drone lands where it is.",
+    "Stop the motors at once: then press K, or Stop motors on the page. The drone falls.",
     "The app does not answer: move the mode switch to position mode and land, or use the kill switch.",
     "The app ends or the link is lost: the drone's failsafes above land it.",
     "A fence, a failsafe or the app's box acts: let the drone land; find the cause before the next start.",
@@ -47,7 +47,7 @@ def make_card(
     settings: PreflightSettings,
     report: PreflightReport,
     *,
-    abort: AbortAction,
+    safety: SafetyRules,
     operator: str,
     kind: str,
     now: datetime,
@@ -58,7 +58,7 @@ def make_card(
         plan: with a mission.
         settings: of the checks.
         report: of the checks.
-        abort: what the drone does when the flight is aborted.
+        safety: what the drone does when the flight is aborted.
         operator: who flies.
         kind: of the flight, such as "dry run".
         now: with a time zone.
@@ -75,7 +75,7 @@ def make_card(
         ("scenario", plan.scenario.name),
         ("mission", f"{plan.chart.name}, class {plan.chart.mission_class}"),
         ("time limit", f"{plan.limit_s:g} s from motors on"),
-        ("on abort", "lands where it is" if abort == "land" else "holds"),
+        ("on abort", "lands where it is" if safety.abort == "land" else _hold_words(safety.hold_s)),
     )
     limits = (
         ("caps", "none" if plan.caps is None else plan.caps.words),
@@ -97,6 +97,10 @@ def make_card(
             Section("Checks: name, result, value, allowed, what to do", _check_rows(report)),
         ),
     )
+
+
+def _hold_words(hold_s: float) -> str:
+    return f"holds for {hold_s:g} s, then lands; at low battery and when the link is lost it lands at once"
 
 
 def _check_rows(report: PreflightReport) -> tuple[tuple[str, ...], ...]:

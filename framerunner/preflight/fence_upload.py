@@ -1,4 +1,4 @@
-"""Uploads a fence to a vehicle and reads it back, by the mission protocol.
+"""Uploads a fence to a vehicle and downloads the one it has, by the mission protocol.
 
 https://mavlink.io/en/services/mission.html; a fence is a plan of the type MAV_MISSION_TYPE_FENCE.
 """
@@ -6,6 +6,7 @@ https://mavlink.io/en/services/mission.html; a fence is a plan of the type MAV_M
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 
 from framerunner.preflight.session import VehicleSession
@@ -22,22 +23,49 @@ Vertex = tuple[int, int]
 """Latitude and longitude, 1e-7 degrees."""
 
 
-def upload_fence(session: VehicleSession, vertices: Sequence[Vertex]) -> None:
-    """Replace the vehicle's fence by one polygon that it must stay in.
+@dataclass(frozen=True, slots=True)
+class FenceItem:
+    """One item of a fence, with the fields of MISSION_ITEM_INT.
+
+    Attributes:
+        command: MAV_CMD.
+        frame: MAV_FRAME.
+        params: param1 to param4.
+        x: latitude, 1e-7 degrees.
+        y: longitude, 1e-7 degrees.
+        z: metres.
+    """
+
+    command: int
+    frame: int
+    params: tuple[float, float, float, float]
+    x: int
+    y: int
+    z: float = 0.0
+
+
+def polygon_fence(vertices: Sequence[Vertex]) -> tuple[FenceItem, ...]:
+    """The items of a fence of one polygon in which the vehicle must stay."""
+    params = (float(len(vertices)), 0.0, 0.0, 0.0)
+    return tuple(FenceItem(_INCLUSION, mavlink.MAV_FRAME_GLOBAL, params, x, y) for x, y in vertices)
+
+
+def upload_fence(session: VehicleSession, items: Sequence[FenceItem]) -> None:
+    """Replace the vehicle's fence; without items it has none afterwards.
 
     Raises:
         DroneError: the vehicle refuses it or does not answer.
     """
     count = mavlink.MAVLink_mission_count_message(
-        session.system_id, AUTOPILOT_COMPONENT_ID, len(vertices), FENCE
+        session.system_id, AUTOPILOT_COMPONENT_ID, len(items), FENCE
     )
 
     def step(message: Message) -> int | None:
         """Answer a request for an item; the result once the vehicle acknowledges."""
         if getattr(message, "mission_type", None) != FENCE:
             return None
-        if message.get_type() in _REQUESTS and message.seq < len(vertices):
-            session.send(_item(session.system_id, message.seq, vertices))
+        if message.get_type() in _REQUESTS and message.seq < len(items):
+            session.send(_message(session.system_id, message.seq, items[message.seq]))
         return int(message.type) if message.get_type() == "MISSION_ACK" else None
 
     def first(message: Message) -> bool | None:
@@ -61,8 +89,8 @@ def upload_fence(session: VehicleSession, vertices: Sequence[Vertex]) -> None:
         raise DroneError(f"the vehicle refuses the fence: {words.replace('_', ' ')}")
 
 
-def read_fence(session: VehicleSession) -> tuple[Vertex, ...] | None:
-    """The vehicle's fence, if it is one polygon to stay in or empty; None if it is another one.
+def download_fence(session: VehicleSession) -> tuple[FenceItem, ...]:
+    """The fence that the vehicle has; empty if it has none.
 
     Raises:
         DroneError: the vehicle does not answer.
@@ -74,24 +102,28 @@ def read_fence(session: VehicleSession) -> tuple[Vertex, ...] | None:
     )
     if count is None or count > _MAX_ITEMS:
         raise DroneError("the vehicle does not tell its fence; check that it takes fences")
-    vertices: list[Vertex] | None = []
+    items = []
     for seq in range(count):
         request = mavlink.MAVLink_mission_request_int_message(*target, seq, FENCE)
         item = session.request(request, partial(_numbered, seq))
         if item is None:
             raise DroneError(f"the vehicle does not tell item {seq + 1} of its fence; check the link")
-        if item.command != _INCLUSION or round(item.param1) != count:
-            vertices = None
-        elif vertices is not None:
-            vertices.append((item.x, item.y))
+        params = (item.param1, item.param2, item.param3, item.param4)
+        items.append(FenceItem(item.command, item.frame, params, item.x, item.y, item.z))
     session.send(mavlink.MAVLink_mission_ack_message(*target, mavlink.MAV_MISSION_ACCEPTED, FENCE))
-    return None if vertices is None else tuple(vertices)
+    return tuple(items)
 
 
-def _item(system_id: int, seq: int, vertices: Sequence[Vertex]) -> Message:
-    x, y = vertices[seq]
-    where = (system_id, AUTOPILOT_COMPONENT_ID, seq, mavlink.MAV_FRAME_GLOBAL, _INCLUSION, 0, 1)
-    return mavlink.MAVLink_mission_item_int_message(*where, len(vertices), 0.0, 0.0, 0.0, x, y, 0.0, FENCE)
+def is_same_fence(one: Sequence[FenceItem], other: Sequence[FenceItem]) -> bool:
+    """Whether two fences have the same corners and circles; vehicles may change frame and unused fields."""
+    return [(each.command, each.params[0], each.x, each.y) for each in one] == [
+        (each.command, each.params[0], each.x, each.y) for each in other
+    ]
+
+
+def _message(system_id: int, seq: int, item: FenceItem) -> Message:
+    where = (system_id, AUTOPILOT_COMPONENT_ID, seq, item.frame, item.command, 0, 1)
+    return mavlink.MAVLink_mission_item_int_message(*where, *item.params, item.x, item.y, item.z, FENCE)
 
 
 def _is(message: Message, kind: str) -> bool:

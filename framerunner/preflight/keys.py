@@ -15,10 +15,9 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
-from offboard.safety.operator import Operator
+from offboard.safety.operator import Controls, Operator
 
 HINT = "hold G for a second to arm; SPACE lands, then K stops the motors"
-HOLD_S = 1.0
 FIRST_REPEAT_S = 0.8
 """From the first character of a held key to the second one, at most."""
 _GO, _STOP, _KILL = "gG", " ", "kK"
@@ -32,26 +31,19 @@ class KeyReader:
     """
 
     def __init__(self, operator: Operator) -> None:
-        self._operator = operator
-        self._go_began_s: float | None = None
-        self._go_last_s = 0.0
+        self._controls = Controls(operator, FIRST_REPEAT_S)
 
     def take(self, key: str, now_s: float) -> None:
         """Take a character at a time, seconds."""
-        stops = self._operator.stops
+        controls = self._controls
         if key in _GO:
-            self._take_go(now_s)
-            return
-        self._go_began_s = None
-        if (key == _STOP and stops == 0) or (key in _KILL and stops == 1):
-            self._operator.press_stop()
-
-    def _take_go(self, now_s: float) -> None:
-        if self._go_began_s is None or now_s - self._go_last_s > FIRST_REPEAT_S:
-            self._go_began_s = now_s
-        self._go_last_s = now_s
-        if now_s - self._go_began_s >= HOLD_S:
-            self._operator.give_go()
+            controls.hold_go(now_s)
+        elif key == _STOP:
+            controls.stop()
+        elif key in _KILL:
+            controls.stop_motors()
+        else:
+            controls.let_go()
 
 
 class TerminalKeys:

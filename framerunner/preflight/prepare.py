@@ -5,29 +5,33 @@ from __future__ import annotations
 import asyncio
 import sys
 import threading
+from collections.abc import Callable
 from contextlib import closing
 from datetime import datetime
 
 from errors import SettingError
 from framerunner.flying.plan import FlightPlan
-from framerunner.preflight.card import make_card
+from framerunner.preflight.card import FlightCard, make_card
 from framerunner.preflight.card_files import HTML_NAME, write_card
 from framerunner.preflight.keys import HINT, has_terminal
 from framerunner.preflight.run import PreflightSettings, run_preflight, tell
 from framerunner.preflight.session import VehicleSession, open_link
 from framerunner.preflight.settings import HardwareSettings
+from offboard.safety.check import failures
 from offboard.safety.operator import Operator
 from offboard.safety.rules import SafetyRules
 from vision.sources import open_source
 from wire.transports.urls import parse_url
 
+PAGE_HINT = "on the monitor's page Operator hold Go, Land lands, then Stop motors stops them"
 
-def check_operator(hardware: HardwareSettings) -> None:
+
+def check_operator(hardware: HardwareSettings, *, has_page: bool) -> None:
     """Raise SettingError if a go is needed and nobody can give it."""
-    if hardware.needs_go and not hardware.dry_run and not has_terminal():
+    if hardware.needs_go and not hardware.dry_run and not has_terminal() and not has_page:
         raise SettingError(
-            "a real drone is armed only by an operator's key, and there is no terminal: start it in one; "
-            "--yes flies without an operator, --simulated says that the drone is a simulation"
+            "a real drone is armed only by an operator's key or page, and there is no terminal: start it in "
+            "one, or add --monitor; --yes flies without an operator, --simulated says that it is a simulation"
         )
 
 
@@ -63,8 +67,23 @@ async def own_simulator_id(drone_url: str, camera_url: str | None) -> int | None
         cancelled.set()
 
 
+def new_operator(hardware: HardwareSettings, *, has_page: bool) -> Operator:
+    """The operator of a flight, with how to give the go and to stop.
+
+    Raises:
+        SettingError: a go is needed, and there is neither a terminal nor a page.
+    """
+    check_operator(hardware, has_page=has_page)
+    hints = ([HINT] if has_terminal() else []) + ([PAGE_HINT] if has_page else [])
+    return Operator(needs_go=hardware.needs_go and not hardware.dry_run, hint="; ".join(hints))
+
+
 async def prepare(
-    plan: FlightPlan, checks: PreflightSettings, hardware: HardwareSettings
+    plan: FlightPlan,
+    checks: PreflightSettings,
+    hardware: HardwareSettings,
+    operator: Operator,
+    show: Callable[[FlightCard, tuple[str, ...]], None] = lambda _card, _failed: None,
 ) -> tuple[SafetyRules, int]:
     """Check the drone and write its flight card.
 
@@ -72,33 +91,35 @@ async def prepare(
         plan: with a mission.
         checks: what is checked; the card is written into its folder.
         hardware: the procedure.
+        operator: of the flight.
+        show: called with the card and the names of checks that prevent arming.
 
     Returns:
-        The rules of the flight, with its operator; the MAVLink id of the drone that was checked.
+        The rules of the flight; the MAVLink id of the drone that was checked.
 
     Raises:
         LinkError: the drone's address is bad, or its link cannot be opened.
         CameraError: the camera's URL can be no camera.
         NotArmedError: a check has failed that the operator does not accept.
         DroneError: the vehicle is not heard or does not answer.
-        SettingError: there is no terminal for the operator, or a name is no check's.
+        SettingError: a name that is accepted is no check's, or old values cannot be kept.
     """
     _check_urls(checks.drone_url, checks.camera_url)
-    check_operator(hardware)
     print("checks before arming, some ten seconds:", file=sys.stderr, flush=True)
     report = await run_preflight(plan, checks)
     tell(report)
+    safety = SafetyRules(hardware.abort, operator, hardware.hold_s)
     card = make_card(
         plan,
         checks,
         report,
-        abort=hardware.abort,
+        safety=safety,
         operator=hardware.operator,
         kind="dry run: nothing is armed" if hardware.dry_run else "flight",
         now=datetime.now().astimezone(),
     )
     write_card(card, checks.folder)
+    show(card, tuple(check.name for check in failures(report.checks)))
     print(f"flight card: {checks.folder / HTML_NAME}", file=sys.stderr, flush=True)
     report.require()
-    needs_go = hardware.needs_go and not hardware.dry_run
-    return SafetyRules(hardware.abort, Operator(needs_go=needs_go, hint=HINT)), report.system_id
+    return safety, report.system_id

@@ -7,7 +7,7 @@ import sys
 import threading
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isnan, nan
 from pathlib import Path
 
@@ -19,14 +19,24 @@ from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import Record
 from framerunner.flying.plan import FlightPlan
 from framerunner.preflight.camera import CameraTimes, measure_camera
-from framerunner.preflight.fence_upload import Vertex, read_fence, upload_fence
-from framerunner.preflight.parameters import ParameterValue, read_parameters, set_and_keep
+from framerunner.preflight.check_names import CHECK_NAMES, RENAMED, REPLACED
+from framerunner.preflight.fence_upload import (
+    FenceItem,
+    Vertex,
+    download_fence,
+    is_same_fence,
+    polygon_fence,
+    upload_fence,
+)
+from framerunner.preflight.kept import OPTION, KeptState, write_kept
+from framerunner.preflight.parameters import ParameterValue, read_parameters, set_parameter
 from framerunner.preflight.session import TIME_REQUESTS, VehicleSession, open_link
 from geometry.axes import Alignment, Pose
 from offboard.drone import DroneError
-from offboard.safety.check import Check, Outcome, accept, failures, passed
+from offboard.safety.check import Check, Outcome, accept, check_names, failures, passed
 from offboard.safety.failsafes import failsafe_checks, failsafe_rows, values_to_set
 from offboard.safety.fence import FlightFence, flight_fence
+from offboard.safety.rules import AbortAction
 from offboard.safety.vehicle_checks import (
     BatteryFacts,
     EstimatorFacts,
@@ -41,13 +51,6 @@ from wire.dialect import degrees_e7, mavlink
 LISTEN_S = 5.0
 CAMERA_S = 3.0
 KEPT_PARAMETERS = "parameters-before{}.params"
-_OWN = frozenset(
-    # Findings of the doctor that checks with a limit replace.
-    (
-        *("battery", "link", "innovations", "setpoints lost", "ground station lost", "battery low", "fence"),
-        *(row.name for row in failsafe_rows()),
-    )
-)
 _OUTCOMES = {Level.GOOD: Outcome.PASS, Level.NOTE: Outcome.NOTE, Level.MISSING: Outcome.FAIL}
 
 
@@ -66,6 +69,7 @@ class PreflightSettings:
         set_parameters: failsafe parameters that fail are set, and their old values kept.
         accepted: names of checks that may fail.
         folder: where the old values are written.
+        abort: what the drone does when the flight is aborted.
     """
 
     drone_url: str
@@ -74,6 +78,7 @@ class PreflightSettings:
     set_parameters: bool = False
     accepted: tuple[str, ...] = ()
     folder: Path = Path()
+    abort: AbortAction = "land"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +100,7 @@ class PreflightReport:
         checks: all, in the order in which they are told.
         fence: of the flight.
         changes: of parameters.
-        kept: the file with their old values; None if nothing was set.
+        kept: the file with their old values and the old fence; None if nothing was changed.
     """
 
     vehicle: str
@@ -139,6 +144,7 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
         LinkError: its link cannot be opened.
         SettingError: a name that is accepted is no check's, or the old parameters cannot be kept.
     """
+    check_names(settings.accepted, CHECK_NAMES)
     fence = flight_fence(plan.box, plan.start_pose[:3])
     cancelled = threading.Event()
     camera = None if settings.camera_url is None else _camera(settings.camera_url)
@@ -193,31 +199,48 @@ def _measure(
         facts = LinkFacts(record.packets.lost_share, session.round_trips_s(), TIME_REQUESTS)
         has_position = has_global_position(record)
         checks: list[Check] = []
-        rows = failsafe_rows(session.autopilot)
+        rows = failsafe_rows(session.autopilot, settings.abort)
         if not rows:
             advice = "check them by hand, then accept it by --accept failsafes"
             checks.append(Check("failsafes", Outcome.FAIL, "no table for this autopilot", "", advice))
         values = read_parameters(session, [row.name for row in rows])
-        changes: tuple[ParameterChange, ...] = ()
-        kept = _unused(settings.folder)
+        wanted: dict[str, float] = {}
         if settings.set_parameters and not record.armed:
             numbers = {name: each.value for name, each in values.items()}
             wanted = values_to_set(numbers, fence, has_global_position=has_position, rows=rows)
-            changes = _set(session, wanted, values, kept)
-            values |= read_parameters(session, wanted)
+        upload = _FenceUpload(session, plan, fence)
+        kept = _keep(session, wanted, values, upload, settings.folder)
+        for name, value in wanted.items():
+            set_parameter(session, ParameterValue(name, value, values[name].kind))
+        changes = tuple(ParameterChange(name, values[name].value, value) for name, value in wanted.items())
+        values |= read_parameters(session, wanted)
         numbers = {name: each.value for name, each in values.items()}
         checks += failsafe_checks(numbers, fence, has_global_position=has_position, rows=rows)
-        checks.append(_fence_check(session, plan, fence))
-    return _Measured(record, session.system_id, facts, tuple(checks), changes, kept if changes else None)
+        checks.append(upload.check())
+    return _Measured(record, session.system_id, facts, tuple(checks), changes, kept)
 
 
-def _set(
-    session: VehicleSession, wanted: Mapping[str, float], values: Mapping[str, ParameterValue], path: Path
-) -> tuple[ParameterChange, ...]:
-    if not wanted:
-        return ()
-    set_and_keep(session, wanted, values, path)
-    return tuple(ParameterChange(name, values[name].value, value) for name, value in wanted.items())
+def _keep(
+    session: VehicleSession,
+    wanted: Mapping[str, float],
+    values: Mapping[str, ParameterValue],
+    upload: _FenceUpload,
+    folder: Path,
+) -> Path | None:
+    """Write what will be changed to a file, and tell where that is; None if nothing will be.
+
+    Raises:
+        SettingError: the file cannot be written.
+    """
+    if not wanted and not upload.replaces:
+        return None
+    fence = upload.before if upload.replaces else None
+    kept, path = KeptState(session.uid, tuple(values[name] for name in wanted), fence), _unused(folder)
+    write_kept(path, session.system_id, kept)
+    what = " and ".join((*(["old values"] if wanted else []), *(["old fence"] if upload.replaces else [])))
+    hint = f"return them by framerunner preflight {OPTION} {path}"
+    print(f"{what}: {path}; {hint}", file=sys.stderr, flush=True)
+    return path
 
 
 def _unused(folder: Path) -> Path:
@@ -247,30 +270,61 @@ def fence_vertices(record: Record, plan: FlightPlan, fence: FlightFence) -> tupl
     return tuple((degrees_e7(each.latitude_deg), degrees_e7(each.longitude_deg)) for each in points)
 
 
-def _fence_check(session: VehicleSession, plan: FlightPlan, fence: FlightFence) -> Check:
-    """Upload the fence and read it back."""
-    record, name = session.record, "fence"
-    limit = f"{len(fence.corners_arena_m)} corners within {fence.radius_m:g} m of the start"
-    if record.armed:
-        return Check(name, Outcome.FAIL, "not uploaded to an armed vehicle", limit, "land and disarm it")
-    if not session.is_px4:
-        advice = "set it by hand (docs/ardupilot.md, section 5), then accept it by --accept fence"
-        return Check(name, Outcome.FAIL, "not uploaded: only PX4's is known", limit, advice)
-    if not has_global_position(record):
-        words = "the vehicle has no global position, so its fence has no effect"
-        advice = "only the app's box and a net keep it in; put up a net"
-        return Check(name, Outcome.NOTE, words, limit, advice)
-    vertices = fence_vertices(record, plan, fence)
-    if vertices is None:
-        advice = "wait until it reports attitude and position"
-        return Check(name, Outcome.FAIL, "the vehicle's pose is not known", limit, advice)
-    try:
-        upload_fence(session, vertices)
-        back = read_fence(session)
-    except DroneError as error:
-        return Check(name, Outcome.FAIL, str(error), limit, "or fly inside a net and --accept fence")
-    value = "uploaded and read back" if back == vertices else "another fence is read back"
-    return passed(name, back == vertices, value, limit, "try again; another station may write to it")
+class _FenceUpload:
+    """The flight's fence in the place of the vehicle's.
+
+    Attributes:
+        before: the fence that the vehicle has; None if it was not downloaded.
+        problem: the check's result if nothing can be uploaded.
+        replaces: the vehicle has another one, which is replaced.
+    """
+
+    def __init__(self, session: VehicleSession, plan: FlightPlan, fence: FlightFence) -> None:
+        self._session = session
+        self._limit = f"{len(fence.corners_arena_m)} corners within {fence.radius_m:g} m of the start"
+        self._wanted: tuple[FenceItem, ...] = ()
+        self.before: tuple[FenceItem, ...] | None = None
+        self.problem = self._obstacle(plan, fence)
+        if self.problem is None:
+            try:
+                self.before = download_fence(session)
+            except DroneError as error:
+                advice = "none is uploaded, as the old one would be lost; or fly in a net and --accept fence"
+                self.problem = Check("fence", Outcome.FAIL, str(error), self._limit, advice)
+        self.replaces = self.before is not None and not is_same_fence(self.before, self._wanted)
+
+    def check(self) -> Check:
+        """Upload the fence and read it back."""
+        name, limit = "fence", self._limit
+        if self.problem is not None:
+            return self.problem
+        try:
+            if self.replaces:
+                upload_fence(self._session, self._wanted)
+            same = is_same_fence(download_fence(self._session), self._wanted)
+        except DroneError as error:
+            return Check(name, Outcome.FAIL, str(error), limit, "or fly inside a net and --accept fence")
+        value = "uploaded and read back" if same else "another fence is read back"
+        return passed(name, same, value, limit, "try again; another station may write to it")
+
+    def _obstacle(self, plan: FlightPlan, fence: FlightFence) -> Check | None:
+        """Why none can be uploaded; None if it can."""
+        record, name, limit = self._session.record, "fence", self._limit
+        if record.armed:
+            return Check(name, Outcome.FAIL, "not uploaded to an armed vehicle", limit, "land and disarm it")
+        if not self._session.is_px4:
+            advice = "set it by hand (docs/ardupilot.md, section 5), then accept it by --accept fence"
+            return Check(name, Outcome.FAIL, "not uploaded: only PX4's is known", limit, advice)
+        if not has_global_position(record):
+            words = "the vehicle has no global position, so its fence has no effect"
+            advice = "only the app's box and a net keep it in; put up a net"
+            return Check(name, Outcome.NOTE, words, limit, advice)
+        vertices = fence_vertices(record, plan, fence)
+        if vertices is None:
+            advice = "wait until it reports attitude and position"
+            return Check(name, Outcome.FAIL, "the vehicle's pose is not known", limit, advice)
+        self._wanted = polygon_fence(vertices)
+        return None
 
 
 def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
@@ -278,7 +332,7 @@ def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
     caps = plan.caps
     if caps is None:
         return Check("caps", Outcome.FAIL, "none", "", "give --max-speed")
-    value = f"{caps.words}; {height_m:.1f} m above the start"
+    value = f"{replace(caps, height_m=None).words}, {height_m:.1f} m above the start"
     limit = f"below the fence, {fence.height_m:g} m"
     if height_m >= fence.height_m:
         return Check("caps", Outcome.FAIL, value, limit, "give a lower --max-height")
@@ -291,14 +345,14 @@ def _doctors(findings: Sequence[Finding]) -> list[Check]:
     """The doctor's findings, but for those that other checks replace."""
     return [
         Check(
-            "estimator settings" if each.subject == "estimator" else each.subject,
+            RENAMED.get(each.subject, each.subject),
             _OUTCOMES[each.level],
             each.text,
             "",
             each.advice,
         )
         for each in findings
-        if each.subject not in _OWN
+        if each.subject not in REPLACED
     ]
 
 

@@ -17,8 +17,8 @@ from wire.dialect import (
     mavlink,
     request_message,
 )
-from wire.simulator_identity import is_simulator
 from wire.transports.vehicle_link import VehicleLink
+from wire.vehicle_identity import is_simulator, vehicle_uid
 
 ANSWER_S = 0.5
 TRIES = 6
@@ -78,13 +78,20 @@ class VehicleSession:
     @property
     def is_own_simulator(self) -> bool:
         """Whether it says that it is framerunner's simulated drone."""
+        version = self._version()
+        return version is not None and is_simulator(version.uid, self.system_id)
+
+    @property
+    def uid(self) -> str:
+        """The unique number of its hardware, as AUTOPILOT_VERSION gives it; empty if it gives none."""
+        version = self._version()
+        return "" if version is None else vehicle_uid(version)
+
+    def _version(self) -> Message | None:
         request = request_message(self.system_id, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
-
-        def uid(message: Message) -> int | None:
-            return message.uid if message.get_type() == "AUTOPILOT_VERSION" else None
-
-        found = self.request(request, uid, tries=3)
-        return found is not None and is_simulator(found, self.system_id)
+        return self.request(
+            request, lambda each: each if each.get_type() == "AUTOPILOT_VERSION" else None, tries=3
+        )
 
     def listen(self, seconds: float) -> None:
         """Let the record collect what the doctor requests."""

@@ -123,11 +123,11 @@ def _is_complete_avi(path: Path) -> bool:
 
 
 class RecordingCamera:
-    """A camera whose images are also written to a video file.
+    """A camera whose images are also written to a video file, if one is wanted.
 
     Args:
         source: the camera.
-        path: the video; made with the first image.
+        path: the video; made with the first image. None: there is none.
         rate_hz: images a second, for players.
         on_frame: called with each image.
     """
@@ -135,30 +135,32 @@ class RecordingCamera:
     def __init__(
         self,
         source: Camera,
-        path: Path,
+        path: Path | None,
         rate_hz: float,
         on_frame: Callable[[CameraFrame], None] | None = None,
     ) -> None:
         self._source = source
         self._on_frame = on_frame
-        self._video = VideoFile(path, rate_hz)
+        self._video = None if path is None else VideoFile(path, rate_hz)
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
         """Images as they arrive, each after it was added to the video."""
         async for frame in self._source.frames():
-            self._video.write(frame.image, wait=False)
+            if self._video is not None:
+                self._video.write(frame.image, wait=False)
             if self._on_frame is not None:
                 self._on_frame(frame)
             yield frame
 
     def close(self) -> None:
         """Finish the file."""
-        self._video.close()
+        if self._video is not None:
+            self._video.close()
 
     @property
     def problem(self) -> str:
         """Of the video, see `VideoFile`."""
-        return self._video.problem
+        return "" if self._video is None else self._video.problem
 
 
 class RunRecords:

@@ -13,6 +13,7 @@ from framerunner.flying.plan import FlightPlan
 from geometry.axes import ORIGIN, Alignment, Pose
 from geometry.rotations import quaternion_from_yaw, yaw_of
 from geometry.vectors import Quaternion, Vec3
+from offboard.link.gimbal_feed import GimbalAttitude, gimbal_attitude
 from scenarios.models import Scenario, TrueState
 from scenarios.result import LocalFrame, Standing
 from sitl.camera import FIRST_EXPOSURE_US, Camera, Motion
@@ -23,6 +24,7 @@ from wire.vehicle_telemetry import AHEAD_US, VehiclePose, VehicleTelemetry
 REFEREE_STEP_US = 20_000
 REPORT_GAP_US = 20_000  # between two reports: the one after an exposure is received so much later
 HELD_AFTER_FLIGHT_US = 10_000_000  # time for the verdict, before the vehicle is put back on its start
+GIMBAL_LOST_US = 2_000_000  # without a report; it sends ten a second
 _PENDING = 200  # poses between two heartbeats
 
 
@@ -100,7 +102,8 @@ class VirtualCamera:
 
     Args:
         scenario: what is to be seen; its frames are higher than declared if there is no base.
-        level: whether the camera is held level, as by a gimbal, and follows the heading only.
+        level: whether the camera is held level, as by a gimbal, and follows the heading only; else it is
+            fixed to the drone or, if the vehicle reports a gimbal, looks as that does.
         base: whether the drone starts from the scenario's base; else it starts from the floor.
     """
 
@@ -122,6 +125,20 @@ class VirtualCamera:
         self._judged_us = 0
         self._next = 0
         self._motors_on = False
+        self._gimbal: GimbalAttitude | None = None
+        self._gimbal_us = 0  # time of the vehicle's telemetry when the gimbal was heard last
+
+    @property
+    def has_gimbal(self) -> bool:
+        """Whether the images are those of a camera on the vehicle's gimbal."""
+        heard = self._gimbal is not None and self.telemetry.time_us - self._gimbal_us <= GIMBAL_LOST_US
+        return heard and not self._level
+
+    def take_gimbal(self, message: Message) -> None:
+        """Take a GIMBAL_DEVICE_ATTITUDE_STATUS of the vehicle."""
+        attitude = gimbal_attitude(tuple(message.q), message.flags)
+        if attitude is not None:
+            self._gimbal, self._gimbal_us = attitude, self.telemetry.time_us
 
     def take(self, message: Message) -> None:
         """Take one of the vehicle's messages; those without its pose or state are ignored."""
@@ -155,8 +172,13 @@ class VirtualCamera:
         if where is None:
             return None
         self._next = index + 1
-        attitude = quaternion_from_yaw(yaw_of(where.attitude_arena)) if self._level else where.attitude_arena
         motion = Motion(exposure_us, where.velocity_arena_m_s)
+        gimbal, alignment = self._gimbal, self.placement.alignment
+        if self.has_gimbal and gimbal is not None and pose is not None and alignment is not None:
+            attitude = alignment.attitude(gimbal.ned(yaw_of(pose.attitude_ned)))
+            eye = self._camera.place_on(where.position_arena_m, where.attitude_arena)
+            return exposure_us, self._camera.render_from(eye, attitude, (), motion)
+        attitude = quaternion_from_yaw(yaw_of(where.attitude_arena)) if self._level else where.attitude_arena
         return exposure_us, self._camera.render(where.position_arena_m, attitude, motion=motion)
 
     def standing(self, state: str = "", ended: str | None = None) -> Standing:

@@ -54,6 +54,7 @@ class CameraServer:
         self._reports = (0, 0)  # of attitude and position when the rates were measured last
         self._rate_requests = 0
         self._restarts = 0
+        self._has_gimbal = False
 
     async def run(self) -> None:
         """Serve until cancelled.
@@ -110,7 +111,9 @@ class CameraServer:
                 self._vehicle = message.get_srcSystem()
                 self._say(f"vehicle {self._vehicle} found")
             sender = (message.get_srcSystem(), message.get_srcComponent())
-            if self._vehicle is not None and sender == (self._vehicle, AUTOPILOT_COMPONENT_ID):
+            if message.get_type() == "GIMBAL_DEVICE_ATTITUDE_STATUS" and sender[0] == self._vehicle:
+                self._camera.take_gimbal(message)
+            elif self._vehicle is not None and sender == (self._vehicle, AUTOPILOT_COMPONENT_ID):
                 self._camera.take(message)
                 self._watch.see(message.get_type(), time.monotonic())
         if self._camera.restarts != self._restarts:
@@ -118,6 +121,11 @@ class CameraServer:
             self._reports, self._rate_requests = (0, 0), 0
             self._say("the vehicle has restarted; the arena is placed again")
         self._watch.report_placement(self._camera)
+        if self._camera.has_gimbal is not self._has_gimbal:
+            self._has_gimbal = self._camera.has_gimbal
+            self._say(
+                "the camera looks as the vehicle's gimbal" if self._has_gimbal else "the gimbal is lost"
+            )
         shot = self._camera.step()
         if shot is not None and not self._watch.stale:
             self._video.publish(shot[1], shot[0])

@@ -18,10 +18,10 @@ _MAX_OTHERS = 3
 
 def register(monitor: Monitor) -> None:
     """Add the page, and its first code as an image at `/join.svg`."""
-    for_others = is_for_others(monitor.place[0])
+    for_others, scheme = is_for_others(monitor.place[0]), monitor.settings.scheme
 
     def urls(request: Request) -> list[str]:
-        return urls_for_visitor(*monitor.place, str(request.url)) if for_others else []
+        return urls_for_visitor(*monitor.place, str(request.url), scheme) if for_others else []
 
     @monitor.web.get("/join")
     async def join(request: Request) -> Response:

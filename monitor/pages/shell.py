@@ -18,6 +18,7 @@ _NAVIGATION = (
     ("Editor", "/edit"),
     ("Course", "/course"),
     ("Pilot", "/pilot"),
+    ("Operator", "/operator"),
     ("Competition", "/competition"),
     ("Ranking", "/ranking"),
     ("Stage", "/stage"),

@@ -56,6 +56,13 @@ PAGES = (
         root_classes="pilot",
     ),
     Page(
+        "/operator",
+        "Operator",
+        "operator",
+        lambda _monitor, _request, visitor: {"mayFly": visitor.may_fly},
+        root_classes="operator",
+    ),
+    Page(
         "/competition",
         "Competition",
         "competition",

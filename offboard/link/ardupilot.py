@@ -110,6 +110,11 @@ class ArduPilotDialect:
         self._command = None
         self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(ardupilot_modes.BRAKE))
 
+    def request_land_blocking(self) -> None:
+        """End the setpoints permanently and request LAND, from a thread."""
+        self.end()
+        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(ardupilot_modes.LAND))
+
     async def arm(self) -> None:
         """Arm."""
         await self._action.arm()

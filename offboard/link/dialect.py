@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 
 from offboard.drone import VelocityCommand
-from offboard.link.commands import SetpointStream
+from offboard.link.commands import SetpointStream, synchronous
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +88,9 @@ class Dialect(Protocol):
     def request_hold_blocking(self) -> None:
         """The same from a thread, which waits for the answer."""
 
+    def request_land_blocking(self) -> None:
+        """End the setpoints permanently and request landing, from a thread, which waits for the answer."""
+
     def arm(self) -> Awaitable[None]:
         """Arm."""
         ...
@@ -127,6 +130,11 @@ class Px4Dialect(SetpointStream):
         """End the stream until the next setpoint, and request hold."""
         # Not through the plugin if the watchdog has ended the stream.
         await (self._action.hold() if self.ended else super().request_hold())
+
+    def request_land_blocking(self) -> None:
+        """End the stream permanently and request the mode land, from a thread."""
+        self.end()
+        synchronous(self._action).land()
 
     async def arm(self) -> None:
         """Arm."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
 from typing import Any
@@ -26,6 +27,21 @@ class GimbalAttitude:
         return self.attitude if self.to_north else multiply(quaternion_from_yaw(yaw_ned_rad), self.attitude)
 
 
+def gimbal_attitude(q: Sequence[float], flags: int) -> GimbalAttitude | None:
+    """The attitude that a GIMBAL_DEVICE_ATTITUDE_STATUS says; None if it says none.
+
+    Args:
+        q: its quaternion (w, x, y, z).
+        flags: GIMBAL_DEVICE_FLAGS.
+    """
+    if len(q) != 4 or not all(map(isfinite, q)) or sum(each * each for each in q) < _MIN_LENGTH:
+        return None
+    locked = bool(flags & _YAW_LOCK)  # older gimbals say the frame by this alone
+    to_north = bool(flags & _YAW_IN_EARTH_FRAME) or (locked and not flags & _YAW_IN_VEHICLE_FRAME)
+    w, x, y, z = q
+    return GimbalAttitude(normalized((w, x, y, z)), to_north)
+
+
 class GimbalFeed:
     """Keeps the newest attitude; it is written on MAVSDK's thread.
 
@@ -43,10 +59,6 @@ class GimbalFeed:
     def _on_attitude(self, message: Any, _user: object) -> None:  # noqa: ANN401
         fields = json.loads(message.fields_json)
         values = [float(value) if isinstance(value, int | float) else nan for value in fields["q"]]
-        if len(values) != 4 or not all(map(isfinite, values)) or sum(v * v for v in values) < _MIN_LENGTH:
-            return
-        flags = int(fields["flags"])
-        locked = bool(flags & _YAW_LOCK)  # older gimbals say the frame by this alone
-        to_north = bool(flags & _YAW_IN_EARTH_FRAME) or (locked and not flags & _YAW_IN_VEHICLE_FRAME)
-        w, x, y, z = values
-        self.newest = GimbalAttitude(normalized((w, x, y, z)), to_north)
+        attitude = gimbal_attitude(values, int(fields["flags"]))
+        if attitude is not None:
+            self.newest = attitude

@@ -144,6 +144,12 @@ class SteppedPx4Dialect:
         self._command, mode = None, px4_modes.HOLD
         self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(mode.main), float(mode.sub))
 
+    def request_land_blocking(self) -> None:
+        """End the setpoints permanently and request landing, from a thread, which waits for the answer."""
+        self.end()
+        mode = px4_modes.LAND
+        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(mode.main), float(mode.sub))
+
     def arm(self) -> Awaitable[None]:
         """Arm."""
         return self._request(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)

@@ -28,7 +28,8 @@ from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Quaternion, Vec3
 from offboard.arming import Arming
 from offboard.drone import VelocityCommand
-from offboard.link.dialect import TickExchange
+from offboard.link.commands import PendingRequests
+from offboard.link.dialect import Dialect, TickExchange
 from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
 from wire.dialect import AUTOPILOT_COMPONENT_ID
 from wire.mission_tunnel import TEXT_PREFIX
@@ -387,17 +388,26 @@ class TickSource:
             self._number = await self._clock.stop() // TICK_US
             self.waits = True
 
-    async def begin_exchange(self, exchange: TickExchange) -> None:
-        """As `begin`, at a multiple of `BEGIN_US`; from then on the exchange goes around each tick."""
+    async def begin_exchange(self, dialect: Dialect, requests: PendingRequests) -> None:
+        """With an exchange: `begin` at a multiple of `BEGIN_US`; exchange at each tick; request streams."""
+        if dialect.exchange is None:
+            return
         await self.begin()
         clock, end_us = self._clock, _next_multiple_us(self._number, BEGIN_US)
         while clock is not None and self._number * TICK_US < end_us:
             self._number += 1
             await clock.advance(self._number * TICK_US, None)
-        self.exchange = exchange
+        self.exchange = dialect.exchange
+        await self.until_done(requests.wait(dialect.request_streams()))
 
-    async def pass_to_arming(self) -> None:
-        """Let time pass to a multiple of `ARM_US`: so all flights begin at the same time."""
+    async def before_arming(self, plugin: Any) -> None:  # noqa: ANN401
+        """Request rates, from MAVSDK's asyncio plugin.
+
+        With an exchange let time pass to a multiple of `ARM_US`, so all such flights begin at the same time.
+        """
+        if self.exchange is None:
+            await request_rates(self._feed, plugin)
+            return
         end_us = _next_multiple_us(self._number, ARM_US)
         while self._number * TICK_US < end_us and await self.next(TICK_LOST_S):
             pass

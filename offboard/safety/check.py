@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from enum import Enum
 
 from errors import SettingError
@@ -59,18 +60,26 @@ def failures(checks: Iterable[Check]) -> list[Check]:
     return [check for check in checks if check.outcome is Outcome.FAIL]
 
 
-def accept(checks: Sequence[Check], names: Sequence[str]) -> list[Check]:
-    """The checks with those failures accepted that the operator named.
+def check_names(names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise SettingError if a name that the operator accepts is no check's, before any check is run.
 
-    Raises:
-        SettingError: there is no check of a name.
+    Args:
+        names: that the operator gave.
+        known: of all checks that there are.
     """
-    known = {check.name for check in checks}
+    listed = sorted(known, key=str.lower)
     for name in names:
-        if name != ALL and name not in known:
+        if name != ALL and name not in listed:
+            near = get_close_matches(name, listed, 1)
+            hint = f"; use {near[0]}" if near else ""
             raise SettingError(
-                f"--accept {name}: there is no such check; the checks are {', '.join(sorted(known))}"
+                f"--accept {name!r}: there is no such check{hint}; the checks are {', '.join(listed)}, "
+                f"and {ALL} accepts each"
             )
+
+
+def accept(checks: Sequence[Check], names: Sequence[str]) -> list[Check]:
+    """The checks with those failures accepted that the operator named."""
     return [
         replace(check, outcome=Outcome.ACCEPTED)
         if check.outcome is Outcome.FAIL and (check.name in names or ALL in names)

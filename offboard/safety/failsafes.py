@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 
 from offboard.safety.check import Check, Outcome
 from offboard.safety.fence import FlightFence
+from offboard.safety.rules import AbortAction
 
 TABLE = Path(__file__).with_name("failsafes.yaml")
 BEGIN, END = "<!-- failsafes: written by `make failsafes` -->\n", "<!-- end of failsafes -->\n"
@@ -37,6 +38,7 @@ class FailsafeRow(BaseModel):
         unit: of the value.
         values: what each value means.
         needs: what the vehicle must have for the parameter to matter.
+        strict_with_hold: with `--on-abort hold` only `set_to` passes.
         why: for people, Markdown.
     """
 
@@ -50,6 +52,7 @@ class FailsafeRow(BaseModel):
     unit: str = ""
     values: dict[int, str] = {}
     needs: Literal["global position"] | None = None
+    strict_with_hold: bool = False
     why: str
 
     @model_validator(mode="after")
@@ -59,8 +62,15 @@ class FailsafeRow(BaseModel):
         return self
 
     def wanted(self, fence: FlightFence) -> float:
-        """The value to set for a flight."""
-        return _number(self.set_to, fence)
+        """The value to set for a flight: not more than a fence allows that is lower."""
+        value = _number(self.set_to, fence)
+        return value if self.most is None else min(value, _number(self.most, fence))
+
+    def strict(self, abort: AbortAction) -> FailsafeRow:
+        """The row for flights that end so when they are aborted."""
+        if abort == "land" or not self.strict_with_hold:
+            return self
+        return self.model_copy(update={"accepted": ()})
 
     def allows(self, value: float, fence: FlightFence) -> bool:
         """Whether a value passes."""
@@ -90,10 +100,10 @@ class FailsafeRow(BaseModel):
 
 
 @cache
-def failsafe_rows(autopilot: str = "px4") -> tuple[FailsafeRow, ...]:
-    """The table of an autopilot; empty if there is none."""
+def failsafe_rows(autopilot: str = "px4", abort: AbortAction = "land") -> tuple[FailsafeRow, ...]:
+    """The table of an autopilot, for flights that end so when they are aborted; empty if there is none."""
     rows = yaml.safe_load(TABLE.read_text(encoding="utf-8")).get(autopilot, ())
-    return tuple(FailsafeRow.model_validate(row) for row in rows)
+    return tuple(FailsafeRow.model_validate(row).strict(abort) for row in rows)
 
 
 def failsafe_checks(

@@ -104,7 +104,7 @@ def estimator_check(facts: EstimatorFacts) -> Check:
     }
     unknown = [what for what, is_known in known.items() if not is_known]
     if unknown:
-        advice = "wait for its estimate; see docs/real-drone.md, section 3"
+        advice = "wait for its estimate; see docs/real-drone.md, step 6"
         return Check(name, Outcome.FAIL, f"it does not know its {' and '.join(unknown)}", limit, advice)
     good = isfinite(facts.largest_ratio) and facts.largest_ratio <= MAX_RATIO
     advice = "keep the drone still, or correct the sensor that disagrees"

@@ -27,6 +27,7 @@ class FaultPart(StrEnum):
     MOTOR = "motor"
     CAMERA = "camera"
     LINK = "link"
+    RC = "rc"
 
 
 class FaultKind(StrEnum):
@@ -123,6 +124,10 @@ SIZES: dict[FaultPart, dict[FaultKind, FaultSize | None]] = {
         FaultKind.OFF: None,
         FaultKind.DELAYED: _late(0.2),
         FaultKind.LOSSY: _SHARE_LOST,
+    },
+    FaultPart.RC: {
+        FaultKind.OFF: None,
+        FaultKind.STUCK: None,
     },
 }
 """The kinds of faults of each part, and what their size means; None: it has no size."""

@@ -14,7 +14,7 @@ REACTION_S = 0.5
 
 
 def fault_fields(facts: FaultFacts, report: RefereeReport, sensors: str) -> dict[str, Any]:
-    """The fields of a result that tell of its faults.
+    """The fields of a result that tell of its faults and its autopilot.
 
     Args:
         facts: the faults and failsafes of the flight.
@@ -22,6 +22,7 @@ def fault_fields(facts: FaultFacts, report: RefereeReport, sensors: str) -> dict
         sensors: name of the suite that was flown with.
     """
     fields: dict[str, Any] = {"faults": (), "fault_reaction": "", "fault_expected": "", "fault_outcome": ""}
+    fields["autopilot"] = facts.autopilot
     if not facts.begun:
         return fields
     first = facts.begun[0]
@@ -34,7 +35,8 @@ def fault_fields(facts: FaultFacts, report: RefereeReport, sensors: str) -> dict
         fault = parse_fault(first.fault)
     except FaultError:
         return fields
-    row = row_of(fault, sensors) if len(facts.begun) == 1 else None
+    own = not facts.autopilot  # the table is of our autopilot
+    row = row_of(fault, sensors) if own and len(facts.begun) == 1 else None
     if row is not None:
         late_s = report.try_time_s - fault.at_s
         ended = _ended_so(row, report, text, reaction_s=reaction_s, late_s=late_s)

@@ -28,6 +28,8 @@ class ArduPilotSimulation(SimulatedVehicle):
     gyroscopes a step, and needs 1.8 times as many as loops.
     """
 
+    autopilot_name = "ArduPilot"
+
     def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
         super().__init__(scenario, airframe, seed)
         self._armed = False

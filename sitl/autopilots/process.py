@@ -53,6 +53,8 @@ class AutopilotProcess(ABC):
         self._environment = dict(environment)
         self._processor = processor
         self._process: Process | None = None
+        self._started = False
+        self._log_start = 0  # where the output of the present start begins
 
     @property
     def process_id(self) -> int | None:
@@ -61,7 +63,7 @@ class AutopilotProcess(ABC):
 
     @property
     def log(self) -> Path:
-        """What it prints."""
+        """What it prints; one that is restarted goes on with the same file."""
         return self.folder / f"{self._name.lower()}.log"
 
     @abstractmethod
@@ -81,7 +83,8 @@ class AutopilotProcess(ABC):
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             command = self.command()
-            output = self.log.open("wb")
+            output = self.log.open("ab" if self._started else "wb")
+            self._log_start, self._started = output.tell(), True
         except OSError as error:
             advice = "name another folder by --storage"
             raise SettingError(f"{self.folder}: cannot be written to ({error.strerror}); {advice}") from None
@@ -121,7 +124,7 @@ class AutopilotProcess(ABC):
     def _last_words(self) -> str:
         """Its last error or line, for the end of a message."""
         with contextlib.suppress(OSError):
-            text = self.log.read_bytes()[-_LAST_BYTES:].decode(errors="replace")
+            text = self.log.read_bytes()[self._log_start :][-_LAST_BYTES:].decode(errors="replace")
             lines = [line.strip() for line in text.splitlines() if line.strip()]
             errors = [line for line in lines if "ERROR" in line]
             if lines:

@@ -24,7 +24,7 @@ _SENSORS = {
     FaultPart.EXTERNAL_POSE: "external_pose",
 }
 """Sensors that a suite may lack, by their fields."""
-_OTHERS = frozenset({FaultPart.BATTERY, FaultPart.MOTOR, FaultPart.CAMERA, FaultPart.LINK})
+_OTHERS = frozenset({FaultPart.BATTERY, FaultPart.MOTOR, FaultPart.CAMERA, FaultPart.LINK, FaultPart.RC})
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +51,7 @@ class Faults:
         world: whose motors fail, and whose time counts.
         battery: that sags.
         seed: of the flight.
+        has_transmitter: there is a remote control, which can fail.
 
     Raises:
         FaultError: the drone has no such part.
@@ -59,6 +60,7 @@ class Faults:
         next_us: before this time `update` need not be called.
         sensors: active faults of sensors; None: there are none.
         link: the active fault of the link; None: there is none.
+        rc: the active fault of the remote control; None: there is none.
         camera: active faults of the camera.
         begun: of the present or last try, oldest first.
         notice: called with a line for people when a fault begins or ends.
@@ -71,7 +73,10 @@ class Faults:
         world: World,
         battery: Battery,
         seed: int,
+        *,
+        has_transmitter: bool = False,
     ) -> None:
+        self._has_transmitter = has_transmitter
         self._declared = tuple(declared)
         self._suite, self._world, self._battery, self._seed = suite, world, battery, seed
         self._rotors = len(world.airframe.rotors)
@@ -82,6 +87,7 @@ class Faults:
         self.next_us = _NEVER_US
         self.sensors: SensorFaults | None = None
         self.link: LinkFault | None = None
+        self.rc: Fault | None = None
         self.camera: tuple[Fault, ...] = ()
         self.begun: list[BegunFault] = []
         self.notice: Callable[[str], None] = lambda line: None
@@ -167,6 +173,8 @@ class Faults:
         self.next_us = self._scheduled[-1][0] if self._scheduled else _NEVER_US
 
     def _has(self, part: FaultPart) -> bool:
+        if part is FaultPart.RC:
+            return self._has_transmitter
         if part in _OTHERS:
             return True
         if self._suite.ideal:
@@ -179,6 +187,10 @@ class Faults:
 
     def _check(self, fault: Fault) -> None:
         """Refuse a fault of a part that the drone does not have."""
+        if fault.part is FaultPart.RC and not self._has_transmitter:
+            raise FaultError(
+                f"fault `{fault}`: only a drone that PX4 flies has a remote control; leave it out, or fly PX4"
+            )
         if not self._has(fault.part):
             raise FaultError(
                 f"fault `{fault}`: the sensors {self._suite.name} have no {fault.part}; leave it out"
@@ -216,6 +228,7 @@ class Faults:
     def _apply_others(self) -> None:
         self.sensors = self._all_sensors if self._all_sensors.active else None
         self.camera = tuple(fault for fault in self._active if fault.part is FaultPart.CAMERA)
+        self.rc = next((fault for fault in reversed(self._active) if fault.part is FaultPart.RC), None)
         links = [fault for fault in self._active if fault.part is FaultPart.LINK]
         if not links:
             self.link = None

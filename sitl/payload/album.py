@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
@@ -17,6 +18,13 @@ if TYPE_CHECKING:
 
 _FOLDER = "DCIM"  # of cameras, by the Design rule for Camera File system
 _MIN_FREE_BYTES = MEBIBYTE  # a recording needs room to begin
+
+
+@dataclass(slots=True)
+class _Recording:
+    encoder: VideoEncoder
+    path: Path
+    written: int = 0  # bytes of the file
 
 
 class CameraAlbum:
@@ -39,24 +47,25 @@ class CameraAlbum:
         self._folder: Path = (_FOLDER, name)
         self._rate_hz = rate_hz
         self._newest: Image | None = None
-        self._encoder: VideoEncoder | None = None
-        self._video: Path = ()
-        self._written = 0  # bytes of the video
+        self._recording: _Recording | None = None
+        self._ending: list[_Recording] = []  # stopped; their last images are still being compressed
         self.can_record = find_spec("av") is not None
 
     @property
     def is_recording(self) -> bool:
         """Whether video is being recorded."""
-        return self._encoder is not None
+        return self._recording is not None
 
     def show(self, image: Image, time_us: int) -> None:
         """Take the image that has just arrived, BGR, shape (height, width, 3), with its time of exposure."""
         self._newest = image
-        encoder = self._encoder
-        if encoder is not None:
-            encoder.show(image, time_us)
-            if not self._write(encoder.take()) or encoder.failed:
+        recording = self._recording
+        if recording is not None:
+            recording.encoder.show(image, time_us)
+            if not self._write(recording) or recording.encoder.failed:
                 self.stop_video()
+        if self._ending:
+            self._ending = [each for each in self._ending if not self._has_ended(each)]
 
     def capture(self, time_us: int, index: int) -> str | None:
         """Keep the newest image under a number, and return its address for MAVLink FTP at component 1.
@@ -89,19 +98,27 @@ class CameraAlbum:
         from sitl.payload.video_file import VideoEncoder
 
         height, width = self._newest.shape[:2]
-        self._video, self._written = path, 0
-        self._encoder = VideoEncoder(width, height, self._rate_hz)
+        self._recording = _Recording(VideoEncoder(width, height, self._rate_hz), path)
         return True
 
     def stop_video(self) -> None:
-        """Finish the file, if one is recorded."""
-        encoder, self._encoder = self._encoder, None
-        if encoder is not None:
-            self._write(encoder.finish())
+        """End the recording, if there is one; the images after this complete its file."""
+        recording, self._recording = self._recording, None
+        if recording is not None:
+            recording.encoder.end()
+            self._ending.append(recording)
+
+    def close(self) -> None:
+        """End the recording, and wait until all files are complete."""
+        self.stop_video()
+        for each in self._ending:
+            each.encoder.wait()
+            self._write(each)
+        self._ending = []
 
     def format(self) -> bool:
         """Delete all pictures and recordings, also those of earlier flights; no other file."""
-        self.stop_video()
+        self.close()
         try:
             self._remove_folder((_FOLDER,))
         except OSError as error:
@@ -113,15 +130,22 @@ class CameraAlbum:
         used, total = self._storage.space()
         return PictureSpace(total / MEBIBYTE, used / MEBIBYTE)
 
-    def _write(self, data: bytes) -> bool:
-        """Append to the video; False if the storage is full."""
+    def _has_ended(self, recording: _Recording) -> bool:
+        """Write what is done of a recording that was stopped; whether that was all."""
+        has_ended = recording.encoder.has_ended  # read first: the last bytes are there then
+        self._write(recording)
+        return has_ended
+
+    def _write(self, recording: _Recording) -> bool:
+        """Append what is done to the file; False if the storage is full."""
+        data = recording.encoder.take()
         if not data:
             return True
         try:
-            self._storage.write(self._video, self._written, data)
+            self._storage.write(recording.path, recording.written, data)
         except OSError:
             return False
-        self._written += len(data)
+        recording.written += len(data)
         return True
 
     def _create(self, path: Path) -> None:

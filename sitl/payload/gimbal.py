@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from math import copysign, cos, isfinite, remainder, sin, tau
+from math import copysign, isfinite, remainder, tau
 
 from firmware_py.mavlink.gimbal.model import GimbalLimits, GimbalTarget
-from geometry.axes import flip_quaternion
-from geometry.rotations import quaternion_from_euler, yaw_of
-from geometry.vectors import Quaternion, Vec3
+from geometry.rotations import yaw_of
+from geometry.vectors import Quaternion
 from scenarios.gimbal import Gimbal
+from scenarios.models import CameraMotion
 
 
 class SimulatedGimbal:
@@ -40,15 +40,10 @@ class SimulatedGimbal:
         return self._target.yaw_locked
 
     @property
-    def attitude_arena(self) -> Quaternion:
-        """Of the camera on it, forward-left-up to arena axes, as of the last step."""
-        return flip_quaternion(quaternion_from_euler(0.0, self.pitch_rad, self._heading_rad + self.yaw_rad))
-
-    @property
-    def rate_frd_rad_s(self) -> Vec3:
-        """Of the camera on it in the last step, in the camera's axes forward, right, down."""
-        yaw_rate = self._turn_rate_rad_s
-        return (-yaw_rate * sin(self.pitch_rad), self.pitch_rate_rad_s, yaw_rate * cos(self.pitch_rad))
+    def motion(self) -> CameraMotion:
+        """Of the camera on it, as of the last step."""
+        yaw_ned_rad = self._heading_rad + self.yaw_rad
+        return CameraMotion(self.pitch_rad, yaw_ned_rad, self.pitch_rate_rad_s, self._turn_rate_rad_s)
 
     def turn(self, target: GimbalTarget) -> None:
         """Take a new target; angles beyond the limits are limited."""

@@ -22,7 +22,7 @@ _CODEC = {"preset": "ultrafast", "tune": "zerolatency", "crf": "20"}  # visually
 
 
 class VideoEncoder:
-    """Compresses images; `take` returns what of the file is done.
+    """Compresses images; `take` returns what of the file is done, and after `end` its last bytes.
 
     Args:
         width_px: of the images; a last odd column or row is left out.
@@ -36,7 +36,7 @@ class VideoEncoder:
     def __init__(self, width_px: int, height_px: int, rate_hz: float) -> None:
         self._size_px = (width_px, height_px)
         self._rate_hz = rate_hz
-        self._images: queue.Queue[tuple[Image, int] | None] = queue.Queue(_WAITING)
+        self._images: queue.SimpleQueue[tuple[Image, int] | None] = queue.SimpleQueue()
         self._pieces: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._first_us = -1
         self.failed = False
@@ -50,8 +50,8 @@ class VideoEncoder:
         """
         if self._first_us < 0:
             self._first_us = time_us
-        with suppress(queue.Full):
-            self._images.put_nowait((image, time_us - self._first_us))
+        if self._images.qsize() < _WAITING:
+            self._images.put((image, time_us - self._first_us))
 
     def take(self) -> bytes:
         """The next bytes of the file; empty if there are none now."""
@@ -61,12 +61,18 @@ class VideoEncoder:
                 pieces.append(self._pieces.get_nowait())
         return b"".join(pieces)
 
-    def finish(self) -> bytes:
-        """Compress what waits, end the file and return its last bytes."""
-        if self._thread.is_alive():
-            self._images.put(None)
-            self._thread.join()
-        return self.take()
+    def end(self) -> None:
+        """Let the thread compress what waits and end the file. Never blocks; see `has_ended`."""
+        self._images.put(None)
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the thread has ended, so that the next `take` returns the last bytes."""
+        return not self._thread.is_alive()
+
+    def wait(self) -> None:
+        """Wait for the end that was requested by `end`."""
+        self._thread.join()
 
     def write(self, data: bytes) -> int:
         """Take bytes of the file from the multiplexer, which sees this object as the file."""
@@ -86,5 +92,5 @@ class VideoEncoder:
                     container.mux(packet)
         except (av.FFmpegError, OSError, ValueError):
             self.failed = True
-            while self._images.get() is not None:  # until `finish`
+            while self._images.get() is not None:  # until `end`
                 pass

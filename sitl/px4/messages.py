@@ -37,12 +37,20 @@ class Packer:
 
     Args:
         message_id: MAVLink's number.
+        system_id: of the sender.
+        component_id: of the sender.
     """
 
-    __slots__ = ("_crc_extra", "_message_id", "_pack", "_sequence")
+    __slots__ = ("_crc_extra", "_message_id", "_pack", "_sender", "_sequence")
 
-    def __init__(self, message_id: int) -> None:
+    def __init__(
+        self,
+        message_id: int,
+        system_id: int = SIMULATOR_SYSTEM_ID,
+        component_id: int = SIMULATOR_COMPONENT_ID,
+    ) -> None:
         kind = mavlink.mavlink_map[message_id]
+        self._sender = (system_id, component_id)
         self._message_id, self._crc_extra = message_id, kind.crc_extra
         self._pack = kind.unpacker.pack
         self._sequence = 0
@@ -54,7 +62,7 @@ class Packer:
         low, high = self._message_id & 0xFFFF, self._message_id >> 16
         head = _HEADER.pack(
             *(MARKER_V2, len(payload), 0, 0, self._sequence),
-            *(SIMULATOR_SYSTEM_ID, SIMULATOR_COMPONENT_ID, low, high),
+            *(*self._sender, low, high),
         )
         body = head + payload
         return body + _CHECKSUM.pack(checksum(body[1:], self._crc_extra))

@@ -9,6 +9,7 @@ from math import sqrt
 
 from firmware_py.airframe import Airframe
 from sitl.autopilots.parameters import Value
+from sitl.px4.transmitter import CHANNELS
 from sitl.sensors.specs import SuiteSpec
 
 _INTEGRAL_SHARE = 4 / 3  # 1/s, of a rate controller's P, by PX4's defaults 0.15 and 0.2
@@ -28,21 +29,40 @@ _VELOCITY_CONTROL: dict[str, Value] = {
     "MC_YAW_TQ_CUTOFF": 0.0,
 }
 """For apps that command velocities; accelerations for velocities, so the same for all airframes."""
+RC_PARAMETERS: dict[str, Value] = {
+    "COM_RC_IN_MODE": 6,  # a ground station's sticks while it sends some, otherwise the transmitter
+    "RC_CHAN_CNT": CHANNELS,
+    "RC_MAP_ROLL": 1,
+    "RC_MAP_PITCH": 2,
+    "RC_MAP_THROTTLE": 3,
+    "RC_MAP_YAW": 4,
+    "RC_MAP_FLTMODE": 5,
+    "COM_FLTMODE1": 2,  # switch low: position
+    "COM_FLTMODE4": 4,  # in the middle: hold
+    "COM_FLTMODE6": 7,  # high: offboard
+    "RC_MAP_KILL_SW": 6,
+}
+"""A transmitter's channels, in the usual order of sticks; PX4's default calibration is 1000, 1500, 2000."""
 _MIN_THRUST_SHARE = 0.25  # of the hover thrust, in the air
 _MAX_PX4_MIN_THRUST = 0.12  # PX4's default
 _HORIZON_RESERVE_MS = 24  # with less, poses come too late for their time and the estimate lags by 20 ms
+_MAX_GPS_DRIFT_M_S = 0.3  # on the ground
 _ARRIVAL_EARLY_MS = 4  # a pose or fix is stamped with the clock of the tick before that of its arrival
 
 
-def all_parameters(airframe: Airframe, suite: SuiteSpec, speed: float) -> dict[str, Value]:
+def all_parameters(
+    airframe: Airframe, suite: SuiteSpec, speed: float, *, transmitter: bool = False
+) -> dict[str, Value]:
     """All parameters that differ from PX4's defaults for a drone; those of its airframe's file win.
 
     Args:
         airframe: of the drone.
         suite: its sensors, not ideal ones.
         speed: simulated seconds a second.
+        transmitter: a pilot has a remote control.
     """
-    return simulation_parameters(speed) | suite_parameters(suite) | airframe_parameters(airframe)
+    values = simulation_parameters(speed) | suite_parameters(suite) | airframe_parameters(airframe)
+    return values | RC_PARAMETERS if transmitter else values
 
 
 def airframe_parameters(airframe: Airframe) -> dict[str, Value]:
@@ -113,6 +133,7 @@ def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
         values |= {"SYS_HAS_GPS": 0, "EKF2_GPS_CTRL": 0, "EKF2_GPS_DELAY": 0}
     else:
         values["EKF2_GPS_DELAY"] = _delay_ms(suite.gps.delay_s)
+        values["EKF2_REQ_HDRIFT"] = _MAX_GPS_DRIFT_M_S  # the noise of the suite's GPS passes 0.1 now and then
     pose = suite.external_pose
     if pose is not None:
         values |= {
@@ -127,16 +148,26 @@ def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
             "EKF2_TAU_POS": 0.1,
             "EKF2_TAU_VEL": 0.1,
         }
+    flow = suite.optical_flow
+    if flow is not None and pose is None and suite.gps is None:
+        values |= {
+            "EKF2_RNG_CTRL": 1,  # flow is a velocity only with a distance to the ground
+            "EKF2_HGT_REF": 0,
+            "EKF2_OF_DELAY": 0,
+            "SENS_FLOW_MINHGT": flow.min_distance_m,
+            "SENS_FLOW_MAXHGT": flow.max_distance_m,
+            "SENS_FLOW_MAXR": flow.max_flow_rad_s,
+        }
     return values
 
 
 def simulation_parameters(speed: float) -> dict[str, Value]:
-    """What a simulated PX4 needs: no sticks, and time-outs of links, which count wall time of the others.
+    """What a simulated PX4 needs: our battery, and time-outs of links, which count wall time of the others.
 
     Args:
         speed: simulated seconds a second.
     """
-    values: dict[str, Value] = {"NAV_RCL_ACT": 3, "NAV_DLL_ACT": 0}
+    values: dict[str, Value] = {"NAV_RCL_ACT": 3, "NAV_DLL_ACT": 0, "SIM_BAT_ENABLE": 0}
     if speed > 1.0:
         values["COM_DL_LOSS_T"] = min(300, round(10 * speed))
     if speed > 4.0:

@@ -10,19 +10,24 @@ from firmware_py.measurements import (
     ExternalPose,
     FlowSample,
     GpsSample,
-    ImuSample,
     RangeSample,
     Readings,
 )
 from firmware_py.types import GeodeticPoint, Sensors
+from geometry.vectors import ZERO3
 from sitl.px4.messages import Packer
+from sitl.px4.transmitter import Channels
 from sitl.sensors.specs import RangeFinderSpec
 from wire.dialect import degrees_e7, mavlink, millimetres, whole
 
-_ACCELEROMETER_AND_GYROSCOPE = 0b111_111
+_ACCELEROMETER, _GYROSCOPE = 0b111, 0b111 << 3
 _MAGNETOMETER = 0b111 << 6
 _BAROMETER = 1 << 9 | 1 << 11 | 1 << 12  # absolute pressure, pressure altitude, temperature
 _TRUTH_PERIOD_US = 20_000
+RC_PERIOD_US = 20_000
+_RC_FIELDS = 18
+_NO_CHANNEL = 0xFFFF
+_FULL_SIGNAL = 100
 _STANDARD_GRAVITY_M_S2 = 9.80665
 _NO_COVARIANCE = (nan,) * 21
 
@@ -48,16 +53,20 @@ class SensorMessages:
         self._odometry = Packer(mavlink.MAVLINK_MSG_ID_ODOMETRY)
         self._distance = Packer(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
         self._flow = Packer(mavlink.MAVLINK_MSG_ID_HIL_OPTICAL_FLOW)
-        self._imu: ImuSample | None = None
+        self._rc = Packer(mavlink.MAVLINK_MSG_ID_RC_CHANNELS)
+        self._acceleration = self._rates = ZERO3  # the last ones that were delivered
         self._started = False
 
-    def pack(self, readings: Readings, pose: ExternalPose | None, true: Sensors) -> bytes:
+    def pack(
+        self, readings: Readings, pose: ExternalPose | None, true: Sensors, rc: Channels | None = None
+    ) -> bytes:
         """All messages of a tick; the last one is its HIL_SENSOR.
 
         Args:
             readings: what the sensors deliver.
             pose: of motion capture, if one has arrived.
             true: the true state, for PX4's log.
+            rc: what the receiver of the remote control delivers now; None: nothing.
         """
         sensor = self._pack_sensor(readings)
         if not self._started:
@@ -74,18 +83,22 @@ class SensorMessages:
             packets += self._pack_flow(readings.optical_flow)
         if readings.time_us % _TRUTH_PERIOD_US == 0:
             packets += self._pack_truth(true)
+        if rc is not None:
+            packets += self._pack_rc(readings.time_us, rc)
         return packets + sensor
 
     def _pack_sensor(self, readings: Readings) -> bytes:
-        """HIL_SENSOR; an IMU that delivers nothing is not flagged as updated, but PX4's clock advances."""
+        """HIL_SENSOR; a sensor that delivers nothing is not flagged as updated, but PX4's clock advances."""
         flags = 0
         imu = readings.imu
         if imu is not None:
-            self._imu = imu
-            flags = _ACCELEROMETER_AND_GYROSCOPE
-        acceleration = rates = field = (0.0, 0.0, 0.0)
-        if self._imu is not None:
-            acceleration, rates = self._imu.specific_force_frd_m_s2, self._imu.angular_rate_frd_rad_s
+            if not isnan(imu.specific_force_frd_m_s2[0]):
+                self._acceleration = imu.specific_force_frd_m_s2
+                flags = _ACCELEROMETER
+            if not isnan(imu.angular_rate_frd_rad_s[0]):
+                self._rates = imu.angular_rate_frd_rad_s
+                flags |= _GYROSCOPE
+        acceleration, rates, field = self._acceleration, self._rates, ZERO3
         if readings.magnetometer is not None:
             field = readings.magnetometer.field_frd_gauss
             flags |= _MAGNETOMETER
@@ -142,6 +155,10 @@ class SensorMessages:
             *(0, -1.0, 0, 0, flow.quality),
         )
 
+    def _pack_rc(self, time_us: int, channels: Channels) -> bytes:
+        unused = (_NO_CHANNEL,) * (_RC_FIELDS - len(channels))
+        return self._rc.pack(time_us // 1000, *channels, *unused, len(channels), _FULL_SIGNAL)
+
     def _pack_truth(self, true: Sensors) -> bytes:
         place = self._projection.to_geodetic(true.position_ned_m)
         force = [_signed(each / _STANDARD_GRAVITY_M_S2 * 1000) for each in true.specific_force_frd_m_s2]
@@ -152,6 +169,12 @@ class SensorMessages:
             *(degrees_e7(place.latitude_deg), degrees_e7(place.longitude_deg)),
             *(millimetres(place.altitude_m), *velocity, speed, speed, *force),
         )
+
+
+def has_whole_imu(readings: Readings) -> bool:
+    """Whether gyroscope and accelerometer both deliver numbers."""
+    imu = readings.imu
+    return imu is not None and not isnan(imu.specific_force_frd_m_s2[0] + imu.angular_rate_frd_rad_s[0])
 
 
 def _covariance(position: tuple[float, float, float], turn: tuple[float, float, float]) -> tuple[float, ...]:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from sitl.autopilots.idle import IdleCheck
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
+from sitl.px4.side_link import PERIOD_US, SideLink
 from sitl.px4.simulation import Px4Simulation
 from sitl.server import BURST_TICKS, LagNotices, Pacer
 from sitl.server_settings import ServerSettings
@@ -60,6 +61,7 @@ class Px4Server:
         self._video = DroneVideo(self._simulation, settings)
         self.link: Px4Link | None = None
         self._idle: IdleCheck | None = None  # of the PX4 that was started here
+        self._side_link: SideLink | None = None
         self._simulation.faults.notice = notice
 
     async def run(self) -> None:
@@ -73,12 +75,16 @@ class Px4Server:
         """
         settings = self._settings
         self.link = Px4Link((settings.bind, FIRST_PORT + settings.instance), self._notice)
+        process = self._px4.process
+        output = None if process is None else process.log
+        self._side_link = SideLink(settings, self._simulation.scenario.camera, output)
         try:
             await self._video.open()
             self._notice(self._greeting())
             await self._serve(self.link)
         finally:
             self.link.close()
+            self._side_link.close()
             if self._px4.process is not None:
                 await self._px4.process.stop()
             if self._grants is not None:
@@ -190,9 +196,11 @@ class Px4Server:
         link.send(packets)
         self._video.step()  # while PX4 computes
         controls = link.answer(time_us)
-        if controls is None and link.in_lockstep:
+        if controls is None and link.in_lockstep and simulation.is_answered:
             controls = await link.late_answer(time_us)
         simulation.move(controls)
+        if time_us % PERIOD_US == 0 and self._side_link is not None:
+            self._side_link.step(simulation)
 
     def _wait_idle(self) -> None:
         """Let PX4's threads that its lockstep does not wait for finish, so that each step is the same."""

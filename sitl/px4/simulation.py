@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
+from errors import UserError
 from firmware_py.airframe import Airframe
+from firmware_py.battery import BatteryMonitor
+from firmware_py.types import BatteryState
 from geometry.vectors import ZERO3, Vec3
+from scenarios.faults.declaration import FaultKind, FaultPart
+from scenarios.faults.parse import FaultError
 from scenarios.models import Scenario
 from sitl.px4.messages import ActuatorControls
-from sitl.px4.sensor_messages import SensorMessages
+from sitl.px4.sensor_messages import RC_PERIOD_US, SensorMessages, has_whole_imu
+from sitl.px4.transmitter import CENTRED, Channels, Sticks, centred
+from sitl.px4.words import FailsafeWords
 from sitl.vehicle import SimulatedVehicle
 
 SUITE_INSTEAD_OF_IDEAL = "mocap"
@@ -20,17 +29,64 @@ def with_sensors_for_px4(scenario: Scenario) -> Scenario:
     return scenario.model_copy(update={"sensors": SUITE_INSTEAD_OF_IDEAL})
 
 
+class MotionError(UserError):
+    """The drone's motion cannot be simulated on; the message is one line for people."""
+
+
+def has_rc_fault(scenario: Scenario) -> bool:
+    """Whether a fault of the remote control is declared."""
+    return any(fault.part is FaultPart.RC for fault in scenario.faults)
+
+
+def check_faults(scenario: Scenario) -> None:
+    """Refuse faults that a drone flown by PX4 cannot have.
+
+    Raises:
+        FaultError: one of the link.
+    """
+    for fault in scenario.faults:
+        if fault.part is FaultPart.LINK:
+            raise FaultError(f"fault `{fault}`: the link to the app is PX4's own; leave it out with PX4")
+
+
 class Px4Simulation(SimulatedVehicle):
     """One drone in one scenario, flown by PX4; see `SimulatedVehicle`. Its sensors must not be ideal.
 
     A tick has two halves: `sense`, whose messages are sent, and `move`, with PX4's answer to them.
 
+    Args:
+        transmitter: the pilot's; None: there is none, unless the scenario has a fault of it.
+
+    Raises:
+        FaultError: the scenario has a fault of the link, which is PX4's.
+
     Attributes:
         messages: packs what `sense` returns.
+        words: what PX4 does about failures.
+        is_answered: PX4 answers the HIL_SENSOR of this tick; without rates and forces it computes no outputs.
     """
 
-    def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
+    autopilot_name = "PX4"
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        airframe: Airframe | None = None,
+        seed: int = 0,
+        transmitter: Sticks | None = None,
+    ) -> None:
+        check_faults(scenario)
+        if transmitter is None and has_rc_fault(scenario):
+            transmitter = centred
+        self.has_transmitter = transmitter is not None
+        self._transmitter = transmitter
+        self._channels: Channels | None = CENTRED
         super().__init__(scenario, airframe, seed)
+        self._monitor = BatteryMonitor(self.world.airframe, self.parameters)
+        self._measured = (0.0, 0.0)
+        self._last: ActuatorControls | None = None
+        self.is_answered = True
+        self.words = FailsafeWords()
         self.messages = SensorMessages(self._suite.range_finder, self._place)
         self._armed = False
         rotors, motor = len(self.world.airframe.rotors), self.world.airframe.motor
@@ -47,17 +103,57 @@ class Px4Simulation(SimulatedVehicle):
         """Where PX4's local frame has its origin: that of motion capture; with GPS it is not known here."""
         return ZERO3 if self._suite.external_pose is not None else None
 
+    @property
+    def has_gps(self) -> bool:
+        """Whether the drone has GPS."""
+        return self._suite.gps is not None
+
     def sense(self) -> bytes:
         """The messages of this tick; begins it."""
         true = self._begin_tick()
         readings, pose = self._read_sensors(true)
-        return self.messages.pack(readings, pose, true)
+        self._measured = (readings.battery_voltage_v, readings.battery_current_a)
+        self.is_answered = has_whole_imu(readings)
+        rc = None
+        if self._transmitter is not None and readings.time_us % RC_PERIOD_US == 0:
+            rc = self._received(self._transmitter)
+        return self.messages.pack(readings, pose, true, rc)
+
+    @property
+    def failsafes(self) -> tuple[tuple[int, str], ...]:
+        """PX4's failsafes of the present or last try: vehicle time and text."""
+        return tuple(self.words.failsafes)
+
+    def measured_battery(self) -> BatteryState | None:
+        """The battery as its monitor measures it now; None: it measures nothing."""
+        voltage_v, current_a = self._measured
+        if voltage_v <= 0.0:
+            return None
+        self._monitor.update(self.time_us, voltage_v, current_a)
+        return self._monitor.state
+
+    def _received(self, transmitter: Sticks) -> Channels | None:
+        """What the receiver of the remote control delivers; None: nothing."""
+        channels, fault = transmitter(), self.faults.rc
+        if fault is None:
+            self._channels = channels
+        return None if fault is not None and fault.kind is FaultKind.OFF else self._channels
 
     def move(self, controls: ActuatorControls | None) -> None:
         """End the tick with PX4's outputs; None: there are none, and the motors stand.
 
         A motor's speed is proportional to its output (PX4's THR_MDL_FAC is 1 then); NaN stops it.
+
+        Raises:
+            MotionError: the physics has diverged.
         """
+        if not isfinite(sum(self.truth.position_arena_m)):
+            time_s = self.time_us / 1e6
+            raise MotionError(f"at {time_s:.1f} s the drone turned too fast to be simulated; its try ends")
+        if controls is None and not self.is_answered:
+            controls = self._last  # the outputs stay as they are
+        self._last = controls
+        self.words.set_armed(controls is not None and controls.armed)
         if controls is None or not controls.armed:
             self._armed = False
             self._end_tick(self._still)

@@ -27,11 +27,12 @@ from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box
 from offboard.link.dialect import Px4Dialect
 from offboard.link.telemetry import TelemetryFeed, TickSource
+from offboard.link.watchdog import LIMITS
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
 from offboard.perception import CameraPerception
 from offboard.safety.caps import Caps
-from offboard.safety.rules import SIMULATED, SafetyRules
+from offboard.safety.rules import SIMULATED, AbortAction, SafetyRules
 from scenarios.models import Scenario, TrueState
 from sitl.camera import CameraFeed
 from sitl.simulation import Simulation
@@ -117,6 +118,7 @@ class LinkedVehicle:
         self.telemetry, self.direct = Callbacks(), Callbacks()
         self.offboard = Offboard(self)
         self.images: asyncio.Queue[CameraFrame] = asyncio.Queue()
+        self.watchdog: SimulatedWatchdog | None = None
         self.events: list[tuple[float, Callable[[LinkedVehicle], None]]] = []
         self._camera = CameraFeed(scenario)
         self._telemetry_us = self._heartbeat_us = 0
@@ -127,6 +129,12 @@ class LinkedVehicle:
 
     def time_s(self):
         return self.simulation.time_us / 1e6
+
+    def hang(self, seconds):
+        """Let the app's event loop stand still: call it as an event."""
+        end_us = self.time_us + seconds * 1e6
+        while self.time_us < end_us:
+            self.tick()
 
     def tick(self):
         self.simulation.tick()
@@ -143,6 +151,8 @@ class LinkedVehicle:
             self._tell_condition(now_us)
             self.beats.send(now_us, self.autopilot.ground_station_heard)
         self.offboard.update(now_us)
+        if self.watchdog is not None:
+            self.watchdog.check(now_us / 1e6)
         while self.events and self.events[0][0] <= now_us / 1e6:
             self.events.pop(0)[1](self)
         for way in (self.up, self.down, self.video, self.beats):
@@ -261,16 +271,56 @@ class Offboard:
         await self._vehicle.command(lambda: self._vehicle.autopilot.set_mode(FlightMode.HOLD))
 
 
+class SimulatedWatchdog:
+    """As the adapter's watchdog, with simulated time for its thread's and the event loop's."""
+
+    def __init__(self, stand_still, stop_commanding):
+        self.tripped_after_s = 0.0
+        self._stand_still, self._stop_commanding = stand_still, stop_commanding
+        self._runs = self._stood = False
+        self._beat_s = 0.0
+
+    def start(self):
+        self._runs = True
+
+    def stop(self):
+        self._runs = False
+
+    def beat(self, now_s):
+        """The event loop runs."""
+        self._beat_s, self._stood = now_s, False
+
+    def check(self, now_s):
+        """What the thread does at a time."""
+        hung_s = now_s - self._beat_s
+        if not self._runs or self.tripped_after_s:
+            return
+        if hung_s > LIMITS.stand_s and not self._stood:
+            self._stood = True
+            self._stand_still()
+        if hung_s > LIMITS.hang_s:
+            self.tripped_after_s = hung_s
+            self._stop_commanding()
+
+
 class LinkedDrone(MavsdkDrone):
     """The adapter with the simulated link in place of MAVSDK's."""
 
-    def __init__(self, vehicle: LinkedVehicle, scenario: Scenario, box: Box | None, caps: Caps | None):
+    def __init__(
+        self,
+        vehicle: LinkedVehicle,
+        scenario: Scenario,
+        box: Box | None,
+        caps: Caps | None,
+        when_hung: AbortAction,
+    ):
         start = FlightPlan(scenario).start_pose
-        super().__init__("udpin://127.0.0.1:14540", start_arena=start, box=box, caps=caps)
+        url = "udpin://127.0.0.1:14540"
+        super().__init__(url, start_arena=start, box=box, caps=caps, when_hung=when_hung)
         self._vehicle = vehicle
         self._feed = TelemetryFeed(vehicle.time_s)
         self._ticks = TickSource(self._feed)
-        self._watchdog = SimpleNamespace(start=lambda: None, stop=lambda: None, tripped_after_s=0.0)
+        self._watchdog = vehicle.watchdog = SimulatedWatchdog(self._stand_still, self._stop_from_watchdog)
 
     async def connect(self):
         vehicle, autopilot = self._vehicle, self._vehicle.autopilot
@@ -279,6 +329,7 @@ class LinkedDrone(MavsdkDrone):
             kill=lambda: vehicle.command(lambda: autopilot.disarm(force=True)),
             land=lambda: vehicle.command(autopilot.land),
             hold=vehicle.offboard.stop,
+            _plugin=SimpleNamespace(land=lambda: vehicle.up.send(vehicle.time_us, autopilot.land)),
         )
         self._dialect = Px4Dialect(vehicle.offboard, action)
         self._telemetry = SimpleNamespace(
@@ -299,9 +350,13 @@ class _Selector(selectors.DefaultSelector):
 
     def select(self, timeout=None):
         ready = super().select(0)
+        if self.vehicle.watchdog is not None:
+            self.vehicle.watchdog.beat(self.vehicle.time_s())
         end_s = float("inf") if timeout is None else self.vehicle.time_s() + timeout
         while not ready and not self.loop._ready and self.vehicle.time_s() < end_s:
             self.vehicle.tick()
+            if self.vehicle.watchdog is not None:
+                self.vehicle.watchdog.beat(self.vehicle.time_s())
         return ready
 
 
@@ -412,7 +467,7 @@ def fly_over(
     async def fly() -> MissionEnd:
         kept_in = box if boxed else None
         vehicle.app = asyncio.current_task()
-        drone = LinkedDrone(vehicle, scenario, kept_in, caps)
+        drone = LinkedDrone(vehicle, scenario, kept_in, caps, safety.abort)
         perception = CameraPerception(_Camera(vehicle))
         return await fly_mission(
             drone,

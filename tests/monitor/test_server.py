@@ -51,6 +51,7 @@ async def test_all_addresses_in_a_page_are_served_locally(monkeypatch):
             "/edit",
             "/course",
             "/pilot",
+            "/operator",
             "/competition",
             "/ranking",
             "/stage",

@@ -7,6 +7,7 @@ import pytest
 
 from offboard.drone import VelocityCommand
 from offboard.link import telemetry
+from offboard.link.commands import PendingRequests
 from offboard.link.telemetry import MAX_JITTER_S, TelemetryFeed, TickSource
 
 COMMAND = VelocityCommand(forward_m_s=0.5)
@@ -152,9 +153,12 @@ async def test_a_flight_begins_and_arms_at_multiples_of_a_period_whenever_the_ap
         pass
 
     source.use_clock(clock)
-    await source.begin_exchange(SimpleNamespace(before_tick=nothing, after_tick=nothing))
+    exchange = SimpleNamespace(before_tick=nothing, after_tick=nothing)
+    dialect = SimpleNamespace(exchange=exchange, request_streams=nothing)
+    clock.answers_take_time = False
+    await source.begin_exchange(dialect, PendingRequests())
     assert clock.granted[-1] == (10_000_000, None)
     assert await source.next(1.0)
     assert feed.sample.time_us == 10_050_000
-    await source.pass_to_arming()
+    await source.before_arming(None)
     assert feed.sample.time_us == 15_000_000

@@ -1,5 +1,6 @@
 """A drone that is taken for a real one, flown by the program: dry run, operator's keys, a killed app."""
 
+import asyncio
 import json
 import os
 import pty
@@ -8,6 +9,7 @@ import threading
 import time
 from contextlib import contextmanager
 
+import aiohttp
 import pytest
 from pymavlink import mavutil
 
@@ -105,6 +107,48 @@ def test_the_operator_arms_by_a_held_key_and_stops_by_the_space_bar(tmp_path, in
     assert result["ended"] == "aborted"
     assert "stopped by the operator" in result["reason"]
     assert "Traceback" not in app.err
+
+
+def test_the_operators_page_arms_and_lands_without_a_terminal(tmp_path, instance):
+    """A page's end of the connection, as a phone has it, at a monitor that is a program of its own."""
+    (tmp_path / "app").mkdir()
+    socket, link = tmp_path / "operator.sock", f"127.0.0.1:{14570 + instance}"
+    arguments = ("fly", "test-case-1", *drone(instance), "--set-parameters", "--operator-socket", str(socket))
+    shared = ("--mission", "explorer_soft_landing", "--monitor-link", f"udpout://{link}", "--accept", "all")
+    monitor_options = ("--port", "0", "--drone", f"udpin://{link}", "--operator-socket", str(socket))
+    with (
+        simulator(tmp_path, instance, "--scenario", "test-case-1"),
+        program(tmp_path, "monitor", *monitor_options) as monitor,
+    ):
+        monitor.wait_for("monitor: http", 60.0)
+        url = next(line for line in monitor.err.splitlines() if line.startswith("monitor: http"))
+        with program(tmp_path / "app", *arguments, *shared) as app:
+            phases = asyncio.run(operate(url.removeprefix("monitor: ")))
+            assert app.process.wait(60.0) == 1, app.err + app.out
+    assert phases == ["checks", "waiting", "flying", "landing"]
+    result = json.loads((run_of(tmp_path / "app") / "result.json").read_text(encoding="utf-8"))
+    assert "stopped by the operator (somebody, on the page)" in result["reason"]
+
+
+async def operate(url):
+    """Hold Go when the flight asks for it, and land two seconds later; the phases of the flight."""
+    phases, flown_s, flight = [], None, ""
+    async with aiohttp.ClientSession() as web, web.ws_connect(f"{url}ws/operator") as page:
+        async for message in page:
+            told = message.json()
+            if told["kind"] in ("flight", "end"):
+                flight = told["flight"]
+            if told["kind"] == "end":
+                break
+            if told["kind"] != "beat":
+                continue
+            if told["phase"] not in (*phases, "ended"):
+                phases.append(told["phase"])
+                flown_s = time.monotonic() if told["phase"] == "flying" else flown_s
+            lands = flown_s is not None and time.monotonic() - flown_s > 8.0
+            what = "go" if told["asks"] else "stop" if lands else "here"
+            await page.send_json({"what": what, "beat": told["beat"], "flight": flight})
+    return phases
 
 
 def test_without_a_terminal_nothing_is_armed(tmp_path, instance):

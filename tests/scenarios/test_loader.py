@@ -17,7 +17,7 @@ from scenarios.random_scenarios import load_level, random_scenario
 from scenarios.yaml_file import MAX_BYTES
 from scenarios.yaml_tree import to_yaml
 
-NAMES = ["empty", "open-field", "round-1", "test-case-1", "test-case-2", "test-case-3"]
+NAMES = ["empty", "first-flight", "open-field", "round-1", "test-case-1", "test-case-2", "test-case-3"]
 
 
 def layout(scenario):
@@ -36,7 +36,7 @@ def test_each_scenario_is_named_as_its_file_and_has_its_base_under_the_start(nam
     assert scenario.name == name
     assert scenario.description
     assert (scenario.base.x_m, scenario.base.y_m) == (scenario.start.x_m, scenario.start.y_m)
-    if name != "open-field":
+    if name not in ("first-flight", "open-field"):
         assert (scenario.base.edge_m, scenario.base.top_m, scenario.try_limit_s) == (0.5, 0.51, 180.0)
 
 
@@ -238,9 +238,9 @@ def test_wrong_values_in_known_fields_give_one_line_or_load(fields):
     [
         (
             "testcase1",
-            'unknown scenario "testcase1"; did you mean test-case-1? Known: empty, open-field, round-1,',
+            'unknown scenario "testcase1"; did you mean test-case-1? Known: empty, first-flight, open-field,',
         ),
-        ("zzz", 'unknown scenario "zzz"; Known: empty, open-field, round-1,'),
+        ("zzz", 'unknown scenario "zzz"; Known: empty, first-flight, open-field,'),
         ("", 'unknown scenario ""; Known:'),
         ("a\nb", 'unknown scenario "a\\nb"; Known:'),
         ("nowhere.yaml", "nowhere.yaml: no such file; give a path or one of: empty,"),

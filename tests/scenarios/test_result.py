@@ -52,6 +52,7 @@ LOCKSTEP = {
     "times_bound": 7.24,
     "judged_by": "truth",
     "response": "",
+    "autopilot": "",
     "faults": ["gps off at 12 s"],
     "fault_reaction": "after 5.96 s: Failsafe activated: position lost, descending",
     "fault_expected": "lands, after 6 s: Failsafe activated: position lost, descending",

@@ -32,6 +32,7 @@ class VehicleLink:
         # Several vehicles may send to a UDP port; other transports have one peer for all.
         self._udp_port = self._transport if parsed.scheme == "udpin" else None
         self._peers: dict[int, Address] = {}  # by system id
+        self._sources: dict[tuple[int, int], set[Address]] = {}  # by system and component id
         self.url = parsed.text
         self._codec = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
         self._reader = PacketReader()
@@ -54,6 +55,8 @@ class VehicleLink:
         if transport.peer is not None:
             for message in messages:
                 self._peers[message.get_srcSystem()] = transport.peer
+                sender = (message.get_srcSystem(), message.get_srcComponent())
+                self._sources.setdefault(sender, set()).add(transport.peer)
         return messages
 
     def send(self, message: Message) -> None:
@@ -66,6 +69,21 @@ class VehicleLink:
         peer = self._peers.get(getattr(message, "target_system", getattr(message, "target", 0)))
         for address in set(self._peers.values()) if peer is None else (peer,):
             self._udp_port.write(data, address)
+
+    def send_to_all(self, message: Message) -> None:
+        """Send a message to every address from which something was received; on other links as `send`."""
+        if not isinstance(self._udp_port, UdpSocket):
+            self.send(message)
+            return
+        data = message.pack(self._codec)
+        self._codec.seq = (self._codec.seq + 1) % 256
+        for address in set().union(*self._sources.values()):
+            self._udp_port.write(data, address)
+
+    def addresses(self, system_id: int, component_id: int) -> tuple[str, ...]:
+        """HOST:PORT of all senders of a component's packets, sorted; empty on a link without addresses."""
+        found = self._sources.get((system_id, component_id), ())
+        return tuple(f"{host}:{port}" for host, port in sorted((each[0], each[1]) for each in found))
 
     @property
     def host(self) -> str:

@@ -24,6 +24,7 @@ Controller = tuple[int, int]  # system and component id; zeros: nobody
 
 _NOBODY: Controller = (0, 0)
 _STATUS_US = 1_000_000
+_REFUSAL_US = 5_000_000
 _KEEP, _MYSELF, _RELEASE = -1, -2, -3  # of DO_GIMBAL_MANAGER_CONFIGURE
 _YAW_LOCK = mavlink.GIMBAL_MANAGER_FLAGS_YAW_LOCK
 _NEUTRAL = mavlink.GIMBAL_MANAGER_FLAGS_NEUTRAL
@@ -44,6 +45,7 @@ class GimbalManager(Service):
         self._primary = self._secondary = _NOBODY
         self._region_ned_m: Vec3 | None = None
         self._status_due_us = 0
+        self._refusal_due_us = 0
         self.commands = {
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
@@ -173,6 +175,10 @@ class GimbalManager(Service):
         return sender != _NOBODY and sender in (self._primary, self._secondary)
 
     def _refuse(self, sender: Controller) -> None:
+        """Say who is refused, once in `_REFUSAL_US`: orders may come many times a second."""
+        if self._exchange.time_us < self._refusal_due_us:
+            return
+        self._refusal_due_us = self._exchange.time_us + _REFUSAL_US
         owner = "nobody" if self._primary == _NOBODY else f"{self._primary[0]}/{self._primary[1]}"
         text = f"Gimbal refused {sender[0]}/{sender[1]}: {owner} is in control"
         self._autopilot.say(mavlink.MAV_SEVERITY_WARNING, text)

@@ -17,7 +17,7 @@ from firmware_py.status import NAVIGATION_STATES, FlightMode, VehicleStatus
 from wire.dialect import BROADCAST, Message, boot_ms, mavlink
 from wire.exchange import Exchange
 from wire.link import Link
-from wire.simulator_identity import simulator_uid
+from wire.vehicle_identity import simulator_uid
 
 FOLLOWED_PX4_VERSION = (1, 17, 0)
 OWN_VERSION = (0, 1, 0)

@@ -139,6 +139,12 @@ class StillVehicle:
         self._answers = []
         self._beat_s = -1.0
 
+    def addresses(self, system_id, component_id):
+        return ()
+
+    def send_to_all(self, message):
+        self.send(message)
+
     def send(self, message):
         message = self._reader.parse_buffer(message.pack(self._asker))[0]
         self.sent.append(message)

@@ -58,7 +58,7 @@ def test_flights_are_flown_once_counted_and_reported(capsys):
 
 
 def test_a_level_is_drawn_with_consecutive_seeds(capsys, monkeypatch):
-    def made(tasks, _pool):
+    def made(tasks, _pool, _terms):
         for task in tasks:
             yield made_row(task.scenario.name, seed=task.seed)
 
@@ -74,7 +74,7 @@ def test_a_level_is_drawn_with_consecutive_seeds(capsys, monkeypatch):
 
 
 def test_a_fault_of_the_program_is_reported_with_its_traceback(capsys, monkeypatch):
-    def made(tasks, _pool):
+    def made(tasks, _pool, _terms):
         for task in tasks:
             yield made_row(task.scenario.name, "error", reason="ValueError: no", traceback="Traceback: why")
 
@@ -135,7 +135,7 @@ def test_a_folder_of_something_else_is_refused(refused, capsys):
 
 
 def test_a_worker_of_another_version_is_refused(refused, monkeypatch):
-    monkeypatch.setattr(evaluate_module, "fly_all", lambda _tasks, _pool: iter_rows(version="0.0.1"))
+    monkeypatch.setattr(evaluate_module, "fly_all", lambda _tasks, _pool, _terms: iter_rows(version="0.0.1"))
     line = refused("test-case-1", "--out", "here", "--backend", "dask", "--address", "tcp://10.0.0.1:1")
     assert "has framerunner 0.0.1, not" in line
 

@@ -12,17 +12,20 @@ from mavsdk.exceptions import MavsdkError
 
 from firmware_py.status import FlightMode
 from framerunner.flying.plan import FlightPlan
+from framerunner.preflight.keys import KeyReader
 from offboard.mission import load_mission
 from offboard.pilot import Pilot
 from offboard.safety.caps import Caps
 from offboard.safety.failsafes import failsafe_rows
 from offboard.safety.fence import flight_fence
 from offboard.safety.operator import Operator
+from offboard.safety.operator_pages import OperatorPages
 from offboard.safety.rules import SafetyRules
 from scenarios.faults.parse import parse_fault
 from scenarios.loader import load_scenario
 from tests.framerunner.simulated_link import Direction, Impairment, fly_over
 from tests.offboard.fakes import runaway
+from wire.operator_messages import PageMessage
 
 GOOD = Impairment()
 SILENT = Impairment(silent_s=(0.0, 1e9))
@@ -261,8 +264,187 @@ def test_ctrl_c_lands(tmp_path):
     assert came_down(flight)
 
 
-def test_hold_on_abort_holds(tmp_path):
+def hold(tmp_path, operator=None, events=(), impairment=GOOD, scenario=None, hold_s=10.0, **changed):
+    """A flight that holds when its time is over, at some 17 s."""
+    scenario = scenario or hall(limit_s=6.0)
+    return fly_over(
+        impairment,
+        scenario,
+        runaway(tmp_path, UP),
+        safety=SafetyRules("hold", operator or Operator(needs_go=False), hold_s),
+        caps=Caps(),
+        events=events,
+        parameters=demanded_parameters(scenario) | changed,
+        after_s=60.0,
+    )
+
+
+def seconds_in(flight, mode):
+    return sum(moment.state.mode == mode for moment in flight.moments) / 20
+
+
+def test_a_drone_that_holds_lands_after_its_time(tmp_path):
+    flight = hold(tmp_path)
+    assert flight.outcome.reason == "not finished within 6 s; it held for 10 s, then landed"
+    assert seconds_in(flight, "HOLD") == pytest.approx(10.0, abs=0.5)
+    assert came_down(flight)
+
+
+def test_a_stop_lands_a_drone_that_holds(tmp_path):
+    operator = Operator(needs_go=False)
+    flight = hold(tmp_path, operator, [(21.0, lambda _: operator.press_stop())], hold_s=30.0)
+    assert came_down(flight)
+    assert 1.0 < seconds_in(flight, "HOLD") < 15.0
+
+
+def test_a_low_battery_lands_a_drone_that_holds(tmp_path):
+    flight = hold(
+        tmp_path, scenario=hall("battery sag 0.2 at 12 s", limit_s=6.0, sensors="mocap"), hold_s=60.0
+    )
+    assert came_down(flight)
+    assert seconds_in(flight, "HOLD") < 15.0
+    assert "it held" not in flight.outcome.reason
+
+
+@pytest.mark.parametrize("end", ["link lost", "app killed"])
+def test_a_drone_that_holds_lands_by_itself_without_the_app(tmp_path, end):
+    def cut(vehicle):
+        vehicle.up = vehicle.beats = Direction(SILENT, Random(0))
+        if end == "link lost":
+            vehicle.down = Direction(SILENT, Random(0))
+
+    flight = hold(tmp_path, events=[(20.0, cut)], hold_s=60.0)
+    assert came_down(flight)
+
+
+def test_others_keep_a_drone_that_held(tmp_path):
+    def take(vehicle):
+        vehicle.autopilot.set_mode(FlightMode.LAND)  # as by a remote control
+
+    flight = hold(tmp_path, events=[(19.0, take)])
+    assert came_down(flight)
+    assert "it held" not in flight.outcome.reason
+
+
+@pytest.mark.parametrize("seconds", [2.0, 5.0])
+def test_an_app_that_hangs_stands_and_then_lands(tmp_path, seconds):
+    flight = fly(tmp_path, events=[(12.0, lambda vehicle: vehicle.hang(seconds))])
+    if seconds < 3.0:
+        assert flight.outcome.ended == "timed out"
+    else:
+        assert flight.outcome.reason == "this app hung for more than 3.0 s; its watchdog requested landing"
+    hung = [truth for truth in flight.truths if 13.5e6 < truth.time_us < 14.0e6]
+    assert max(abs(truth.velocity_arena_m_s[2]) for truth in hung) < 0.1  # it stands
+    assert came_down(flight)
+
+
+def test_an_app_that_hangs_for_good_lands(tmp_path):
+    flight = fly(tmp_path, events=[(12.0, lambda vehicle: vehicle.hang(40.0))])
+    down_s = next(t.time_us for t in flight.truths if t.time_us > 12e6 and not t.motors_on) / 1e6
+    assert down_s < 35.0
+    assert came_down(flight)
+
+
+def test_an_app_that_is_stopped_and_continued_leaves_the_landing_to_the_vehicle(tmp_path):
+    """As SIGSTOP and SIGCONT: nothing is sent for five seconds, then the app finds the drone landing."""
+
+    def stop(vehicle):
+        up, beats, watchdog = vehicle.up, vehicle.beats, vehicle.watchdog
+        vehicle.up = vehicle.beats = Direction(SILENT, Random(0))
+        vehicle.watchdog = None  # its thread is stopped, too
+        vehicle.hang(5.0)
+        vehicle.up, vehicle.beats, vehicle.watchdog = up, beats, watchdog
+        watchdog.beat(vehicle.time_s())
+
+    flight = fly(tmp_path, events=[(12.0, stop)])
+    assert flight.outcome.reason.startswith("the pilot or a failsafe took over: mode LAND")
+    assert came_down(flight)
+
+
+def test_hold_on_abort_holds_without_an_operator(tmp_path):
     scenario = hall(limit_s=6.0)
     safety = SafetyRules("hold")
     flight = fly_over(GOOD, scenario, runaway(tmp_path, UP), safety=safety, caps=Caps(), after_s=10.0)
     assert (flight.mode, flight.armed) == (FlightMode.HOLD, True)
+
+
+FLIGHT = "test-case-1 7"
+
+
+class PageHand:
+    """An operator's page beside a flight, in the flight's time: events for `fly`."""
+
+    def __init__(self, *, alone=True):
+        self.operator = Operator(hint="hold Go on the page")
+        self.pages = OperatorPages(self.operator, FLIGHT, alone=alone)
+        self.beat = -1
+
+    def events(self, script, to_s=60.0):
+        """What the page says, ten times a second.
+
+        Args:
+            script: from a time in seconds on: `here`, `go`, `stop`, `stop_motors`, or None: it is lost.
+            to_s: end of the events.
+        """
+        times = [step / 10 for step in range(round(to_s * 10))]
+        return [
+            (at_s, self._event([what for from_s, what in script if from_s <= at_s][-1])) for at_s in times
+        ]
+
+    def _event(self, what):
+        def happen(vehicle):
+            now_s = vehicle.time_s()
+            self.pages.check(now_s)
+            if what is not None:
+                self.beat = self.pages.beat(now_s)
+                for each in ("here", what):
+                    message = PageMessage(page=1, name="Ada", what=each, beat=self.beat, flight=FLIGHT)
+                    self.pages.take(message, now_s)
+
+        return happen
+
+
+def test_a_page_gives_the_go_and_lands(tmp_path):
+    page = PageHand()
+    script = [(0.0, "here"), (12.0, "go"), (13.5, "here"), (22.0, "stop"), (22.5, "here")]
+    flight = fly(tmp_path, operator=page.operator, events=page.events(script))
+    on_s = next(truth.time_us for truth in flight.truths if truth.motors_on) / 1e6
+    assert 13.0 < on_s < 16.0
+    assert flight.outcome.reason == "stopped by the operator (Ada, on the page)"
+    assert came_down(flight)
+
+
+def test_the_pages_second_control_stops_the_motors(tmp_path):
+    page = PageHand()
+    script = [(0.0, "here"), (12.0, "go"), (13.5, "here"), (22.0, "stop"), (23.0, "stop_motors")]
+    flight = fly(tmp_path, operator=page.operator, events=page.events(script))
+    assert flight.outcome.reason.endswith("(Ada, on the page); the operator stopped the motors")
+    off_s = max(truth.time_us for truth in flight.truths if truth.motors_on) / 1e6
+    assert off_s == pytest.approx(23.0, abs=0.1)
+
+
+def test_a_page_that_is_lost_before_the_go_arms_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr("offboard.app.GO_LIMIT_US", 12_000_000)
+    page = PageHand()
+    script = [(0.0, "here"), (12.0, "go"), (12.9, None)]
+    flight = fly(tmp_path, operator=page.operator, events=page.events(script))
+    assert flight.outcome.reason.startswith("no go within")
+    assert not any(truth.motors_on for truth in flight.truths)
+
+
+def test_a_page_that_is_lost_in_flight_without_a_terminal_lands(tmp_path):
+    page = PageHand()
+    script = [(0.0, "here"), (12.0, "go"), (13.5, "here"), (20.0, None)]
+    flight = fly(tmp_path, operator=page.operator, events=page.events(script))
+    assert flight.outcome.reason == "stopped by the operator (no operator's page was connected)"
+    assert came_down(flight)
+
+
+def test_the_terminal_stops_what_the_page_has_armed(tmp_path):
+    page = PageHand(alone=False)
+    keys = KeyReader(page.operator)
+    script = [(0.0, "here"), (12.0, "go"), (13.5, None)]
+    events = [*page.events(script), (22.0, lambda vehicle: keys.take(" ", vehicle.time_s()))]
+    flight = fly(tmp_path, operator=page.operator, events=sorted(events, key=lambda each: each[0]))
+    assert flight.outcome.reason == "stopped by the operator"
+    assert came_down(flight)

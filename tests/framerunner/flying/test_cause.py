@@ -107,3 +107,8 @@ def test_a_result_says_why_it_was_not_clean():
     flown = fly_lockstep(FlightPlan(short_scenario(1, 3.0), load_mission("explorer")))
     assert flown.result.cause.startswith("in ")
     assert "was never on the map" in flown.result.cause or "for the last" in flown.result.cause
+
+
+def test_an_operators_stop_is_a_cause_of_a_crash():
+    stop = "stopped by the operator; the operator stopped the motors"
+    assert words({"verdict": "crashed", "try_time_s": 20.0}, "aborted", stop, ()).endswith(f"; {stop}")

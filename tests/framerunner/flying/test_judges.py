@@ -81,6 +81,17 @@ async def test_a_referee_by_telemetry_is_not_taken_for_the_truth():
         assert judge.source == "telemetry"
 
 
+async def test_the_verdict_of_an_earlier_flight_is_not_that_of_this_one():
+    """A flight that is stopped before arming begins no try."""
+    earlier, now = answer(over=True, began_us=3), answer(over=True, began_us=7)
+    async with referee(earlier, earlier, earlier, earlier, now) as (root, session, _):
+        judge, _ = await choose_judge(PLAN, SimulatorApi(root), session)
+        assert await judge.standing() is None
+        report = await judge.report("searching", "stopped by the operator")
+        assert (report.verdict, judge.source) == ("aborted", "telemetry")
+        assert (await judge.standing()).began_us == 7
+
+
 @pytest.mark.parametrize(
     "body", [answer("another-place"), "not json", {"weather": "fine"}, answer(contacts="many")], ids=str
 )

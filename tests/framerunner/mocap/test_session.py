@@ -241,7 +241,7 @@ def test_whether_px4_uses_the_poses(flags, control, distance_m, expected):
         ({"flags": 0, "autopilot": 3}, "fused", "VISO_TYPE"),
         ({"comparison": replace(RIGHT, tilt_deg=90.0)}, "tilt", "--frame"),
         ({"comparison": replace(RIGHT, heading_deg=90.0)}, "heading", "--forward"),
-        ({"comparison": replace(RIGHT, distance_m=0.3)}, "position", "section 7.3"),
+        ({"comparison": replace(RIGHT, distance_m=0.3)}, "position", "step 6"),
         ({"comparison": replace(RIGHT, correlation=0.2)}, "axes", "rigid"),
         ({"sent": 0}, "poses", "tracked"),
         (

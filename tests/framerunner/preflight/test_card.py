@@ -8,6 +8,7 @@ from framerunner.preflight.card_files import HTML_NAME, PDF_NAME, write_card
 from framerunner.preflight.run import ParameterChange, PreflightReport, PreflightSettings
 from offboard.safety.check import Check, Outcome
 from offboard.safety.fence import flight_fence
+from offboard.safety.rules import SafetyRules
 
 NOW = datetime(2026, 11, 24, 9, 30, tzinfo=UTC)
 
@@ -28,7 +29,9 @@ def card(plan):
         Path("parameters-before.params"),
     )
     settings = PreflightSettings("udpin://0.0.0.0:14540", "rtsp://10.0.0.2/1")
-    return make_card(plan, settings, report, abort="land", operator="Ada", kind="flight", now=NOW)
+    return make_card(
+        plan, settings, report, safety=SafetyRules("land"), operator="Ada", kind="flight", now=NOW
+    )
 
 
 def test_the_card_has_all_that_matters(card, tmp_path):

@@ -8,6 +8,7 @@ from offboard.safety.operator import Operator
 
 def type_keys(operator, *characters):
     """Characters as (key, time)."""
+    operator.ask_for_go()
     reader = KeyReader(operator)
     for key, at_s in sorted(characters, key=lambda each: each[1]):
         reader.take(key, at_s)

@@ -6,7 +6,10 @@ from errors import SettingError
 from firmware_py.missions.items import PlanType
 from firmware_py.types import GeodeticPoint
 from framerunner.preflight import parameters
-from framerunner.preflight.parameters import load_parameters, read_parameters, set_parameter
+from framerunner.preflight.check_names import CHECK_NAMES
+from framerunner.preflight.fence_upload import FenceItem, download_fence, is_same_fence, upload_fence
+from framerunner.preflight.kept import KeptState, check_vehicle, load_kept, restore
+from framerunner.preflight.parameters import read_parameters, set_parameter
 from framerunner.preflight.run import NotArmedError, PreflightSettings, run_preflight
 from framerunner.preflight.session import VehicleSession
 from offboard.drone import DroneError
@@ -24,6 +27,10 @@ def outcomes(report):
     return {check.name: check.outcome for check in report.checks}
 
 
+def uid_of(link):
+    return VehicleSession(link).uid
+
+
 def names_sent(link, kind):
     return [message.param_id for message in link.sent if message.get_type() == kind]
 
@@ -37,7 +44,7 @@ async def test_each_check_is_told_and_a_failing_one_prevents_arming(link, plan, 
     with pytest.raises(NotArmedError, match=r"5 checks have failed .*--accept NAME"):
         report.require()
     assert names_sent(link, "PARAM_SET") == []
-    assert report.kept is None
+    assert load_kept(report.kept) == KeptState(uid_of(link), (), ())  # there was no fence
     line = next(check.line for check in report.checks if check.name == "NAV_RCL_ACT")
     assert line.startswith("FAIL     NAV_RCL_ACT: 2 (return) (allowed: 3 (land)); set it to 3 (land)")
 
@@ -57,7 +64,7 @@ async def test_the_fence_is_on_the_vehicle_and_read_back(link, plan, tmp_path):
 
 
 async def test_another_fence_that_is_read_back_fails(link, plan, tmp_path, monkeypatch):
-    monkeypatch.setattr("framerunner.preflight.run.read_fence", lambda session: ())
+    monkeypatch.setattr("framerunner.preflight.run.download_fence", lambda session: ())
     report = await run_preflight(plan, settings(tmp_path))
     assert outcomes(report)["fence"] is Outcome.FAIL
 
@@ -69,11 +76,9 @@ async def test_parameters_are_set_and_returned(link, plan, tmp_path):
     assert [change.name for change in report.changes] == FAILING
     assert names_sent(link, "PARAM_SET") == FAILING
     assert link.simulation.autopilot.parameters.value("NAV_RCL_ACT") == 3
-    kept = load_parameters(report.kept)
-    assert {each.name: each.value for each in kept} == before
-    session = VehicleSession(link)
-    for each in kept:
-        set_parameter(session, each)
+    kept = load_kept(report.kept)
+    assert {each.name: each.value for each in kept.parameters} == before
+    restore(VehicleSession(link), kept, lambda line: None)
     assert {name: link.simulation.autopilot.parameters.value(name) for name in FAILING} == before
 
 
@@ -83,7 +88,8 @@ async def test_old_values_that_are_kept_are_not_overwritten(link, plan, tmp_path
     second = await run_preflight(plan, settings(tmp_path, set_parameters=True))
     third = await run_preflight(plan, settings(tmp_path, set_parameters=True))
     assert [first.kept.name, second.kept.name] == ["parameters-before.params", "parameters-before-2.params"]
-    assert [each.name for each in load_parameters(second.kept)] == ["NAV_RCL_ACT"]
+    assert [each.name for each in load_kept(second.kept).parameters] == ["NAV_RCL_ACT"]
+    assert load_kept(second.kept).fence is None  # this program's own, which the first check left
     assert (third.kept, third.changes) == (None, ())
 
 
@@ -93,7 +99,7 @@ async def test_where_the_old_values_are_is_told_even_if_setting_fails(link, plan
         await run_preflight(plan, settings(tmp_path, set_parameters=True))
     kept = tmp_path / "parameters-before.params"
     assert f"--restore-parameters {kept}" in capsys.readouterr().err
-    assert [each.name for each in load_parameters(kept)] == FAILING
+    assert [each.name for each in load_kept(kept).parameters] == FAILING
 
 
 async def test_nothing_is_set_if_the_old_values_cannot_be_kept(link, plan, tmp_path):
@@ -123,8 +129,19 @@ async def test_a_failure_is_accepted_by_its_name_only(link, plan, tmp_path):
     report = await run_preflight(plan, settings(tmp_path, accepted=("NAV_RCL_ACT",)))
     assert outcomes(report)["NAV_RCL_ACT"] is Outcome.ACCEPTED
     assert outcomes(report)["COM_OBL_RC_ACT"] is Outcome.FAIL
-    with pytest.raises(SettingError, match="--accept NAV_RCL: there is no such check; the checks are"):
-        await run_preflight(plan, settings(tmp_path, accepted=("NAV_RCL",)))
+
+
+async def test_a_name_that_is_no_checks_is_found_before_anything_is_sent(link, plan, tmp_path):
+    line = r"^--accept 'batery': there is no such check; use battery; the checks are armed, .*and all accepts"
+    with pytest.raises(SettingError, match=line):
+        await run_preflight(plan, settings(tmp_path, accepted=("COM_OBL_RC_ACT", "batery")))
+    assert link.sent == []
+
+
+async def test_each_check_that_is_told_can_be_accepted(link, plan, tmp_path):
+    report = await run_preflight(plan, settings(tmp_path))
+    assert {check.name for check in report.checks} <= CHECK_NAMES
+    await run_preflight(plan, settings(tmp_path, accepted=("camera delay", "GUID_OPTIONS", "all")))
 
 
 async def test_an_armed_vehicle_is_left_alone(link, plan, tmp_path):
@@ -163,16 +180,94 @@ def test_a_parameter_that_is_not_there_is_left_out(link):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "# only a comment\n", "1 1 NAME 2 9\n", "1\t1\tNAME\tnan\t9\n", "1\t1\tNAME\t1.5\t6\n"]
+    "text",
+    [
+        "# fence-items\t2\n# fence-item\t5001\t0\t3\t0\t0\t0\t1\t1\t0\n",
+        "# fence-items\tmany\n",
+        "",
+        "# only a comment\n",
+        "1 1 NAME 2 9\n",
+        "1\t1\tNAME\tnan\t9\n",
+        "1\t1\tNAME\t1.5\t6\n",
+    ],
 )
 def test_a_file_that_holds_no_parameters_is_refused_in_a_line(tmp_path, text):
     path = tmp_path / "old.params"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(SettingError, match=r"--restore-parameters .*old.params"):
-        load_parameters(path)
+        load_kept(path)
 
 
 def test_a_file_of_qgroundcontrol_is_read(tmp_path):
     path = tmp_path / "old.params"
     path.write_text("# Vehicle-Id Component-Id Name Value Type\n1\t1\tGF_ACTION\t2\t6\n", encoding="utf-8")
-    assert load_parameters(path) == [parameters.ParameterValue("GF_ACTION", 2.0, 6)]
+    kept = load_kept(path)
+    assert kept == KeptState("", (parameters.ParameterValue("GF_ACTION", 2.0, 6),))
+    with pytest.raises(SettingError, match=r"does not say of which vehicle .* add --any-vehicle"):
+        check_vehicle(kept, path, "0a0b")
+
+
+OLD_FENCE = (
+    FenceItem(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 0, (40.0, 0.0, 0.0, 0.0), 473979710, 85461640),
+    *(
+        FenceItem(mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION, 0, (3.0, 0.0, 0.0, 0.0), x, y)
+        for x, y in ((473970000, 85460000), (473971000, 85460000), (473970000, 85461000))
+    ),
+)
+
+
+async def test_the_old_fence_is_kept_and_returned(link, plan, tmp_path):
+    session = VehicleSession(link)
+    session.listen(3.0)
+    upload_fence(session, OLD_FENCE)
+    report = await run_preflight(plan, settings(tmp_path))
+    assert outcomes(report)["fence"] is Outcome.PASS
+    again = await run_preflight(plan, settings(tmp_path))
+    assert again.kept is None  # the flight's fence is there already; the file of the first check stays
+    kept = load_kept(report.kept)
+    assert is_same_fence(kept.fence, OLD_FENCE)
+    told = []
+    restore(session, kept, told.append)
+    assert told == ["the fence has its 4 items again"]
+    assert is_same_fence(download_fence(session), OLD_FENCE)
+    restore(session, KeptState("", (), ()), told.append)
+    assert (download_fence(session), told[-1]) == ((), "there is no fence again")
+
+
+async def test_a_fence_that_cannot_be_kept_is_not_replaced(link, plan, tmp_path):
+    session = VehicleSession(link)
+    session.listen(3.0)
+    upload_fence(session, OLD_FENCE)
+    link.lost = lambda message: message.get_type() == "MISSION_REQUEST_INT"
+    report = await run_preflight(plan, settings(tmp_path))
+    assert outcomes(report)["fence"] is Outcome.FAIL
+    link.lost = lambda message: False
+    assert is_same_fence(download_fence(session), OLD_FENCE)
+
+
+async def test_values_of_another_vehicle_are_not_returned(link, plan, tmp_path):
+    report = await run_preflight(plan, settings(tmp_path, set_parameters=True))
+    kept = load_kept(report.kept)
+    assert kept.uid == uid_of(link) != ""
+    check_vehicle(kept, report.kept, uid_of(link))
+    with pytest.raises(SettingError, match=f"number {kept.uid}, but the one on the link has 0a0b; connect"):
+        check_vehicle(kept, report.kept, "0a0b")
+    with pytest.raises(SettingError, match="the one on the link reports no number"):
+        check_vehicle(kept, report.kept, "")
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.3, 20.0])
+async def test_two_vehicles_with_the_same_id_are_refused(link, plan, tmp_path, later_s):
+    link.add_vehicle(plan.scenario, later_s)
+    report = await run_preflight(plan, settings(tmp_path))
+    check = next(each for each in report.checks if each.name == "one vehicle")
+    assert check.outcome is Outcome.FAIL
+    assert check.value.startswith("two vehicles have this system id")
+    assert not report.may_arm
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.05, 0.3])
+async def test_one_vehicle_whose_packets_are_lost_is_one(link, plan, tmp_path, lost):
+    link.lose(lost)
+    report = await run_preflight(plan, settings(tmp_path))
+    assert "one vehicle" not in outcomes(report)

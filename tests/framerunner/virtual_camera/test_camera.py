@@ -14,7 +14,7 @@ from firmware_py.mavlink.telemetry.streams import GROUND
 from framerunner.flying.plan import FlightPlan
 from framerunner.virtual_camera.camera import HELD_AFTER_FLIGHT_US, Placement, VirtualCamera
 from geometry.axes import Pose
-from geometry.rotations import quaternion_from_euler
+from geometry.rotations import multiply, quaternion_from_euler, quaternion_from_yaw
 from scenarios.loader import load_scenario
 from sitl.camera import Camera, CameraFeed
 from sitl.simulation import Simulation
@@ -134,6 +134,28 @@ def test_a_level_camera_follows_the_heading_only():
     upright = Camera(SCENARIO).render(START.position_m, (cos(half), 0.0, 0.0, sin(half)))
     assert np.mean(np.abs(level.step()[1].astype(int) - upright) > 8) < 0.01
     assert np.mean(np.abs(tilted.step()[1].astype(int) - upright) > 8) > 0.2
+
+
+@pytest.mark.parametrize("to_north", [False, True])
+def test_a_camera_on_the_vehicles_gimbal_looks_where_that_does(to_north):
+    """The vehicle is tilted and turned; the gimbal looks 20 degrees down and 0.3 rad to the right."""
+    camera = ready_camera()
+    q = quaternion_from_euler(0.0, -0.35, 0.3 if to_north else 0.2)
+    flags = 4 | 8 | (16 | 64 if to_north else 32)
+    for time_us in range(1_020_000, 1_100_001, 20_000):
+        ms = time_us // 1000
+        camera.take(mavlink.MAVLink_attitude_message(ms, 0.2, -0.3, 0.1, 0.0, 0.0, 0.0))
+        camera.take_gimbal(
+            mavlink.MAVLink_gimbal_device_attitude_status_message(0, 0, ms, flags, q, 0.0, 0.0, 0.0, 0)
+        )
+        camera.take(mavlink.MAVLink_local_position_ned_message(ms, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert camera.has_gimbal
+    level = multiply(quaternion_from_yaw(START.yaw_rad), quaternion_from_euler(0.0, 0.35, -0.3))  # FLU
+    wanted = Camera(SCENARIO).render(START.position_m, level)
+    assert np.mean(np.abs(camera.step()[1].astype(int) - wanted) > 8) < 0.05
+    for time_us in range(1_120_000, 3_400_001, 20_000):
+        send(camera, reports(time_us))
+    assert not camera.has_gimbal  # it reports no more
 
 
 def test_the_referee_follows_a_flight_through_a_frame_and_back():

@@ -48,6 +48,13 @@ def test_other_safe_values_pass(name, value):
     assert outcome_of(name, value) is Outcome.PASS
 
 
+def test_what_is_set_is_below_a_fence_that_is_lower():
+    low = FlightFence(FENCE.corners_arena_m, 1.8, 9.0)
+    assert values_to_set(GOOD, low, has_global_position=True)["RTL_RETURN_ALT"] == 1.8
+    checks = failsafe_checks(GOOD, low, has_global_position=True)
+    assert next(each.outcome for each in checks if each.name == "RTL_RETURN_ALT") is Outcome.FAIL
+
+
 def test_a_value_as_single_precision_passes():
     fence = FlightFence(FENCE.corners_arena_m, 4.77, 13.15)
     parameters = {"GF_MAX_VER_DIST": 4.769999980926514, "GF_MAX_HOR_DIST": 13.149999618530273}

@@ -4,7 +4,7 @@ from math import nan
 import pytest
 
 from errors import SettingError
-from offboard.safety.check import Check, Outcome, accept, failures
+from offboard.safety.check import Check, Outcome, accept, check_names, failures
 from offboard.safety.vehicle_checks import (
     BatteryFacts,
     CameraFacts,
@@ -86,5 +86,9 @@ def test_a_failure_is_accepted_by_name_or_all():
     assert [check.name for check in failures(accept(checks, ["a"]))] == ["b"]
     assert failures(accept(checks, ["all"])) == []
     assert accept(checks, ["c"])[2].outcome is Outcome.PASS
-    with pytest.raises(SettingError, match="the checks are a, b, c"):
-        accept(checks, ["d"])
+
+
+def test_a_name_that_is_no_checks_is_told_with_all_names():
+    check_names(["a", "all"], ["a", "b"])
+    with pytest.raises(SettingError, match="the checks are Apple, banana, and all accepts each"):
+        check_names(["x"], ["banana", "Apple"])

@@ -74,9 +74,19 @@ def test_what_the_fields_say():
         "fault_reaction": f"after 5.96 s: {LOST}",
         "fault_expected": f"lands, after 6 s: {LOST}",
         "fault_outcome": "as expected",
+        "autopilot": "",
     }
     nothing = fault_fields(FaultFacts(), FlightResult(verdict="clean"), "mocap")
-    assert nothing == {"faults": (), "fault_reaction": "", "fault_expected": "", "fault_outcome": ""}
+    assert not any(nothing.values())
+
+
+def test_of_a_genuine_autopilot_nothing_is_expected():
+    begun = (BegunFault(fault="external pose off at 10 s", began_us=10_000_000),)
+    said = (FailsafeText(time_us=14_500_000, text="Failsafe activated: LAND"),)
+    facts = FaultFacts(begun=begun, failsafes=said, autopilot="PX4")
+    fields = fault_fields(facts, FlightResult(verdict="aborted"), "mocap")
+    assert fields["fault_reaction"] == "after 4.50 s: Failsafe activated: LAND"
+    assert (fields["autopilot"], fields["fault_expected"], fields["fault_outcome"]) == ("PX4", "", "")
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,9 @@ def first_number(sample):
 
 
 SENSORS = [
-    part for part in FaultPart if FaultKind.OFF in SIZES[part] and part not in ("motor", "camera", "link")
+    part
+    for part in FaultPart
+    if FaultKind.OFF in SIZES[part] and part not in ("motor", "camera", "link", "rc")
 ]
 SAMPLED = [*FIELDS, FaultPart.EXTERNAL_POSE]
 

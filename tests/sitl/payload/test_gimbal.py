@@ -36,7 +36,7 @@ def test_it_turns_at_its_rate_and_stops_at_its_limits():
 def test_the_camera_stays_level_however_the_drone_tilts():
     gimbal = SimulatedGimbal(Gimbal())
     gimbal.step(STEP_S, quaternion_from_euler(0.4, -0.3, 1.0))
-    assert gimbal.attitude_arena == pytest.approx(quaternion_from_euler(0.0, 0.0, -1.0))
+    assert gimbal.motion.attitude_arena == pytest.approx(quaternion_from_euler(0.0, 0.0, -1.0))
 
 
 @pytest.mark.parametrize(("locked", "yaw_rad", "heading_ned_rad"), [(False, 0.3, 1.3), (True, -0.7, 0.3)])
@@ -46,7 +46,7 @@ def test_the_yaw_follows_the_drone_or_stays_to_north(locked, yaw_rad, heading_ne
     after(gimbal, 2.0)
     gimbal.step(STEP_S, quaternion_from_euler(0.0, 0.0, 1.0))  # at once: it does not lag
     assert gimbal.yaw_rad == pytest.approx(yaw_rad)
-    assert yaw_of(gimbal.attitude_arena) == pytest.approx(-heading_ned_rad)
+    assert yaw_of(gimbal.motion.attitude_arena) == pytest.approx(-heading_ned_rad)
 
 
 @pytest.mark.parametrize(("locked", "rate_rad_s"), [(False, 0.5), (True, 0.0)])
@@ -55,7 +55,7 @@ def test_the_camera_turns_with_the_drone_unless_its_yaw_is_locked(locked, rate_r
     gimbal.turn(GimbalTarget(0.0, 0.0, yaw_locked=locked))
     for number in range(10):
         gimbal.step(STEP_S, quaternion_from_euler(0.0, 0.0, 0.5 * STEP_S * number))
-    assert gimbal.rate_frd_rad_s == pytest.approx((0.0, 0.0, rate_rad_s))
+    assert gimbal.motion.rate_frd_rad_s == pytest.approx((0.0, 0.0, rate_rad_s))
     assert gimbal.yaw_rate_rad_s == pytest.approx(0.0)
 
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from pymavlink import mavutil
 
 from scenarios.loader import load_scenario
 from sitl.autopilots.process import AutopilotStart
@@ -14,9 +15,11 @@ from sitl.px4.build import Px4Process, find_build
 from sitl.px4.parameters import all_parameters
 from sitl.px4.server import Px4Server
 from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
+from sitl.px4.transmitter import CENTRED
 from sitl.sensors.suite import load_suite
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
+from wire.px4_modes import px4_name
 
 PX4_DIR = os.environ.get("FRAMERUNNER_PX4_DIR", "")
 pytestmark = pytest.mark.skipif(not PX4_DIR, reason="no genuine PX4: make test-px4 PX4_DIR=PX4-Autopilot")
@@ -36,6 +39,67 @@ async def test_lockstep_loses_and_doubles_no_step(tmp_path):
     assert server.link.unexpected == 0
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
+
+
+async def test_sticks_and_switches_of_a_transmitter(tmp_path):
+    """Climb and fly by sticks, change the mode, lose the link, stop the motors."""
+    scenario = load_scenario("empty").model_copy(update={"sensors": "mocap"})
+    channels, instance, made = list(CENTRED), free_instance(), []
+    signal = [True]
+
+    def make():
+        made.append(Px4Simulation(scenario, transmitter=lambda: tuple(channels) if signal[0] else None))
+        return made[-1]
+
+    airframe = Px4Simulation(scenario).world.airframe
+    values = all_parameters(airframe, load_suite("mocap"), 2.0, transmitter=True)
+    process = Px4Process(find_build(Path(PX4_DIR)), instance, tmp_path, values)
+    settings = ServerSettings(instance=instance, speed=2.0)
+    task = asyncio.create_task(Px4Server(make, settings, AutopilotStart(process, "")).run())
+    link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{14540 + instance}", source_system=245)
+    heard = []
+
+    async def until(condition, limit_s=60.0):
+        async with asyncio.timeout(limit_s):
+            while not condition():
+                assert not task.done()
+                while (message := link.recv_match(type="HEARTBEAT", blocking=False)) is not None:
+                    if message.get_srcComponent() == 1:
+                        heard.append((px4_name(message.custom_mode), message.system_status))
+                await asyncio.sleep(0.01)
+
+    def place():
+        return made[-1].truth.position_arena_m
+
+    await until(lambda: heard and heard[-1] == ("POSCTL", mavutil.mavlink.MAV_STATE_STANDBY))
+    link.mav.command_long_send(instance + 1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
+    await until(lambda: made[-1].armed)
+    channels[2] = 1900
+    await until(lambda: place()[2] > 1.5)
+    channels[2] = 1500
+    channels[1] = 1700
+    await until(lambda: place()[0] > 1.0)
+    assert abs(place()[1]) < 0.5
+    channels[1] = 1500
+    centred_us = made[-1].time_us
+    await until(lambda: made[-1].time_us > centred_us + 1_500_000)  # sticks that move end the mode hold
+    channels[4] = 1500
+    await until(lambda: heard[-1][0] == "LOITER")
+    signal[0] = False
+    await until(lambda: made[-1].failsafes)
+    await until(lambda: made[-1].failsafes[-1][1].endswith("LAND"))
+    first, last = (text for _, text in made[-1].failsafes)
+    assert "Failsafe activated: entering Hold for" in first
+    assert last.endswith("Failsafe activated: LAND")
+    signal[0] = True
+    back_us = made[-1].time_us
+    await until(lambda: made[-1].time_us > back_us + 500_000)
+    channels[5] = 2000
+    await until(lambda: max(made[-1].world.dynamics.motor_speeds_rad_s()) < 1.0)
+    await until(lambda: not made[-1].armed)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    link.close()
 
 
 async def test_the_whole_challenge(tmp_path):

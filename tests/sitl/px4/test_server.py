@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from sitl.px4.build import Px4Process, find_build
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
 from sitl.px4.messages import ActuatorControls
 from sitl.px4.server import Px4Server
-from sitl.px4.simulation import Px4Simulation, with_sensors_for_px4
+from sitl.px4.simulation import MotionError, Px4Simulation, with_sensors_for_px4
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.sitl.px4.fake_px4 import FakePx4
@@ -148,6 +149,14 @@ def test_an_output_that_is_no_number_stops_its_motor():
     assert min(speeds_rad_s[1:]) > 0.0
 
 
+def test_a_motion_that_is_no_number_ends_in_words():
+    simulation = new_simulation()
+    simulation.sense()
+    simulation.truth = replace(simulation.truth, position_arena_m=(nan, 0.0, 1.0))
+    with pytest.raises(MotionError, match="turned too fast to be simulated"):
+        simulation.move(None)
+
+
 async def test_an_answer_to_another_sensor_is_counted():
     place = ("127.0.0.1", FIRST_PORT + free_instance())
     link = Px4Link(place, print)
@@ -181,6 +190,16 @@ async def test_a_px4_that_ends_at_once_is_reported_with_its_error(tmp_path):
     assert await process.ended() == "PX4 ended with code 3: ERROR [init] no airframe"
     assert "PX4_PARAM_MPC_THR_HOVER=0.5" in process.log.read_text()
     assert "PX4_SIM_MODEL=none_iris" in process.log.read_text()
+
+
+async def test_a_px4_that_is_restarted_goes_on_with_its_log(tmp_path):
+    script = "if [ -f was ]; then exit 4; fi; touch was; echo 'ERROR [init] the first start'"
+    process = Px4Process(build_of(tmp_path, script), 2, tmp_path / "files", {})
+    await process.start()
+    assert (await process.ended()).endswith("ERROR [init] the first start")
+    await process.start()
+    assert await process.ended() == "PX4 ended with code 4"  # not the words of the start before
+    assert "the first start" in process.log.read_text()
 
 
 def test_a_folder_is_given_to_px4_by_its_absolute_path(tmp_path):

@@ -111,6 +111,17 @@ def test_only_who_is_in_control_turns_it(pilot, gimbal, autopilot, make_peer):
     assert len(gimbal.targets) == 1
 
 
+def test_refusals_are_answered_each_time_and_told_once_in_five_seconds(pilot, autopilot, monkeypatch):
+    told = []
+    monkeypatch.setattr(autopilot, "say", lambda _severity, text: told.append(text))
+    for _ in range(120):
+        answers = pilot.ask(pilot.long(PITCH_YAW, -10, 0, nan, nan, 12, target=MANAGER))
+        assert [m.result for m in answers if m.get_type() == "COMMAND_ACK"] == [DENIED]
+        pilot.advance(0.1)
+    assert 2 <= len(told) <= 3
+    assert all(text.startswith("Gimbal refused ") for text in told)
+
+
 @pytest.mark.parametrize(
     ("flags", "yaw_deg", "yaw_rad", "locked"),
     [

@@ -1,0 +1,96 @@
+"""A flight with a genuine PX4, for many of them: no display, no files, an instance of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory, gettempdir
+
+from errors import SettingError
+from framerunner.flying.fly import FinishedFlight
+from framerunner.flying.plan import FlightPlan
+from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
+from framerunner.runs.recorder import RunRecords
+from framerunner.runs.run_folder import RunFolder
+from sitl.px4.link import FIRST_PORT
+from sitl.px4.side_link import CAMERA_PORT
+from sitl.server_settings import VIDEO_PORT
+
+INSTANCES = 10
+_TCP_PORTS = (FIRST_PORT, VIDEO_PORT)
+_UDP_PORTS = (14540, 14580, 18570, CAMERA_PORT)  # of the app, and PX4's own
+
+
+@dataclass(frozen=True, slots=True)
+class Px4Use:
+    """By which PX4 flights are flown.
+
+    Attributes:
+        folder: of PX4 or its build.
+        speed: simulated seconds a second, if the machine can.
+    """
+
+    folder: Path
+    speed: float
+
+
+def fly_with_px4(plan: FlightPlan, use: Px4Use) -> FinishedFlight:
+    """Fly a plan with a PX4 and a simulator that are started for it and end with it.
+
+    Raises:
+        DroneError: the drone does not get ready.
+        SettingError: simulator or PX4 cannot be started, or have ended.
+        ValueError: the plan has no mission.
+    """
+    with claimed_instance() as instance, TemporaryDirectory(prefix="framerunner-") as out:
+        folder = RunFolder(Path(out), plan.scenario.name)
+        folder.write_plan(plan.scenario, plan.chart)
+        settings = RealTimeSettings(speed=use.speed, instance=instance, px4=use.folder, unattended=True)
+        return asyncio.run(fly_in_real_time(plan, settings, RunRecords(folder, None), None))
+
+
+@contextmanager
+def claimed_instance() -> Iterator[int]:
+    """An instance whose ports are free, and which no other flight of this machine claims meanwhile.
+
+    Raises:
+        SettingError: there is none.
+    """
+    for instance in range(INSTANCES):
+        try:
+            lock = (Path(gettempdir()) / f"framerunner-px4-{instance}.lock").open("w")
+        except OSError:  # another user's
+            continue
+        with lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            if _is_free(instance):
+                yield instance
+                return
+    raise SettingError(
+        f"the ports of all {INSTANCES} instances of PX4 are in use; end other simulators, or use fewer --jobs"
+    )
+
+
+def _is_free(instance: int) -> bool:
+    ports = [(socket.SOCK_STREAM, port) for port in _TCP_PORTS]
+    ports += [(socket.SOCK_DGRAM, port) for port in _UDP_PORTS]
+    return all(_can_bind(kind, port + instance) for kind, port in ports)
+
+
+def _can_bind(kind: socket.SocketKind, port: int) -> bool:
+    with socket.socket(socket.AF_INET, kind) as tried:
+        if kind == socket.SOCK_STREAM:
+            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            tried.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True

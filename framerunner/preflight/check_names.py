@@ -1,0 +1,30 @@
+"""The names of all checks before arming, so that one that is misspelt is found before any check is run."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from framerunner.doctor.subjects import Subject
+from offboard.safety.failsafes import failsafe_rows
+
+REPLACED = frozenset(
+    # Findings of the doctor that checks with a limit replace.
+    (
+        *("battery", "link", "innovations", "setpoints lost", "ground station lost", "battery low", "fence"),
+        *(row.name for row in failsafe_rows()),
+    )
+)
+RENAMED = {"estimator": "estimator settings"}
+"""Findings of the doctor whose name is that of a check with a limit."""
+_OWN = ("battery", "estimator", "link loss", "link latency", "camera", "camera delay")
+_OF_RUN = ("failsafes", "fence", "caps")
+
+CHECK_NAMES = frozenset(
+    (
+        *(RENAMED.get(each, each) for each in get_args(Subject) if each not in REPLACED),
+        *(row.name for row in failsafe_rows()),
+        *_OWN,
+        *_OF_RUN,
+    )
+)
+"""All names that `--accept` takes, of each autopilot."""

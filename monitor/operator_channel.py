@@ -1,0 +1,236 @@
+"""`/ws/operator`: the operator's buttons, between the pages of those who may fly and the flight.
+
+A flight connects to a local socket that only this user may open. What it sends is passed on to all pages, and
+their demands to the flight with who made them; the flight decides what they mean (`operator_pages.py` of
+`offboard/safety/`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import os
+import stat
+import time
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+
+from monitor.access import refuse
+from monitor.pilot_channel import Allowance
+from monitor.settings import MonitorError
+from wire.operator_messages import MAX_LINE_BYTES, PageDemand, PageMessage
+
+if TYPE_CHECKING:
+    from monitor.server import Monitor
+
+MAX_MESSAGE_BYTES = 500  # a page sends some 80
+MAX_PAGES = 20
+BAD_MESSAGE_CODE, TOO_MANY_CODE = 4400, 4429
+_MAX_QUEUE = 100  # messages to a page; beats come five times a second
+_MAX_UNSENT_BYTES = 1 << 16
+_NO_FLIGHT: dict[str, Any] = {"kind": "none"}
+
+logger = logging.getLogger(__name__)
+
+
+class _Page:
+    """One page's connection."""
+
+    def __init__(self, number: int, name: str) -> None:
+        self.number = number
+        self.name = name
+        self.outbox: asyncio.Queue[str] = asyncio.Queue(_MAX_QUEUE)
+        self.is_slow = asyncio.Event()
+
+    def put(self, text: str) -> None:
+        try:
+            self.outbox.put_nowait(text)
+        except asyncio.QueueFull:
+            self.is_slow.set()
+
+
+class OperatorDesk:
+    """The flight that is connected, and the pages that show it.
+
+    Args:
+        path: of the socket at which flights connect.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._pages: dict[int, _Page] = {}
+        self._numbers = count(1)
+        self._flight: asyncio.StreamWriter | None = None
+        self._shown = json.dumps(_NO_FLIGHT)  # what a page that opens is sent first
+
+    async def run(self) -> None:
+        """Listen for flights until cancelled.
+
+        Raises:
+            MonitorError: the socket cannot be opened.
+        """
+        path = self._path
+        try:
+            if path.exists() and stat.S_ISSOCK(path.stat().st_mode):  # left by a monitor that was killed
+                path.unlink()
+            before = os.umask(0o177)
+            try:
+                server = await asyncio.start_unix_server(self._serve, str(path), limit=MAX_LINE_BYTES)
+            finally:
+                os.umask(before)
+        except OSError as error:
+            raise MonitorError(
+                f"monitor: --operator-socket {path}: cannot be opened ({error.strerror or error}); "
+                "give the path of a new file in a folder of yours"
+            ) from None
+        try:
+            await server.serve_forever()
+        finally:
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+    def enter(self, name: str) -> _Page | None:
+        """Add a page of a person; None if there are too many."""
+        if len(self._pages) >= MAX_PAGES:
+            return None
+        page = _Page(next(self._numbers), name)
+        self._pages[page.number] = page
+        page.put(json.dumps({"kind": "you", "page": page.number}))
+        page.put(self._shown)
+        return page
+
+    def leave(self, page: _Page) -> None:
+        """Remove a page; the flight is told."""
+        self._pages.pop(page.number, None)
+        self._tell(PageMessage(page=page.number, name=page.name, what="gone"))
+
+    def demand(self, page: _Page, demand: PageDemand) -> None:
+        """Pass a page's demand on; without a flight it means nothing."""
+        self._tell(PageMessage(page=page.number, name=page.name, **demand.model_dump()))
+
+    def _tell(self, message: PageMessage) -> None:
+        flight = self._flight
+        if flight is None or flight.is_closing():
+            return
+        if flight.transport.get_write_buffer_size() > _MAX_UNSENT_BYTES:
+            flight.transport.abort()  # it hangs; demands that wait for it would come late
+            return
+        flight.write(message.model_dump_json().encode() + b"\n")
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """One flight's connection; a second flight is refused."""
+        if self._flight is not None:
+            logger.warning("a second flight with an operator was refused; end the first one")
+            writer.close()
+            return
+        self._flight = writer
+        ended = False
+        try:
+            with contextlib.suppress(OSError, ValueError):
+                while line := await reader.readline():
+                    ended = self._pass_on(line) or ended
+        finally:
+            self._flight = None
+            writer.close()
+            if not ended:
+                words = "the app has ended, or its connection is lost: use the remote control"
+                self._show_all(json.dumps({"kind": "end", "flight": "", "words": words, "lost": True}))
+
+    def _pass_on(self, line: bytes) -> bool:
+        """Pass a flight's message on to its page or to all; True if it is its last one."""
+        message = json.loads(line)  # ValueError ends the connection
+        text = line.decode()
+        kind = message.get("kind")
+        if kind == "answer":
+            page = self._pages.get(message.get("page"))
+            if page is not None:
+                page.put(text)
+            return False
+        if kind == "flight":
+            self._shown = text
+        elif kind == "end":
+            self._shown = json.dumps(_NO_FLIGHT)
+        self._show_all(text)
+        return bool(kind == "end")
+
+    def _show_all(self, text: str) -> None:
+        for page in self._pages.values():
+            page.put(text)
+
+
+def register(monitor: Monitor) -> None:
+    """Add the WebSocket, and listen for flights."""
+    path = monitor.settings.operator_socket
+    desk = None if path is None else OperatorDesk(path)
+    if desk is not None:
+        monitor.jobs.append(desk.run)
+
+    @monitor.web.websocket("/ws/operator")
+    async def operator(websocket: WebSocket) -> None:
+        visitor = monitor.access.visitor(websocket)
+        if not visitor.may_fly:
+            await refuse(websocket, "only those who logged in may operate a flight")
+            return
+        if desk is None:
+            await refuse(websocket, "this monitor was started without --operator-socket")
+            return
+        await websocket.accept()
+        page = desk.enter(visitor.name)
+        if page is None:
+            await websocket.close(TOO_MANY_CODE, "too many operators' pages")
+            return
+        tasks = [
+            asyncio.create_task(each)
+            for each in (
+                _receive(monitor, desk, page, websocket),
+                _send(page, websocket),
+                page.is_slow.wait(),
+            )
+        ]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            desk.leave(page)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            if websocket.application_state is WebSocketState.CONNECTED:
+                with contextlib.suppress(RuntimeError, OSError):
+                    await websocket.close(TOO_MANY_CODE if page.is_slow.is_set() else 1000)
+
+
+async def _receive(monitor: Monitor, desk: OperatorDesk, page: _Page, websocket: WebSocket) -> None:
+    """Take a page's demands until it leaves, sends something else, or its person has logged out."""
+    allowance = Allowance(time.monotonic)
+    while True:
+        message = await websocket.receive()
+        if message["type"] == "websocket.disconnect":
+            return
+        text = message.get("text") or ""
+        try:
+            if len(text) > MAX_MESSAGE_BYTES:
+                raise ValueError("too long")
+            demand = PageDemand.model_validate_json(text)
+        except (ValidationError, ValueError):
+            await websocket.close(BAD_MESSAGE_CODE, "not a message of this page")
+            return
+        if demand.what != "stop":  # a stop is taken in any case
+            if not monitor.access.visitor(websocket).may_fly:
+                await websocket.close(4403, "logged out")
+                return
+            if not allowance.spend():
+                await websocket.close(TOO_MANY_CODE, "too many messages a second")
+                return
+        desk.demand(page, demand)
+
+
+async def _send(page: _Page, websocket: WebSocket) -> None:
+    with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):
+        while True:
+            await websocket.send_text(await page.outbox.get())

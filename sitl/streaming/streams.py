@@ -1,0 +1,42 @@
+"""The video streams that a drone's camera offers."""
+
+from __future__ import annotations
+
+import socket
+from math import degrees
+
+from firmware_py.mavlink.camera.model import VideoEncoding, VideoStream
+from scenarios.models import Camera
+from sitl.server_settings import ServerSettings
+from wire.simulator_api import VIDEO_PATH
+from wire.transports.urls import is_loopback
+
+
+def video_streams(settings: ServerSettings, camera: Camera) -> tuple[VideoStream, ...]:
+    """What a camera component announces; QGroundControl takes the first that it can show.
+
+    Args:
+        settings: of the drone.
+        camera: of the scenario.
+    """
+    common = (camera.width_px, camera.height_px, camera.rate_hz, degrees(camera.horizontal_fov_rad))
+    host = _public_address(settings)
+    page = VideoStream(f"http://{host}:{settings.http_port}{VIDEO_PATH}", VideoEncoding.MJPEG_HTTP, *common)
+    if settings.video_rtp is None:
+        return (page,)
+    return (VideoStream(str(settings.video_rtp[1]), VideoEncoding.H264_RTP, *common), page)
+
+
+def _public_address(settings: ServerSettings) -> str:
+    """The address under which a ground station reaches this machine, when all addresses are listened on."""
+    if settings.bind != "0.0.0.0":
+        return settings.bind
+    remote = settings.ground.remote
+    if remote is None or is_loopback(remote[0]):
+        return "127.0.0.1"
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(remote)  # sends nothing; the system chooses the route
+            return str(probe.getsockname()[0])
+        except OSError:
+            return "127.0.0.1"

@@ -1,0 +1,135 @@
+"""`framerunner evaluate --px4`: no PX4 is needed, its flights are lockstep flights here."""
+
+import json
+import socket
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from errors import SettingError
+from framerunner.cli import run
+from framerunner.evaluation import px4_flight, runner
+from framerunner.evaluation.plan import plan_files
+from framerunner.evaluation.px4_flight import claimed_instance
+from framerunner.flying.lockstep import fly_lockstep
+from offboard.mission import load_mission
+from scenarios.faults.parse import parse_fault
+from scenarios.loader import dump_yaml, load_scenario
+from tests.framerunner.evaluation.flights import short_scenario, write_scenarios
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def px4():
+    """A folder that looks like a build of PX4, whose program ends at once."""
+    folder = Path("px4")
+    (folder / "bin").mkdir(parents=True)
+    (folder / "etc").mkdir()
+    program = folder / "bin" / "px4"
+    program.write_text("#!/bin/sh\necho 'ERROR [init] no airframe'; exit 3\n")
+    program.chmod(0o755)
+    return folder
+
+
+@pytest.fixture
+def flown(monkeypatch):
+    """Plans that were flown by "PX4"."""
+    plans = []
+
+    def fly(plan, use):
+        plans.append((plan, use))
+        flight = fly_lockstep(plan)
+        return replace(flight, result=flight.result.model_copy(update={"autopilot": "PX4"}))
+
+    monkeypatch.setattr(runner, "fly_with_px4", fly)
+    return plans
+
+
+def test_flights_are_kept_counted_and_continued_as_in_lockstep(px4, flown, capsys):
+    write_scenarios(Path("mine"), seeds=(1, 2))
+    assert run(["evaluate", "mine", "--px4", str(px4)]) == 0
+    said = capsys.readouterr()
+    assert "drones with ideal sensors have mocap" in said.err
+    assert "mine, flown by PX4: explorer" in said.out
+    assert [(plan.scenario.sensors, use.speed) for plan, use in flown] == [("mocap", 4.0)] * 2
+    (folder,) = Path("runs").iterdir()
+    assert folder.name.startswith("evaluate-mine-px4-explorer-")
+    assert load_scenario(folder / "scenarios" / "calm-1.yaml").sensors == "mocap"
+    header, *rows = (folder / "results.csv").read_text().splitlines()
+    at = header.split(",").index("autopilot") - len(header.split(","))
+    assert {row.split(",")[at] for row in rows} == {"PX4"}
+    assert " --px4 px4" in (folder / "report.html").read_text()
+
+    lines = (folder / "flights.jsonl").read_text().splitlines(keepends=True)
+    (folder / "flights.jsonl").write_text(lines[0])
+    assert run(["evaluate", "mine", "--px4", str(px4)]) == 0
+    assert len(flown) == 3
+    (px4 / "bin" / "px4").write_text("#!/bin/sh\nanother build\n")
+    out = ["--out", str(folder)]
+    assert run(["evaluate", "mine", "--px4", str(px4), *out]) == 2
+    assert "has an evaluation of autopilot PX4 " in capsys.readouterr().err
+    assert run(["evaluate", "mine", *out]) == 2
+
+
+def test_our_own_autopilots_evaluations_are_recognised_as_before():
+    identity = plan_files([str(write_scenarios(Path("mine")))], load_mission("explorer")).identity
+    assert "autopilot" not in identity.as_data()
+    assert "autopilot" in replace(identity, autopilot="PX4 1234").as_data()
+
+
+def test_a_px4_that_ends_is_an_error_in_words(px4, capsys):
+    write_scenarios(Path("mine"), seeds=(1,))
+    assert run(["evaluate", "mine", "--px4", str(px4), "--out", "kept"]) == 1
+    (row,) = (json.loads(line) for line in Path("kept/flights.jsonl").read_text().splitlines())
+    assert row["verdict"] == "error"
+    assert "PX4 ended with code 3: ERROR [init] no airframe" in row["reason"]
+
+
+def test_flights_with_faults_of_the_link_are_left_out(px4, flown, capsys):
+    folder = Path("mine")
+    folder.mkdir()
+    for seed, fault in ((1, "link off at 1 s"), (2, "barometer off at 0 s")):
+        scenario = short_scenario(seed).model_copy(
+            update={"sensors": "mocap", "faults": (parse_fault(fault),)}
+        )
+        (folder / f"{scenario.name}.yaml").write_text(dump_yaml(scenario))
+    assert run(["evaluate", "mine", "--px4", str(px4)]) == 0
+    assert "1 of 2 flights have a fault of it, left out" in capsys.readouterr().err
+    assert [plan.scenario.name for plan, _ in flown] == ["calm-2"]
+    assert run(["evaluate", "mine/calm-1.yaml", "--px4", str(px4)]) == 2
+    assert "all flights have a fault of the link" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--px4", "/no/px4"], "--px4 /no/px4: has no bin/px4"),
+        (["--speed", "2"], "--speed 2: is for flights with --px4"),
+        (["--px4", "px4", "--response", "lag=0.5"], "--response lag=0.5: changes our autopilot's flights"),
+        (["--px4", "px4", "--backend", "ray"], "--backend ray: PX4 is started on this machine"),
+        (["--px4", "px4", "--jobs", "11"], "--jobs"),
+    ],
+)
+def test_options_that_do_not_go_together(px4, options, message, capsys):
+    assert run(["evaluate", "calm-1", *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_each_flight_at_once_has_an_instance_of_its_own(monkeypatch, tmp_path):
+    monkeypatch.setattr(px4_flight, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(px4_flight, "INSTANCES", 3)
+    monkeypatch.setattr(px4_flight, "_TCP_PORTS", (24560,))
+    monkeypatch.setattr(px4_flight, "_UDP_PORTS", (24580,))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 24581))
+        with claimed_instance() as first, claimed_instance() as second:
+            assert (first, second) == (0, 2)
+            with pytest.raises(SettingError, match="all 3 instances of PX4 are in use"), claimed_instance():
+                pass
+        with claimed_instance() as again:
+            assert again == 0
