@@ -19,17 +19,16 @@ from offboard.keep_in_box import Box, confine
 from offboard.link.autopilots import open_dialect
 from offboard.link.commands import PendingRequests, synchronous
 from offboard.link.companion import Companion
-from offboard.link.connections import new_mavsdk, open_connections
+from offboard.link.connections import check_is_free, new_mavsdk, open_connections
 from offboard.link.dialect import Dialect
 from offboard.link.reported_state import reported_state
-from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, request_rates
+from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, pose_of
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
 from offboard.safety.caps import CapKeeper, Caps
 from offboard.safety.rules import AbortAction
-from wire.transports.sockets import check_free
-from wire.transports.urls import LinkError, parse_url
+from wire.transports.urls import parse_url
 
 STAND_STILL_S = 0.5  # wall time without a tick after which a velocity of zero is sent
 LINK_LOST_S = 1.0  # wall time without telemetry
@@ -149,16 +148,12 @@ class MavsdkDrone:
 
     async def connect(self) -> None:
         """Find the vehicle and subscribe to its telemetry."""
-        try:
-            check_free(self._url, self._advice)
-        except LinkError as error:
-            raise DroneError(str(error)) from None
+        check_is_free(self._url, self._advice)
         self._mavsdk = new_mavsdk()
         self._recorder = await open_connections(
             self._mavsdk, (*self._shared_with, self._url.text), self._tlog_path, self._companion
         )
-        system: Any = await self._mavsdk.first_autopilot(self._connect_limit_s)
-        if system is None:
+        if (system := await self._mavsdk.first_autopilot(self._connect_limit_s)) is None:
             raise DroneError(
                 f"no vehicle was found on {self._url.text} within {self._connect_limit_s:g} s; "
                 "is it running and sending to this address?"
@@ -174,14 +169,16 @@ class MavsdkDrone:
         self._telemetry = TelemetryAsync(system)
         self._direct = MavlinkDirectAsync(system)
         room_m = inf if self._box is None else self._box.high_m[2] - self._start_arena.position_m[2]
-        self._dialect = await open_dialect(system, self._direct, self._feed, room_m)
-        telemetry = synchronous(self._telemetry)
-        self._feed.subscribe(telemetry, synchronous(self._direct), self._dialect.numbered_modes)
-        await self._requests.wait(self._dialect.request_streams())
+        steps = self._ticks.steps
+        self._dialect = new = await open_dialect(system, self._direct, self._feed, room_m, stepped=steps)
+        self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct), new.numbered_modes)
+        if new.exchange is None:
+            await self._requests.wait(new.request_streams())
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then determine the axes."""
         limit_s = self._ready_limit_s or self._stream.ready_limit_s
+        await self._ticks.begin_exchange(self._stream, self._requests)
         try:
             await self._wait_for_checks(limit_s)
         except TimeoutError:
@@ -193,9 +190,8 @@ class MavsdkDrone:
             ) from None
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        feed = self._feed
-        await request_rates(feed, self._telemetry)
-        self._alignment = Alignment(self._start_arena, Pose(feed.position_ned_m, feed.yaw_ned_rad))
+        await self._ticks.before_arming(self._telemetry)
+        self._alignment = Alignment(self._start_arena, pose_of(self._feed))
         await self._ticks.begin()
 
     async def _wait_for_checks(self, limit_s: float) -> None:
@@ -211,8 +207,9 @@ class MavsdkDrone:
                     with contextlib.suppress(MavsdkError):  # refused without a position
                         await self._requests.wait(self._stream.request_offboard())
                     await self._becomes(lambda: self._in_offboard, HOLD_SHOWN_S)
-        with contextlib.suppress(TimeoutError):
-            await self._until(lambda: not self._feed.missing(), min(FIRST_MODE_S, limit_s / 2))
+        with contextlib.suppress(TimeoutError):  # with an exchange its checks have had their time
+            first_s = 0.0 if self._stream.exchange else min(FIRST_MODE_S, limit_s / 2)
+            await self._until(lambda: not self._feed.missing(), first_s)
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
             await self._request("offboard mode", self._stream.request_offboard())
@@ -417,10 +414,8 @@ class MavsdkDrone:
         assert self._alignment is not None, "ready() comes first"
         sample = self._feed.sample
         missed = [before for before in self._feed.take_samples() if before.time_us < sample.time_us]
-        mode, known = self._stream.modes.offboard, self._stream.loops_known
-        fixed = (self._feed, self._alignment, mode)
-        states = tuple(reported_state(before, *fixed, loops_known=known) for before in missed)
-        return reported_state(sample, *fixed, states, loops_known=known)
+        fixed = (self._feed, self._alignment, self._stream)
+        return reported_state(sample, *fixed, tuple(reported_state(before, *fixed) for before in missed))
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s

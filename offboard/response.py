@@ -35,6 +35,7 @@ _KEPT = max(DEAD_STEPS) + _WINDOW + 1
 _MEMORY_S = 40.0
 _MAX_STEPS = 8  # after a longer gap everything but the estimate begins again
 _EXPECTED = ((3, 2), (1, 0), (1, 0))  # indices of dead time and lag, before there is evidence
+_EXPECTED_LATE = ((1, 5), (0, 1), (0, 0))  # likewise, of a vehicle with PX4: 1 m/s sideways takes it a second
 _MIN_ENERGY = (0.3, 0.2, 0.2)  # sums of squared changes (m/s, m/s, rad/s) that are evidence
 _BETTER = 0.7  # share of the present pair's error that another one must reach
 _LITTLE_ENERGY = 0.03  # is enough where a vehicle is known to be late, and a pair is
@@ -120,14 +121,16 @@ class Prediction:
 class ResponseEstimate:
     """Estimates the response of the vehicle that is flown; call `update` once a tick.
 
+    Args:
+        late: the vehicle is known to answer late, though not how late.
+
     Attributes:
         response: as known now.
     """
 
-    def __init__(self) -> None:
-        self.response = Response()
-        self._chosen = list(_EXPECTED)
-        self._turning = True
+    def __init__(self, *, late: bool = False) -> None:
+        self._chosen = list(_EXPECTED_LATE if late else _EXPECTED)
+        self._turning = not late
         shape = (len(DEAD_STEPS), len(LAGS_S), len(_GROUPS))
         self._errors = np.zeros(shape)
         self._energies = np.zeros(len(_GROUPS))
@@ -137,6 +140,7 @@ class ResponseEstimate:
         self._second = SecondLag(shape[:2], STEP_S, _WINDOW)
         self._slow = SlowShare(shape[:2], STEP_S, _WINDOW)
         self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])[:, None]
+        self.response = self._as_response() if late else Response()
         self._restart()
 
     def _restart(self) -> None:

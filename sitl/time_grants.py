@@ -71,10 +71,12 @@ class TimeGrants:
 
     Attributes:
         until_us: time of the last control tick that may run; `FREE_US` without a limit.
+        used: time has been granted.
     """
 
     def __init__(self, channel: socket.socket) -> None:
         self.until_us = FREE_US
+        self.used = False
         self._channel = channel
         self._setpoint: Velocity | None = None
         self._granted = asyncio.Event()
@@ -121,7 +123,7 @@ class TimeGrants:
         try:
             async for line in reader:
                 grant = Grant.parse(line)
-                self.until_us, self._setpoint = grant.until_us, grant.setpoint
+                self.until_us, self._setpoint, self.used = grant.until_us, grant.setpoint, True
                 self._granted.set()
         finally:  # the channel has closed
             self.until_us, self._setpoint = FREE_US, None

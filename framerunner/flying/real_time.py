@@ -94,6 +94,8 @@ async def fly_in_real_time(
         vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
         named = settings.simulator is not None
         judge, plan = await choose_judge(plan, vehicle.api, session, named=named)
+        late = settings.autopilot is not None and settings.autopilot.name == "px4"
+        plan = replace(plan, answers_late=late)
         plan, safety, system_id = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)

@@ -18,20 +18,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import threading
 from math import inf
 from typing import Any
 
 from mavsdk.asyncio import MavsdkError
-from mavsdk.plugins.mavlink_direct import MavlinkMessage
 
 from offboard.drone import VelocityCommand
-from offboard.link.commands import synchronous
 from offboard.link.dialect import ModeNames
+from offboard.link.direct import DirectMessages
 from offboard.link.telemetry import TelemetryFeed
 from wire import ardupilot_modes
-from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
+from wire.dialect import mavlink
 
 TAKEOFF_HEIGHT_M = 1.0  # requested; velocities take over as soon as the drone is off the ground
 TAKEOFF_SHARE = 0.7  # likewise, of the room below the ceiling at most
@@ -44,21 +42,7 @@ _STREAMS_HZ = {
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
 }
-_VELOCITY_AND_YAW_RATE = (
-    mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_Y_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_Z_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_AX_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_AY_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_AZ_IGNORE
-    | mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
-)
-
 ARDUPILOT_MODES = ModeNames(offboard="GUIDED", hold="BRAKE", land="LAND", pilot=ardupilot_modes.PILOT_MODES)
-
-
-class CommandRefusedError(MavsdkError):  # type: ignore[misc]  # MAVSDK is untyped
-    """The vehicle answered a command, but not with "accepted"; the message is the MAV_RESULT's name."""
 
 
 class ArduPilotDialect:
@@ -76,6 +60,7 @@ class ArduPilotDialect:
     numbered_modes = ardupilot_modes.NAMES
     loops_known = False
     checks_in_offboard = True
+    exchange = None
     ready_limit_s = 90.0  # its estimator uses GPS some 40 s after its start
 
     def __init__(
@@ -89,10 +74,9 @@ class ArduPilotDialect:
         self._takeoff_height_m = min(TAKEOFF_HEIGHT_M, TAKEOFF_SHARE * room_above_m)
         self.ended = False
         self._action = action
-        self._direct = synchronous(direct)
+        self._messages = DirectMessages(direct, system_id)
         self._feed = feed
         feed.needs_landed_state = True  # else each climb in the air would be taken for a take-off
-        self._system_id = system_id
         self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
         self._sent_since_repeat = False
         self._takeoff_us: int | None = None  # vehicle time at which take-off was last requested
@@ -116,7 +100,7 @@ class ArduPilotDialect:
                     self._take_off()
                 else:
                     self._takeoff_us = None
-                    self._send("SET_POSITION_TARGET_LOCAL_NED", _velocity_target(command))
+                    self._messages.send_velocity(command)
 
     def repeat(self) -> None:
         """Send the last velocity again if nothing was sent since the last call."""
@@ -136,12 +120,12 @@ class ArduPilotDialect:
     def request_hold_blocking(self) -> None:
         """The same from a thread, which waits for the answer."""
         self._command = None
-        self._command_long_blocking(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(ardupilot_modes.BRAKE))
+        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(ardupilot_modes.BRAKE))
 
     def request_land_blocking(self) -> None:
         """End the setpoints permanently and request LAND, from a thread."""
         self.end()
-        self._command_long_blocking(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(ardupilot_modes.LAND))
+        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(ardupilot_modes.LAND))
 
     async def arm(self) -> None:
         """Arm."""
@@ -173,49 +157,10 @@ class ArduPilotDialect:
         now_us = self._feed.time_us
         if self._takeoff_us is None or now_us - self._takeoff_us > TAKEOFF_AGAIN_US:
             self._takeoff_us = now_us
-            fields = self._command_fields(mavlink.MAV_CMD_NAV_TAKEOFF, *(0.0,) * 6, self._takeoff_height_m)
-            self._send("COMMAND_LONG", fields)
+            self._messages.send_command(mavlink.MAV_CMD_NAV_TAKEOFF, *(0.0,) * 6, self._takeoff_height_m)
 
     async def _set_mode(self, number: int) -> None:
         await self._command_long(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(number))
 
     async def _command_long(self, number: int, *parameters: float) -> None:
-        await asyncio.to_thread(self._command_long_blocking, number, *parameters)
-
-    def _command_long_blocking(self, number: int, *parameters: float) -> None:
-        fields = self._command_fields(number, *parameters)
-        answer = json.loads(self._direct.send_command(self._message("COMMAND_LONG", fields)).fields_json)
-        result = answer.get("result")
-        if result != mavlink.MAV_RESULT_ACCEPTED:
-            known = mavlink.enums["MAV_RESULT"].get(result)
-            name = f"result {result}" if known is None else known.name.removeprefix("MAV_RESULT_")
-            raise CommandRefusedError(name)
-
-    def _command_fields(self, number: int, *parameters: float) -> dict[str, float]:
-        filled = (*parameters, *([0.0] * (7 - len(parameters))))
-        values = {f"param{index}": value for index, value in enumerate(filled, start=1)}
-        return {"command": number, "confirmation": 0, **values}
-
-    def _send(self, name: str, fields: dict[str, float]) -> None:
-        self._direct.send_message(self._message(name, fields))
-
-    def _message(self, name: str, fields: dict[str, float]) -> MavlinkMessage:
-        target = {"target_system": self._system_id, "target_component": AUTOPILOT_COMPONENT_ID}
-        return MavlinkMessage(
-            name, 0, 0, self._system_id, AUTOPILOT_COMPONENT_ID, json.dumps({**target, **fields})
-        )
-
-
-def _velocity_target(command: VelocityCommand) -> dict[str, float]:
-    """The fields of SET_POSITION_TARGET_LOCAL_NED for a velocity and a yaw rate in body axes."""
-    zeros = dict.fromkeys(("x", "y", "z", "afx", "afy", "afz", "yaw"), 0.0)
-    return {
-        **zeros,
-        "time_boot_ms": 0,
-        "coordinate_frame": mavlink.MAV_FRAME_BODY_NED,
-        "type_mask": _VELOCITY_AND_YAW_RATE,
-        "vx": command.forward_m_s,
-        "vy": -command.left_m_s,
-        "vz": -command.up_m_s,
-        "yaw_rate": -command.yaw_rate_rad_s,
-    }
+        await asyncio.to_thread(self._messages.command, number, *parameters)

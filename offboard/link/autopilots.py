@@ -12,14 +12,17 @@ from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from offboard.drone import DroneError
 from offboard.link.ardupilot import ArduPilotDialect
 from offboard.link.dialect import Dialect, Px4Dialect
+from offboard.link.stepped_px4 import SteppedPx4Dialect
 from offboard.link.telemetry import TelemetryFeed
 
 
 async def open_dialect(
-    system: Any,  # noqa: ANN401
+    system: Any,  # noqa: ANN401 - MAVSDK is untyped
     direct: Any,  # noqa: ANN401
     feed: TelemetryFeed,
     room_above_m: float = inf,
+    *,
+    stepped: bool = False,
 ) -> Dialect:
     """The dialect of one of MAVSDK's systems, by the autopilot in its HEARTBEAT.
 
@@ -28,6 +31,7 @@ async def open_dialect(
         direct: its asyncio plugin `mavlink_direct`.
         feed: the vehicle's telemetry.
         room_above_m: from the start to the ceiling under which the vehicle must stay.
+        stepped: it is a PX4 whose time waits for this app.
 
     Raises:
         DroneError: it is ArduPilot, but no multicopter: the numbers of its modes mean others.
@@ -38,4 +42,6 @@ async def open_dialect(
         if kind in (Vehicle.FIXED_WING, Vehicle.ROVER, Vehicle.SUBMARINE):
             raise DroneError(f"the vehicle is a {kind.name.lower().replace('_', ' ')}; use a multicopter")
         return ArduPilotDialect(action, direct, feed, await system.get_system_id(), room_above_m)
+    if stepped:
+        return SteppedPx4Dialect(direct, await system.get_system_id())
     return Px4Dialect(OffboardAsync(system), action)

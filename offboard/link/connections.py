@@ -14,6 +14,8 @@ from mavsdk.logging import log_subscribe
 from offboard.drone import DroneError
 from offboard.link.companion import Companion
 from offboard.link.tlog import TlogRecorder
+from wire.transports.sockets import check_free
+from wire.transports.urls import LinkError, LinkUrl
 
 logger = logging.getLogger(__name__)
 
@@ -25,6 +27,14 @@ def new_mavsdk() -> Mavsdk:
     """
     log_subscribe(_log)
     return Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+
+
+def check_is_free(url: LinkUrl, advice: str) -> None:
+    """Raise DroneError, with advice, if another program listens at a drone's address."""
+    try:
+        check_free(url, advice)
+    except LinkError as error:
+        raise DroneError(str(error)) from None
 
 
 async def open_connections(

@@ -6,7 +6,7 @@ in `ardupilot.py`. To add an autopilot, write its dialect and choose it in `auto
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Awaitable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -35,6 +35,16 @@ PX4_MODES = ModeNames(
 )
 
 
+class TickExchange(Protocol):
+    """What makes all that app and vehicle send each other arrive while time stands; DroneError: it cannot."""
+
+    async def before_tick(self) -> None:
+        """The vehicle has what was sent to it, and a setpoint, when this returns."""
+
+    async def after_tick(self) -> None:
+        """What the vehicle has sent has been received when this returns."""
+
+
 class Dialect(Protocol):
     """Commands to one vehicle. Its coroutines raise `MavsdkError` when the vehicle refuses.
 
@@ -45,6 +55,7 @@ class Dialect(Protocol):
         ready_limit_s: wall time until it can be armed, usually.
         loops_known: it may be this project's autopilot, which presents itself as PX4.
         checks_in_offboard: its pre-arm checks are those of its mode, so it must enter offboard to be ready.
+        exchange: of a vehicle whose time waits for this app; None: its time goes on.
     """
 
     modes: ModeNames
@@ -54,8 +65,13 @@ class Dialect(Protocol):
     checks_in_offboard: bool
     ready_limit_s: float
 
-    async def request_streams(self) -> None:
+    @property
+    def exchange(self) -> TickExchange | None:
+        """See above."""
+
+    def request_streams(self) -> Awaitable[None]:
         """Request what the vehicle does not send by itself, as soon as it is connected."""
+        ...
 
     def send(self, command: VelocityCommand) -> None:
         """Send a velocity from now on; ignored after `end`. From any thread."""
@@ -63,11 +79,13 @@ class Dialect(Protocol):
     def repeat(self) -> None:
         """Send the last velocity again if nothing was sent since the last call; once a tick."""
 
-    async def request_offboard(self) -> None:
+    def request_offboard(self) -> Awaitable[None]:
         """Request the mode that follows setpoints."""
+        ...
 
-    async def request_hold(self) -> None:
+    def request_hold(self) -> Awaitable[None]:
         """End the setpoints until the next one, and request hold."""
+        ...
 
     def request_hold_blocking(self) -> None:
         """The same from a thread, which waits for the answer."""
@@ -75,14 +93,17 @@ class Dialect(Protocol):
     def request_land_blocking(self) -> None:
         """End the setpoints permanently and request landing, from a thread, which waits for the answer."""
 
-    async def arm(self) -> None:
+    def arm(self) -> Awaitable[None]:
         """Arm."""
+        ...
 
-    async def kill(self) -> None:
+    def kill(self) -> Awaitable[None]:
         """Disarm at once, in the air too."""
+        ...
 
-    async def land(self) -> None:
+    def land(self) -> Awaitable[None]:
         """Request landing where the vehicle is."""
+        ...
 
     def end(self) -> None:
         """End the setpoints permanently, without a request; from any thread."""
@@ -96,6 +117,7 @@ class Px4Dialect(SetpointStream):
     loops_known = True
     checks_in_offboard = False
     ready_limit_s = 30.0
+    exchange = None
 
     def __init__(self, offboard: OffboardAsync, action: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
         super().__init__(offboard)

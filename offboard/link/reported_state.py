@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from geometry.axes import Alignment, Pose
 from offboard.drone import DroneState
+from offboard.link.dialect import Dialect
 from offboard.link.telemetry import Sample, TelemetryFeed
 
 
@@ -11,10 +12,8 @@ def reported_state(
     sample: Sample,
     feed: TelemetryFeed,
     alignment: Alignment,
-    offboard_mode: str,
+    dialect: Dialect,
     missed: tuple[DroneState, ...] = (),
-    *,
-    loops_known: bool = True,
 ) -> DroneState:
     """The state at a tick.
 
@@ -22,9 +21,8 @@ def reported_state(
         sample: of the tick.
         feed: for mode, arming and landing, which have no time stamps.
         alignment: from the vehicle's local axes to the arena's.
-        offboard_mode: name of the mode in which the vehicle follows this app's setpoints.
+        dialect: of the vehicle.
         missed: states at the ticks that were skipped before this one, oldest first.
-        loops_known: as `DroneState` has it.
     """
     pose = alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
     camera_ned = sample.camera_attitude_ned
@@ -36,12 +34,12 @@ def reported_state(
         yaw=pose.yaw_rad,
         velocity_arena_m_s=alignment.vector(sample.velocity_ned_m_s),
         armed=feed.arming.is_armed(sample.time_us),
-        offboard=feed.mode == offboard_mode,
+        offboard=feed.mode == dialect.modes.offboard,
         mode=feed.mode,
         landed=feed.landed,
         position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
         attitude_arena=alignment.attitude(sample.attitude_ned),
         camera_attitude_arena=None if camera_ned is None else alignment.attitude(camera_ned),
-        loops_known=loops_known,
+        loops_known=dialect.loops_known,
         missed=missed,
     )

@@ -23,16 +23,21 @@ from typing import Any, Protocol
 
 from mavsdk.asyncio import MavsdkError
 
+from geometry.axes import Pose
 from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Quaternion, Vec3
 from offboard.arming import Arming
 from offboard.drone import VelocityCommand
+from offboard.link.commands import PendingRequests
+from offboard.link.dialect import Dialect, TickExchange
 from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
 from wire.dialect import AUTOPILOT_COMPONENT_ID
 from wire.mission_tunnel import TEXT_PREFIX
 from wire.vehicle_telemetry import MessageOrder
 
 TICK_US = 50_000
+BEGIN_US = 10_000_000  # vehicle time; the preparation of a vehicle with an exchange begins at a multiple
+ARM_US = 5_000_000  # vehicle time; such a vehicle is armed right after a multiple
 TICK_LOST_S = 0.5  # wall time; a tick whose telemetry has not arrived by then was lost on the link
 _MAX_LOST_IN_A_ROW = 10
 LAG_GROWTH_S = 2e-5  # with each attitude: 1 ms a second, more than clocks differ
@@ -275,6 +280,15 @@ class TelemetryFeed:
             self._loop = None
 
 
+def pose_of(feed: TelemetryFeed) -> Pose:
+    """Where the vehicle is, in its local NED axes."""
+    return Pose(feed.position_ned_m, feed.yaw_ned_rad)
+
+
+def _next_multiple_us(tick_number: int, period_us: int) -> int:
+    return -(-tick_number * TICK_US // period_us) * period_us
+
+
 def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Any, _user: object) -> None:  # noqa: ANN401
     """Take the mode in an autopilot's HEARTBEAT, of `mavlink_direct`."""
     if heartbeat.component_id == AUTOPILOT_COMPONENT_ID:
@@ -346,12 +360,14 @@ class TickSource:
         late: ticks that were skipped, or lost on the link, in flight.
         in_flight: ticks in flight, late ones included.
         waits: vehicle time waits for the app now.
+        exchange: around each tick that is waited for; None: what is sent needs no waiting.
     """
 
     def __init__(self, feed: TelemetryFeed) -> None:
         self.late = 0
         self.in_flight = 0
         self.waits = False
+        self.exchange: TickExchange | None = None
         self._feed = feed
         self._clock: VehicleClock | None = None
         self._number = 0
@@ -361,11 +377,40 @@ class TickSource:
         """Let vehicle time wait for the app, from `begin` to `release`."""
         self._clock = clock
 
+    @property
+    def steps(self) -> bool:
+        """Vehicle time can wait, and the vehicle answers only while it goes on; see `SteppedPx4Dialect`."""
+        return self._clock is not None and self._clock.answers_take_time
+
     async def begin(self) -> None:
         """Let vehicle time wait from now on, if it can."""
-        if self._clock is not None:
+        if self._clock is not None and not self.waits:
             self._number = await self._clock.stop() // TICK_US
             self.waits = True
+
+    async def begin_exchange(self, dialect: Dialect, requests: PendingRequests) -> None:
+        """With an exchange: `begin` at a multiple of `BEGIN_US`; exchange at each tick; request streams."""
+        if dialect.exchange is None:
+            return
+        await self.begin()
+        clock, end_us = self._clock, _next_multiple_us(self._number, BEGIN_US)
+        while clock is not None and self._number * TICK_US < end_us:
+            self._number += 1
+            await clock.advance(self._number * TICK_US, None)
+        self.exchange = dialect.exchange
+        await self.until_done(requests.wait(dialect.request_streams()))
+
+    async def before_arming(self, plugin: Any) -> None:  # noqa: ANN401
+        """Request rates, from MAVSDK's asyncio plugin.
+
+        With an exchange let time pass to a multiple of `ARM_US`, so all such flights begin at the same time.
+        """
+        if self.exchange is None:
+            await request_rates(self._feed, plugin)
+            return
+        end_us = _next_multiple_us(self._number, ARM_US)
+        while self._number * TICK_US < end_us and await self.next(TICK_LOST_S):
+            pass
 
     async def next(self, timeout_s: float, command: VelocityCommand | None = None) -> bool:
         """Wait for the next tick; the feed's `sample` belongs to it then. False if there was none.
@@ -380,7 +425,11 @@ class TickSource:
         for _ in range(_MAX_LOST_IN_A_ROW):
             self._number += 1
             self.in_flight += command is not None
+            if self.exchange is not None:
+                await self.exchange.before_tick()
             await clock.advance(self._number * TICK_US, command)
+            if self.exchange is not None:
+                await self.exchange.after_tick()
             if await self._feed.tick(self._number, TICK_LOST_S):
                 return True
             self.late += 1

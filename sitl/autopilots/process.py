@@ -33,9 +33,17 @@ class AutopilotProcess(ABC):
         option: of the command line that names its build, for messages.
         folder: where it runs and keeps parameters and logs. None: a temporary one, removed in the end.
         environment: its variables besides the inherited ones.
+        processor: the one that it may run on, where a system can set that; None: any.
     """
 
-    def __init__(self, name: str, option: str, folder: Path | None, environment: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        name: str,
+        option: str,
+        folder: Path | None,
+        environment: Mapping[str, str],
+        processor: int | None = None,
+    ) -> None:
         self._name, self._option = name, option
         prefix = f"framerunner-{name.lower()}-"
         if folder is None:
@@ -43,9 +51,15 @@ class AutopilotProcess(ABC):
             folder = Path(self._temporary.name)
         self.folder = folder.absolute()
         self._environment = dict(environment)
+        self._processor = processor
         self._process: Process | None = None
         self._started = False
         self._log_start = 0  # where the output of the present start begins
+
+    @property
+    def process_id(self) -> int | None:
+        """Of the one that was started; None: none has been."""
+        return None if self._process is None else self._process.pid
 
     @property
     def log(self) -> Path:
@@ -85,7 +99,7 @@ class AutopilotProcess(ABC):
                     stdout=output,
                     stderr=output,
                     start_new_session=True,
-                    preexec_fn=_end_with_parent(),
+                    preexec_fn=_before_start(self._processor),
                 )
         except OSError as error:
             message = f"{self._option} {command[0]}: cannot be started ({error.strerror})"
@@ -126,9 +140,16 @@ class AutopilotStart:
     command: str  # by which a user starts it
 
 
-def _end_with_parent() -> Callable[[], None] | None:
+def _before_start(processor: int | None) -> Callable[[], None] | None:
     """What the child calls before it becomes the autopilot: Linux ends it when this process ends."""
     if sys.platform != "linux":
         return None
     call = ctypes.CDLL(None).prctl
-    return lambda: call(_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+
+    def prepare() -> None:
+        call(_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+        if processor is not None:
+            with contextlib.suppress(OSError):  # it may run anywhere then
+                os.sched_setaffinity(0, {processor})
+
+    return prepare

@@ -18,8 +18,6 @@ from sitl.world import CONTROL_PERIOD_US
 
 FALL_US = 3_000_000
 """For which a drone without its autopilot is simulated on."""
-SETPOINT_S = 0.002
-"""Wall time in which an autopilot takes a setpoint that was sent before time was granted."""
 
 V = TypeVar("V", bound=SimulatedVehicle)
 
@@ -41,6 +39,8 @@ class AutopilotServer(ABC, Generic[V]):
 
     NAME: ClassVar[str]
     """The autopilot's, for messages."""
+    SETPOINT_S: ClassVar[float] = 0.002
+    """Wall time in which it takes a setpoint that was sent before time was granted."""
 
     def __init__(
         self,
@@ -146,4 +146,4 @@ class AutopilotServer(ABC, Generic[V]):
         held_us = self._simulation.time_us - CONTROL_PERIOD_US
         await grants.hold(held_us, self._video.image_us, lambda: grants.setpoint)
         if grants.setpoint is not None:
-            await asyncio.sleep(SETPOINT_S)
+            await asyncio.sleep(self.SETPOINT_S)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -37,6 +38,17 @@ def find_build(folder: Path) -> Path:
     )
 
 
+def _processor(instance: int) -> int | None:
+    """One processor for all of PX4's threads, so that only one runs at a time; None: not on this system.
+
+    With real-time priorities, which PX4 asks for, their order is then the same each time.
+    """
+    if sys.platform != "linux":
+        return None
+    allowed = sorted(os.sched_getaffinity(0))
+    return allowed[-1 - instance % len(allowed)]
+
+
 def version_of(folder: Path) -> str:
     """PX4 and the hash of its program, which differs between builds.
 
@@ -61,7 +73,7 @@ class Px4Process(AutopilotProcess):
     def __init__(
         self, build: Path, instance: int, folder: Path | None, parameters: Mapping[str, Value]
     ) -> None:
-        super().__init__("PX4", "--px4", folder, environment(parameters))
+        super().__init__("PX4", "--px4", folder, environment(parameters), _processor(instance))
         self._build, self._instance = build, instance
 
     def command(self) -> list[str]:

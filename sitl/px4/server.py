@@ -7,6 +7,7 @@ import contextlib
 import time
 from collections.abc import Callable
 
+from sitl.autopilots.idle import IdleCheck
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.server import AutopilotServer
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
@@ -17,6 +18,13 @@ from sitl.server_settings import ServerSettings
 from sitl.time_grants import TimeGrants
 from sitl.world import CONTROL_PERIOD_US
 
+_OWN_TIME = ("commander", "mavlink_if1")
+"""Threads that PX4's lockstep does not wait for: its state machine, and what sends to UDP 14540."""
+_IDLE_S = 0.1  # wall time for which a step waits until PX4's threads have done their work
+_FIRST_S = 0.3  # wall time in which its start-up script comes to waiting for them
+_IDLE_START_S = 2.0  # likewise, while it starts
+_READY_US = 7_000_000  # by which PX4 can be armed
+_WAITING_SPEED = 0.2  # simulated seconds a second; a heartbeat still comes every 5 s
 _ENDING_S = 1.0  # wall time in which a PX4 that has closed the connection ends
 
 
@@ -35,6 +43,7 @@ class Px4Server(AutopilotServer[Px4Simulation]):
     """
 
     NAME = "PX4"
+    SETPOINT_S = 0.0  # the app waits until PX4 has taken it
 
     def __init__(
         self,
@@ -46,6 +55,7 @@ class Px4Server(AutopilotServer[Px4Simulation]):
     ) -> None:
         super().__init__(new_simulation, settings, px4, notice, grants)
         self.link: Px4Link | None = None
+        self._idle: IdleCheck | None = None  # of the PX4 that was started here
         self._side_link: SideLink | None = None
 
     def _open(self) -> None:
@@ -82,6 +92,7 @@ class Px4Server(AutopilotServer[Px4Simulation]):
             return
         await process.stop()
         await process.start()
+        self._idle = None if process.process_id is None else IdleCheck(process.process_id, _OWN_TIME)
         ended = asyncio.create_task(process.ended())
         connected = asyncio.create_task(link.connected())
         done, _ = await asyncio.wait({ended, connected}, return_when=asyncio.FIRST_COMPLETED)
@@ -101,16 +112,18 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         return "PX4 has closed the connection"
 
     async def _run_paced(self, link: Px4Link) -> None:
-        settings, simulation = self._settings, self._simulation
-        pacer = Pacer(1.0, time.monotonic(), simulation.time_us)
-        notices = LagNotices(self._notice, settings.speed)
-        started = False
+        """Step until PX4 has gone."""
+        simulation, grants = self._simulation, self._grants
+        speed, opened = 0.0, False
         while True:
-            if link.in_lockstep and not started:
-                started = True
-                pacer = Pacer(settings.speed, time.monotonic(), simulation.time_us)
-                if self._grants is not None:
-                    await self._grants.open()
+            if self._has_started(link) and not opened:
+                opened = True
+                if grants is not None:
+                    await grants.open()
+            if speed != (wanted := self._wanted_speed(opened=opened)):
+                speed = wanted
+                pacer = Pacer(speed, time.monotonic(), simulation.time_us)
+                notices = LagNotices(self._notice, speed)
             target_us = pacer.target_us(time.monotonic())
             for _ in range(BURST_TICKS):
                 if simulation.time_us + CONTROL_PERIOD_US > target_us or simulation.time_us > self._until_us:
@@ -118,17 +131,33 @@ class Px4Server(AutopilotServer[Px4Simulation]):
                 await self._tick(link)
             now_s = time.monotonic()
             lost_s = pacer.give_up_lag(now_s, simulation.time_us)
-            if started:
+            if opened:
                 notices.lag(lost_s, now_s)
-            if self._grants is not None and simulation.time_us > self._until_us:
+            if grants is not None and simulation.time_us > self._until_us:
                 await self._hold()
                 continue
             await asyncio.sleep(pacer.wait_s(now_s, simulation.time_us + CONTROL_PERIOD_US))
 
+    def _wanted_speed(self, *, opened: bool) -> float:
+        """Simulated seconds a second: real time while PX4 starts, and until a program grants time.
+
+        When PX4 can be armed, time passes slowly until then, because that program begins its flight at a
+        whole multiple of ten seconds.
+        """
+        speed, grants = self._settings.speed, self._grants
+        if opened and (grants is None or grants.used):
+            return speed
+        return min(1.0 if self._simulation.time_us < _READY_US else _WAITING_SPEED, speed)
+
+    def _has_started(self, link: Px4Link) -> bool:
+        return link.in_lockstep and not (self._idle is not None and self._idle.starting)
+
     async def _tick(self, link: Px4Link) -> None:
         simulation = self._simulation
         time_us = simulation.time_us
-        link.send(simulation.sense())
+        packets = simulation.sense()
+        self._wait_idle()
+        link.send(packets)
         self._video.step()  # while PX4 computes
         controls = link.answer(time_us)
         if controls is None and link.in_lockstep and simulation.is_answered:
@@ -140,3 +169,20 @@ class Px4Server(AutopilotServer[Px4Simulation]):
     def _coast(self) -> None:
         self._simulation.sense()
         self._simulation.move(None)
+
+    def _wait_idle(self) -> None:
+        """Let PX4's threads that its lockstep does not wait for finish, so that each step is the same."""
+        idle = self._idle
+        if idle is None:
+            return
+        if idle.starting and self._simulation.time_us > 0:  # until its first sensors, PX4 waits by polling
+            idle.wait_started(_IDLE_START_S)
+        elif idle.starting:
+            time.sleep(_FIRST_S)
+        else:
+            idle.wait(_IDLE_S)
+
+    async def _hold(self) -> None:
+        """Wait until simulated time may advance; what PX4 sends before that has been sent then."""
+        self._wait_idle()
+        await super()._hold()

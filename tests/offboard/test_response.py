@@ -97,8 +97,8 @@ def command_at(time_s):
     )
 
 
-def learn(vehicle, seconds=15.0):
-    estimate, sent = ResponseEstimate(), None
+def learn(vehicle, seconds=15.0, **known):
+    estimate, sent = ResponseEstimate(**known), None
     for tick in range(round(seconds / STEP_S)):
         estimate.update(vehicle.state, sent)
         sent = command_at(tick * STEP_S)
@@ -124,6 +124,16 @@ def test_dead_time_lag_and_axes_are_learnt(dead_s, lag_s, turning):
 def test_a_vehicle_that_answers_in_time_is_not_late():
     estimate = learn(Vehicle(0.05, 0.15, turning=True))
     assert not estimate.response.late
+
+
+def test_a_vehicle_that_is_known_to_be_late_is_so_from_the_first_tick_on():
+    known = ResponseEstimate(late=True).response
+    assert known.late
+    assert known.level_s > 0.6
+
+
+def test_one_that_was_taken_for_late_and_is_not_is_known_after_some_seconds():
+    assert not learn(Vehicle(0.05, 0.15), late=True).response.late
 
 
 def test_slow_flight_shows_the_lag_of_a_vehicle_that_is_known_to_be_late():

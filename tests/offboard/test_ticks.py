@@ -7,6 +7,7 @@ import pytest
 
 from offboard.drone import VelocityCommand
 from offboard.link import telemetry
+from offboard.link.commands import PendingRequests
 from offboard.link.telemetry import MAX_JITTER_S, TelemetryFeed, TickSource
 
 COMMAND = VelocityCommand(forward_m_s=0.5)
@@ -130,3 +131,34 @@ def test_vehicle_time_at_a_wall_time_is_that_of_the_quickest_message_within_limi
     now_s = 103.0  # the vehicle's clock stood still, or is slower
     attitude(feed, attitude_us)
     assert feed.time_at_us(103.0) == attitude_us + round(MAX_JITTER_S * 1e6)
+
+
+async def test_what_was_sent_is_exchanged_before_and_after_each_tick(feed):
+    clock, source, order = Clock(feed), TickSource(feed), []
+
+    async def note(what):
+        order.append((what, len(clock.granted)))
+
+    source.use_clock(clock)
+    await source.begin()
+    source.exchange = SimpleNamespace(before_tick=lambda: note("before"), after_tick=lambda: note("after"))
+    assert await source.next(1.0)
+    assert order == [("before", 0), ("after", 1)]
+
+
+async def test_a_flight_begins_and_arms_at_multiples_of_a_period_whenever_the_app_is_ready(feed):
+    clock, source = Clock(feed), TickSource(feed)
+
+    async def nothing():
+        pass
+
+    source.use_clock(clock)
+    exchange = SimpleNamespace(before_tick=nothing, after_tick=nothing)
+    dialect = SimpleNamespace(exchange=exchange, request_streams=nothing)
+    clock.answers_take_time = False
+    await source.begin_exchange(dialect, PendingRequests())
+    assert clock.granted[-1] == (10_000_000, None)
+    assert await source.next(1.0)
+    assert feed.sample.time_us == 10_050_000
+    await source.before_arming(None)
+    assert feed.sample.time_us == 15_000_000
