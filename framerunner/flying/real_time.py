@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from contextlib import AsyncExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -47,6 +47,11 @@ class RealTimeSettings:
     hardware: HardwareSettings | None = None  # of a drone that may be a real one; None: it is simulated
     monitor_socket: Path | None = None  # of the monitor that was started here
     unattended: bool = False  # one of many flights: nothing is shown, and there is no video
+
+    @property
+    def has_px4(self) -> bool:
+        """Whether a genuine PX4 flies in the simulator that is started."""
+        return self.autopilot is not None and self.autopilot.name == "px4"
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +97,8 @@ async def fly_in_real_time(
     async with AsyncExitStack() as stack:
         session = await stack.enter_async_context(aiohttp.ClientSession())
         vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
-        named = settings.simulator is not None
-        judge, plan = await choose_judge(plan, vehicle.api, session, named=named)
-        late = settings.autopilot is not None and settings.autopilot.name == "px4"
-        plan = replace(plan, answers_late=late)
+        judge, plan = await choose_judge(plan, vehicle.api, session, named=settings.simulator is not None)
+        plan = replace(plan, answers_late=settings.has_px4)
         plan, safety, system_id = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)
@@ -103,15 +106,7 @@ async def fly_in_real_time(
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         drone = _drone(plan, vehicle, records, stack, safety, hardware=settings.hardware, system_id=system_id)
         drone.use_companion(companion)
-        camera = await _camera(
-            plan,
-            vehicle,
-            records,
-            stack,
-            reporter,
-            vehicle_time_us=drone.vehicle_time_us,
-            video=not settings.unattended,
-        )
+        camera = await _camera(plan, vehicle, records, stack, reporter, drone=drone, settings=settings)
         perception = _perception(plan, vehicle, judge, camera)
         perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
@@ -249,22 +244,22 @@ async def _camera(
     stack: AsyncExitStack,
     reporter: MissionReporter,
     *,
-    vehicle_time_us: Callable[[float], int | None],
-    video: bool,
+    drone: MavsdkDrone,
+    settings: RealTimeSettings,
 ) -> RecordingCamera:
     """The camera, whose images are recorded; closed with the stack."""
     from vision.sources import open_source
 
     def keep(frame: CameraFrame) -> None:
         # Without a time of its own it is recorded at that of its arrival, which is between two ticks.
-        time_us = vehicle_time_us(frame.received_s) if frame.time_us is None else frame.time_us
+        time_us = drone.vehicle_time_us(frame.received_s) if frame.time_us is None else frame.time_us
         records.see_frame(replace(frame, time_us=time_us))
         reporter.see_frame(frame)
 
     limit_s = CAMERA_LIMIT_S if vehicle.sitl is None else PATIENT_CAMERA_LIMIT_S
     opened = open_source(vehicle.camera_url, timeout_s=limit_s, size_px=vehicle.image_size_px)
     source = await stack.enter_async_context(opened)
-    path = records.folder.video if video else None
+    path = None if settings.unattended else records.folder.video
     camera = RecordingCamera(source, path, plan.scenario.camera.rate_hz, keep)
     stack.callback(camera.close)
     return camera
