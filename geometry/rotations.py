@@ -106,6 +106,17 @@ def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> 
     return (crcp * cy + srsp * sy, srcp * cy - crsp * sy, crsp * cy + srcp * sy, crcp * sy - srsp * cy)
 
 
+def mounting_flu(angles_frd_rad: Vec3) -> Quaternion:
+    """How a sensor is turned on the body, from its axes forward, left, up to the body's.
+
+    Args:
+        angles_frd_rad: roll, pitch and yaw of the sensor on the body, axes forward, right, down: to the
+            right, up and to the right are positive.
+    """
+    roll_rad, pitch_rad, yaw_rad = angles_frd_rad
+    return quaternion_from_euler(roll_rad, -pitch_rad, -yaw_rad)
+
+
 def quaternion_from_yaw(yaw_rad: float) -> Quaternion:
     """A level attitude with a heading."""
     return (cos(yaw_rad / 2), 0.0, 0.0, sin(yaw_rad / 2))

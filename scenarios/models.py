@@ -214,8 +214,12 @@ def _standing(name: str, place_m: tuple[float, float], yaw_rad: float, size_m: V
     return Solid(name, (*place_m, height_m / 2), yaw_rad, (length_m / 2, width_m / 2, height_m / 2))
 
 
+MAX_MOUNTING_RAD = 0.8
+"""Of a camera's roll, pitch and yaw on the drone: it looks ahead."""
+
+
 class Camera(Part):
-    """A pinhole camera that looks along the drone's x axis, fixed to it or on a gimbal."""
+    """A pinhole camera that looks along the drone's x axis unless it is mounted otherwise, or on a gimbal."""
 
     width_px: int = Field(320, ge=16, le=4096, description="columns of the image")
     height_px: int = Field(240, ge=16, le=4096, description="rows of the image")
@@ -223,6 +227,10 @@ class Camera(Part):
     rate_hz: float = Field(10.0, gt=0, le=120, description="images a second of simulated time")
     latency_s: float = Field(0.05, ge=0, le=2, description="from exposure to sending the image")
     position_flu_m: Vec3 = Field((0.08, 0.0, 0.0), description="in body axes forward, left, up")
+    mounting_frd_rad: Vec3 = Field(
+        (0.0, 0.0, 0.0),
+        description="roll, pitch and yaw on the drone; to the right, up and to the right are positive",
+    )
     near_m: float = Field(0.01, gt=0, description="nothing nearer is drawn")
     far_m: float = Field(20.0, gt=0, description="nothing farther is drawn")
     effects: CameraEffects | None = Field(
@@ -240,6 +248,11 @@ class Camera(Part):
     def _sees_something(self) -> Self:
         if self.near_m >= self.far_m:
             raise refusal(self.near_m, f"must be below far_m {self.far_m}", "near_m")
+        largest_rad = max(map(abs, self.mounting_frd_rad))
+        if largest_rad > MAX_MOUNTING_RAD:
+            raise refusal(largest_rad, f"must be {MAX_MOUNTING_RAD} at most", "mounting_frd_rad")
+        if self.gimbal is not None and largest_rad > 0.0:
+            raise refusal(largest_rad, "does not go with a gimbal; leave one of them out", "mounting_frd_rad")
         lens = None if self.effects is None else self.effects.lens
         half = (self.width_px / 2 / self.focal_px, self.height_px / 2 / self.focal_px)
         if lens is not None and not lens.sees_up_to(*half):
@@ -249,7 +262,7 @@ class Camera(Part):
 
     @model_serializer(mode="wrap")
     def _without_unused_effects(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return _without_defaults(self, write(self), ("effects", "gimbal"))
+        return _without_defaults(self, write(self), ("effects", "gimbal", "mounting_frd_rad"))
 
 
 class Light(Part):

@@ -16,7 +16,15 @@ from math import hypot, isfinite
 import cv2
 import numpy as np
 
-from geometry.rotations import RotationRows, normalized, rotated_by_rate, rotation, rotation_rows
+from geometry.rotations import (
+    RotationRows,
+    mounting_flu,
+    multiply,
+    normalized,
+    rotated_by_rate,
+    rotation,
+    rotation_rows,
+)
 from geometry.solids import Solid
 from geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.models import Scenario, TrueState
@@ -55,6 +63,8 @@ class Camera:
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
         self._settings = settings = scenario.camera
         self._effects = effects = settings.effects
+        angles_rad = settings.mounting_frd_rad
+        self._mounting = mounting_flu(angles_rad) if any(angles_rad) else None
         if effects is None:
             width, height = settings.width_px + 2 * MARGIN_PX, settings.height_px + 2 * MARGIN_PX
             pinhole = Pinhole(width, height, settings.focal_px, settings.near_m, settings.far_m)
@@ -97,8 +107,8 @@ class Camera:
             ValueError: a number is not finite, or the quaternion is zero.
         """
         if self._effects is None:
-            rotation = _rows(attitude_arena)
-            eye = self._eye(position_arena_m, rotation)
+            attitude = _unit(attitude_arena)
+            eye, rotation = self._seen_from(position_arena_m, attitude)
             return self._painter.paint(eye, rotation, drones, time_us=motion.time_us)[_INSIDE]
         light = self._exposed(position_arena_m, attitude_arena, drones, motion)
         return self._sensor.develop(light, motion.time_us)
@@ -162,8 +172,15 @@ class Camera:
         vx, vy, vz = motion.velocity_arena_m_s
         roll, pitch, yaw = motion.rate_frd_rad_s
         turned = rotated_by_rate(_unit(attitude), (roll, -pitch, -yaw), after_s)
-        rows = rotation_rows(rotation(turned))
-        return self._eye((x + vx * after_s, y + vy * after_s, z + vz * after_s), rows), rows
+        return self._seen_from((x + vx * after_s, y + vy * after_s, z + vz * after_s), turned)
+
+    def _seen_from(self, position: Vec3, attitude: Quaternion) -> tuple[Vec3, RotationRows]:
+        """The camera's position and axes on a drone with this pose; its attitude has unit length."""
+        rows = rotation_rows(rotation(attitude))
+        eye = self._eye(position, rows)
+        if self._mounting is not None:
+            rows = rotation_rows(rotation(multiply(attitude, self._mounting)))
+        return eye, rows
 
     def _eye(self, position: Vec3, rotation: RotationRows) -> Vec3:
         if not all(map(isfinite, position)):

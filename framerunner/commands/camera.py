@@ -209,6 +209,68 @@ def colours(
     return 0
 
 
+@app.command
+def extrinsics(
+    flight: Annotated[
+        Path | None,
+        Parameter(help="a run folder of `fly --record`; without it --drone and --camera are watched"),
+    ] = None,
+    /,
+    *,
+    drone: Annotated[str | None, Parameter(help="MAVLink URL on which the drone is heard")] = None,
+    camera: Annotated[
+        str | None, Parameter(help="URL or device of its camera, as for `fly --camera`")
+    ] = None,
+    calibration: Annotated[
+        Path, Parameter(help="file of `framerunner camera calibrate`, which is given the mounting")
+    ] = Path("camera.yaml"),
+    position: Annotated[
+        str | None,
+        Parameter(
+            help="of the lens from the drone's centre in m, by a ruler: forward=0.08,left=0,up=0.02; by "
+            "default that of the file, else 0.08 m forward"
+        ),
+    ] = None,
+    seconds: Annotated[WholeNumber, Parameter(help="for how long a live drone is watched at most")] = 180,
+) -> int:
+    """Measure how the camera is mounted on the drone: roll, pitch, yaw, place, and the delay of its images.
+
+    Frames are seen while the drone yaws and moves by a metre. Neither the frames' places nor the camera's
+    angles need be known; the drone's position must be, as for a flight. From a live drone, which an operator
+    flies or carries, it is said what movement is missing; nothing is armed or commanded. The angles are
+    refused if they are uncertain by more than 0.3 degrees.
+
+    **Examples**
+
+        framerunner camera extrinsics runs/20261124-120000-hall --calibration camera.yaml
+
+        framerunner camera extrinsics --drone serial:///dev/ttyUSB0:921600 --camera 0
+    """
+    check_range("--seconds", seconds, 20, 1800)
+
+    from framerunner.camera_calibration.mounting_report import finish
+    from framerunner.camera_calibration.recorded_mounting import measure_recorded, place_of
+    from framerunner.commands.named_numbers import place_of_lens
+
+    place_m = None if position is None else place_of_lens(position)
+    if flight is not None:
+        if drone is not None or camera is not None:
+            raise SettingError(f"{flight}: is a recorded flight; leave out --drone and --camera")
+        search, known, stamped = measure_recorded(flight, calibration, place_m)
+    else:
+        if drone is None or camera is None:
+            missing = "--drone" if drone is None else "--camera"
+            raise SettingError(f"{missing}: is missing; name a run folder, or both --drone and --camera")
+        from framerunner.camera_calibration.calibration_file import load_calibration
+        from framerunner.camera_calibration.live_mounting import measure_live
+
+        known = load_calibration(calibration)
+        where = (known, place_of(known, place_m, None))
+        search, stamped = asyncio.run(measure_live(drone, camera, *where, limit_s=float(seconds), say=say))
+    finish(search, known, calibration, say, stamped=stamped)
+    return 0
+
+
 def _board(columns: int, rows: int, square: float, marker: float) -> Board:
     """Check the options."""
     from vision.calibration.board import Board

@@ -36,11 +36,18 @@ _Drone = Annotated[
 ]
 _Camera = Annotated[str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")]
 _CameraDelay = Annotated[
-    float, Parameter(help="with --camera: age in s of an image that arrives without a time stamp")
+    float | None,
+    Parameter(
+        help="with --camera: age in s of an image that arrives without a time stamp; by default that of the "
+        "calibration, else 0.1"
+    ),
 ]
 _Calibration = Annotated[
     Path | None,
-    Parameter(help="with --drone: its camera's calibration, a file of `framerunner camera calibrate`"),
+    Parameter(
+        help="its camera's calibration, a file of `framerunner camera calibrate`; for a simulated drone it "
+        "replaces the camera's true one"
+    ),
 ]
 _Simulator = Annotated[
     str | None,
@@ -108,7 +115,7 @@ def fly(
     mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
     drone: _Drone = None,
     camera: _Camera = None,
-    camera_delay: _CameraDelay = 0.1,
+    camera_delay: _CameraDelay = None,
     calibration: _Calibration = None,
     simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
@@ -157,10 +164,10 @@ def fly(
     loaded = load_mission_with(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, hardware, autopilot, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    plan = replace(_calibrated(plan, calibration, drone), caps=caps_of(hardware, drone))
-    real_time = RealTimeSettings(drone, camera, api, speed, instance, autopilot, camera_delay, procedure)
-    ends = (plan, None if lockstep else real_time, out, record, video, monitor, monitor_link)
-    return _run(FlightSettings(*ends), lifeline=lifeline)
+    plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
+    ends, delay_s = (drone, camera, api, speed, instance, autopilot), plan.camera_delay_s(camera_delay)
+    flown = None if lockstep else RealTimeSettings(*ends, delay_s, procedure)
+    return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
 
 
 def _run(settings: FlightSettings, *, lifeline: bool) -> int:
@@ -199,14 +206,12 @@ def _scenario(
     return scenario if autopilot is None else for_genuine(autopilot.title, scenario)
 
 
-def _calibrated(plan: FlightPlan, path: Path | None, drone: str | None) -> FlightPlan:
-    """The plan with the calibration of a real drone's camera, if one is given."""
+def _calibrated(plan: FlightPlan, path: Path | None) -> FlightPlan:
+    """The plan with the calibration of the drone's camera, if one is given."""
     if path is None:
         return plan
     from framerunner.camera_calibration.calibration_file import load_calibration
 
-    if drone is None:
-        raise SettingError("--calibration: a simulated drone's camera is known; leave it out or give --drone")
     if plan.chart.vision == "boxes":
         raise SettingError(
             f"--calibration: mission {plan.chart.name} sees boxes, whose formulas know no lens; leave it out "
@@ -292,7 +297,13 @@ def _genuine(given: GenuineOptions, *, drone: str | None, lockstep: bool) -> Gen
 
 
 def _check(
-    drone: str | None, camera: str | None, delay_s: float, speed: float, instance: int, *, lockstep: bool
+    drone: str | None,
+    camera: str | None,
+    delay_s: float | None,
+    speed: float,
+    instance: int,
+    *,
+    lockstep: bool,
 ) -> None:
     """Refuse options that do not go together, and numbers out of range."""
     check_range("--camera-delay", delay_s, 0.0, 0.5)

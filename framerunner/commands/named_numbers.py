@@ -12,6 +12,7 @@ from framerunner.commands import check_range
 
 if TYPE_CHECKING:
     from framerunner.flying.response import Response
+    from geometry.vectors import Vec3
     from offboard.limits import CommandLimits
 
 
@@ -34,6 +35,13 @@ _LIMITS = {
     "yaw-rate": Span(0.1, 2 * pi),
     "down": Span(0.1, 20.0, 0.0),
 }
+_PLACE = {"forward": Span(-1.0, 1.0), "left": Span(-1.0, 1.0, 0.0), "up": Span(-1.0, 1.0, 0.0)}
+
+
+def place_of_lens(text: str) -> Vec3:
+    """The value of `--position`, metres forward, left, up. Raises `SettingError` with one line."""
+    given = _named_numbers("--position", text, _PLACE)
+    return (given["forward"], given["left"], given["up"])
 
 
 def response_of(text: str) -> Response:

@@ -16,6 +16,15 @@ from framerunner.commands import DEFAULT_MISSION, check_range, load_mission_with
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.run import PreflightSettings
+_CameraDelay = Annotated[
+    float | None,
+    Parameter(
+        help="age in s of an image that arrives without a time stamp; by default the calibration's, else 0.1"
+    ),
+]
+_Calibration = Annotated[
+    Path | None, Parameter(help="the camera's calibration, a file of `framerunner camera calibrate`")
+]
 _MaxHeight = Annotated[float | None, Parameter(help="cap on the height above the start, m")]
 _SetParameters = Annotated[
     bool, Parameter(negative="", help="set failsafe parameters that fail, and keep their old values")
@@ -39,9 +48,8 @@ def preflight(
     camera: Annotated[
         str | None, Parameter(help="URL, device or folder of its camera; checked if given")
     ] = None,
-    camera_delay: Annotated[
-        float, Parameter(help="age in s of an image that arrives without a time stamp")
-    ] = 0.1,
+    camera_delay: _CameraDelay = None,
+    calibration: _Calibration = None,
     mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
     max_speed: Annotated[float, Parameter(help="cap on the level speed, m/s")] = 2.0,
     max_height: _MaxHeight = None,
@@ -73,6 +81,7 @@ def preflight(
     if any_vehicle:
         raise SettingError("--any-vehicle: is for --restore-parameters; leave it out")
 
+    from framerunner.camera_calibration.calibration_file import load_calibration
     from framerunner.commands.hardware import HardwareOptions, caps_of
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.check_names import CHECK_NAMES
@@ -82,8 +91,10 @@ def preflight(
 
     check_names(accept, CHECK_NAMES)
     caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission_with(mission, None)
-    plan = FlightPlan(load_scenario(scenario), loaded, None, caps=caps)
-    return _check(plan, PreflightSettings(drone, camera, camera_delay, set_parameters, accept, out))
+    known = None if calibration is None else load_calibration(calibration)
+    plan = FlightPlan(load_scenario(scenario), loaded, None, calibration=known, caps=caps)
+    delay_s = plan.camera_delay_s(camera_delay)
+    return _check(plan, PreflightSettings(drone, camera, delay_s, set_parameters, accept, out))
 
 
 def _check(plan: FlightPlan, settings: PreflightSettings) -> int:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:  # it imports the statechart library, which the virtual camera
     from offboard.mission import Mission
 
 P = TypeVar("P", bound=Part)
+CAMERA_DELAY_S = 0.1
+"""From exposure to arrival of an image, where it was not measured."""
 StartPose = tuple[float, float, float, float]
 """x, y, z of the drone's centre (metres) and yaw (radians), arena axes."""
 
@@ -39,7 +41,7 @@ class FlightPlan:
             Lifted by the base's height, everything is as high above the real floor as the scenario says.
         drone_limits: of a real drone, for a mission of the class `open`; None: those of the airframe.
         response: how late the simulated vehicle of a lockstep flight answers; None: as its autopilot does.
-        calibration: of a real camera; None: it is the scenario's.
+        calibration: of the camera; None: it is the scenario's.
         caps: on the speed and the height of the drone, whatever the mission asks; None: there are none.
         answers_late: the drone is known to follow velocities later than framerunner's own autopilot.
     """
@@ -110,14 +112,24 @@ class FlightPlan:
         camera, calibration = self.scenario.camera, self.calibration
         if calibration is None:
             return camera
+        mounting = calibration.mounting
+        place_m = None if mounting is None else mounting.position_flu_m
         return camera.model_copy(
             update={
                 "width_px": calibration.width_px,
                 "height_px": calibration.height_px,
                 "horizontal_fov_rad": calibration.horizontal_fov_rad,
                 "effects": CameraEffects(readout_s=calibration.readout_s),
+                "mounting_frd_rad": (0.0, 0.0, 0.0) if mounting is None else mounting.angles_frd_rad,
+                "position_flu_m": camera.position_flu_m if place_m is None else place_m,
             }
         )
+
+    def camera_delay_s(self, given_s: float | None) -> float:
+        """Age of an image that arrives without a time stamp: as given, else the calibration's, else usual."""
+        measured_s = None if self.calibration is None else self.calibration.delay_s
+        known = (each for each in (given_s, measured_s) if each is not None)
+        return next(known, CAMERA_DELAY_S)
 
     @property
     def box(self) -> Box:

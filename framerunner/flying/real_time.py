@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from framerunner.flying.fly import FinishedFlight, fly
-from framerunner.flying.plan import FlightPlan
+from framerunner.flying.plan import CAMERA_DELAY_S, FlightPlan
 from framerunner.flying.timing import flight_timing
 from framerunner.runs.recorder import RecordingCamera, RunRecords
 from framerunner.runs.run_folder import warn
@@ -43,7 +43,7 @@ class RealTimeSettings:
     speed: float = 1.0  # of the simulator that is started: simulated seconds a second
     instance: int = 0  # of the simulator that is started: shifts its ports
     autopilot: GenuineAutopilot | None = None  # flies in the simulator that is started; None: our own does
-    camera_delay_s: float = 0.1  # age of an image on arrival, for a camera that sends no time stamps
+    camera_delay_s: float = CAMERA_DELAY_S  # age on arrival of an image without a time stamp
     hardware: HardwareSettings | None = None  # of a drone that may be a real one; None: it is simulated
     monitor_socket: Path | None = None  # of the monitor that was started here
     unattended: bool = False  # one of many flights: nothing is shown, and there is no video
@@ -106,7 +106,7 @@ async def fly_in_real_time(
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         drone = _drone(plan, vehicle, records, stack, safety, hardware=settings.hardware, system_id=system_id)
         drone.use_companion(companion)
-        camera = await _camera(plan, vehicle, records, stack, reporter, video=not settings.unattended)
+        camera = await _camera(plan, vehicle, records, stack, reporter, drone=drone, settings=settings)
         perception = _perception(plan, vehicle, judge, camera)
         perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
@@ -244,19 +244,22 @@ async def _camera(
     stack: AsyncExitStack,
     reporter: MissionReporter,
     *,
-    video: bool,
+    drone: MavsdkDrone,
+    settings: RealTimeSettings,
 ) -> RecordingCamera:
     """The camera, whose images are recorded; closed with the stack."""
     from vision.sources import open_source
 
     def keep(frame: CameraFrame) -> None:
-        records.see_frame(frame)
+        # Without a time of its own it is recorded at that of its arrival, which is between two ticks.
+        time_us = drone.vehicle_time_us(frame.received_s) if frame.time_us is None else frame.time_us
+        records.see_frame(replace(frame, time_us=time_us))
         reporter.see_frame(frame)
 
     limit_s = CAMERA_LIMIT_S if vehicle.sitl is None else PATIENT_CAMERA_LIMIT_S
     opened = open_source(vehicle.camera_url, timeout_s=limit_s, size_px=vehicle.image_size_px)
     source = await stack.enter_async_context(opened)
-    path = records.folder.video if video else None
+    path = None if settings.unattended else records.folder.video
     camera = RecordingCamera(source, path, plan.scenario.camera.rate_hz, keep)
     stack.callback(camera.close)
     return camera

@@ -72,6 +72,10 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
     folder = RunFolder(settings.out, plan.scenario.name)
     try:
         folder.write_plan(plan.scenario, plan.chart)
+        if plan.calibration is not None:
+            from framerunner.camera_calibration.calibration_file import save_calibration
+
+            save_calibration(plan.calibration, folder.calibration)
         with _recording(settings, folder) as recording:
             records = RunRecords(folder, recording)
             try:

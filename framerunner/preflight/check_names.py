@@ -18,7 +18,7 @@ REPLACED = frozenset(
 )
 RENAMED = {"estimator": "estimator settings"}
 """Findings of the doctor whose name is that of a check with a limit."""
-_OWN = ("battery", "estimator", "link loss", "link latency", "camera", "camera delay")
+_OWN = ("battery", "estimator", "link loss", "link latency", "camera", "camera delay", "camera calibration")
 _OF_RUN = ("failsafes", "fence", "caps")
 
 CHECK_NAMES = frozenset(

@@ -11,7 +11,7 @@ from math import cos, isfinite, sin
 from typing import Any
 
 from firmware_py.airframe import load_airframe
-from geometry.rotations import quaternion_from_yaw
+from geometry.rotations import mounting_flu, multiply, quaternion_from_yaw
 from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
 from offboard.app import Moment
@@ -353,8 +353,10 @@ def scene(scenario: Scenario, time_us: int) -> Message:
 
 def camera_transform(scenario: Scenario, time_us: int) -> Message:
     """The camera's pose on the drone, in the axes of images: x right, y down, z forward."""
-    rotation = {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5}
-    return _transform(time_us, (DRONE, CAMERA), scenario.camera.position_flu_m, rotation)
+    camera = scenario.camera
+    turned = multiply(mounting_flu(camera.mounting_frd_rad), (0.5, -0.5, 0.5, -0.5))
+    rotation = dict(zip("wxyz", turned, strict=True))
+    return _transform(time_us, (DRONE, CAMERA), camera.position_flu_m, rotation)
 
 
 def calibration(scenario: Scenario, time_us: int) -> Message:

@@ -99,6 +99,7 @@ def _tlog(path: Path, result: FlightResult | None) -> Recorded:
 
 def _fly_again(folder: Path, result: FlightResult, path: Path, pilot: PilotFile | None) -> None:
     """Fly the lockstep flight of a run folder again and record it; it must be the same to the last bit."""
+    from framerunner.camera_calibration.calibration_file import load_calibration
     from framerunner.flying.display import LockstepProgress
     from framerunner.flying.lockstep import fly_lockstep
     from framerunner.flying.plan import FlightPlan
@@ -119,10 +120,12 @@ def _fly_again(folder: Path, result: FlightResult, path: Path, pilot: PilotFile 
     seed = result.seed
     if seed is None:
         raise RecordingError(f"replay '{folder}': result.json has no seed; fly it again with --record")
+    calibration_file = folder / "calibration.yaml"
+    calibration = load_calibration(calibration_file) if calibration_file.is_file() else None
     with FlightRecording(path, scenario, mission, seed) as recording:
         with LockstepProgress(scenario.try_limit_s) as progress:
             observers = (recording.see, progress.see)
-            plan = FlightPlan(scenario, mission, seed)
+            plan = FlightPlan(scenario, mission, seed, calibration=calibration)
             flown = fly_lockstep(plan, observers=observers, on_image=recording.see_image)
         if flown.outcome.interrupted:
             raise KeyboardInterrupt

@@ -62,6 +62,7 @@ class RunFolder:
         self.scenario = path / "scenario.yaml"
         self.mission = path / "mission.yaml"
         self.pilot = path / "pilot.py"
+        self.calibration = path / "calibration.yaml"
         self.recording = path / "flight.mcap"
 
     def write_plan(self, scenario: Scenario, mission: Mission) -> None:
@@ -106,7 +107,7 @@ class RunFolder:
             if path.stat().st_size == 0 or self.stopped_before_start:
                 path.unlink()
         if not any(path.exists() for path in (self.result, self.tlog, self.recording)):
-            for path in (self.scenario, self.mission, self.pilot):
+            for path in (self.scenario, self.mission, self.pilot, self.calibration):
                 path.unlink(missing_ok=True)
             if not any(self.path.iterdir()):
                 self.path.rmdir()

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.flying.detector import true_calibration
-from geometry.rotations import quaternion_from_euler, rotation, rotation_rows
+from geometry.rotations import mounting_flu, quaternion_from_euler, rotation, rotation_rows
 from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Scenario, UprightFrame
@@ -136,8 +136,10 @@ class _LabelledScene:
 
     def labels(self, position_arena_m: Vec3, attitude: Quaternion) -> tuple[FrameLabel, ...]:
         """What is true of every frame."""
-        rows = np.array(rotation_rows(rotation(attitude)))
-        eye = np.array(position_arena_m) + rows @ np.array(self.scenario.camera.position_flu_m)
+        camera = self.scenario.camera
+        body = np.array(rotation_rows(rotation(attitude)))
+        eye = np.array(position_arena_m) + body @ np.array(camera.position_flu_m)
+        rows = body @ np.array(rotation_rows(rotation(mounting_flu(camera.mounting_frd_rad))))
         outlines = [self._outline(solid, eye, rows) for solid in self._solids]
         return tuple(
             self._label(frame, eye, rows, outlines, k) for k, frame in enumerate(self.scenario.all_frames)

@@ -222,7 +222,7 @@ class TelemetryFeed:
         self.yaw_ned_rad = radians(euler.yaw_deg)
         self.time_us = time_us
         self._attitude_received_s = self._clock()
-        self._lag_s = _least_lag(self._lag_s, self._attitude_received_s - time_us * 1e-6)
+        self._lag_s = least_lag(self._lag_s, self._attitude_received_s - time_us * 1e-6)
         self.attitudes += 1
         tick = time_us // TICK_US
         if tick != self.tick_number:
@@ -296,7 +296,7 @@ def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Any, _u
         feed.mode = names.get(number, f"mode {number}")
 
 
-def _least_lag(before_s: float | None, lag_s: float) -> float:
+def least_lag(before_s: float | None, lag_s: float) -> float:
     """How far vehicle time is behind wall time, by the message that was underway for the shortest time.
 
     A message that came late makes the lag seem larger, so the smallest counts; but clocks differ in pace, and

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import tan
 from typing import Self
 
-from geometry.rotations import Rotation, rotation, to_body, to_world
+from geometry.rotations import Rotation, mounting_flu, rotation, to_body, to_world
 from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Camera
 
@@ -24,6 +24,7 @@ class CameraModel:
         position_flu_m: of the camera on the drone: forward, left, up.
         readout_s: of a rolling shutter, from the first to the last row; an image's time is the middle.
         on_gimbal: whether a gimbal carries it; its attitude is reported then.
+        mounting: how it is turned on the drone, from its axes forward, left, up to the body's; None: not.
     """
 
     focal_px: float
@@ -32,6 +33,7 @@ class CameraModel:
     position_flu_m: Vec3
     readout_s: float = 0.0
     on_gimbal: bool = False
+    mounting: Quaternion | None = None
 
     @classmethod
     def of(cls, camera: Camera) -> Self:
@@ -40,7 +42,9 @@ class CameraModel:
         focal_px = half_width_px / tan(camera.horizontal_fov_rad / 2)
         readout_s = 0.0 if camera.effects is None else camera.effects.readout_s
         half_height_px, place, gimbal = camera.height_px / 2, camera.position_flu_m, camera.gimbal
-        return cls(focal_px, half_width_px, half_height_px, place, readout_s, gimbal is not None)
+        angles_rad = camera.mounting_frd_rad
+        mounting = mounting_flu(angles_rad) if any(angles_rad) else None
+        return cls(focal_px, half_width_px, half_height_px, place, readout_s, gimbal is not None, mounting)
 
     def read_after_s(self, down_px: float) -> float:
         """How long after the time of an image a row is read out; before it if negative."""
@@ -54,9 +58,10 @@ class CameraModel:
         return CameraPose((drone_m[0] + x, drone_m[1] + y, drone_m[2] + z), turn)
 
     def carrier(self, drone_m: Vec3, attitude_arena: Quaternion, camera_attitude_arena: Quaternion) -> Vec3:
-        """The centre of a drone that, with the attitude of a camera on a gimbal, has the camera at its place.
+        """The centre of a drone that, with the camera's own attitude, has the camera at its place.
 
-        With it and the camera's attitude, what holds for a fixed camera holds for one on a gimbal.
+        With it and the camera's attitude, what holds for a camera that looks along the drone's axis holds for
+        one on a gimbal, and for one that is mounted otherwise.
         """
         eye_m = self.pose(drone_m, attitude_arena).position_m
         x, y, z = to_world(rotation(camera_attitude_arena), *self.position_flu_m)

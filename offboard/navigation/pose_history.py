@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import acos, hypot
 from typing import Generic, TypeVar
 
-from geometry.rotations import interpolated
+from geometry.rotations import interpolated, multiply
 from geometry.vectors import Quaternion, Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
@@ -74,12 +74,13 @@ class PoseHistory:
     Positions and attitudes are reported with times of their own, so they are kept apart.
 
     Args:
-        camera: if it is on a gimbal, poses are those of a drone to which it would be fixed (`carrier`); None:
-            it is not.
+        camera: if it is on a gimbal, or turned on the drone, poses are those of a drone along whose axis it
+            would look (`carrier`); None: it looks along the drone's.
     """
 
     def __init__(self, camera: CameraModel | None = None) -> None:
         self._camera = camera if camera is not None and camera.on_gimbal else None
+        self._turned = camera if camera is not None and camera.mounting is not None else None
         self._camera_attitudes: _Samples[Quaternion] = _Samples()
         self._positions: _Samples[tuple[Vec3, Vec3]] = _Samples()  # metres; velocity, metres a second
         self._attitudes: _Samples[Quaternion] = _Samples()
@@ -104,6 +105,10 @@ class PoseHistory:
                 return None
             carrier_m = self._camera.carrier(position[0], attitude[0], turned[0])
             return DronePose(time_us, carrier_m, turned[0], position[1], turned[1])
+        if (camera := self._turned) is not None and camera.mounting is not None:
+            looking = multiply(attitude[0], camera.mounting)
+            carrier_m = camera.carrier(position[0], attitude[0], looking)
+            return DronePose(time_us, carrier_m, looking, position[1], attitude[1])
         return DronePose(time_us, position[0], attitude[0], position[1], attitude[1])
 
     def _position_at(self, time_us: int) -> tuple[Vec3, float] | None:

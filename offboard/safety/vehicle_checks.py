@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite, isnan
+from math import degrees, isfinite, isnan
 from statistics import median
 
 from offboard.safety.check import Check, Outcome, passed
@@ -84,6 +84,21 @@ class CameraFacts:
     problem: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class CalibrationFacts:
+    """What is known of the camera's calibration.
+
+    Attributes:
+        calibrated_px: width and height of the images that it was made from; None: there is no calibration.
+        size_px: width and height of the camera's images; zeros: there was none.
+        angles_frd_rad: roll, pitch and yaw of the camera on the drone; None: never measured.
+    """
+
+    calibrated_px: tuple[int, int] | None = None
+    size_px: tuple[int, int] = (0, 0)
+    angles_frd_rad: tuple[float, float, float] | None = None
+
+
 def battery_check(facts: BatteryFacts) -> Check:
     """Whether the battery is charged for a try and the way back."""
     if isnan(facts.percent):
@@ -155,3 +170,22 @@ def camera_checks(facts: CameraFacts) -> list[Check]:
         return [rate, Check("camera delay", Outcome.FAIL, value, limit, advice)]
     good = facts.age_s <= MAX_CAMERA_AGE_S
     return [rate, passed("camera delay", good, f"{facts.age_s:.2f} s", limit, "use a camera with less delay")]
+
+
+def calibration_check(facts: CalibrationFacts) -> Check:
+    """Whether the camera's lens and its mounting on the drone were measured, for missions that map frames."""
+    name = "camera calibration"
+    if facts.calibrated_px is None:
+        advice = "run framerunner camera calibrate, then camera extrinsics, and give --calibration"
+        return Check(name, Outcome.NOTE, "none: the scenario's camera is assumed", "", advice)
+    (width, height), (seen_width, seen_height) = facts.calibrated_px, facts.size_px
+    limit = f"images of {width} × {height}"
+    if any(facts.size_px) and facts.size_px != facts.calibrated_px:
+        value = f"images have {seen_width} × {seen_height}"
+        return Check(name, Outcome.FAIL, value, limit, "calibrate it with images as it gives them in flight")
+    if facts.angles_frd_rad is None:
+        value = "the mounting was never measured; the camera is taken to look straight ahead"
+        return Check(name, Outcome.NOTE, value, limit, "run framerunner camera extrinsics")
+    roll, pitch, yaw = (degrees(angle) for angle in facts.angles_frd_rad)
+    value = f"mounted at roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"
+    return Check(name, Outcome.PASS, value, limit)

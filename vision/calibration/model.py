@@ -10,14 +10,42 @@ from pydantic import BaseModel, ConfigDict, Field
 from errors import UserError
 from geometry.lens import Coefficients
 
+MAX_ANGLE_RAD = 0.8
+"""Of a camera's roll, pitch and yaw on the drone: it looks ahead."""
+
 Coefficient = Annotated[float, Field(ge=-100, le=100)]
 _Weight = Annotated[float, Field(ge=-10, le=10)]
 _Weights = tuple[_Weight, _Weight, _Weight]
+_Angle = Annotated[float, Field(ge=-MAX_ANGLE_RAD, le=MAX_ANGLE_RAD)]
+_Offset = Annotated[float, Field(ge=-2, le=2)]
+_Deviation = Annotated[float, Field(ge=0, le=10)]
 ColourMatrix = tuple[_Weights, _Weights, _Weights]
 
 
 class CalibrationError(UserError):
     """A calibration that cannot be made or used; the message is one line for people."""
+
+
+class Mounting(BaseModel):
+    """How a camera is mounted on a drone, as `camera extrinsics` measures it.
+
+    Angles turn the body's axes into the camera's: yaw, pitch, roll, about the axes down, right, forward.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    angles_frd_rad: tuple[_Angle, _Angle, _Angle] = Field(
+        description="roll, pitch and yaw; to the right, up and to the right are positive"
+    )
+    angles_std_rad: tuple[_Deviation, _Deviation, _Deviation] | None = Field(
+        None, description="standard deviations of the angles"
+    )
+    position_flu_m: tuple[_Offset, _Offset, _Offset] | None = Field(
+        None, description="of the lens from the drone's centre: forward, left, up; None: the scenario's"
+    )
+    position_std_m: tuple[_Deviation, _Deviation, _Deviation] | None = Field(
+        None, description="standard deviations of the position"
+    )
 
 
 class Calibration(BaseModel):
@@ -41,6 +69,15 @@ class Calibration(BaseModel):
     colour_matrix: ColourMatrix | None = Field(
         None,
         description="by which blue, green and red are multiplied, from `camera colours`",
+    )
+    mounting: Mounting | None = Field(
+        None, description="how it is mounted on the drone, from `camera extrinsics`; None: never measured"
+    )
+    delay_s: float | None = Field(
+        None,
+        ge=0,
+        le=0.5,
+        description="from exposure to arrival of an image without a time stamp; None: --camera-delay says it",
     )
     rms_px: float | None = Field(
         None, ge=0, description="root mean square of what is left of the corners' errors"

@@ -7,10 +7,12 @@ from errors import SettingError
 from offboard.safety.check import Check, Outcome, accept, check_names, failures
 from offboard.safety.vehicle_checks import (
     BatteryFacts,
+    CalibrationFacts,
     CameraFacts,
     EstimatorFacts,
     LinkFacts,
     battery_check,
+    calibration_check,
     camera_checks,
     estimator_check,
     link_checks,
@@ -94,3 +96,16 @@ def test_a_name_that_is_no_checks_is_told_with_all_names():
     check_names(["a", "all"], ["a", "b"])
     with pytest.raises(SettingError, match="the checks are Apple, banana, and all accepts each"):
         check_names(["x"], ["banana", "Apple"])
+
+
+def test_a_mounting_that_was_never_measured_is_noted_and_another_size_fails():
+    size_px = (320, 240)
+    none = calibration_check(CalibrationFacts(size_px=size_px))
+    unmeasured = calibration_check(CalibrationFacts(size_px, size_px))
+    assert (none.outcome, unmeasured.outcome) == (Outcome.NOTE, Outcome.NOTE)
+    assert "never measured" in unmeasured.value and "camera extrinsics" in unmeasured.advice
+    measured = calibration_check(CalibrationFacts(size_px, size_px, (0.0, 0.1, 0.0)))
+    assert measured.outcome is Outcome.PASS and "pitch 5.7" in measured.value
+    assert failed(calibration_check(CalibrationFacts((640, 480), size_px, (0.0, 0.1, 0.0)))) == [
+        "camera calibration"
+    ]

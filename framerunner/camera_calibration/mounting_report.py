@@ -1,0 +1,161 @@
+"""The mounting that was found: told to people, refused if not known, written into the calibration file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import degrees
+from pathlib import Path
+
+from framerunner.camera_calibration.calibration_file import save_calibration
+from framerunner.flying.plan import CAMERA_DELAY_S
+from geometry.vectors import Vec3
+from vision.calibration.model import MAX_ANGLE_RAD, Calibration, CalibrationError, Mounting
+from vision.calibration.motion import Motion, MotionReport
+from vision.calibration.mounting import MountingFit, fit_mounting
+from vision.calibration.movement import (
+    MAX_DELAY_STD_S,
+    MAX_POSITION_STD_M,
+    Movement,
+    missing_for,
+    movement_of,
+)
+from vision.calibration.sightings import Values, sightings_of
+from vision.types import Detections
+
+_ANGLES = (
+    ("roll", "to the right", "to the left"),
+    ("pitch", "upwards", "downwards"),
+    ("yaw", "to the right", "to the left"),
+)
+_MAX_RMS_PX = 3.0
+_MAX_DELAY_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class MountingSearch:
+    """What is known of the mounting after some movement.
+
+    Attributes:
+        fit: None if no frame was seen often enough.
+        movement: of the drone while frames were seen.
+        missing: what must still be done, in words; empty if the angles are known.
+    """
+
+    fit: MountingFit | None
+    movement: Movement
+    missing: tuple[str, ...]
+
+
+def search_mounting(
+    images: Sequence[Detections],
+    reports: Sequence[MotionReport],
+    calibration: Calibration,
+    position_flu_m: Vec3,
+    *,
+    stamped: bool,
+) -> MountingSearch:
+    """Find the mounting from images and states of a flight.
+
+    Args:
+        images: what was seen in them, as an ideal camera with this calibration's focal length would see it.
+        reports: the drone's states.
+        calibration: of the camera.
+        position_flu_m: of the camera from the drone's centre, as measured by hand.
+        stamped: whether images have the time of their exposure; else it is that of their arrival.
+    """
+    motion, delay_s = Motion(reports), 0.0 if stamped else CAMERA_DELAY_S
+    half_height_px = calibration.height_px / 2
+    seen = sightings_of(images, motion, half_height_px, calibration.readout_s, delay_s)
+    known = Values((0.0, 0.0, 0.0), position_flu_m, delay_s)
+    fit = fit_mounting(seen, motion, calibration.fx_px, known)
+    movement = movement_of(seen, motion, fit)
+    return MountingSearch(fit, movement, missing_for(movement, fit))
+
+
+def accepted_fit(search: MountingSearch) -> MountingFit:
+    """The mounting if it is known.
+
+    Raises:
+        CalibrationError: it is not; the message says what movement is missing.
+    """
+    fit = search.fit
+    if fit is None or search.missing:
+        raise CalibrationError(f"extrinsics: not known: {'; '.join(search.missing)}")
+    if fit.rms_px > _MAX_RMS_PX:
+        raise CalibrationError(
+            f"extrinsics: the frames' corners are {fit.rms_px:.1f} pixels from where they should be; is the "
+            "calibration that of this camera, and is the drone's position that of its centre?"
+        )
+    largest_rad = max(map(abs, fit.values.angles_frd_rad))
+    if largest_rad > MAX_ANGLE_RAD:
+        raise CalibrationError(
+            f"extrinsics: an angle of {degrees(largest_rad):.0f} degrees was found; a camera that looks "
+            f"ahead has {degrees(MAX_ANGLE_RAD):.0f} at most"
+        )
+    return fit
+
+
+def tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) -> None:
+    """Say what was found and how exactly it is known."""
+    movement, found, std = search.movement, fit.values, fit.std
+    say(
+        f"{movement.sightings} sightings of {_counted(movement.frames, 'frame')}; turned by "
+        f"{movement.turn_deg:.0f} degrees, {movement.approach_m:.1f} m nearer and farther; corners fit "
+        f"within {fit.rms_px:.2f} px RMS"
+    )
+    angles = zip(_ANGLES, found.angles_frd_rad, std.angles_frd_rad, strict=True)
+    for (name, positive, negative), angle, one in angles:
+        way = positive if angle >= 0.0 else negative
+        say(f"{name:8s}{degrees(abs(angle)):6.2f} degrees {way} (1 sigma {degrees(one):.2f})")
+    for name, place, one in zip(
+        ("forward", "left", "up"), found.position_flu_m, std.position_flu_m, strict=True
+    ):
+        hint = "" if one <= MAX_POSITION_STD_M else "; hardly observable: measure it, and give --position"
+        say(f"{name:8s}{place:6.3f} m (1 sigma {one:.3f}){hint}")
+    if std.delay_s <= MAX_DELAY_STD_S:
+        say(f"{'delay':8s}{1000 * found.delay_s:6.1f} ms (1 sigma {1000 * std.delay_s:.1f})")
+    else:
+        say("delay   not observable: yaw faster, at 30 degrees a second or more")
+
+
+def with_mounting(calibration: Calibration, fit: MountingFit, *, stamped: bool) -> Calibration:
+    """The calibration with what was found; the delay is of images without time stamps."""
+    found, std = fit.values, fit.std
+    mounting = Mounting(
+        angles_frd_rad=found.angles_frd_rad,
+        angles_std_rad=std.angles_frd_rad,
+        position_flu_m=found.position_flu_m,
+        position_std_m=std.position_flu_m,
+    )
+    update: dict[str, object] = {"mounting": mounting}
+    if not stamped and std.delay_s <= MAX_DELAY_STD_S and 0.0 <= found.delay_s <= _MAX_DELAY_S:
+        update["delay_s"] = found.delay_s
+    return calibration.model_copy(update=update)
+
+
+def finish(
+    search: MountingSearch,
+    calibration: Calibration,
+    path: Path,
+    say: Callable[[str], None],
+    *,
+    stamped: bool,
+) -> None:
+    """Tell what was found and write it.
+
+    Raises:
+        CalibrationError: the mounting is not known.
+        SettingError: the file cannot be written.
+    """
+    fit = accepted_fit(search)
+    tell(search, fit, say)
+    measured = with_mounting(calibration, fit, stamped=stamped)
+    save_calibration(measured, path)
+    if measured.delay_s is not None and not stamped:
+        say(f"without --camera-delay, `fly` takes {measured.delay_s:.3f} s from the file")
+    say(f"written to {path}; use it with `framerunner fly --calibration {path}`")
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

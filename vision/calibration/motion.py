@@ -1,0 +1,116 @@
+"""A drone's motion from reported states, for many times at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from geometry.vectors import Quaternion, Vec3
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+MAX_GAP_S = 0.3
+"""Between two reports; what happened in a longer gap is not known."""
+END_S = 0.05
+"""Motion is known this long before its end, so that delays and rolling shutters stay within it."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionReport:
+    """A state of the drone, upright axes x, y, z (z up) that are fixed to the world.
+
+    Attributes:
+        time_us: vehicle time of the attitude.
+        position_time_us: vehicle time of position and velocity.
+        position_m: of the drone's centre.
+        velocity_m_s: of it.
+        attitude: body forward, left, up to the world.
+    """
+
+    time_us: int
+    position_time_us: int
+    position_m: Vec3
+    velocity_m_s: Vec3
+    attitude: Quaternion
+
+
+class Motion:
+    """The drone's poses between reports: positions by cubic Hermite splines, attitudes with a constant rate.
+
+    Args:
+        reports: in any order; those of a time that is known already are left out.
+
+    Attributes:
+        start_us: the time from which seconds are counted.
+        span_s: the first and the last second at which the pose is known; empty if the first is the larger.
+    """
+
+    def __init__(self, reports: Sequence[MotionReport]) -> None:
+        self.start_us = min((report.position_time_us for report in reports), default=0)
+        times_s = self.seconds([report.position_time_us for report in reports])
+        self._position_s, first = np.unique(times_s, return_index=True)
+        self._positions = np.array([report.position_m for report in reports]).reshape(-1, 3)[first]
+        self._velocities = np.array([report.velocity_m_s for report in reports]).reshape(-1, 3)[first]
+        times_s = self.seconds([report.time_us for report in reports])
+        self._attitude_s, first = np.unique(times_s, return_index=True)
+        quaternions = np.array([report.attitude for report in reports]).reshape(-1, 4)[first]
+        flips = np.sign(np.einsum("ij,ij->i", quaternions[1:], quaternions[:-1]))
+        signs = np.concatenate([np.ones(min(1, len(quaternions))), np.where(flips < 0.0, -1.0, 1.0)])
+        self._quaternions = quaternions * np.cumprod(signs)[:, None]
+        tracks = (self._position_s, self._attitude_s)
+        enough = min(map(len, tracks)) >= 2
+        self.span_s = (
+            (max(float(track[0]) for track in tracks), min(float(track[-1]) for track in tracks) - END_S)
+            if enough
+            else (0.0, -1.0)
+        )
+
+    def seconds(self, times_us: Sequence[int]) -> Floats:
+        """Vehicle times as seconds since the start."""
+        return np.array([(time_us - self.start_us) * 1e-6 for time_us in times_us], np.float64)
+
+    def is_known(self, times_s: Floats) -> Bools:
+        """Whether times are within the reports, and in none of their gaps."""
+        known: Bools = (times_s >= self.span_s[0]) & (times_s <= self.span_s[1])
+        if self.span_s[1] < self.span_s[0]:
+            return known
+        for track in (self._position_s, self._attitude_s):
+            after = np.clip(np.searchsorted(track, times_s), 1, len(track) - 1)
+            known &= track[after] - track[after - 1] <= MAX_GAP_S
+        return known
+
+    def positions(self, times_s: Floats) -> Floats:
+        """Where the drone's centre is, shape (n, 3)."""
+        track = self._position_s
+        after = np.clip(np.searchsorted(track, times_s), 1, len(track) - 1)
+        gap_s = (track[after] - track[after - 1])[:, None]
+        t = np.clip((times_s - track[after - 1])[:, None] / gap_s, 0.0, 1.0)
+        rise = t * t * (3.0 - 2.0 * t)
+        start, end = gap_s * t * (1.0 - t) ** 2, gap_s * t * t * (t - 1.0)
+        before_m, after_m = self._positions[after - 1], self._positions[after]
+        bent = start * self._velocities[after - 1] + end * self._velocities[after]
+        at: Floats = before_m + rise * (after_m - before_m) + bent
+        return at
+
+    def rotations(self, times_s: Floats) -> Floats:
+        """Matrices from body to world, shape (n, 3, 3)."""
+        track = self._attitude_s
+        after = np.clip(np.searchsorted(track, times_s), 1, len(track) - 1)
+        share = np.clip((times_s - track[after - 1]) / (track[after] - track[after - 1]), 0.0, 1.0)[:, None]
+        mixed = (1.0 - share) * self._quaternions[after - 1] + share * self._quaternions[after]
+        return matrices(mixed / np.sqrt((mixed**2).sum(axis=1))[:, None])
+
+
+def matrices(quaternions: Floats) -> Floats:
+    """Rotation matrices of unit quaternions (w, x, y, z), shape (n, 4) to (n, 3, 3)."""
+    w, x, y, z = quaternions.T
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)

@@ -1,0 +1,374 @@
+"""The mounting of a camera on a drone, from frames seen while it moves: bundle adjustment.
+
+Unknown are roll, pitch and yaw of the camera on the body, its place, the delay of its images, and the pose of
+every frame; known are the frames' size, where their corners are in the images, and the drone's poses by its
+telemetry but for an error of its position that wanders. All are found by robust least squares of the corners'
+errors (B. Triggs et al., "Bundle adjustment - a modern synthesis", 2000). Frames hang nearly upright, so
+their tilt is unknown within a degree only.
+
+The standard deviations are the larger of two: those of the least squares, and those of the jackknife, which
+leaves out one tenth of the flight after the other. The second knows that errors of the drone's estimator go
+on for seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from geometry.rotations import mounting_flu
+from geometry.vectors import Vec3
+from vision.calibration.motion import Bools, Floats, Motion, matrices
+from vision.calibration.sightings import (
+    MIN_OF_A_FRAME,
+    Indices,
+    Sightings,
+    Values,
+    first_mounting,
+    first_yaw,
+    frames_among,
+)
+from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M
+
+PLACE_STD_M = 0.02
+"""Of the camera's place on the drone, measured with a ruler."""
+DELAY_STD_S = 0.1
+WANDER_STD_M = 0.01
+"""Of the errors of the drone's position, which go on for seconds: by motion capture or visual odometry."""
+FRAME_TILT_STD_RAD = 0.0175
+SIZE_STD = 0.005
+"""Of a frame, as a share of it; of what may be none, `UNKNOWN_SIZE_STD`."""
+UNKNOWN_SIZE_STD = 0.5
+_ANGLE_STD_RAD = 0.6
+_MAX_SIZE_ERROR = 0.06  # a rectangle that differs more from a frame's size is none
+_SURE = 3.0  # standard deviations
+_MAX_STEPS = 40
+_PIXEL_STD_PX = 0.1  # added to what the finder of frames states: its edges' errors are not all independent
+_ATTITUDE_STD_RAD = 0.0025  # of the drone's estimator
+_OUTLIER = 4.0  # standard deviations of a corner, after the robust solution
+_MAX_FRAME_ERROR = 3.0  # median of a frame's corners' errors, standard deviations; more: it is no frame
+_NEAREST_M = 0.05
+_BLOCKS = 10
+_MIN_ROUNDS, _MAX_ROUNDS = 2, 6
+_OF_MOUNTING = 7  # numbers before those of the frames: three angles, three of the place, the delay
+_OF_A_FRAME = 7  # x, y, z, yaw, two small angles of its tilt, logarithm of its size
+_OF_A_KNOT = 3  # of how far the drone is from where its estimator has it: x, y, z
+_KNOT_S = 3.0  # between two of them; in between it is interpolated
+_STEP = 1e-4  # of numerical differences, rad and s
+
+_SIDEWAYS_M = np.array([-1.0, 1.0, 1.0, -1.0]) * FRAME_WIDTH_M / 2.0
+_UPWARDS_M = np.array([1.0, 1.0, -1.0, -1.0]) * FRAME_HEIGHT_M / 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MountingFit:
+    """A mounting that explains what was seen.
+
+    Attributes:
+        values: of the mounting.
+        std: their standard deviations.
+        sightings: those used.
+        numbers: of the frame that each is of.
+        frames_m: where the frames are, shape (frames, 3).
+        rms_px: of the corners' errors.
+    """
+
+    values: Values
+    std: Values
+    sightings: Sightings
+    numbers: Indices
+    frames_m: Floats
+    rms_px: float
+
+
+def fit_mounting(seen: Sightings, motion: Motion, focal_px: float, known: Values) -> MountingFit | None:
+    """Find the mounting.
+
+    Args:
+        seen: frames in images.
+        motion: of the drone.
+        focal_px: focal length of the camera.
+        known: what is known before: the place and the delay; of the angles nothing is known.
+
+    Returns:
+        None if no frame was seen often enough. How exactly the values are known is told by their standard
+        deviations alone.
+    """
+    if len(seen) < MIN_OF_A_FRAME:
+        return None
+    start = first_mounting(seen, motion, known)
+    free = np.ones(len(seen), np.bool_)  # sightings that may be of a frame
+    for number in range(_MAX_ROUNDS):
+        numbers, places = frames_among(seen, free, motion, start)
+        used = np.flatnonzero(numbers >= 0)
+        if not len(used):
+            return None
+        fitted = _Adjustment(seen.at(used), numbers[used], motion, focal_px, known)
+        fitted.solve(start, places, UNKNOWN_SIZE_STD)
+        start = fitted.values
+        wrong = fitted.are_wrong()
+        free[used[wrong[numbers[used]]]] = False  # such as a poster: drawn borders look like frames
+        if number >= _MIN_ROUNDS - 1 and not wrong.any():
+            break
+    else:
+        return None
+    fitted.refine()
+    return fitted.result()
+
+
+@dataclass(slots=True, eq=False)
+class _Adjustment:
+    """The least squares of some sightings, each of a numbered frame."""
+
+    seen: Sightings
+    numbers: Indices
+    motion: Motion
+    focal_px: float
+    known: Values
+    solution: Floats = field(default_factory=lambda: np.empty(0))
+    _weights: Floats = field(default_factory=lambda: np.empty(0))  # shape (n, 4, 2); 0: not used
+    _sides: Floats = field(
+        default_factory=lambda: np.empty(0)
+    )  # 1: seen from the side of the normal, else -1
+    _size_std: float = 0.0
+    _count: int = 0  # of frames
+    _knots: Floats = field(default_factory=lambda: np.empty(0))  # their weights, shape (n, knots)
+    _poses: tuple[float, Floats, Floats] | None = None  # of the drone at the corners, with a delay
+
+    @property
+    def frames_m(self) -> Floats:
+        """Where the frames are, shape (frames, 3)."""
+        return self._frames(self.solution)[:, :3]
+
+    @property
+    def values(self) -> Values:
+        """Of the mounting."""
+        return _values(self.solution[:_OF_MOUNTING])
+
+    def solve(self, start: Values, places: Sequence[Vec3], size_std: float) -> None:
+        """Find the solution nearest to a start, whatever single corners are."""
+        at = [*start.angles_frd_rad, *start.position_flu_m, start.delay_s]
+        for number, place in enumerate(places):
+            mine = self.seen.at(np.flatnonzero(self.numbers == number))
+            yaw = first_yaw(mine, self.motion, start)
+            at += [*place, yaw, 0.0, 0.0, 0.0]
+        self._count = len(places)
+        self._knots = _knots_of(self.seen.times_s)
+        self.solution = np.array(at + [0.0] * _OF_A_KNOT * self._knots.shape[1])
+        variances = self.seen.std_px**2 + _PIXEL_STD_PX**2 + (_ATTITUDE_STD_RAD * self.focal_px) ** 2
+        self._weights = np.nan_to_num(1.0 / np.sqrt(variances))
+        self._size_std = size_std
+        for _ in range(2):
+            self._sides = self._seen_from()
+            self.solution = _minimized(self._residuals, self.solution, self._jacobian, "soft_l1")
+
+    def refine(self) -> None:
+        """Go on from the solution: frames have their size, and corners that are far off are not used."""
+        self._size_std = SIZE_STD
+        self.solution = _minimized(self._residuals, self.solution, self._jacobian, "soft_l1")
+        errors = np.abs(self._errors(self.solution)).max(axis=2)
+        self._weights[errors > _OUTLIER] = 0.0
+        self.solution = _minimized(self._residuals, self.solution, self._jacobian, "linear")
+
+    def are_wrong(self) -> Bools:
+        """Which frames are none: their corners are not those of a rectangle, or their size is another."""
+        sizes = self._frames(self.solution)[:, 6]
+        jacobian = self._jacobian(self.solution)
+        variances = np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True))
+        sizes_std = np.sqrt(self._frames(variances)[:, 6])
+        wrong_size = np.abs(sizes) > np.maximum(_MAX_SIZE_ERROR, _SURE * sizes_std)
+        return (self._frame_errors() > _MAX_FRAME_ERROR) | wrong_size
+
+    def _frame_errors(self) -> Floats:
+        """The median of each frame's corners' errors, standard deviations; infinite without corners."""
+        errors = np.linalg.norm(self._errors(self.solution), axis=2)
+        used = self._weights[:, :, 0] > 0.0
+        found = []
+        for number in range(len(self.frames_m)):
+            mine = errors[self.numbers == number][used[self.numbers == number]]
+            found.append(float(np.median(mine)) if len(mine) else np.inf)
+        return np.array(found)
+
+    def result(self) -> MountingFit:
+        """What was found, with its standard deviations."""
+        std = _values(self._deviations())
+        errors_px = np.linalg.norm(self._offsets(self.solution), axis=2)[self._weights[:, :, 0] > 0.0]
+        rms_px = float(np.sqrt(np.mean(errors_px**2))) if len(errors_px) else np.inf
+        return MountingFit(self.values, std, self.seen, self.numbers, self.frames_m, rms_px)
+
+    def _frames(self, at: Floats) -> Floats:
+        return at[_OF_MOUNTING : self._first_knot].reshape(-1, _OF_A_FRAME)
+
+    @property
+    def _first_knot(self) -> int:
+        return _OF_MOUNTING + self._count * _OF_A_FRAME
+
+    def _drone(self, delay_s: float) -> tuple[Floats, Floats]:
+        """Positions and rotations of the drone when corners were exposed, shape (n, 4, 3), (n, 4, 3, 3)."""
+        if self._poses is None or self._poses[0] != delay_s:
+            times_s = (self.seen.corners_s - delay_s).ravel()
+            count = len(self.seen)
+            positions = self.motion.positions(times_s).reshape(count, 4, 3)
+            self._poses = (delay_s, positions, self.motion.rotations(times_s).reshape(count, 4, 3, 3))
+        return self._poses[1:]
+
+    def _seen_from(self) -> Floats:
+        """From which side of its frame each sighting is."""
+        positions, _ = self._drone(self.solution[6])
+        frames = self._frames(self.solution)[self.numbers]
+        away = positions[:, 0] - frames[:, :3]
+        facing = away[:, 0] * np.cos(frames[:, 3]) + away[:, 1] * np.sin(frames[:, 3])
+        return np.where(facing >= 0.0, 1.0, -1.0)
+
+    def _corners(self, at: Floats) -> tuple[Floats, Floats]:
+        """Where the corners are in the world, shape (n, 4, 3), and how they move with their frame's numbers.
+
+        The second has shape (n, 4, 3, 7).
+        """
+        frames = self._frames(at)[self.numbers]
+        across, up = self._sides[:, None] * _SIDEWAYS_M, np.broadcast_to(_UPWARDS_M, (len(frames), 4))
+        c, s = np.cos(frames[:, 3:4]), np.sin(frames[:, 3:4])
+        roll, lean, size = frames[:, 4:5], frames[:, 5:6], np.exp(frames[:, 6:7])
+        along, ahead, above = size * (across - roll * up), size * lean * up, size * (up + roll * across)
+        arms = np.stack([c * ahead - s * along, s * ahead + c * along, above], axis=-1)
+        slopes = np.zeros((*arms.shape, _OF_A_FRAME))
+        slopes[..., :3] = np.eye(3)
+        slopes[..., 0, 3], slopes[..., 1, 3] = -arms[..., 1], arms[..., 0]
+        slopes[..., 0, 4], slopes[..., 1, 4], slopes[..., 2, 4] = s * size * up, -c * size * up, size * across
+        slopes[..., 0, 5], slopes[..., 1, 5] = c * size * up, s * size * up
+        slopes[..., 6] = arms
+        return frames[:, None, :3] + arms, slopes
+
+    def _in_camera(self, at: Floats, corners: Floats) -> tuple[Floats, Floats]:
+        """Corners of the world from the camera, forward, left, up, and from the drone's centre, likewise."""
+        positions, rotations = self._drone(float(at[6]))
+        wander = self._knots @ at[self._first_knot :].reshape(-1, _OF_A_KNOT)
+        body = np.einsum("nkji,nkj->nki", rotations, corners - positions - wander[:, None])
+        return (body - at[3:6]) @ _turn(at[:3]), body
+
+    def _offsets(self, at: Floats) -> Floats:
+        """Of the corners from where the solution has them, pixels, shape (n, 4, 2)."""
+        camera, _ = self._in_camera(at, self._corners(at)[0])
+        pixels = -self.focal_px * camera[..., 1:] / np.maximum(camera[..., :1], _NEAREST_M)
+        offsets: Floats = pixels - np.nan_to_num(self.seen.corners_px)
+        return offsets
+
+    def _errors(self, at: Floats) -> Floats:
+        """The offsets in standard deviations."""
+        errors: Floats = self._offsets(at) * self._weights
+        return errors
+
+    def _residuals(self, at: Floats) -> Floats:
+        """Errors of all corners, then what is known before."""
+        mean, std = self._prior(at)
+        residuals: Floats = np.concatenate([self._errors(at).ravel(), (at - mean) / std])
+        return residuals
+
+    def _deviations(self) -> Floats:
+        """Standard deviations of the mounting's numbers."""
+        residuals, jacobian = self._residuals(self.solution), self._jacobian(self.solution)
+        normal = jacobian.T @ jacobian
+        inverse = np.linalg.pinv(normal, hermitian=True)
+        count = int(np.count_nonzero(self._weights))
+        excess = max(1.0, float(residuals @ residuals) / max(1, count - len(self.solution)))
+        formal = np.sqrt(np.diag(inverse)[:_OF_MOUNTING] * excess)
+        order = np.argsort(self.seen.times_s, kind="stable")
+        rows = np.arange(8 * len(self.seen)).reshape(-1, 8)
+        shifts = []
+        for block in np.array_split(order, _BLOCKS):
+            mine = rows[block].ravel()
+            left_out = jacobian[mine]
+            rest = normal - left_out.T @ left_out + 1e-9 * np.diag(np.diag(normal))
+            shifts.append(np.linalg.lstsq(rest, left_out.T @ residuals[mine], rcond=None)[0][:_OF_MOUNTING])
+        spread = np.array(shifts) - np.mean(shifts, axis=0)
+        jackknife = np.sqrt((_BLOCKS - 1) / _BLOCKS * (spread**2).sum(axis=0))
+        larger: Floats = np.maximum(formal, jackknife)
+        return larger
+
+    def _jacobian(self, at: Floats) -> Floats:
+        """How the residuals change with the solution's numbers, shape (residuals, numbers)."""
+        corners, slopes = self._corners(at)
+        camera, body = self._in_camera(at, corners)
+        depth = np.maximum(camera[..., :1], _NEAREST_M)
+        # Of both pixels with the place in the camera's axes: forward, left, up.
+        by_place = np.zeros((*camera.shape[:2], 2, 3))
+        by_place[..., 0] = self.focal_px * camera[..., 1:] / depth**2
+        by_place[..., 0, 1] = by_place[..., 1, 2] = -self.focal_px / depth[..., 0]
+        by_place *= self._weights[..., None]
+        turn = _turn(at[:3])
+        mounting = np.empty((*camera.shape, _OF_MOUNTING))
+        for number in range(3):
+            step = np.zeros(3)
+            step[number] = _STEP
+            change = (_turn(at[:3] + step) - _turn(at[:3] - step)) / (2.0 * _STEP)
+            mounting[..., number] = (body - at[3:6]) @ change
+        mounting[..., 3:6] = -turn.T
+        ends = [self._in_camera(_later(at, step), corners)[0] for step in (-_STEP, _STEP)]
+        mounting[..., 6] = (ends[1] - ends[0]) / (2.0 * _STEP)
+        _, rotations = self._drone(float(at[6]))
+        frames = np.einsum("im,nkji,nkjp->nkmp", turn, rotations, slopes, optimize=True)
+        dense = np.zeros((*camera.shape[:2], 2, len(at)))
+        dense[..., :_OF_MOUNTING] = by_place @ mounting
+        of_frames = by_place @ frames
+        for number in range(self._count):
+            first = _OF_MOUNTING + number * _OF_A_FRAME
+            mine = self.numbers == number
+            dense[mine, :, :, first : first + _OF_A_FRAME] = of_frames[mine]
+        wandering = of_frames[:, :, :, None, :_OF_A_KNOT] * -self._knots[:, None, None, :, None]
+        dense[..., self._first_knot :] = wandering.reshape(*dense.shape[:3], -1)
+        before = np.diag(1.0 / self._prior(at)[1])
+        jacobian: Floats = np.concatenate([dense.reshape(-1, len(at)), before])
+        return jacobian
+
+    def _prior(self, at: Floats) -> tuple[Floats, Floats]:
+        """What is known of each number before, and its standard deviation; infinite: nothing."""
+        known, count, knots = self.known, self._count, self._knots.shape[1]
+        mean = [0.0] * 3 + [*known.position_flu_m, known.delay_s] + [0.0] * (len(at) - _OF_MOUNTING)
+        std = [_ANGLE_STD_RAD] * 3 + [PLACE_STD_M] * 3 + [DELAY_STD_S]
+        std += ([np.inf] * 4 + [FRAME_TILT_STD_RAD] * 2 + [self._size_std]) * count
+        std += [WANDER_STD_M] * _OF_A_KNOT * knots
+        return np.array(mean), np.array(std)
+
+
+def _minimized(
+    residuals: Callable[[Floats], Floats],
+    start: Floats,
+    jacobian: Callable[[Floats], Floats],
+    loss: Literal["linear", "soft_l1"],
+) -> Floats:
+    """The numbers of the least squares near a start."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 - it takes 0.2 s
+
+    found = least_squares(residuals, start, jacobian, loss=loss, x_scale="jac", max_nfev=_MAX_STEPS)
+    solution: Floats = found.x
+    return solution
+
+
+def _knots_of(times_s: Floats) -> Floats:
+    """How much each knot of the wandering error counts at times, shape (n, knots)."""
+    places = (times_s - times_s.min()) / _KNOT_S
+    knots = np.arange(int(places.max()) + 2)
+    weights: Floats = np.maximum(0.0, 1.0 - np.abs(places[:, None] - knots))
+    return weights
+
+
+def _later(at: Floats, step_s: float) -> Floats:
+    """A solution with another delay."""
+    later = at.copy()
+    later[6] += step_s
+    return later
+
+
+def _turn(angles_frd_rad: Floats) -> Floats:
+    """The matrix from the camera's axes to the body's, forward, left, up."""
+    roll, pitch, yaw = (float(angle) for angle in angles_frd_rad)
+    turn: Floats = matrices(np.array([mounting_flu((roll, pitch, yaw))]))[0]
+    return turn
+
+
+def _values(numbers: Floats) -> Values:
+    roll, pitch, yaw, x, y, z, delay_s = (float(number) for number in numbers)
+    return Values((roll, pitch, yaw), (x, y, z), delay_s)

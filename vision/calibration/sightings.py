@@ -1,0 +1,234 @@
+"""Frames seen from a moving drone: which images are used, and which sightings are of one frame.
+
+A frame does not move, so the sightings of one are those that put it to one place in the world, whatever the
+camera's mounting is thought to be: an error of the mounting moves them together as long as the drone stands,
+and spreads them when it moves. The mounting with which they are least spread is where the solution starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from geometry.rotations import mounting_flu
+from geometry.vectors import Vec3
+from vision.calibration.motion import Bools, Floats, Motion, matrices
+from vision.types import Detections, FrameSighting
+
+Indices = npt.NDArray[np.intp]
+
+MAX_SIGHTINGS = 700
+MIN_OF_A_FRAME = 12
+"""Sightings; of what is seen less often nothing is learnt."""
+_MAX_FRAMES = 8
+_MIN_CORNERS = 3
+_SAME_PLACE_M = 0.45
+_MOVED_M, _TURNED_COSINE, _LONGEST_S = 0.02, 0.99985, 1.0
+_SEARCHED = 250  # sightings of a colour, when a first mounting is looked for
+_PITCHES_RAD, _YAWS_RAD = np.radians(np.arange(-40.0, 41.0, 5.0)), np.radians(np.arange(-15.0, 16.0, 7.5))
+_ANGLE_COST = 0.05  # of a radian, as a share of the sightings
+
+
+@dataclass(frozen=True, slots=True)
+class Values:
+    """What is known of a mounting before; as standard deviations, how exactly it is known after.
+
+    Attributes:
+        angles_frd_rad: roll, pitch and yaw on the body.
+        position_flu_m: of the camera from the drone's centre.
+        delay_s: by which images are older than their times.
+    """
+
+    angles_frd_rad: Vec3
+    position_flu_m: Vec3
+    delay_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sightings:
+    """Frames in images, n of them.
+
+    Attributes:
+        colours: of the frames, shape (n,).
+        corners_px: right of and below the optical axis, upper left, upper right, lower right, lower left as
+            seen; NaN where one is not seen, shape (n, 4, 2).
+        std_px: standard deviations, likewise.
+        corners_s: when the row of each corner was read, seconds of the motion, shape (n, 4).
+        positions_flu_m: of the frames' centres from the camera, forward, left, up, shape (n, 3).
+        normals_flu: of the frames, by the better and the other pose; NaN if there is none, shape (n, 2, 3).
+    """
+
+    colours: npt.NDArray[np.str_]
+    corners_px: Floats
+    std_px: Floats
+    corners_s: Floats
+    positions_flu_m: Floats
+    normals_flu: Floats
+
+    def __len__(self) -> int:
+        return len(self.colours)
+
+    @property
+    def times_s(self) -> Floats:
+        """Of each sighting, its corners' mean."""
+        mean: Floats = self.corners_s.mean(axis=1)
+        return mean
+
+    def at(self, index: Indices) -> Sightings:
+        """Some of them."""
+        return Sightings(
+            self.colours[index],
+            self.corners_px[index],
+            self.std_px[index],
+            self.corners_s[index],
+            self.positions_flu_m[index],
+            self.normals_flu[index],
+        )
+
+
+def sightings_of(
+    images: Sequence[Detections],
+    motion: Motion,
+    half_height_px: float,
+    readout_s: float,
+    delay_s: float = 0.0,
+) -> Sightings:
+    """The frames in images that differ and at whose times the drone's pose is known.
+
+    Args:
+        images: with their vehicle times.
+        motion: of the drone.
+        half_height_px: from the image's middle to its upper and lower edges.
+        readout_s: of a rolling shutter, from the first to the last row; an image's time is the middle.
+        delay_s: by which images are about older than their times.
+    """
+    timed = sorted(
+        (image for image in images if image.time_us is not None), key=lambda each: each.time_us or 0
+    )
+    useful = [(image, frames) for image in timed if (frames := _useful(image))]
+    times_s = motion.seconds([image.time_us or 0 for image, _ in useful])
+    kept = _differing(times_s, motion, delay_s)
+    pairs = [(times_s[place], frame) for place in kept for frame in useful[place][1]]
+    if len(pairs) > MAX_SIGHTINGS:
+        pairs = [pairs[place] for place in np.linspace(0, len(pairs) - 1, MAX_SIGHTINGS).astype(int)]
+    count = len(pairs)
+    corners, std = np.full((count, 4, 2), np.nan), np.full((count, 4, 2), np.nan)
+    places, normals = np.empty((count, 3)), np.full((count, 2, 3), np.nan)
+    for row, (_, frame) in enumerate(pairs):
+        for place, corner in enumerate(frame.corners):
+            if corner is not None:
+                corners[row, place] = corner.right_px, corner.down_px
+                std[row, place] = corner.std_right_px, corner.std_down_px
+        places[row] = frame.poses[0].position_flu_m
+        for place, pose in enumerate(frame.poses[:2]):
+            normals[row, place] = pose.normal_flu
+    share = np.clip(np.nan_to_num(corners[:, :, 1]) / (2.0 * half_height_px), -0.5, 0.5)
+    read_s = np.array([time_s for time_s, _ in pairs]).reshape(-1, 1) + readout_s * share
+    colours = np.array([frame.colour for _, frame in pairs], dtype=np.str_)
+    return Sightings(colours, corners, std, read_s, places, normals)
+
+
+def _useful(image: Detections) -> list[FrameSighting]:
+    return [
+        frame
+        for frame in image.frames
+        if frame.poses and sum(corner is not None for corner in frame.corners) >= _MIN_CORNERS
+    ]
+
+
+def _differing(times_s: Floats, motion: Motion, delay_s: float) -> list[int]:
+    """Which images differ from the last one used: the drone has moved or turned, or a second has passed."""
+    known = np.flatnonzero(motion.is_known(times_s - delay_s - 0.1) & motion.is_known(times_s))
+    at = times_s[known] - delay_s
+    positions, rotations = motion.positions(at), motion.rotations(at)
+    kept: list[int] = []
+    last = -1
+    for place in range(len(known)):
+        if last >= 0:
+            moved_m = float(np.linalg.norm(positions[place] - positions[last]))
+            cosine = (float(np.einsum("ij,ij->", rotations[place], rotations[last])) - 1.0) / 2.0
+            waited_s = at[place] - at[last]
+            if moved_m < _MOVED_M and cosine > _TURNED_COSINE and waited_s < _LONGEST_S:
+                continue
+        last = place
+        kept.append(int(known[place]))
+    return kept
+
+
+def world_places(seen: Sightings, motion: Motion, by: Values) -> Floats:
+    """Where sightings put their frames, by a mounting, shape (n, 3)."""
+    times_s = seen.times_s - by.delay_s
+    turn = matrices(np.array([mounting_flu(by.angles_frd_rad)]))[0]
+    from_centre = np.array(by.position_flu_m) + seen.positions_flu_m @ turn.T
+    places: Floats = motion.positions(times_s) + np.einsum(
+        "nij,nj->ni", motion.rotations(times_s), from_centre
+    )
+    return places
+
+
+def first_mounting(seen: Sightings, motion: Motion, known: Values) -> Values:
+    """A mounting, its angles in steps of some degrees, with which frames are spread the least."""
+    few = [np.flatnonzero(seen.colours == colour) for colour in np.unique(seen.colours)]
+    few = [index[np.linspace(0, len(index) - 1, min(len(index), _SEARCHED)).astype(int)] for index in few]
+    best, best_score = known, -np.inf
+    for pitch in _PITCHES_RAD.tolist():
+        for yaw in _YAWS_RAD.tolist():
+            at = replace(known, angles_frd_rad=(0.0, pitch, yaw))
+            together = 0.0
+            for index in few:
+                places = world_places(seen.at(index), motion, at)
+                together += _neighbours(places, _SAME_PLACE_M).max() / len(seen)
+            score = together - _ANGLE_COST * float(np.hypot(pitch, yaw))
+            if score > best_score:
+                best, best_score = at, score
+    return best
+
+
+def frames_among(seen: Sightings, usable: Bools, motion: Motion, by: Values) -> tuple[Indices, list[Vec3]]:
+    """Which frame each usable sighting is of.
+
+    Returns:
+        The number of its frame for each sighting, -1 if it is of none; where the frames are.
+    """
+    places = world_places(seen, motion, by)
+    numbers = np.full(len(seen), -1, np.intp)
+    found: list[Vec3] = []
+    for colour in np.unique(seen.colours):
+        free = np.flatnonzero((seen.colours == colour) & usable)
+        while len(free) >= MIN_OF_A_FRAME and len(found) < _MAX_FRAMES:
+            centre = places[free[_neighbours(places[free], _SAME_PLACE_M).argmax()]]
+            for _ in range(3):
+                near = np.linalg.norm(places[free] - centre, axis=1) < _SAME_PLACE_M
+                if near.any():
+                    centre = np.median(places[free[near]], axis=0)
+            if np.count_nonzero(near) < MIN_OF_A_FRAME:
+                break
+            numbers[free[near]] = len(found)
+            found.append((float(centre[0]), float(centre[1]), float(centre[2])))
+            apart = np.linalg.norm(places[free] - centre, axis=1) > 2.0 * _SAME_PLACE_M
+            free = free[apart]
+    return numbers, found
+
+
+def _neighbours(places: Floats, within_m: float) -> Indices:
+    """How many places are near each."""
+    squares = np.einsum("ij,ij->i", places, places)
+    away2 = squares[:, None] + squares[None] - 2.0 * places @ places.T
+    near: Bools = away2 < within_m**2
+    counts: Indices = near.sum(axis=1)
+    return counts
+
+
+def first_yaw(seen: Sightings, motion: Motion, by: Values) -> float:
+    """The yaw of a frame's normal, up to half a turn, that most of its sightings allow, radians."""
+    turn = matrices(np.array([mounting_flu(by.angles_frd_rad)]))[0]
+    body = seen.normals_flu @ turn.T
+    normals = np.einsum("nij,nkj->nki", motion.rotations(seen.times_s - by.delay_s), body)
+    yaws = np.arctan2(normals[..., 1], normals[..., 0])
+    candidates = np.linspace(0.0, np.pi, 45, endpoint=False)
+    away = np.abs(np.sin(yaws[None] - candidates[:, None, None]))
+    costs = np.minimum(np.nanmin(away, axis=2), 0.3).sum(axis=1)
+    return float(candidates[costs.argmin()])
