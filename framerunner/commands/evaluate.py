@@ -72,7 +72,7 @@ def evaluate(
     """Fly a mission on many scenarios in lockstep; report how often it lands, how well, and why it fails.
 
     Every flight is saved as soon as it is over. Ctrl-C loses none of them: the same command continues where
-    it stopped, and ends with the same results. With --px4 a genuine PX4 flies, whose flights do not repeat.
+    it stopped, and ends with the same results. With --px4 a genuine PX4 flies.
     Exit code 0: all were flown, 1: a fault of the program ended some of them, 2: bad input.
 
     **Examples**
