@@ -35,6 +35,14 @@ def parsed(path):
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
+@cache
+def headings(path):
+    """The names under which links find the headings of a document."""
+    found = re.findall(r"^#+ (.+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    plain = (re.sub(r"\[(.*?)\]\(.*?\)", r"\1", each).lower() for each in found)
+    return {re.sub(r"[^\w\- ]", "", each).replace(" ", "-") for each in plain}
+
+
 def name_of(path):
     return str(path.relative_to(ROOT))
 
@@ -87,8 +95,14 @@ def test_documented_make_targets_exist(document):
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=name_of)
 def test_links_between_documents_lead_somewhere(document):
-    links = re.findall(r"\]\(([^)#]+)[^)]*\)", document.read_text(encoding="utf-8"))
-    broken = [link for link in links if "://" not in link and not (document.parent / link).exists()]
+    links = re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)\)", document.read_text(encoding="utf-8"))
+    broken = []
+    for path, heading in links:
+        target = document.parent / path if path else document
+        if "://" in path or (target.exists() and not (heading and target.suffix == ".md")):
+            continue
+        if not target.exists() or heading not in headings(target):
+            broken.append(f"{path}#{heading}")
     assert broken == []
 
 
