@@ -5,7 +5,9 @@ The mission itself has no positions. A state without a place in the file is plac
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
@@ -88,9 +90,14 @@ def layout_text(layout: Layout) -> str:
 def write_layout(mission: str | Path, layout: Layout) -> Path:
     """Write the side file of a mission file. Raises `LayoutError` if it cannot be written."""
     path = layout_path(mission)
+    file = Path(os.path.realpath(path))  # a link stays one
+    part = file.with_name(f".{file.name}.part")
     try:
-        path.write_text(layout_text(layout), encoding="utf-8", newline="\n")
+        part.write_text(layout_text(layout), encoding="utf-8", newline="\n")
+        os.replace(part, file)  # so nobody reads half of it, and a failure leaves the old one
     except OSError as error:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
         raise LayoutError(f"{path.name}: cannot be written: {error.strerror}") from None
     return path
 
