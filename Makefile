@@ -79,7 +79,7 @@ test-realtime: test-realtime-links test-realtime-pairs test-realtime-alone ## th
 test-realtime-%: export FRAMERUNNER_MAVPROXY := $(abspath $(MAVPROXY_VENV)/bin/mavproxy.py)
 
 test-realtime-links: setup # these only wait
-	$(BIN)/pytest -n 4 -m "realtime and not alone" tests/offboard
+	$(BIN)/pytest -n 6 -m "realtime and not alone" tests/offboard
 
 test-realtime-pairs: setup
 	$(BIN)/pytest -n 2 --dist loadfile -m "realtime and not alone" tests/realtime

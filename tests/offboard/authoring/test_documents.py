@@ -81,13 +81,12 @@ def test_an_edit_changes_what_it_says_and_no_line_outside(seed):
     assert applied
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_500_edits_and_500_undos_give_the_first_bytes(seed):
-    random = Random(seed)
+def test_200_edits_and_200_undos_give_the_first_bytes():
+    random = Random(0)
     data = random_mission(random).encode()
     session = EditSession(Document.from_bytes(data, "m.yaml"))
     count, states = 0, []
-    while count < 500:
+    while count < 200:
         try:
             changed = session.apply(random_edit(session.document, random, text=count % 50 == 49))
         except EditError:
@@ -98,11 +97,11 @@ def test_500_edits_and_500_undos_give_the_first_bytes(seed):
         count += bool(changed)
         states.append(session.document.data)
     last = session.document.data
-    for _ in range(500):
+    for _ in range(200):
         session.undo()
     assert session.document.data == data
     assert not session.can_undo
-    for _ in range(500):
+    for _ in range(200):
         session.redo()
     assert session.document.data == last
     with pytest.raises(EditError, match="nothing to do again"):
