@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import json
 import logging
 import os
-import stat
+import socket
 import time
 from itertools import count
 from pathlib import Path
@@ -77,13 +78,17 @@ class OperatorDesk:
         """
         path = self._path
         try:
-            if path.exists() and stat.S_ISSOCK(path.stat().st_mode):  # left by a monitor that was killed
-                path.unlink()
+            if _is_listened_at(path):
+                raise MonitorError(
+                    f"monitor: --operator-socket {path}: another monitor listens there; end it, "
+                    "or give another path"
+                )
             before = os.umask(0o177)
-            try:
+            try:  # a socket that was left by a monitor that was killed is replaced
                 server = await asyncio.start_unix_server(self._serve, str(path), limit=MAX_LINE_BYTES)
             finally:
                 os.umask(before)
+            own = path.stat().st_ino
         except OSError as error:
             raise MonitorError(
                 f"monitor: --operator-socket {path}: cannot be opened ({error.strerror or error}); "
@@ -93,7 +98,8 @@ class OperatorDesk:
             await server.serve_forever()
         finally:
             with contextlib.suppress(OSError):
-                path.unlink()
+                if path.stat().st_ino == own:
+                    path.unlink()
 
     def enter(self, name: str) -> _Page | None:
         """Add a page of a person; None if there are too many."""
@@ -132,7 +138,7 @@ class OperatorDesk:
         self._flight = writer
         ended = False
         try:
-            with contextlib.suppress(OSError, ValueError):
+            with contextlib.suppress(OSError, ValueError, RecursionError):
                 while line := await reader.readline():
                     ended = self._pass_on(line) or ended
         finally:
@@ -145,10 +151,13 @@ class OperatorDesk:
     def _pass_on(self, line: bytes) -> bool:
         """Pass a flight's message on to its page or to all; True if it is its last one."""
         message = json.loads(line)  # ValueError ends the connection
+        if not isinstance(message, dict):
+            raise ValueError("not a message of a flight")
         text = line.decode()
         kind = message.get("kind")
         if kind == "answer":
-            page = self._pages.get(message.get("page"))
+            number = message.get("page")
+            page = self._pages.get(number) if isinstance(number, int) else None
             if page is not None:
                 page.put(text)
             return False
@@ -162,6 +171,23 @@ class OperatorDesk:
     def _show_all(self, text: str) -> None:
         for page in self._pages.values():
             page.put(text)
+
+
+def _is_listened_at(path: Path) -> bool:
+    """Whether a process listens at a local socket, which does not notice the question.
+
+    Raises:
+        OSError: it is another user's.
+    """
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(str(path))
+        except (FileNotFoundError, ConnectionRefusedError):  # refused: its process has ended, or it is a file
+            return False
+        except OSError as error:
+            if error.errno != errno.EPROTOTYPE:  # somebody listens, for streams
+                raise
+    return True
 
 
 def register(monitor: Monitor) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import re
+import socket
 from contextlib import asynccontextmanager, suppress
 
 import aiohttp
@@ -13,7 +14,7 @@ from errors import SettingError
 from framerunner.preflight.card import FlightCard, Section
 from framerunner.preflight.operator_link import OperatorLink
 from monitor.run import serve
-from monitor.settings import MonitorSettings
+from monitor.settings import MonitorError, MonitorSettings
 from offboard.safety.operator import Operator
 from tests.chromium import Complaints
 from tests.monitor.serving import StubFleet
@@ -51,8 +52,8 @@ async def monitor(folder, **changed):
         if line.startswith("monitor: ") and not started.done():
             started.set_result(line.removeprefix("monitor: "))
 
-    database, socket = f"sqlite:///{folder / 'monitor.db'}", folder / "operator.sock"
-    settings = MonitorSettings(port=0, database=database, operator_socket=socket, **changed)
+    database, path = f"sqlite:///{folder / 'monitor.db'}", folder / "operator.sock"
+    settings = MonitorSettings(port=0, database=database, operator_socket=path, **changed)
     task = asyncio.create_task(serve(EQUIPMENT, settings, say))
     try:
         await asyncio.wait({task, started}, return_when=asyncio.FIRST_COMPLETED, timeout=30.0)
@@ -274,15 +275,40 @@ async def test_a_viewer_operates_nothing_and_one_who_logged_in_does(tmp_path, op
 
 async def test_the_socket_is_this_users_alone_and_a_second_flight_is_refused(tmp_path):
     async with monitor(tmp_path), link_to(tmp_path, Operator()):
-        socket = tmp_path / "operator.sock"
-        assert socket.stat().st_mode & 0o077 == 0
-        reader, writer = await asyncio.open_unix_connection(str(socket))
+        path = tmp_path / "operator.sock"
+        assert path.stat().st_mode & 0o077 == 0
+        reader, writer = await asyncio.open_unix_connection(str(path))
         assert await reader.read() == b""
         writer.close()
-    assert not socket.exists()
+    assert not path.exists()
     with pytest.raises(SettingError, match="no monitor listens there"):
         async with link_to(tmp_path, Operator()):
             pass
+
+
+async def test_a_second_monitor_does_not_take_the_socket_and_a_stale_one_is_replaced(tmp_path):
+    path = tmp_path / "operator.sock"
+    with socket.socket(socket.AF_UNIX) as killed:
+        killed.bind(str(path))
+    async with monitor(tmp_path):
+        with pytest.raises(MonitorError, match=r"operator.sock: another monitor listens there"):
+            async with monitor(tmp_path) as (_, second):
+                await asyncio.wait_for(second, 20.0)
+        async with link_to(tmp_path, Operator()):
+            pass
+
+
+@pytest.mark.parametrize("line", [b"[1]", b'{"kind": "answer", "page": [1]}', b"[" * 100_000, b"\xff"])
+async def test_what_no_flight_sends_leaves_the_monitor_ready(tmp_path, line, caplog):
+    async with monitor(tmp_path):
+        reader, writer = await asyncio.open_unix_connection(str(tmp_path / "operator.sock"))
+        writer.write(line + b"\n")
+        writer.write_eof()
+        assert await reader.read() == b""
+        writer.close()
+        async with link_to(tmp_path, Operator()):
+            pass
+    assert not [each for each in caplog.records if each.exc_info]
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"what": "arm"}', '{"what": "go", "beat": 1e99}', "x" * 600])
@@ -292,10 +318,10 @@ async def test_what_no_page_sends_ends_the_connection(tmp_path, text):
         monitor(tmp_path) as (url, _),
         link_to(tmp_path, operator),
         aiohttp.ClientSession() as web,
-        web.ws_connect(f"{url}ws/operator") as socket,
+        web.ws_connect(f"{url}ws/operator") as page,
     ):
-        await socket.send_str(text)
-        async for _ in socket:
+        await page.send_str(text)
+        async for _ in page:
             pass
-        assert socket.close_code == 4400
+        assert page.close_code == 4400
     assert operator.stops == 0
