@@ -280,6 +280,9 @@ async def test_the_socket_is_this_users_alone_and_a_second_flight_is_refused(tmp
         reader, writer = await asyncio.open_unix_connection(str(path))
         assert await reader.read() == b""
         writer.close()
+        with pytest.raises(SettingError, match="the monitor there has another flight already"):
+            async with link_to(tmp_path, Operator()):
+                pass
     assert not path.exists()
     with pytest.raises(SettingError, match="no monitor listens there"):
         async with link_to(tmp_path, Operator()):

@@ -205,7 +205,7 @@ async def test_a_second_simulator_of_the_same_instance_says_what_to_do():
     place = ("127.0.0.1", FIRST_PORT + free_instance())
     first = Px4Link(place, lambda line: None)
     try:
-        with pytest.raises(LinkError, match="cannot be listened on .*; choose another --instance"):
+        with pytest.raises(LinkError, match=r"cannot be listened on .*; choose another --instance"):
             Px4Link(place, lambda line: None)
     finally:
         first.close()
