@@ -176,7 +176,7 @@ async def _is_refused(reader: asyncio.StreamReader) -> bool:
     """Whether a monitor closes a new connection at once."""
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(_REFUSAL_S):
-            while not reader.at_eof():  # noqa: ASYNC110 - a read would take what is for `_serve`
+            while not reader.at_eof() and reader.exception() is None:  # noqa: ASYNC110 - a read would take what is for `_serve`
                 await asyncio.sleep(0.02)
             return True
     return False
