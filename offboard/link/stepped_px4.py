@@ -14,7 +14,7 @@ from collections.abc import Awaitable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from offboard.drone import DroneError, VelocityCommand
+from offboard.drone import DroneError, ResponsePrior, VelocityCommand
 from offboard.link.commands import synchronous
 from offboard.link.dialect import PX4_MODES, TickExchange
 from offboard.link.direct import CommandRefusedError, DirectMessages
@@ -75,7 +75,7 @@ class SteppedPx4Dialect:
 
     modes = PX4_MODES
     numbered_modes: Mapping[int, str] = MappingProxyType({})
-    loops_known = False
+    response_prior = ResponsePrior.LATE
     checks_in_offboard = False
     ready_limit_s = 30.0
 
