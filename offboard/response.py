@@ -127,6 +127,7 @@ class ResponseEstimate:
 
     def __init__(self) -> None:
         self._prior = ResponsePrior.OWN  # until the first state
+        self._stays_late = False  # whatever the evidence: its loops cannot be inverted
         self._chosen = list(_EXPECTED)
         self._turning = True
         shape = (len(DEAD_STEPS), len(LAGS_S), len(_GROUPS))
@@ -158,7 +159,7 @@ class ResponseEstimate:
         self._prior = prior
         if prior is ResponsePrior.LATE:
             self._chosen, self._turning = list(_EXPECTED_LATE), False
-        self.response = self._as_response()
+            self.response = self._as_response()
 
     def update(self, state: DroneState, sent: VelocityCommand | None) -> None:
         """Add a tick.
@@ -169,6 +170,8 @@ class ResponseEstimate:
         """
         if state.response_prior is not self._prior:
             self._begin_with(state.response_prior)
+        if self._prior is not ResponsePrior.OWN and not self.response.late:
+            self._stays_late, self.response = True, self._as_response()
         now_s = state.time_us * 1e-6
         if sent is None or self._last_s is None or not 0.0 <= now_s - self._last_s <= _MAX_STEPS * STEP_S:
             self._restart()
@@ -255,7 +258,7 @@ class ResponseEstimate:
         seems_late = self._seems_late(errors)
         self._late_choices = self._late_choices + 1 if seems_late else 0
         is_late = seems_late and (self.response.late or self._late_choices >= _SURE)
-        is_late = is_late or self._prior is not ResponsePrior.OWN
+        is_late = is_late or self._stays_late
         if is_late != self.response.late or (self._turning, self._others_before, *self._chosen) != before:
             self.response = self._as_response() if is_late else Response()
 
