@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import fcntl
-import socket
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
+from typing import BinaryIO
 
 from errors import SettingError
 from framerunner.flying.fly import FinishedFlight
@@ -21,6 +22,8 @@ from framerunner.runs.run_folder import RunFolder
 from sitl.px4.link import FIRST_PORT
 from sitl.px4.side_link import CAMERA_PORT
 from sitl.server_settings import VIDEO_PORT
+from wire.transports.sockets import bind_udp, listen_tcp
+from wire.transports.urls import LinkError
 
 INSTANCES = 10
 _TCP_PORTS = (FIRST_PORT, VIDEO_PORT)
@@ -65,8 +68,8 @@ def claimed_instance() -> Iterator[int]:
     """
     for instance in range(INSTANCES):
         try:
-            lock = (Path(gettempdir()) / f"framerunner-px4-{instance}.lock").open("w")
-        except OSError:  # another user's
+            lock = _open_lock(Path(gettempdir()) / f"framerunner-px4-{instance}.lock")
+        except OSError:  # its name is taken by something else
             continue
         with lock:
             try:
@@ -81,18 +84,25 @@ def claimed_instance() -> Iterator[int]:
     )
 
 
+def _open_lock(path: Path) -> BinaryIO:
+    """Open a file that every user can lock, in a folder where others may have put a file or a link before.
+
+    It is opened for reading, and made only where there is nothing, so no other file is changed.
+    """
+    with suppress(FileExistsError):
+        made = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_EXCL)
+        with os.fdopen(made, "rb"):
+            os.fchmod(made, 0o644)
+    return os.fdopen(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb")
+
+
 def _is_free(instance: int) -> bool:
-    ports = [(socket.SOCK_STREAM, port) for port in _TCP_PORTS]
-    ports += [(socket.SOCK_DGRAM, port) for port in _UDP_PORTS]
-    return all(_can_bind(kind, port + instance) for kind, port in ports)
-
-
-def _can_bind(kind: socket.SocketKind, port: int) -> bool:
-    with socket.socket(socket.AF_INET, kind) as tried:
-        if kind == socket.SOCK_STREAM:
-            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            tried.bind(("127.0.0.1", port))
-        except OSError:
-            return False
+    """Whether no program has one of its ports."""
+    try:
+        for port in _TCP_PORTS:
+            listen_tcp(("127.0.0.1", port + instance)).close()
+        for port in _UDP_PORTS:
+            bind_udp(("127.0.0.1", port + instance), "").close()
+    except LinkError:
+        return False
     return True
