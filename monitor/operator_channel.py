@@ -24,7 +24,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from monitor.access import refuse
 from monitor.pilot_channel import Allowance
 from monitor.settings import MonitorError
-from wire.operator_messages import MAX_LINE_BYTES, PageDemand, PageMessage
+from wire.operator_messages import MAX_LINE_BYTES, EndMessage, PageDemand, PageMessage
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
@@ -137,7 +137,7 @@ class OperatorDesk:
             writer.close()
             if is_open:
                 words = "the app has ended, or its connection is lost: use the remote control"
-                self._show_all(json.dumps({"kind": "end", "flight": "", "words": words, "lost": True}))
+                self._show_all(EndMessage(flight="", words=words, lost=True).model_dump_json())
 
     def _pass_on(self, line: bytes) -> bool:
         """Pass a flight's message on to its page or to all; True if it is its last one."""
