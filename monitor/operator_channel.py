@@ -11,9 +11,9 @@ import asyncio
 import contextlib
 import json
 import logging
-import os
-import stat
+import socket
 import time
+from errno import EADDRINUSE
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from monitor.access import refuse
 from monitor.pilot_channel import Allowance
 from monitor.settings import MonitorError
-from wire.operator_messages import MAX_LINE_BYTES, PageDemand, PageMessage
+from wire.operator_messages import MAX_LINE_BYTES, EndMessage, PageDemand, PageMessage
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
@@ -34,6 +34,7 @@ MAX_PAGES = 20
 BAD_MESSAGE_CODE, TOO_MANY_CODE = 4400, 4429
 _MAX_QUEUE = 100  # messages to a page; beats come five times a second
 _MAX_UNSENT_BYTES = 1 << 16
+_TRIAL_S = 1.0
 _NO_FLIGHT: dict[str, Any] = {"kind": "none"}
 
 logger = logging.getLogger(__name__)
@@ -77,13 +78,9 @@ class OperatorDesk:
         """
         path = self._path
         try:
-            if path.exists() and stat.S_ISSOCK(path.stat().st_mode):  # left by a monitor that was killed
-                path.unlink()
-            before = os.umask(0o177)
-            try:
-                server = await asyncio.start_unix_server(self._serve, str(path), limit=MAX_LINE_BYTES)
-            finally:
-                os.umask(before)
+            server = await asyncio.start_unix_server(
+                self._serve, sock=_listening_socket(path), limit=MAX_LINE_BYTES
+            )
         except OSError as error:
             raise MonitorError(
                 f"monitor: --operator-socket {path}: cannot be opened ({error.strerror or error}); "
@@ -130,17 +127,17 @@ class OperatorDesk:
             writer.close()
             return
         self._flight = writer
-        ended = False
+        is_open = False  # it has sent a message, and not its last one
         try:
             with contextlib.suppress(OSError, ValueError):
                 while line := await reader.readline():
-                    ended = self._pass_on(line) or ended
+                    is_open = not self._pass_on(line)
         finally:
             self._flight = None
             writer.close()
-            if not ended:
+            if is_open:
                 words = "the app has ended, or its connection is lost: use the remote control"
-                self._show_all(json.dumps({"kind": "end", "flight": "", "words": words, "lost": True}))
+                self._show_all(EndMessage(flight="", words=words, lost=True).model_dump_json())
 
     def _pass_on(self, line: bytes) -> bool:
         """Pass a flight's message on to its page or to all; True if it is its last one."""
@@ -162,6 +159,31 @@ class OperatorDesk:
     def _show_all(self, text: str) -> None:
         for page in self._pages.values():
             page.put(text)
+
+
+def _listening_socket(path: Path) -> socket.socket:
+    """A socket that only this user may open, in the place of one that a monitor left when it was killed.
+
+    Raises:
+        OSError: it cannot be opened there, or another monitor listens there.
+    """
+    if path.is_socket():
+        with socket.socket(socket.AF_UNIX) as trial:
+            trial.settimeout(_TRIAL_S)
+            try:
+                trial.connect(str(path))
+            except ConnectionRefusedError:
+                path.unlink()
+            else:
+                raise OSError(EADDRINUSE, "another monitor listens there")
+    listener = socket.socket(socket.AF_UNIX)
+    try:
+        listener.bind(str(path))
+        path.chmod(0o600)  # nobody can connect before it listens
+    except OSError:
+        listener.close()
+        raise
+    return listener
 
 
 def register(monitor: Monitor) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import re
+import socket
 from contextlib import asynccontextmanager, suppress
 
 import aiohttp
@@ -13,7 +14,7 @@ from errors import SettingError
 from framerunner.preflight.card import FlightCard, Section
 from framerunner.preflight.operator_link import OperatorLink
 from monitor.run import serve
-from monitor.settings import MonitorSettings
+from monitor.settings import MonitorError, MonitorSettings
 from offboard.safety.operator import Operator
 from tests.chromium import Complaints
 from tests.monitor.serving import StubFleet
@@ -234,6 +235,30 @@ async def test_a_stop_that_is_pressed_without_a_connection_is_sent_when_it_is_ba
             await until(lambda: operator.stops == 1)
 
 
+async def test_a_stop_is_sent_until_the_flight_has_it(tmp_path, open_window):
+    """The app's connection is lost with the stop in it; the page sends it again to the same flight only."""
+    operator = Operator()
+    async with monitor(tmp_path) as (url, _):
+        link = link_to(tmp_path, operator)
+        async with link:
+            window = await open_window(url)
+            await expect(window.head).to_have_text("Checks")
+            link._take = lambda line: None  # what the page sends is lost
+            await press(window, window.land, 0.0)
+            await expect(window.land).to_contain_text("being sent")
+            link._writer.close()
+            await expect(window.state).to_contain_text("its connection is lost: use the remote")
+            await expect(window.land).to_be_enabled()
+            del link._take
+            await until(lambda: operator.stops == 1)  # it has connected again
+            await expect(window.land).to_have_text(re.compile("^Landing"))
+        operator = Operator()
+        async with link_to(tmp_path, operator):
+            await expect(window.head).to_have_text("Checks")
+            await asyncio.sleep(0.5)
+            assert operator.stops == 0
+
+
 async def test_what_ended_a_flight_stays_on_the_page(tmp_path, open_window):
     async with monitor(tmp_path) as (url, _):
         window = await open_window(url)
@@ -274,15 +299,30 @@ async def test_a_viewer_operates_nothing_and_one_who_logged_in_does(tmp_path, op
 
 async def test_the_socket_is_this_users_alone_and_a_second_flight_is_refused(tmp_path):
     async with monitor(tmp_path), link_to(tmp_path, Operator()):
-        socket = tmp_path / "operator.sock"
-        assert socket.stat().st_mode & 0o077 == 0
-        reader, writer = await asyncio.open_unix_connection(str(socket))
+        path = tmp_path / "operator.sock"
+        assert path.stat().st_mode & 0o077 == 0
+        reader, writer = await asyncio.open_unix_connection(str(path))
         assert await reader.read() == b""
         writer.close()
-    assert not socket.exists()
+    assert not path.exists()
     with pytest.raises(SettingError, match="no monitor listens there"):
         async with link_to(tmp_path, Operator()):
             pass
+
+
+async def test_the_socket_of_a_monitor_that_runs_is_left_alone_and_one_that_was_killed_replaced(tmp_path):
+    path = tmp_path / "operator.sock"
+    async with monitor(tmp_path), link_to(tmp_path, Operator()) as link:
+        with pytest.raises(MonitorError, match="another monitor listens there"):
+            async with monitor(tmp_path) as (_, second):
+                await asyncio.wait({second})
+        assert path.is_socket()
+        assert link._writer is not None
+    with socket.socket(socket.AF_UNIX) as killed:
+        killed.bind(str(path))
+        killed.listen()
+    async with monitor(tmp_path), link_to(tmp_path, Operator()):
+        assert path.stat().st_mode & 0o077 == 0
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"what": "arm"}', '{"what": "go", "beat": 1e99}', "x" * 600])
