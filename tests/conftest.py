@@ -3,7 +3,7 @@ import signal
 
 import hypothesis
 
-# As in the program (framerunner/cli.py): threads of OpenBLAS take small matrices ten times the processor time.
+# As in framerunner/cli.py: with several threads small matrices take ten times the processor time.
 # It is read when numpy is imported, and inherited by programs that tests start.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 

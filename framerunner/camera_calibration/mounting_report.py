@@ -9,8 +9,9 @@ from pathlib import Path
 
 from framerunner.camera_calibration.calibration_file import save_calibration
 from framerunner.flying.plan import CAMERA_DELAY_S
+from geometry.rotations import MAX_MOUNTING_RAD
 from geometry.vectors import Vec3
-from vision.calibration.model import MAX_ANGLE_RAD, Calibration, CalibrationError, Mounting
+from vision.calibration.model import Calibration, CalibrationError, Mounting
 from vision.calibration.motion import Motion, MotionReport
 from vision.calibration.mounting import MountingFit, fit_mounting
 from vision.calibration.movement import (
@@ -88,10 +89,10 @@ def accepted_fit(search: MountingSearch) -> MountingFit:
             "calibration that of this camera, and is the drone's position that of its centre?"
         )
     largest_rad = max(map(abs, fit.values.angles_frd_rad))
-    if largest_rad > MAX_ANGLE_RAD:
+    if largest_rad > MAX_MOUNTING_RAD:
         raise CalibrationError(
             f"extrinsics: an angle of {degrees(largest_rad):.0f} degrees was found; a camera that looks "
-            f"ahead has {degrees(MAX_ANGLE_RAD):.0f} at most"
+            f"ahead has {degrees(MAX_MOUNTING_RAD):.0f} at most"
         )
     return fit
 

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from geometry.rotations import mounting_flu
 from geometry.vectors import Vec3
-from vision.calibration.motion import Bools, Floats, Motion, matrices
+from vision.calibration.motion import Bools, Floats, Motion, mounting_matrix
 from vision.types import Detections, FrameSighting
 
 Indices = npt.NDArray[np.intp]
@@ -161,7 +160,7 @@ def _differing(times_s: Floats, motion: Motion, delay_s: float) -> list[int]:
 def world_places(seen: Sightings, motion: Motion, by: Values) -> Floats:
     """Where sightings put their frames, by a mounting, shape (n, 3)."""
     times_s = seen.times_s - by.delay_s
-    turn = matrices(np.array([mounting_flu(by.angles_frd_rad)]))[0]
+    turn = mounting_matrix(by.angles_frd_rad)
     from_centre = np.array(by.position_flu_m) + seen.positions_flu_m @ turn.T
     places: Floats = motion.positions(times_s) + np.einsum(
         "nij,nj->ni", motion.rotations(times_s), from_centre
@@ -224,7 +223,7 @@ def _neighbours(places: Floats, within_m: float) -> Indices:
 
 def first_yaw(seen: Sightings, motion: Motion, by: Values) -> float:
     """The yaw of a frame's normal, up to half a turn, that most of its sightings allow, radians."""
-    turn = matrices(np.array([mounting_flu(by.angles_frd_rad)]))[0]
+    turn = mounting_matrix(by.angles_frd_rad)
     body = seen.normals_flu @ turn.T
     normals = np.einsum("nij,nkj->nki", motion.rotations(seen.times_s - by.delay_s), body)
     yaws = np.arctan2(normals[..., 1], normals[..., 0])
