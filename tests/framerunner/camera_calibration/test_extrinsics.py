@@ -37,13 +37,13 @@ states:
     during: [fly_to_goal]
     transitions: [{when: distance_to_goal_m < 0.15, to: here}]
   here:
-    enter: [cmd.rot_z = 0.5]
+    enter: [cmd.rot_z = 0.7]
     during: [fly_to_goal]
-    transitions: [{when: seconds_in_state > 13, to: there}]
+    transitions: [{when: seconds_in_state > 9.3, to: there}]
   there:
-    enter: [cmd.rot_z = 0.5, "goal_m = (memory.x0 + 1.4, memory.y0 + 1.2, memory.z0 + 1)"]
+    enter: [cmd.rot_z = 0.7, "goal_m = (memory.x0 + 1.4, memory.y0 + 1.2, memory.z0 + 1)"]
     during: [fly_to_goal]
-    transitions: [{when: seconds_in_state > 14, to: down}]
+    transitions: [{when: seconds_in_state > 10, to: down}]
   down:
     enter: [land]
     final: true
