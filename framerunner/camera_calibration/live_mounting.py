@@ -114,7 +114,7 @@ class Watched:
             self.images.append(self._detect(frame.image, time_us))
 
 
-async def rendering_scenario(camera_url: str) -> Scenario | None:
+async def _rendering_scenario(camera_url: str) -> Scenario | None:
     """The scenario whose images a URL serves, if it is that of a simulator or a virtual camera."""
     import aiohttp
     from pydantic import ValidationError
@@ -160,7 +160,7 @@ async def measure_live(
         LinkError: the link cannot be opened or has failed.
         DroneError: no vehicle is heard, or it has restarted.
     """
-    watched = Watched(calibration, await rendering_scenario(camera_url))
+    watched = Watched(calibration, await _rendering_scenario(camera_url))
     with closing(open_link(drone_url)) as link:
         reading = _Reading(link, watched)
         reader = asyncio.create_task(reading.run())

@@ -74,7 +74,7 @@ def search_mounting(
     return MountingSearch(fit, movement, missing_for(movement, fit))
 
 
-def accepted_fit(search: MountingSearch) -> MountingFit:
+def _accepted_fit(search: MountingSearch) -> MountingFit:
     """The mounting if it is known.
 
     Raises:
@@ -97,7 +97,7 @@ def accepted_fit(search: MountingSearch) -> MountingFit:
     return fit
 
 
-def tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) -> None:
+def _tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) -> None:
     """Say what was found and how exactly it is known."""
     movement, found, std = search.movement, fit.values, fit.std
     say(
@@ -120,7 +120,7 @@ def tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) -
         say("delay   not observable: yaw faster, at 30 degrees a second or more")
 
 
-def with_mounting(calibration: Calibration, fit: MountingFit, *, stamped: bool) -> Calibration:
+def _with_mounting(calibration: Calibration, fit: MountingFit, *, stamped: bool) -> Calibration:
     """The calibration with what was found; the delay is of images without time stamps."""
     found, std = fit.values, fit.std
     mounting = Mounting(
@@ -149,9 +149,9 @@ def finish(
         CalibrationError: the mounting is not known.
         SettingError: the file cannot be written.
     """
-    fit = accepted_fit(search)
-    tell(search, fit, say)
-    measured = with_mounting(calibration, fit, stamped=stamped)
+    fit = _accepted_fit(search)
+    _tell(search, fit, say)
+    measured = _with_mounting(calibration, fit, stamped=stamped)
     save_calibration(measured, path)
     if measured.delay_s is not None and not stamped:
         say(f"without --camera-delay, `fly` takes {measured.delay_s:.3f} s from the file")

@@ -157,7 +157,7 @@ def _differing(times_s: Floats, motion: Motion, delay_s: float) -> list[int]:
     return kept
 
 
-def world_places(seen: Sightings, motion: Motion, by: Values) -> Floats:
+def _world_places(seen: Sightings, motion: Motion, by: Values) -> Floats:
     """Where sightings put their frames, by a mounting, shape (n, 3)."""
     times_s = seen.times_s - by.delay_s
     turn = mounting_matrix(by.angles_frd_rad)
@@ -178,7 +178,7 @@ def first_mounting(seen: Sightings, motion: Motion, known: Values) -> Values:
             at = replace(known, angles_frd_rad=(0.0, pitch, yaw))
             together = 0.0
             for index in few:
-                places = world_places(seen.at(index), motion, at)
+                places = _world_places(seen.at(index), motion, at)
                 together += _neighbours(places, _SAME_PLACE_M).max() / len(seen)
             score = together - _ANGLE_COST * float(np.hypot(pitch, yaw))
             if score > best_score:
@@ -192,7 +192,7 @@ def frames_among(seen: Sightings, usable: Bools, motion: Motion, by: Values) -> 
     Returns:
         The number of its frame for each sighting, -1 if it is of none; where the frames are.
     """
-    places = world_places(seen, motion, by)
+    places = _world_places(seen, motion, by)
     numbers = np.full(len(seen), -1, np.intp)
     found: list[Vec3] = []
     for colour in np.unique(seen.colours):

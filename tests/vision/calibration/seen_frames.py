@@ -1,7 +1,7 @@
 """What a camera that is turned on a drone sees of frames while the drone flies, without painting images."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import cos, radians, sin
 
 import numpy as np
@@ -103,7 +103,3 @@ def sighting(
 
 def sightings(images: list[Detections], motion: Motion, delay_s: float = 0.0) -> Sightings:
     return sightings_of(images, motion, HALF_HEIGHT_PX, 0.0, delay_s)
-
-
-def with_delay(values: Values, delay_s: float) -> Values:
-    return replace(values, delay_s=delay_s)
