@@ -19,6 +19,7 @@ from offboard.safety.operator import Operator
 from tests.chromium import Complaints
 from tests.monitor.serving import StubFleet
 from tests.monitor.test_pilot_page import EQUIPMENT
+from tests.waiting import until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 PHONE = {"width": 390, "height": 844}
@@ -106,14 +107,6 @@ async def open_window(chromium):
     yield open_at
     for context in contexts:
         await context.close()
-
-
-async def until(condition, limit_s=20.0):
-    loop = asyncio.get_running_loop()
-    end_s = loop.time() + limit_s
-    while not condition():
-        assert loop.time() < end_s
-        await asyncio.sleep(0.02)
 
 
 async def press(window, button, seconds):
