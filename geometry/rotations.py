@@ -17,6 +17,9 @@ Rotation = tuple[float, float, float, float, float, float, float, float, float]
 body axes."""
 RotationRows = tuple[Vec3, Vec3, Vec3]
 
+MAX_MOUNTING_RAD = 0.8
+"""Of a camera's roll, pitch and yaw on the body: it looks ahead."""
+
 
 def rotation(attitude: Quaternion) -> Rotation:
     """The matrix of a unit quaternion, body to world."""

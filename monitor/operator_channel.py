@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import errno
 import json
 import logging
-import os
 import socket
 import time
+from errno import EADDRINUSE
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +24,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from monitor.access import refuse
 from monitor.pilot_channel import Allowance
 from monitor.settings import MonitorError
-from wire.operator_messages import MAX_LINE_BYTES, PageDemand, PageMessage
+from wire.operator_messages import MAX_LINE_BYTES, EndMessage, PageDemand, PageMessage
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
@@ -35,6 +34,7 @@ MAX_PAGES = 20
 BAD_MESSAGE_CODE, TOO_MANY_CODE = 4400, 4429
 _MAX_QUEUE = 100  # messages to a page; beats come five times a second
 _MAX_UNSENT_BYTES = 1 << 16
+_TRIAL_S = 1.0
 _NO_FLIGHT: dict[str, Any] = {"kind": "none"}
 
 logger = logging.getLogger(__name__)
@@ -78,17 +78,9 @@ class OperatorDesk:
         """
         path = self._path
         try:
-            if _is_listened_at(path):
-                raise MonitorError(
-                    f"monitor: --operator-socket {path}: another monitor listens there; end it, "
-                    "or give another path"
-                )
-            before = os.umask(0o177)
-            try:  # a socket that was left by a monitor that was killed is replaced
-                server = await asyncio.start_unix_server(self._serve, str(path), limit=MAX_LINE_BYTES)
-            finally:
-                os.umask(before)
-            own = path.stat().st_ino
+            server = await asyncio.start_unix_server(
+                self._serve, sock=_listening_socket(path), limit=MAX_LINE_BYTES
+            )
         except OSError as error:
             raise MonitorError(
                 f"monitor: --operator-socket {path}: cannot be opened ({error.strerror or error}); "
@@ -98,8 +90,7 @@ class OperatorDesk:
             await server.serve_forever()
         finally:
             with contextlib.suppress(OSError):
-                if path.stat().st_ino == own:
-                    path.unlink()
+                path.unlink()
 
     def enter(self, name: str) -> _Page | None:
         """Add a page of a person; None if there are too many."""
@@ -136,17 +127,17 @@ class OperatorDesk:
             writer.close()
             return
         self._flight = writer
-        ended = False
+        is_open = False  # it has sent a message, and not its last one
         try:
             with contextlib.suppress(OSError, ValueError, RecursionError):
                 while line := await reader.readline():
-                    ended = self._pass_on(line) or ended
+                    is_open = not self._pass_on(line)
         finally:
             self._flight = None
             writer.close()
-            if not ended:
+            if is_open:
                 words = "the app has ended, or its connection is lost: use the remote control"
-                self._show_all(json.dumps({"kind": "end", "flight": "", "words": words, "lost": True}))
+                self._show_all(EndMessage(flight="", words=words, lost=True).model_dump_json())
 
     def _pass_on(self, line: bytes) -> bool:
         """Pass a flight's message on to its page or to all; True if it is its last one."""
@@ -173,21 +164,29 @@ class OperatorDesk:
             page.put(text)
 
 
-def _is_listened_at(path: Path) -> bool:
-    """Whether a process listens at a local socket, which does not notice the question.
+def _listening_socket(path: Path) -> socket.socket:
+    """A socket that only this user may open, in the place of one that a monitor left when it was killed.
 
     Raises:
-        OSError: it is another user's.
+        OSError: it cannot be opened there, or another monitor listens there.
     """
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(str(path))
-        except (FileNotFoundError, ConnectionRefusedError):  # refused: its process has ended, or it is a file
-            return False
-        except OSError as error:
-            if error.errno != errno.EPROTOTYPE:  # somebody listens, for streams
-                raise
-    return True
+    if path.is_socket():
+        with socket.socket(socket.AF_UNIX) as trial:
+            trial.settimeout(_TRIAL_S)
+            try:
+                trial.connect(str(path))
+            except ConnectionRefusedError:
+                path.unlink()
+            else:
+                raise OSError(EADDRINUSE, "another monitor listens there")
+    listener = socket.socket(socket.AF_UNIX)
+    try:
+        listener.bind(str(path))
+        path.chmod(0o600)  # nobody can connect before it listens
+    except OSError:
+        listener.close()
+        raise
+    return listener
 
 
 def register(monitor: Monitor) -> None:

@@ -14,6 +14,8 @@ from offboard.safety.rules import SafetyRules
 ATTEND_US = 120_000_000  # vehicle time for which an operator may stop the motors after an abort
 LINK_LOSSES = 10  # a second each, after which the drone is not watched any more
 KILL_ATTEMPTS = 3  # a link may lose the request or its answer
+LAND_ATTEMPTS = 5  # likewise
+LAND_AGAIN_S = 2.0  # vehicle time for which a drone holds whose landing has failed
 logger = logging.getLogger(__name__)
 
 
@@ -32,7 +34,8 @@ class FlightAbort:
         self._see = see
         self._end_us: int | None = None  # vehicle time until which the drone is watched
         self._armed = True  # when it was seen last
-        self._holds = False
+        self._landings = 0  # that were requested
+        self._hold_s: float | None = None  # for which it holds, then lands; None: it does not hold
         self._held_mode = ""  # in which it was first seen after hold was requested
         self._hold_end_us: int | None = None
 
@@ -41,7 +44,7 @@ class FlightAbort:
 
         An operator's first stop lands whatever the rules say, the second one stops the motors. With an
         operator this returns when the drone is disarmed, when the link stays lost, or after `ATTEND_US`, and
-        a drone that holds lands after the rules' time.
+        a drone that holds lands after the rules' time. A landing that fails is requested again.
 
         Returns:
             What is to be told beside the reason of the abort; empty if nothing.
@@ -64,35 +67,45 @@ class FlightAbort:
         return await self._kill()
 
     async def _end_and_attend(self) -> str:
-        problem = await self._end()
-        if not await self._attend():
+        problem, held_s = await self._end(), None
+        while await self._attend():
+            held_s = self._hold_s
+            logger.warning("held for %g s; it lands now", held_s)
+            self._end_us = None
+            # It is still in the hold that was requested here; a pilot's mode is left alone.
+            problem = await self._land(demanded=True) or problem
+        if held_s is None or self._armed:  # a pilot may have it
             return problem
-        hold_s = self._safety.hold_s
-        logger.warning("held for %g s; it lands now", hold_s)
-        self._hold_end_us, self._end_us = None, None
-        self._show("landing")
-        try:
-            await self._drone.land_now(demanded=True)  # it is still in the hold that was requested here
-        except DroneError as error:
-            problem = f"land after {hold_s:g} s of hold: {error}"
-        await self._attend()
-        landed = "" if self._armed else f"it held for {hold_s:g} s, then landed"  # a pilot may have it
-        return problem or landed
+        return f"{problem}; it landed later" if problem else f"it held for {held_s:g} s, then landed"
 
     async def _end(self) -> str:
         operator, abort = self._safety.operator, self._safety.abort
         demanded = operator is not None and operator.stops > 0
-        holds = abort == "hold" and not demanded
-        self._holds = holds and operator is not None
-        self._show("holding" if holds else "landing")
+        if abort == "land" or demanded:
+            return await self._land(demanded=demanded)
+        self._show("holding")
+        self._hold_for(self._safety.hold_s)
         try:
-            if abort == "land" or demanded:
-                await self._drone.land_now(demanded=demanded)
-            else:
-                await self._drone.hold()
+            await self._drone.hold()
         except DroneError as error:
-            return f"{'land' if demanded else abort}: {error}"
+            return f"hold: {error}"
         return ""
+
+    async def _land(self, *, demanded: bool) -> str:
+        """Request a landing; the drone holds for a while if that fails, then it is requested again."""
+        self._show("landing")
+        self._hold_for(None)
+        self._landings += 1
+        try:
+            await self._drone.land_now(demanded=demanded)
+        except DroneError as error:
+            if self._landings < LAND_ATTEMPTS:
+                self._hold_for(LAND_AGAIN_S)
+            return f"land: {error}"
+        return ""
+
+    def _hold_for(self, seconds: float | None) -> None:
+        self._hold_s, self._hold_end_us = seconds, None
 
     def _show(self, phase: Phase) -> None:
         if self._safety.operator is not None:
@@ -116,15 +129,15 @@ class FlightAbort:
             async for state in ticks:
                 if self._end_us is None:
                     self._end_us = state.time_us + ATTEND_US
-                if self._holds and self._hold_end_us is None:
+                if self._hold_s is not None and self._hold_end_us is None:
                     self._held_mode = state.mode
-                    self._hold_end_us = state.time_us + round(self._safety.hold_s * 1e6)
+                    self._hold_end_us = state.time_us + round(self._hold_s * 1e6)
                 self._armed = state.armed
                 if not state.armed or state.time_us > self._end_us:
                     return False
                 # A failsafe or a pilot who has taken it keeps it.
-                if self._holds and state.mode == self._held_mode and state.time_us > (self._hold_end_us or 0):
-                    self._holds = False
+                ends_us = self._hold_end_us
+                if ends_us is not None and state.mode == self._held_mode and state.time_us > ends_us:
                     return True
                 self._see(state)
         finally:

@@ -479,10 +479,10 @@ class MavsdkDrone:
 
     async def _until(self, condition: Callable[[], bool], limit_s: float) -> None:
         """Wait for a condition; the limit is vehicle time if that waits for the app, else wall time."""
-        waits, limit_us = self._ticks.waits, self._feed.time_us + round(limit_s * 1e6)
+        waits, limit_us = self._ticks.waits, self._ticks.time_us + round(limit_s * 1e6)
         async with asyncio.timeout(None if waits else limit_s):
             while not condition():
-                if waits and self._feed.time_us > limit_us:
+                if waits and self._ticks.time_us > limit_us:
                     raise TimeoutError
                 await self._ticks.next(0.05)
 

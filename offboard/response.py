@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.vectors import Vec3
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, ResponsePrior, VelocityCommand
 from offboard.second_lag import LAG_S as OWN_LAG_S
 from offboard.second_lag import SecondLag
 from offboard.slow_share import SlowShare
@@ -121,26 +121,24 @@ class Prediction:
 class ResponseEstimate:
     """Estimates the response of the vehicle that is flown; call `update` once a tick.
 
-    Args:
-        late: the vehicle is known to answer late, though not how late.
-
     Attributes:
         response: as known now.
     """
 
-    def __init__(self, *, late: bool = False) -> None:
-        self._chosen = list(_EXPECTED_LATE if late else _EXPECTED)
-        self._turning = not late
+    def __init__(self) -> None:
+        self._prior = ResponsePrior.OWN  # until the first state
+        self._stays_late = False  # whatever the evidence: its loops cannot be inverted
+        self._chosen = list(_EXPECTED)
+        self._turning = True
         shape = (len(DEAD_STEPS), len(LAGS_S), len(_GROUPS))
         self._errors = np.zeros(shape)
         self._energies = np.zeros(len(_GROUPS))
         self._late_choices = 0  # in a row
-        self._loops_known = True
         self._others_before: tuple[object, ...] = (None, None, 1.0)  # what was chosen of the other models
         self._second = SecondLag(shape[:2], STEP_S, _WINDOW)
         self._slow = SlowShare(shape[:2], STEP_S, _WINDOW)
         self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])[:, None]
-        self.response = self._as_response() if late else Response()
+        self.response = Response()
         self._restart()
 
     def _restart(self) -> None:
@@ -156,6 +154,13 @@ class ResponseEstimate:
         self._disturbance = [0.0, 0.0, 0.0]  # arena axes, m/s
         self._disturbance_rate = [0.0, 0.0, 0.0]
 
+    def _begin_with(self, prior: ResponsePrior) -> None:
+        """Expect what is known of the vehicle before there is evidence."""
+        self._prior = prior
+        if prior is ResponsePrior.LATE:
+            self._chosen, self._turning = list(_EXPECTED_LATE), False
+            self.response = self._as_response()
+
     def update(self, state: DroneState, sent: VelocityCommand | None) -> None:
         """Add a tick.
 
@@ -163,8 +168,10 @@ class ResponseEstimate:
             state: of the drone now.
             sent: the command that it has had since the last tick; None if it had none, or it is not known.
         """
-        if not state.loops_known and not self.response.late:
-            self._loops_known, self.response = False, self._as_response()
+        if state.response_prior is not self._prior:
+            self._begin_with(state.response_prior)
+        if self._prior is not ResponsePrior.OWN and not self.response.late:
+            self._stays_late, self.response = True, self._as_response()
         now_s = state.time_us * 1e-6
         if sent is None or self._last_s is None or not 0.0 <= now_s - self._last_s <= _MAX_STEPS * STEP_S:
             self._restart()
@@ -251,7 +258,7 @@ class ResponseEstimate:
         seems_late = self._seems_late(errors)
         self._late_choices = self._late_choices + 1 if seems_late else 0
         is_late = seems_late and (self.response.late or self._late_choices >= _SURE)
-        is_late = is_late or not self._loops_known
+        is_late = is_late or self._stays_late
         if is_late != self.response.late or (self._turning, self._others_before, *self._chosen) != before:
             self.response = self._as_response() if is_late else Response()
 

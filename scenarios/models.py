@@ -12,7 +12,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, mod
 
 from errors import UserError
 from geometry.axes import flip_quaternion
-from geometry.rotations import quaternion_from_euler
+from geometry.rotations import MAX_MOUNTING_RAD, quaternion_from_euler
 from geometry.solids import Solid
 from geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.air import Wind
@@ -212,10 +212,6 @@ def _standing(name: str, place_m: tuple[float, float], yaw_rad: float, size_m: V
     """A box on the floor."""
     length_m, width_m, height_m = size_m
     return Solid(name, (*place_m, height_m / 2), yaw_rad, (length_m / 2, width_m / 2, height_m / 2))
-
-
-MAX_MOUNTING_RAD = 0.8
-"""Of a camera's roll, pitch and yaw on the drone: it looks ahead."""
 
 
 class Camera(Part):

@@ -84,6 +84,9 @@ class SimulatedVehicle(ABC):
         truth: the true state now.
     """
 
+    autopilot_name = ""  # of a genuine autopilot; empty: our own flies
+    has_transmitter = False  # a pilot's remote control, which can fail
+
     def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
         self.scenario, self.seed = scenario, seed
         airframe = airframe or load_airframe(scenario.airframe)
@@ -96,7 +99,13 @@ class SimulatedVehicle(ABC):
         self.referee = Referee(scenario, airframe.envelope_m)
         self.battery = Battery(airframe, self.parameters)
         self.faults = Faults(
-            scenario.faults, suite, self.world, self.battery, seed, has_transmitter=self.has_transmitter
+            scenario.faults,
+            suite,
+            self.world,
+            self.battery,
+            seed,
+            autopilot=self.autopilot_name,
+            has_transmitter=self.has_transmitter,
         )
         settings = scenario.camera.gimbal
         self.gimbal = None if settings is None else SimulatedGimbal(settings)
@@ -106,9 +115,6 @@ class SimulatedVehicle(ABC):
         if self.gimbal is not None:
             self._turn_camera(self.gimbal)
         self.referee.update(self.truth)
-
-    autopilot_name = ""  # of a genuine autopilot; empty: our own flies
-    has_transmitter = False  # a pilot's remote control, which can fail
 
     @property
     @abstractmethod

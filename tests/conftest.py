@@ -1,6 +1,11 @@
+import os
 import signal
 
 import hypothesis
+
+# As in framerunner/cli.py: with several threads small matrices take ten times the processor time.
+# It is read when numpy is imported, and inherited by programs that tests start.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def pytest_configure():

@@ -124,8 +124,15 @@ class AnswerMessage(_Message):
 
 
 class EndMessage(_Message):
-    """The flight has ended; the pages keep what they show."""
+    """The flight has ended; the pages keep what they show.
+
+    Attributes:
+        flight: that has ended; empty: the one that is shown.
+        words: how it ended.
+        lost: its connection is lost, as the monitor says; it may go on, and connect again.
+    """
 
     kind: Literal["end"] = "end"
     flight: str
     words: str
+    lost: bool = False

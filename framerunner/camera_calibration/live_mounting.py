@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 from framerunner.camera_calibration.mounting_report import MountingSearch, search_mounting
 from framerunner.preflight.session import open_link
-from geometry.vectors import Quaternion, Vec3
+from geometry.axes import flip_quaternion, flip_vector
+from geometry.vectors import Vec3
 from offboard.drone import DroneError
 from offboard.link.telemetry import least_lag
 from vision.calibration.motion import MotionReport
@@ -56,7 +57,7 @@ class Watched:
         scenario: of the simulator that renders the images; None: they are a real camera's.
 
     Attributes:
-        reports: the drone's states.
+        reports: the drone's states, axes north, west, up.
         images: what was seen.
         stamped: whether the images have times of their own.
         vehicle: MAVLink id; None until it is heard.
@@ -95,9 +96,9 @@ class Watched:
                     MotionReport(
                         attitude.time_us,
                         position.time_us,
-                        _upright(position.position_ned_m),
-                        _upright(position.velocity_ned_m_s),
-                        _upright_attitude(attitude.attitude_ned),
+                        flip_vector(position.position_ned_m),
+                        flip_vector(position.velocity_ned_m_s),
+                        flip_quaternion(attitude.attitude_ned),
                     )
                 )
         if telemetry.restarts:
@@ -113,19 +114,7 @@ class Watched:
             self.images.append(self._detect(frame.image, time_us))
 
 
-def _upright(vector_ned: Vec3) -> Vec3:
-    """North, west, up."""
-    north, east, down = vector_ned
-    return (north, -east, -down)
-
-
-def _upright_attitude(attitude_ned: Quaternion) -> Quaternion:
-    """From forward, left, up to north, west, up: both axes are turned by half a turn about the first."""
-    w, x, y, z = attitude_ned
-    return (w, x, -y, -z)
-
-
-async def rendering_scenario(camera_url: str) -> Scenario | None:
+async def _rendering_scenario(camera_url: str) -> Scenario | None:
     """The scenario whose images a URL serves, if it is that of a simulator or a virtual camera."""
     import aiohttp
     from pydantic import ValidationError
@@ -171,7 +160,7 @@ async def measure_live(
         LinkError: the link cannot be opened or has failed.
         DroneError: no vehicle is heard, or it has restarted.
     """
-    watched = Watched(calibration, await rendering_scenario(camera_url))
+    watched = Watched(calibration, await _rendering_scenario(camera_url))
     with closing(open_link(drone_url)) as link:
         reading = _Reading(link, watched)
         reader = asyncio.create_task(reading.run())

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from framerunner.camera_calibration.calibration_file import save_calibration
 from framerunner.flying.plan import CAMERA_DELAY_S
+from geometry.rotations import MAX_MOUNTING_RAD
 from geometry.vectors import Vec3
-from vision.calibration.model import MAX_ANGLE_RAD, Calibration, CalibrationError, Mounting
+from vision.calibration.model import Calibration, CalibrationError, Mounting
 from vision.calibration.motion import Motion, MotionReport
 from vision.calibration.mounting import MountingFit, fit_mounting
 from vision.calibration.movement import (
@@ -73,7 +74,7 @@ def search_mounting(
     return MountingSearch(fit, movement, missing_for(movement, fit))
 
 
-def accepted_fit(search: MountingSearch) -> MountingFit:
+def _accepted_fit(search: MountingSearch) -> MountingFit:
     """The mounting if it is known.
 
     Raises:
@@ -88,15 +89,15 @@ def accepted_fit(search: MountingSearch) -> MountingFit:
             "calibration that of this camera, and is the drone's position that of its centre?"
         )
     largest_rad = max(map(abs, fit.values.angles_frd_rad))
-    if largest_rad > MAX_ANGLE_RAD:
+    if largest_rad > MAX_MOUNTING_RAD:
         raise CalibrationError(
             f"extrinsics: an angle of {degrees(largest_rad):.0f} degrees was found; a camera that looks "
-            f"ahead has {degrees(MAX_ANGLE_RAD):.0f} at most"
+            f"ahead has {degrees(MAX_MOUNTING_RAD):.0f} at most"
         )
     return fit
 
 
-def tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) -> None:
+def _tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) -> None:
     """Say what was found and how exactly it is known."""
     movement, found, std = search.movement, fit.values, fit.std
     say(
@@ -119,7 +120,7 @@ def tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) -
         say("delay   not observable: yaw faster, at 30 degrees a second or more")
 
 
-def with_mounting(calibration: Calibration, fit: MountingFit, *, stamped: bool) -> Calibration:
+def _with_mounting(calibration: Calibration, fit: MountingFit, *, stamped: bool) -> Calibration:
     """The calibration with what was found; the delay is of images without time stamps."""
     found, std = fit.values, fit.std
     mounting = Mounting(
@@ -148,9 +149,9 @@ def finish(
         CalibrationError: the mounting is not known.
         SettingError: the file cannot be written.
     """
-    fit = accepted_fit(search)
-    tell(search, fit, say)
-    measured = with_mounting(calibration, fit, stamped=stamped)
+    fit = _accepted_fit(search)
+    _tell(search, fit, say)
+    measured = _with_mounting(calibration, fit, stamped=stamped)
     save_calibration(measured, path)
     if measured.delay_s is not None and not stamped:
         say(f"without --camera-delay, `fly` takes {measured.delay_s:.3f} s from the file")

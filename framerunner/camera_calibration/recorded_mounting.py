@@ -65,7 +65,7 @@ def measure_recorded(
                 if isinstance(event, RecordedImage):
                     images.append(detect(event.image, event.time_us))
                 elif isinstance(event, Moment):
-                    reports += [report_of(state) for state in (*event.state.missed, event.state)]
+                    reports += [_report_of(state) for state in (*event.state.missed, event.state)]
     place_m = place_of(known, position_flu_m, scenario)
     with Console(stderr=True).status("fitting"):
         search = search_mounting(images, reports, known, place_m, stamped=simulated)
@@ -86,7 +86,7 @@ def place_of(calibration: Calibration, given_m: Vec3 | None, scenario: Scenario 
     return Camera().position_flu_m
 
 
-def report_of(state: DroneState) -> MotionReport:
+def _report_of(state: DroneState) -> MotionReport:
     """A tick's state."""
     position_us = state.time_us - round(state.position_age_s * 1e6)
     place_m = (state.x, state.y, state.z)

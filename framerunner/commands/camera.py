@@ -235,10 +235,10 @@ def extrinsics(
 ) -> int:
     """Measure how the camera is mounted on the drone: roll, pitch, yaw, place, and the delay of its images.
 
-    Frames are seen while the drone yaws and moves by a metre. Neither the frames' places nor the camera's
-    angles need be known; the drone's position must be, as for a flight. From a live drone, which an operator
-    flies or carries, it is said what movement is missing; nothing is armed or commanded. The angles are
-    refused if they are uncertain by more than 0.3 degrees.
+    This is extrinsic (hand-eye) calibration by bundle adjustment. Frames are seen while the drone yaws and
+    moves by a metre. Neither the frames' places nor the camera's angles need be known; the drone's position
+    must be, as for a flight. From a live drone, which an operator flies or carries, it is said what movement
+    is missing; nothing is commanded. Angles are refused if they are uncertain by more than 0.3 degrees.
 
     **Examples**
 

@@ -95,11 +95,11 @@ def evaluate(
     _check(scenarios, level, count, seed)
     use = _px4_use(px4, speed, jobs, response=response, backend=backend)
 
-    from framerunner.evaluation import evaluate as module
+    from framerunner.evaluation import evaluate as evaluation
 
     drawn = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
     plan = _flown_by(drawn, response, use)
-    settings = module.EvaluationSettings(
+    settings = evaluation.EvaluationSettings(
         plan=plan,
         pool=_pool(backend, jobs, address, use),
         out=plan.default_out if out is None else out,
@@ -110,7 +110,7 @@ def evaluate(
         command=_command(scenarios, given),
         px4=use,
     )
-    return module.evaluate(settings)
+    return evaluation.evaluate(settings)
 
 
 def _flown_by(plan: Plan, response: str | None, use: Px4Use | None) -> Plan:

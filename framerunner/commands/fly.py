@@ -199,9 +199,10 @@ def _scenario(
     scenario = with_faults(with_sensors(loaded, sensors), fault)
     failing = next((each for each in scenario.faults if each.part == "link"), None)
     if failing is not None and starts and not lockstep:
+        advice = "add --lockstep, or start framerunner sim and fly it with --drone"
         raise SettingError(
             f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
-            "add --lockstep, or start framerunner sim and fly it with --drone"
+            f"{advice if autopilot is None else 'leave it out'}"
         )
     return scenario if autopilot is None else for_genuine(autopilot.title, scenario)
 

@@ -15,6 +15,7 @@ from framerunner.commands import Faults, Sensors, WholeNumber, check_range, say,
 from framerunner.commands.ardupilot import ardupilot_server
 from framerunner.commands.px4 import px4_server
 from framerunner.extras import install_advice, is_installed
+from sitl.autopilots import TITLES
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
@@ -122,15 +123,14 @@ class FlownBy:
         Raises:
             SettingError: one of them is given.
         """
-        for name, title, folder in (("px4", "PX4", self.px4), ("ardupilot", "ArduPilot", self.ardupilot)):
+        for name, folder in (("px4", self.px4), ("ardupilot", self.ardupilot)):
             if folder is not None and name != self.autopilot:
-                raise SettingError(f"--{name} {folder}: is for {title}; add --autopilot {name}")
+                raise SettingError(f"--{name} {folder}: is for {TITLES[name]}; add --autopilot {name}")
         if self.transmitter is not None and self.autopilot != "px4":
             raise SettingError(f"--transmitter {self.transmitter}: is for PX4; add --autopilot px4")
         if self.autopilot == "own":
             return
-        name = {"px4": "PX4", "ardupilot": "ArduPilot"}[self.autopilot]
-        plain, sends_itself = Connections(), self.autopilot == "px4"
+        name, plain, sends_itself = TITLES[self.autopilot], Connections(), self.autopilot == "px4"
         refused = [
             (
                 "--onboard-remote",

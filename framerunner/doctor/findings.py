@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
-from functools import partial
 
 
 class Level(Enum):
@@ -26,7 +25,4 @@ class Finding:
     advice: str = ""
 
 
-good = partial(Finding, Level.GOOD)
-note = partial(Finding, Level.NOTE)
-missing = partial(Finding, Level.MISSING)
 Findings = Iterator[Finding]

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import fcntl
+import os
 import signal
-import socket
 import threading
 from collections.abc import Coroutine, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from types import FrameType
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 from errors import SettingError
 from framerunner.flying.fly import FinishedFlight
@@ -26,6 +26,8 @@ from framerunner.runs.run_folder import RunFolder
 from sitl.px4.link import FIRST_PORT
 from sitl.px4.side_link import CAMERA_PORT
 from sitl.server_settings import VIDEO_PORT
+from wire.transports.sockets import bind_udp, listen_tcp
+from wire.transports.urls import LinkError
 
 T = TypeVar("T")
 
@@ -90,8 +92,8 @@ def claimed_instance() -> Iterator[int]:
     """
     for instance in range(INSTANCES):
         try:
-            lock = (Path(gettempdir()) / f"framerunner-px4-{instance}.lock").open("w")
-        except OSError:  # another user's
+            lock = _open_lock(Path(gettempdir()) / f"framerunner-px4-{instance}.lock")
+        except OSError:  # its name is taken by something else
             continue
         with lock:
             try:
@@ -106,18 +108,25 @@ def claimed_instance() -> Iterator[int]:
     )
 
 
+def _open_lock(path: Path) -> BinaryIO:
+    """Open a file that every user can lock, in a folder where others may have put a file or a link before.
+
+    It is opened for reading, and made only where there is nothing, so no other file is changed.
+    """
+    with suppress(FileExistsError):
+        made = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_EXCL)
+        with os.fdopen(made, "rb"):
+            os.fchmod(made, 0o644)
+    return os.fdopen(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb")
+
+
 def _is_free(instance: int) -> bool:
-    ports = [(socket.SOCK_STREAM, port) for port in _TCP_PORTS]
-    ports += [(socket.SOCK_DGRAM, port) for port in _UDP_PORTS]
-    return all(_can_bind(kind, port + instance) for kind, port in ports)
-
-
-def _can_bind(kind: socket.SocketKind, port: int) -> bool:
-    with socket.socket(socket.AF_INET, kind) as tried:
-        if kind == socket.SOCK_STREAM:
-            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            tried.bind(("127.0.0.1", port))
-        except OSError:
-            return False
+    """Whether no program has one of its ports."""
+    try:
+        for port in _TCP_PORTS:
+            listen_tcp(("127.0.0.1", port + instance)).close()
+        for port in _UDP_PORTS:
+            bind_udp(("127.0.0.1", port + instance), "").close()
+    except LinkError:
+        return False
     return True

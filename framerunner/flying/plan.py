@@ -43,7 +43,6 @@ class FlightPlan:
         response: how late the simulated vehicle of a lockstep flight answers; None: as its autopilot does.
         calibration: of the camera; None: it is the scenario's.
         caps: on the speed and the height of the drone, whatever the mission asks; None: there are none.
-        answers_late: the drone is known to follow velocities later than framerunner's own autopilot.
     """
 
     scenario: Scenario
@@ -54,7 +53,6 @@ class FlightPlan:
     response: Response | None = None
     calibration: Calibration | None = None
     caps: Caps | None = None
-    answers_late: bool = False
 
     @property
     def chart(self) -> Mission:
@@ -100,11 +98,10 @@ class FlightPlan:
         """What a navigator knows before the flight: all but the layout."""
         layout, envelope_m, camera = self.layout, self.airframe.envelope_m, self.camera
         if not layout.frames:
-            return Surroundings(layout.arena, layout.base, camera, envelope_m, answers_late=self.answers_late)
+            return Surroundings(layout.arena, layout.base, camera, envelope_m)
         frame = layout.frames[0]  # all are of one size, which the rules tell
         size_m = (frame.outer_width_m, frame.outer_height_m)
-        known = (layout.arena, layout.base, camera, envelope_m, size_m, frame.bar_m)
-        return Surroundings(*known, answers_late=self.answers_late)
+        return Surroundings(layout.arena, layout.base, camera, envelope_m, size_m, frame.bar_m)
 
     @property
     def camera(self) -> Camera:

@@ -48,11 +48,6 @@ class RealTimeSettings:
     monitor_socket: Path | None = None  # of the monitor that was started here
     unattended: bool = False  # one of many flights: nothing is shown, and there is no video
 
-    @property
-    def answers_late(self) -> bool:
-        """Whether the drone is known to follow velocities later than framerunner's own autopilot."""
-        return self.autopilot is not None and self.autopilot.name == "px4"
-
 
 @dataclass(frozen=True, slots=True)
 class _Endpoints:
@@ -98,7 +93,6 @@ async def fly_in_real_time(
         session = await stack.enter_async_context(aiohttp.ClientSession())
         vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
         judge, plan = await choose_judge(plan, vehicle.api, session, named=settings.simulator is not None)
-        plan = replace(plan, answers_late=settings.answers_late)
         plan, safety, system_id = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)

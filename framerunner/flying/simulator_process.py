@@ -17,6 +17,7 @@ from framerunner.child_process import ChildProcess
 from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate, single
 from offboard.drone import DroneError, VelocityCommand
 from offboard.perception import CameraPerception
+from sitl.autopilots import TITLES
 from sitl.server_settings import VIDEO_PORT
 from sitl.time_grants import FREE_US, Grant, Held, Velocity
 from sitl.world import CONTROL_PERIOD_US
@@ -46,7 +47,7 @@ class GenuineAutopilot:
     @property
     def title(self) -> str:
         """For people."""
-        return {"px4": "PX4", "ardupilot": "ArduPilot"}[self.name]
+        return TITLES[self.name]
 
 
 class SitlProcess(ChildProcess):

@@ -125,6 +125,8 @@ class OperatorLink:
                 while line := await reader.readline():
                     self._take(line)
             self._pages.lose_all()
+            if self._writer is not None:  # the monitor serves one connection at a time
+                self._writer.close()
             self._writer = None
             logger.warning("the monitor with the operator's page is lost; trying again")
             while self._writer is None:

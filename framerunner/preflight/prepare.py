@@ -44,6 +44,8 @@ def _check_urls(drone_url: str, camera_url: str | None) -> None:
 async def own_simulator_id(drone_url: str, camera_url: str | None) -> int | None:
     """The MAVLink id of the vehicle on a link if it says that it is framerunner's simulated drone, else None.
 
+    None, too, if another vehicle on the link has the same id: what is sent to one would move both.
+
     Args:
         drone_url: of the vehicle.
         camera_url: of its camera; checked first, as far as that goes without opening it.
@@ -59,7 +61,7 @@ async def own_simulator_id(drone_url: str, camera_url: str | None) -> int | None
     def ask() -> int | None:
         with closing(open_link(drone_url)) as link:
             session = VehicleSession(link, cancelled)
-            return session.system_id if session.is_own_simulator else None
+            return session.system_id if session.is_own_simulator and session.is_alone() else None
 
     try:
         return await asyncio.to_thread(ask)

@@ -28,6 +28,7 @@ TIME_REQUESTS = 20
 _TIME_PERIOD_S = 0.05
 _LAST_ANSWER_S = 0.5
 _HEARTBEAT_S = 1.0
+_HEARTBEATS_S = 1.2  # in which each vehicle sends one
 _AUTOPILOTS = {mavlink.MAV_AUTOPILOT_PX4: "px4", mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot"}
 
 T = TypeVar("T")
@@ -88,6 +89,12 @@ class VehicleSession:
         """The unique number of its hardware, as AUTOPILOT_VERSION gives it; empty if it gives none."""
         version = self._version()
         return "" if version is None else vehicle_uid(version)
+
+    def is_alone(self) -> bool:
+        """Whether no other vehicle with the same id is heard until each has sent a heartbeat."""
+        self.wait(lambda _: None, _HEARTBEATS_S)
+        addresses = self._link.addresses(self.system_id, AUTOPILOT_COMPONENT_ID)
+        return len(addresses) <= 1 and not self.record.senders.problem
 
     def _version(self) -> Message | None:
         request = request_message(self.system_id, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)

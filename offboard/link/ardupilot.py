@@ -24,7 +24,7 @@ from typing import Any
 
 from mavsdk.asyncio import MavsdkError
 
-from offboard.drone import VelocityCommand
+from offboard.drone import ResponsePrior, VelocityCommand
 from offboard.link.dialect import ModeNames
 from offboard.link.direct import DirectMessages
 from offboard.link.telemetry import TelemetryFeed
@@ -58,7 +58,7 @@ class ArduPilotDialect:
 
     modes = ARDUPILOT_MODES
     numbered_modes = ardupilot_modes.NAMES
-    loops_known = False
+    response_prior = ResponsePrior.UNKNOWN
     checks_in_offboard = True
     exchange = None
     ready_limit_s = 90.0  # its estimator uses GPS some 40 s after its start

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 
-from offboard.drone import VelocityCommand
+from offboard.drone import ResponsePrior, VelocityCommand
 from offboard.link.commands import SetpointStream, synchronous
 
 
@@ -53,7 +53,7 @@ class Dialect(Protocol):
         numbered_modes: names by HEARTBEAT.custom_mode; empty: MAVSDK's names are used.
         ended: no setpoint is sent any more.
         ready_limit_s: wall time until it can be armed, usually.
-        loops_known: it may be this project's autopilot, which presents itself as PX4.
+        response_prior: how it follows velocities, as far as is known before the flight.
         checks_in_offboard: its pre-arm checks are those of its mode, so it must enter offboard to be ready.
         exchange: of a vehicle whose time waits for this app; None: its time goes on.
     """
@@ -61,7 +61,7 @@ class Dialect(Protocol):
     modes: ModeNames
     numbered_modes: Mapping[int, str]
     ended: bool
-    loops_known: bool
+    response_prior: ResponsePrior
     checks_in_offboard: bool
     ready_limit_s: float
 
@@ -114,7 +114,7 @@ class Px4Dialect(SetpointStream):
 
     modes = PX4_MODES
     numbered_modes: Mapping[int, str] = MappingProxyType({})
-    loops_known = True
+    response_prior = ResponsePrior.OWN  # framerunner's own autopilot presents itself as PX4
     checks_in_offboard = False
     ready_limit_s = 30.0
     exchange = None

@@ -14,7 +14,7 @@ from collections.abc import Awaitable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from offboard.drone import DroneError, VelocityCommand
+from offboard.drone import DroneError, ResponsePrior, VelocityCommand
 from offboard.link.commands import synchronous
 from offboard.link.dialect import PX4_MODES, TickExchange
 from offboard.link.direct import CommandRefusedError, DirectMessages
@@ -75,7 +75,7 @@ class SteppedPx4Dialect:
 
     modes = PX4_MODES
     numbered_modes: Mapping[int, str] = MappingProxyType({})
-    loops_known = False
+    response_prior = ResponsePrior.LATE
     checks_in_offboard = False
     ready_limit_s = 30.0
 
@@ -142,14 +142,13 @@ class SteppedPx4Dialect:
 
     def request_hold_blocking(self) -> None:
         """The same from a thread, which waits for the answer."""
-        self._command, mode = None, px4_modes.HOLD
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(mode.main), float(mode.sub))
+        self._command = None
+        self._messages.command(*_mode_command(px4_modes.HOLD))
 
     def request_land_blocking(self) -> None:
         """End the setpoints permanently and request landing, from a thread, which waits for the answer."""
         self.end()
-        mode = px4_modes.LAND
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(mode.main), float(mode.sub))
+        self._messages.command(*_mode_command(px4_modes.LAND))
 
     def arm(self) -> Awaitable[None]:
         """Arm."""
@@ -170,7 +169,7 @@ class SteppedPx4Dialect:
         self.ended, self._command = True, None
 
     def _set_mode(self, mode: Px4Mode) -> Awaitable[None]:
-        return self._request(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(mode.main), float(mode.sub))
+        return self._request(*_mode_command(mode))
 
     def _request(self, number: int, *parameters: float) -> Awaitable[None]:
         answer: asyncio.Future[int] = self._loop.create_future()
@@ -186,6 +185,11 @@ class SteppedPx4Dialect:
         answer = self._answers.get(number)
         if answer is not None and not answer.done() and result != mavlink.MAV_RESULT_IN_PROGRESS:
             answer.set_result(result)
+
+
+def _mode_command(mode: Px4Mode) -> tuple[int, float, float, float]:
+    """Number and parameters of the MAV_CMD that requests a mode."""
+    return (mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(mode.main), float(mode.sub))
 
 
 async def _accepted(answer: asyncio.Future[int]) -> None:

@@ -378,6 +378,11 @@ class TickSource:
         self._clock = clock
 
     @property
+    def time_us(self) -> int:
+        """Vehicle time, microseconds: that of the newest attitude, or of a later tick that was granted."""
+        return max(self._feed.time_us, self._number * TICK_US if self.waits else 0)
+
+    @property
     def steps(self) -> bool:
         """Vehicle time can wait, and the vehicle answers only while it goes on; see `SteppedPx4Dialect`."""
         return self._clock is not None and self._clock.answers_take_time

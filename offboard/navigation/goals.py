@@ -58,8 +58,6 @@ Goal = Gate | Point
 class FrameSize:
     """Measures of all frames, metres."""
 
-    opening_width_m: float = 0.38
-    opening_height_m: float = 0.18
     width_m: float = 0.42
     height_m: float = 0.22
     thickness_m: float = 0.02

@@ -40,7 +40,7 @@ class Navigator:
         self._opening_m = (width_m - 2 * surroundings.bar_m, height_m - 2 * surroundings.bar_m)
         self._style = style_of(limits)
         self._world = WorldModel(surroundings, self._style)
-        self._flight = PathFlight(surroundings.arena, self._style, limits, late=surroundings.answers_late)
+        self._flight = PathFlight(surroundings.arena, self._style, limits)
         self._places = LookingPlaces(surroundings.arena, self._style)
         self._start_m: Vec3 | None = None
         self._state: DroneState | None = None

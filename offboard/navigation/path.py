@@ -54,11 +54,6 @@ class Path:
         """Time from start to end."""
         return self.times_s[-1]
 
-    @property
-    def gate_times_s(self) -> tuple[float, ...]:
-        """When each gate is crossed, since the start."""
-        return tuple(crossing.time_s for crossing in self.crossings)
-
     def at(self, time_s: float) -> Motion:
         """The motion at a time since the start; before and after the path, that of its start and end."""
         (x, y, z, vx, vy, vz, ax, ay, az, yaw, rate), turn = self._between(time_s)

@@ -53,9 +53,7 @@ class PathFlight:
         watched: the place that stopped the drone, which now looks there; None if none did.
     """
 
-    def __init__(
-        self, arena: Arena, style: FlightStyle, limits: CommandLimits, *, late: bool = False
-    ) -> None:
+    def __init__(self, arena: Arena, style: FlightStyle, limits: CommandLimits) -> None:
         self.path: Path | None = None
         self.refusal = ""
         self.watched: Vec3 | None = None
@@ -65,7 +63,7 @@ class PathFlight:
         self._left: Path | None = None  # which the drone stops on
         self._anew = False  # the path begins with the drone's own motion
         self._lookout = Lookout(arena, style)
-        self._response = ResponseEstimate(late=late)
+        self._response = ResponseEstimate()
         self._planned_for: tuple[tuple[Goal, ...], Obstacles] | None = None
         self._checked: tuple[Path, int, tuple[Vec3, ...]] | None = None  # and which obstacles there were
         self._checked_s = 0.0

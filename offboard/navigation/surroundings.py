@@ -18,6 +18,3 @@ class Surroundings:
     envelope_m: Vec3  # length, width and height of the drone
     frame_m: tuple[float, float] = (0.42, 0.22)  # outer width and height of each frame
     bar_m: float = 0.02  # thickness of its bars
-    answers_late: bool = (
-        False  # the drone is known to follow velocities later than framerunner's own autopilot
-    )

@@ -85,8 +85,6 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         exchange: with the present ArduPilot.
     """
 
-    NAME = "ArduPilot"
-
     def __init__(
         self,
         new_simulation: Callable[[], ArduPilotSimulation],

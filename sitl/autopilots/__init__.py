@@ -1,1 +1,4 @@
 """What the simulators of genuine autopilots share."""
+
+TITLES = {"px4": "PX4", "ardupilot": "ArduPilot"}
+"""For people, by the names that options have."""

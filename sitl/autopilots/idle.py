@@ -42,10 +42,9 @@ class IdleCheck:
         if not self._usable:
             return False
         try:
-            if self._files is None:
-                self._files = self._open()
+            files = self._opened() if self._files is None else self._files
             end_s = time.monotonic() + limit_s
-            while not self._is_idle(self._files):
+            while not self._is_idle(files):
                 if time.monotonic() > end_s:
                     return False
                 time.sleep(_PAUSE_S)
@@ -81,13 +80,12 @@ class IdleCheck:
             return False
         return all(_state(os.pread(file, _STAT_BYTES, 0)) in _WAITING for file in files)
 
-    def _open(self) -> list[int]:
-        threads = Path(f"/proc/{self._process_id}/task").iterdir()
-        return [
-            os.open(thread / "stat", os.O_RDONLY)
-            for thread in threads
-            if (thread / "comm").read_text().strip() in self._names
-        ]
+    def _opened(self) -> list[int]:
+        self._files = files = []  # so that `close` has those before a thread that has ended
+        for thread in Path(f"/proc/{self._process_id}/task").iterdir():
+            if (thread / "comm").read_text().strip() in self._names:
+                files.append(os.open(thread / "stat", os.O_RDONLY))
+        return files
 
     def _used_ns(self) -> dict[int, int]:
         """Processor time that each process of the session has used."""

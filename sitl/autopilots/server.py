@@ -37,8 +37,6 @@ class AutopilotServer(ABC, Generic[V]):
             the server.
     """
 
-    NAME: ClassVar[str]
-    """The autopilot's, for messages."""
     SETPOINT_S: ClassVar[float] = 0.002
     """Wall time in which it takes a setpoint that was sent before time was granted."""
 
@@ -64,8 +62,8 @@ class AutopilotServer(ABC, Generic[V]):
             SettingError: the autopilot cannot be started.
             AutopilotEndedError: it ended soon after its start, or time is granted by another program.
         """
-        self._open()
         try:
+            self._open()
             await self._video.open()
             self._notice(self._greeting())
             await self._serve()
@@ -79,7 +77,7 @@ class AutopilotServer(ABC, Generic[V]):
 
     @abstractmethod
     def _open(self) -> None:
-        """Open the autopilot's port."""
+        """Open the autopilot's ports; `_close` closes those that were opened before one that cannot be."""
 
     @abstractmethod
     def _close(self) -> None:
@@ -94,11 +92,11 @@ class AutopilotServer(ABC, Generic[V]):
         """Simulate one control period with standing motors."""
 
     def _greeting(self) -> str:
-        scenario, settings = self._simulation.scenario, self._settings
+        scenario, settings, name = self._simulation.scenario, self._settings, self._simulation.autopilot_name
         page = f"http://{settings.bind}:{settings.http_port}/"
         return (
-            f"{scenario.airframe} with {self.NAME} and sensors {scenario.sensors} in {scenario.name}: "
-            f"{self.NAME}'s MAVLink on UDP {14540 + settings.instance} and 14550, video on {page} "
+            f"{scenario.airframe} with {name} and sensors {scenario.sensors} in {scenario.name}: "
+            f"{name}'s MAVLink on UDP {14540 + settings.instance} and 14550, video on {page} "
             "(Ctrl-C stops)"
         )
 

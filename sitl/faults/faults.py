@@ -51,6 +51,7 @@ class Faults:
         world: whose motors fail, and whose time counts.
         battery: that sags.
         seed: of the flight.
+        autopilot: a genuine one, whose link to the app is its own; empty: our own flies.
         has_transmitter: there is a remote control, which can fail.
 
     Raises:
@@ -74,9 +75,10 @@ class Faults:
         battery: Battery,
         seed: int,
         *,
+        autopilot: str = "",
         has_transmitter: bool = False,
     ) -> None:
-        self._has_transmitter = has_transmitter
+        self._autopilot, self._has_transmitter = autopilot, has_transmitter
         self._declared = tuple(declared)
         self._suite, self._world, self._battery, self._seed = suite, world, battery, seed
         self._rotors = len(world.airframe.rotors)
@@ -190,6 +192,11 @@ class Faults:
         if fault.part is FaultPart.RC and not self._has_transmitter:
             raise FaultError(
                 f"fault `{fault}`: only a drone that PX4 flies has a remote control; leave it out, or fly PX4"
+            )
+        name = self._autopilot
+        if fault.part is FaultPart.LINK and name:
+            raise FaultError(
+                f"fault `{fault}`: the link to the app is {name}'s own; leave it out with {name}"
             )
         if not self._has(fault.part):
             raise FaultError(

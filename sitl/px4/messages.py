@@ -20,7 +20,6 @@ SIMULATOR_SYSTEM_ID = 1
 SIMULATOR_COMPONENT_ID = 200  # the component PX4's own simulators use
 LOCKSTEP_FLAG = 1  # of HIL_ACTUATOR_CONTROLS
 ARMED_FLAG = int(mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
-ACTUATORS = 16
 
 
 def checksum(data: bytes, seed: int) -> int:

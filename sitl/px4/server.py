@@ -42,7 +42,6 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         link: to PX4; None before `run`.
     """
 
-    NAME = "PX4"
     SETPOINT_S = 0.0  # the app waits until PX4 has taken it
 
     def __init__(
@@ -69,6 +68,8 @@ class Px4Server(AutopilotServer[Px4Simulation]):
             self.link.close()
         if self._side_link is not None:
             self._side_link.close()
+        if self._idle is not None:
+            self._idle.close()
 
     async def _serve(self) -> None:
         link = self.link
@@ -92,6 +93,8 @@ class Px4Server(AutopilotServer[Px4Simulation]):
             return
         await process.stop()
         await process.start()
+        if self._idle is not None:
+            self._idle.close()
         self._idle = None if process.process_id is None else IdleCheck(process.process_id, _OWN_TIME)
         ended = asyncio.create_task(process.ended())
         connected = asyncio.create_task(link.connected())
@@ -101,6 +104,7 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         await asyncio.gather(ended, connected, return_exceptions=True)
         if connected not in done:
             raise AutopilotEndedError(f"{ended.result()} (its output: {process.log})")
+        connected.result()
 
     async def _reason(self) -> str:
         """Why PX4 is no longer connected."""
@@ -156,7 +160,8 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         simulation = self._simulation
         time_us = simulation.time_us
         packets = simulation.sense()
-        self._wait_idle()
+        if self._idle is not None:
+            await self._wait_idle(self._idle)
         link.send(packets)
         self._video.step()  # while PX4 computes
         controls = link.answer(time_us)
@@ -170,19 +175,20 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         self._simulation.sense()
         self._simulation.move(None)
 
-    def _wait_idle(self) -> None:
-        """Let PX4's threads that its lockstep does not wait for finish, so that each step is the same."""
-        idle = self._idle
-        if idle is None:
-            return
-        if idle.starting and self._simulation.time_us > 0:  # until its first sensors, PX4 waits by polling
-            idle.wait_started(_IDLE_START_S)
-        elif idle.starting:
-            time.sleep(_FIRST_S)
-        else:
+    async def _wait_idle(self, idle: IdleCheck) -> None:
+        """Let PX4's threads that its lockstep does not wait for finish, so that each step is the same.
+
+        Others run meanwhile only while PX4 starts: later it takes less time than to change to them and back.
+        """
+        if not idle.starting:
             idle.wait(_IDLE_S)
+        elif self._simulation.time_us > 0:
+            await asyncio.to_thread(idle.wait_started, _IDLE_START_S)
+        else:  # until its first sensors, PX4 waits by polling
+            await asyncio.sleep(_FIRST_S)
 
     async def _hold(self) -> None:
         """Wait until simulated time may advance; what PX4 sends before that has been sent then."""
-        self._wait_idle()
+        if self._idle is not None:
+            await self._wait_idle(self._idle)
         await super()._hold()

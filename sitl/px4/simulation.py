@@ -10,7 +10,6 @@ from firmware_py.battery import BatteryMonitor
 from firmware_py.types import BatteryState
 from geometry.vectors import ZERO3, Vec3
 from scenarios.faults.declaration import FaultKind, FaultPart
-from scenarios.faults.parse import FaultError
 from scenarios.models import Scenario
 from sitl.px4.messages import ActuatorControls
 from sitl.px4.sensor_messages import RC_PERIOD_US, SensorMessages, has_whole_imu
@@ -23,22 +22,6 @@ class MotionError(UserError):
     """The drone's motion cannot be simulated on; the message is one line for people."""
 
 
-def has_rc_fault(scenario: Scenario) -> bool:
-    """Whether a fault of the remote control is declared."""
-    return any(fault.part is FaultPart.RC for fault in scenario.faults)
-
-
-def check_faults(scenario: Scenario) -> None:
-    """Refuse faults that a drone flown by PX4 cannot have.
-
-    Raises:
-        FaultError: one of the link.
-    """
-    for fault in scenario.faults:
-        if fault.part is FaultPart.LINK:
-            raise FaultError(f"fault `{fault}`: the link to the app is PX4's own; leave it out with PX4")
-
-
 class Px4Simulation(SimulatedVehicle):
     """One drone in one scenario, flown by PX4; see `SimulatedVehicle`. Its sensors must not be ideal.
 
@@ -46,9 +29,6 @@ class Px4Simulation(SimulatedVehicle):
 
     Args:
         transmitter: the pilot's; None: there is none, unless the scenario has a fault of it.
-
-    Raises:
-        FaultError: the scenario has a fault of the link, which is PX4's.
 
     Attributes:
         messages: packs what `sense` returns.
@@ -65,8 +45,7 @@ class Px4Simulation(SimulatedVehicle):
         seed: int = 0,
         transmitter: Sticks | None = None,
     ) -> None:
-        check_faults(scenario)
-        if transmitter is None and has_rc_fault(scenario):
+        if transmitter is None and any(fault.part is FaultPart.RC for fault in scenario.faults):
             transmitter = centred
         self.has_transmitter = transmitter is not None
         self._transmitter = transmitter

@@ -6,7 +6,7 @@ from math import cos, exp, hypot, pi, remainder, sin
 
 import pytest
 
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, ResponsePrior, VelocityCommand
 from offboard.response import ResponseEstimate
 
 STEP_S = 0.05
@@ -18,7 +18,10 @@ class Vehicle:
     With a lag of its own it follows what comes of that with another lag, in axes that turn.
     """
 
-    def __init__(self, dead_s, lag_s, *, turning=False, drift_m_s=0.0, own_lag_s=0.0):
+    def __init__(
+        self, dead_s, lag_s, *, turning=False, drift_m_s=0.0, own_lag_s=0.0, prior=ResponsePrior.OWN
+    ):
+        self.prior = prior
         self.own_lag_s, self.own = own_lag_s, (0.0, 0.0)
         self.lag_s, self.turning, self.drift_m_s = lag_s, turning, drift_m_s
         self.waiting = deque([(0.0, 0.0, 0.0, 0.0)] * round(dead_s / STEP_S))
@@ -31,7 +34,9 @@ class Vehicle:
         x, y = self.own if self.own_lag_s else (c * a - s * b, s * a + c * b)
         velocity = (x, y, up + self.drift_m_s)
         time_us = round(self.ticks * STEP_S * 1e6)
-        return DroneState(time_us, *self.position, self.yaw, velocity, landed=False)
+        return DroneState(
+            time_us, *self.position, self.yaw, velocity, landed=False, response_prior=self.prior
+        )
 
     def fly(self, command):
         c, s = (1.0, 0.0) if self.turning else (cos(self.yaw), sin(self.yaw))
@@ -97,8 +102,8 @@ def command_at(time_s):
     )
 
 
-def learn(vehicle, seconds=15.0, **known):
-    estimate, sent = ResponseEstimate(**known), None
+def learn(vehicle, seconds=15.0):
+    estimate, sent = ResponseEstimate(), None
     for tick in range(round(seconds / STEP_S)):
         estimate.update(vehicle.state, sent)
         sent = command_at(tick * STEP_S)
@@ -126,14 +131,18 @@ def test_a_vehicle_that_answers_in_time_is_not_late():
     assert not estimate.response.late
 
 
-def test_a_vehicle_that_is_known_to_be_late_is_so_from_the_first_tick_on():
-    known = ResponseEstimate(late=True).response
-    assert known.late
-    assert known.level_s > 0.6
+@pytest.mark.parametrize(("prior", "least_s"), [(ResponsePrior.LATE, 0.6), (ResponsePrior.UNKNOWN, 0.0)])
+def test_a_vehicle_that_is_known_to_be_another_is_late_from_the_first_tick_on(prior, least_s):
+    estimate = ResponseEstimate()
+    estimate.update(Vehicle(0.05, 0.15, prior=prior).state, None)
+    assert estimate.response.late
+    assert estimate.response.level_s > least_s
 
 
 def test_one_that_was_taken_for_late_and_is_not_is_known_after_some_seconds():
-    assert not learn(Vehicle(0.05, 0.15), late=True).response.late
+    response = learn(Vehicle(0.05, 0.15, prior=ResponsePrior.LATE)).response
+    assert response.late  # its loops are not known, so its motion is still predicted
+    assert response.level_dead_s + response.level_lag_s == pytest.approx(0.2)
 
 
 def test_slow_flight_shows_the_lag_of_a_vehicle_that_is_known_to_be_late():

@@ -79,7 +79,9 @@ async def test_telemetry_that_never_comes_ends_the_waiting(feed, monkeypatch):
     source = TickSource(feed)
     source.use_clock(Clock(feed, lost=range(100)))
     await source.begin()
+    began_us = source.time_us
     assert not await source.next(1.0)
+    assert source.time_us == began_us + 10 * 50_000  # so that limits in vehicle time are reached
 
 
 async def test_time_that_does_not_wait_passes_ticks_over_and_counts_them_in_flight(feed):

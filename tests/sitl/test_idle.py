@@ -75,3 +75,14 @@ def test_a_script_that_computes_is_waited_for():
         check = IdleCheck(process.pid)
         assert not check.wait_started(0.3)
         assert check.starting
+
+
+def test_no_file_stays_open():
+    before = len(os.listdir("/proc/self/fd"))
+    with child("sleep", "60") as process:
+        time.sleep(0.1)
+        check = IdleCheck(process.pid, ("sleep",))
+        assert check.wait(2.0)
+        check.close()
+        assert not check.wait(2.0)
+    assert len(os.listdir("/proc/self/fd")) == before

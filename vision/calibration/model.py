@@ -9,14 +9,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from errors import UserError
 from geometry.lens import Coefficients
-
-MAX_ANGLE_RAD = 0.8
-"""Of a camera's roll, pitch and yaw on the drone: it looks ahead."""
+from geometry.rotations import MAX_MOUNTING_RAD
 
 Coefficient = Annotated[float, Field(ge=-100, le=100)]
 _Weight = Annotated[float, Field(ge=-10, le=10)]
 _Weights = tuple[_Weight, _Weight, _Weight]
-_Angle = Annotated[float, Field(ge=-MAX_ANGLE_RAD, le=MAX_ANGLE_RAD)]
+_Angle = Annotated[float, Field(ge=-MAX_MOUNTING_RAD, le=MAX_MOUNTING_RAD)]
 _Offset = Annotated[float, Field(ge=-2, le=2)]
 _Deviation = Annotated[float, Field(ge=0, le=10)]
 ColourMatrix = tuple[_Weights, _Weights, _Weights]

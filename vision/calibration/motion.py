@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from geometry.rotations import mounting_flu, rotation, rotation_rows
 from geometry.vectors import Quaternion, Vec3
 
 Floats = npt.NDArray[np.float64]
@@ -114,3 +115,8 @@ def matrices(quaternions: Floats) -> Floats:
         [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(rows), -1, 0)
+
+
+def mounting_matrix(angles_frd_rad: Vec3) -> Floats:
+    """The matrix from a camera's axes to the body's, forward, left, up, by its roll, pitch and yaw."""
+    return np.array(rotation_rows(rotation(mounting_flu(angles_frd_rad))))

@@ -1,5 +1,7 @@
 """The mounting of a camera on a drone, from frames seen while it moves: bundle adjustment.
 
+Also known as extrinsic calibration of camera and body, hand-eye calibration, or boresight alignment.
+
 Unknown are roll, pitch and yaw of the camera on the body, its place, the delay of its images, and the pose of
 every frame; known are the frames' size, where their corners are in the images, and the drone's poses by its
 telemetry but for an error of its position that wanders. All are found by robust least squares of the corners'
@@ -14,14 +16,13 @@ on for seconds.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from geometry.rotations import mounting_flu
 from geometry.vectors import Vec3
-from vision.calibration.motion import Bools, Floats, Motion, matrices
+from vision.calibration.motion import Bools, Floats, Motion, mounting_matrix
 from vision.calibration.sightings import (
     MIN_OF_A_FRAME,
     Indices,
@@ -33,15 +34,15 @@ from vision.calibration.sightings import (
 )
 from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M
 
-PLACE_STD_M = 0.02
+_PLACE_STD_M = 0.02
 """Of the camera's place on the drone, measured with a ruler."""
-DELAY_STD_S = 0.1
-WANDER_STD_M = 0.01
+_DELAY_STD_S = 0.1
+_WANDER_STD_M = 0.01
 """Of the errors of the drone's position, which go on for seconds: by motion capture or visual odometry."""
-FRAME_TILT_STD_RAD = 0.0175
-SIZE_STD = 0.005
-"""Of a frame, as a share of it; of what may be none, `UNKNOWN_SIZE_STD`."""
-UNKNOWN_SIZE_STD = 0.5
+_FRAME_TILT_STD_RAD = 0.0175
+_SIZE_STD = 0.005
+"""Of a frame, as a share of it; of what may be none, `_UNKNOWN_SIZE_STD`."""
+_UNKNOWN_SIZE_STD = 0.5
 _ANGLE_STD_RAD = 0.6
 _MAX_SIZE_ERROR = 0.06  # a rectangle that differs more from a frame's size is none
 _SURE = 3.0  # standard deviations
@@ -106,8 +107,8 @@ def fit_mounting(seen: Sightings, motion: Motion, focal_px: float, known: Values
         used = np.flatnonzero(numbers >= 0)
         if not len(used):
             return None
-        fitted = _Adjustment(seen.at(used), numbers[used], motion, focal_px, known)
-        fitted.solve(start, places, UNKNOWN_SIZE_STD)
+        fitted = _BundleAdjustment(seen.at(used), numbers[used], motion, focal_px, known)
+        fitted.solve(start, places)
         start = fitted.values
         wrong = fitted.are_wrong()
         free[used[wrong[numbers[used]]]] = False  # such as a poster: drawn borders look like frames
@@ -119,55 +120,58 @@ def fit_mounting(seen: Sightings, motion: Motion, focal_px: float, known: Values
     return fitted.result()
 
 
-@dataclass(slots=True, eq=False)
-class _Adjustment:
-    """The least squares of some sightings, each of a numbered frame."""
+class _BundleAdjustment:
+    """The least squares of some sightings, each of a numbered frame.
 
-    seen: Sightings
-    numbers: Indices
-    motion: Motion
-    focal_px: float
-    known: Values
-    solution: Floats = field(default_factory=lambda: np.empty(0))
-    _weights: Floats = field(default_factory=lambda: np.empty(0))  # shape (n, 4, 2); 0: not used
-    _sides: Floats = field(
-        default_factory=lambda: np.empty(0)
-    )  # 1: seen from the side of the normal, else -1
-    _size_std: float = 0.0
-    _count: int = 0  # of frames
-    _knots: Floats = field(default_factory=lambda: np.empty(0))  # their weights, shape (n, knots)
-    _poses: tuple[float, Floats, Floats] | None = None  # of the drone at the corners, with a delay
+    Args:
+        seen: the sightings.
+        numbers: of the frame that each is of; each frame has sightings.
+        motion: of the drone.
+        focal_px: focal length of the camera.
+        known: the place and the delay, known before.
 
-    @property
-    def frames_m(self) -> Floats:
-        """Where the frames are, shape (frames, 3)."""
-        return self._frames(self.solution)[:, :3]
+    Attributes:
+        solution: the mounting's numbers, then those of every frame, then those of every knot.
+    """
+
+    def __init__(
+        self, seen: Sightings, numbers: Indices, motion: Motion, focal_px: float, known: Values
+    ) -> None:
+        self._seen, self._numbers, self._motion, self._focal_px = seen, numbers, motion, focal_px
+        self._count = int(numbers.max()) + 1  # of frames
+        self._first_knot = _OF_MOUNTING + self._count * _OF_A_FRAME
+        self._knots = _knots_of(seen.times_s)
+        self._mean, self._std = _prior(known, self._count, self._knots.shape[1])
+        self.solution = self._mean
+        variances = seen.std_px**2 + _PIXEL_STD_PX**2 + (_ATTITUDE_STD_RAD * focal_px) ** 2
+        self._weights = np.nan_to_num(1.0 / np.sqrt(variances))  # shape (n, 4, 2); 0: not used
+        self._sides = np.ones(len(seen))  # 1: seen from the side of the normal, else -1
+        self._poses: tuple[float, Floats, Floats] | None = None  # of the drone at the corners, with a delay
 
     @property
     def values(self) -> Values:
         """Of the mounting."""
         return _values(self.solution[:_OF_MOUNTING])
 
-    def solve(self, start: Values, places: Sequence[Vec3], size_std: float) -> None:
-        """Find the solution nearest to a start, whatever single corners are."""
-        at = [*start.angles_frd_rad, *start.position_flu_m, start.delay_s]
-        for number, place in enumerate(places):
-            mine = self.seen.at(np.flatnonzero(self.numbers == number))
-            yaw = first_yaw(mine, self.motion, start)
-            at += [*place, yaw, 0.0, 0.0, 0.0]
-        self._count = len(places)
-        self._knots = _knots_of(self.seen.times_s)
-        self.solution = np.array(at + [0.0] * _OF_A_KNOT * self._knots.shape[1])
-        variances = self.seen.std_px**2 + _PIXEL_STD_PX**2 + (_ATTITUDE_STD_RAD * self.focal_px) ** 2
-        self._weights = np.nan_to_num(1.0 / np.sqrt(variances))
-        self._size_std = size_std
+    def solve(self, start: Values, places: Sequence[Vec3]) -> None:
+        """Find the solution nearest to a start, whatever single corners are.
+
+        Args:
+            start: a mounting.
+            places: of the frames.
+        """
+        self.solution = np.zeros(len(self._mean))
+        self.solution[:_OF_MOUNTING] = *start.angles_frd_rad, *start.position_flu_m, start.delay_s
+        for number, (frame, place) in enumerate(zip(self._frames(self.solution), places, strict=True)):
+            mine = self._seen.at(np.flatnonzero(self._numbers == number))
+            frame[:4] = *place, first_yaw(mine, self._motion, start)
         for _ in range(2):
             self._sides = self._seen_from()
             self.solution = _minimized(self._residuals, self.solution, self._jacobian, "soft_l1")
 
     def refine(self) -> None:
         """Go on from the solution: frames have their size, and corners that are far off are not used."""
-        self._size_std = SIZE_STD
+        self._frames(self._std)[:, 6] = _SIZE_STD
         self.solution = _minimized(self._residuals, self.solution, self._jacobian, "soft_l1")
         errors = np.abs(self._errors(self.solution)).max(axis=2)
         self._weights[errors > _OUTLIER] = 0.0
@@ -187,8 +191,8 @@ class _Adjustment:
         errors = np.linalg.norm(self._errors(self.solution), axis=2)
         used = self._weights[:, :, 0] > 0.0
         found = []
-        for number in range(len(self.frames_m)):
-            mine = errors[self.numbers == number][used[self.numbers == number]]
+        for number in range(self._count):
+            mine = errors[self._numbers == number][used[self._numbers == number]]
             found.append(float(np.median(mine)) if len(mine) else np.inf)
         return np.array(found)
 
@@ -197,28 +201,26 @@ class _Adjustment:
         std = _values(self._deviations())
         errors_px = np.linalg.norm(self._offsets(self.solution), axis=2)[self._weights[:, :, 0] > 0.0]
         rms_px = float(np.sqrt(np.mean(errors_px**2))) if len(errors_px) else np.inf
-        return MountingFit(self.values, std, self.seen, self.numbers, self.frames_m, rms_px)
+        frames_m = self._frames(self.solution)[:, :3]
+        return MountingFit(self.values, std, self._seen, self._numbers, frames_m, rms_px)
 
     def _frames(self, at: Floats) -> Floats:
+        """A view of the frames' numbers, shape (frames, 7)."""
         return at[_OF_MOUNTING : self._first_knot].reshape(-1, _OF_A_FRAME)
-
-    @property
-    def _first_knot(self) -> int:
-        return _OF_MOUNTING + self._count * _OF_A_FRAME
 
     def _drone(self, delay_s: float) -> tuple[Floats, Floats]:
         """Positions and rotations of the drone when corners were exposed, shape (n, 4, 3), (n, 4, 3, 3)."""
         if self._poses is None or self._poses[0] != delay_s:
-            times_s = (self.seen.corners_s - delay_s).ravel()
-            count = len(self.seen)
-            positions = self.motion.positions(times_s).reshape(count, 4, 3)
-            self._poses = (delay_s, positions, self.motion.rotations(times_s).reshape(count, 4, 3, 3))
+            times_s = (self._seen.corners_s - delay_s).ravel()
+            count = len(self._seen)
+            positions = self._motion.positions(times_s).reshape(count, 4, 3)
+            self._poses = (delay_s, positions, self._motion.rotations(times_s).reshape(count, 4, 3, 3))
         return self._poses[1:]
 
     def _seen_from(self) -> Floats:
         """From which side of its frame each sighting is."""
         positions, _ = self._drone(self.solution[6])
-        frames = self._frames(self.solution)[self.numbers]
+        frames = self._frames(self.solution)[self._numbers]
         away = positions[:, 0] - frames[:, :3]
         facing = away[:, 0] * np.cos(frames[:, 3]) + away[:, 1] * np.sin(frames[:, 3])
         return np.where(facing >= 0.0, 1.0, -1.0)
@@ -228,7 +230,7 @@ class _Adjustment:
 
         The second has shape (n, 4, 3, 7).
         """
-        frames = self._frames(at)[self.numbers]
+        frames = self._frames(at)[self._numbers]
         across, up = self._sides[:, None] * _SIDEWAYS_M, np.broadcast_to(_UPWARDS_M, (len(frames), 4))
         c, s = np.cos(frames[:, 3:4]), np.sin(frames[:, 3:4])
         roll, lean, size = frames[:, 4:5], frames[:, 5:6], np.exp(frames[:, 6:7])
@@ -252,8 +254,8 @@ class _Adjustment:
     def _offsets(self, at: Floats) -> Floats:
         """Of the corners from where the solution has them, pixels, shape (n, 4, 2)."""
         camera, _ = self._in_camera(at, self._corners(at)[0])
-        pixels = -self.focal_px * camera[..., 1:] / np.maximum(camera[..., :1], _NEAREST_M)
-        offsets: Floats = pixels - np.nan_to_num(self.seen.corners_px)
+        pixels = -self._focal_px * camera[..., 1:] / np.maximum(camera[..., :1], _NEAREST_M)
+        offsets: Floats = pixels - np.nan_to_num(self._seen.corners_px)
         return offsets
 
     def _errors(self, at: Floats) -> Floats:
@@ -263,8 +265,7 @@ class _Adjustment:
 
     def _residuals(self, at: Floats) -> Floats:
         """Errors of all corners, then what is known before."""
-        mean, std = self._prior(at)
-        residuals: Floats = np.concatenate([self._errors(at).ravel(), (at - mean) / std])
+        residuals: Floats = np.concatenate([self._errors(at).ravel(), (at - self._mean) / self._std])
         return residuals
 
     def _deviations(self) -> Floats:
@@ -275,8 +276,8 @@ class _Adjustment:
         count = int(np.count_nonzero(self._weights))
         excess = max(1.0, float(residuals @ residuals) / max(1, count - len(self.solution)))
         formal = np.sqrt(np.diag(inverse)[:_OF_MOUNTING] * excess)
-        order = np.argsort(self.seen.times_s, kind="stable")
-        rows = np.arange(8 * len(self.seen)).reshape(-1, 8)
+        order = np.argsort(self._seen.times_s, kind="stable")
+        rows = np.arange(8 * len(self._seen)).reshape(-1, 8)
         shifts = []
         for block in np.array_split(order, _BLOCKS):
             mine = rows[block].ravel()
@@ -295,8 +296,8 @@ class _Adjustment:
         depth = np.maximum(camera[..., :1], _NEAREST_M)
         # Of both pixels with the place in the camera's axes: forward, left, up.
         by_place = np.zeros((*camera.shape[:2], 2, 3))
-        by_place[..., 0] = self.focal_px * camera[..., 1:] / depth**2
-        by_place[..., 0, 1] = by_place[..., 1, 2] = -self.focal_px / depth[..., 0]
+        by_place[..., 0] = self._focal_px * camera[..., 1:] / depth**2
+        by_place[..., 0, 1] = by_place[..., 1, 2] = -self._focal_px / depth[..., 0]
         by_place *= self._weights[..., None]
         turn = _turn(at[:3])
         mounting = np.empty((*camera.shape, _OF_MOUNTING))
@@ -315,22 +316,23 @@ class _Adjustment:
         of_frames = by_place @ frames
         for number in range(self._count):
             first = _OF_MOUNTING + number * _OF_A_FRAME
-            mine = self.numbers == number
+            mine = self._numbers == number
             dense[mine, :, :, first : first + _OF_A_FRAME] = of_frames[mine]
         wandering = of_frames[:, :, :, None, :_OF_A_KNOT] * -self._knots[:, None, None, :, None]
         dense[..., self._first_knot :] = wandering.reshape(*dense.shape[:3], -1)
-        before = np.diag(1.0 / self._prior(at)[1])
+        before = np.diag(1.0 / self._std)
         jacobian: Floats = np.concatenate([dense.reshape(-1, len(at)), before])
         return jacobian
 
-    def _prior(self, at: Floats) -> tuple[Floats, Floats]:
-        """What is known of each number before, and its standard deviation; infinite: nothing."""
-        known, count, knots = self.known, self._count, self._knots.shape[1]
-        mean = [0.0] * 3 + [*known.position_flu_m, known.delay_s] + [0.0] * (len(at) - _OF_MOUNTING)
-        std = [_ANGLE_STD_RAD] * 3 + [PLACE_STD_M] * 3 + [DELAY_STD_S]
-        std += ([np.inf] * 4 + [FRAME_TILT_STD_RAD] * 2 + [self._size_std]) * count
-        std += [WANDER_STD_M] * _OF_A_KNOT * knots
-        return np.array(mean), np.array(std)
+
+def _prior(known: Values, frames: int, knots: int) -> tuple[Floats, Floats]:
+    """What is known of each number before, and its standard deviation; infinite: nothing."""
+    others = frames * _OF_A_FRAME + knots * _OF_A_KNOT
+    mean = [0.0] * 3 + [*known.position_flu_m, known.delay_s] + [0.0] * others
+    std = [_ANGLE_STD_RAD] * 3 + [_PLACE_STD_M] * 3 + [_DELAY_STD_S]
+    std += ([np.inf] * 4 + [_FRAME_TILT_STD_RAD] * 2 + [_UNKNOWN_SIZE_STD]) * frames
+    std += [_WANDER_STD_M] * _OF_A_KNOT * knots
+    return np.array(mean), np.array(std)
 
 
 def _minimized(
@@ -365,8 +367,7 @@ def _later(at: Floats, step_s: float) -> Floats:
 def _turn(angles_frd_rad: Floats) -> Floats:
     """The matrix from the camera's axes to the body's, forward, left, up."""
     roll, pitch, yaw = (float(angle) for angle in angles_frd_rad)
-    turn: Floats = matrices(np.array([mounting_flu((roll, pitch, yaw))]))[0]
-    return turn
+    return mounting_matrix((roll, pitch, yaw))
 
 
 def _values(numbers: Floats) -> Values:

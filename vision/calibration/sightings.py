@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from geometry.rotations import mounting_flu
 from geometry.vectors import Vec3
-from vision.calibration.motion import Bools, Floats, Motion, matrices
+from vision.calibration.motion import Bools, Floats, Motion, mounting_matrix
 from vision.types import Detections, FrameSighting
 
 Indices = npt.NDArray[np.intp]
@@ -158,10 +157,10 @@ def _differing(times_s: Floats, motion: Motion, delay_s: float) -> list[int]:
     return kept
 
 
-def world_places(seen: Sightings, motion: Motion, by: Values) -> Floats:
+def _world_places(seen: Sightings, motion: Motion, by: Values) -> Floats:
     """Where sightings put their frames, by a mounting, shape (n, 3)."""
     times_s = seen.times_s - by.delay_s
-    turn = matrices(np.array([mounting_flu(by.angles_frd_rad)]))[0]
+    turn = mounting_matrix(by.angles_frd_rad)
     from_centre = np.array(by.position_flu_m) + seen.positions_flu_m @ turn.T
     places: Floats = motion.positions(times_s) + np.einsum(
         "nij,nj->ni", motion.rotations(times_s), from_centre
@@ -179,7 +178,7 @@ def first_mounting(seen: Sightings, motion: Motion, known: Values) -> Values:
             at = replace(known, angles_frd_rad=(0.0, pitch, yaw))
             together = 0.0
             for index in few:
-                places = world_places(seen.at(index), motion, at)
+                places = _world_places(seen.at(index), motion, at)
                 together += _neighbours(places, _SAME_PLACE_M).max() / len(seen)
             score = together - _ANGLE_COST * float(np.hypot(pitch, yaw))
             if score > best_score:
@@ -193,7 +192,7 @@ def frames_among(seen: Sightings, usable: Bools, motion: Motion, by: Values) -> 
     Returns:
         The number of its frame for each sighting, -1 if it is of none; where the frames are.
     """
-    places = world_places(seen, motion, by)
+    places = _world_places(seen, motion, by)
     numbers = np.full(len(seen), -1, np.intp)
     found: list[Vec3] = []
     for colour in np.unique(seen.colours):
@@ -224,7 +223,7 @@ def _neighbours(places: Floats, within_m: float) -> Indices:
 
 def first_yaw(seen: Sightings, motion: Motion, by: Values) -> float:
     """The yaw of a frame's normal, up to half a turn, that most of its sightings allow, radians."""
-    turn = matrices(np.array([mounting_flu(by.angles_frd_rad)]))[0]
+    turn = mounting_matrix(by.angles_frd_rad)
     body = seen.normals_flu @ turn.T
     normals = np.einsum("nij,nkj->nki", motion.rotations(seen.times_s - by.delay_s), body)
     yaws = np.arctan2(normals[..., 1], normals[..., 0])

@@ -3,11 +3,13 @@
 from math import degrees
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from errors import UserError
 from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.camera_calibration.live_mounting import Watched
+from framerunner.camera_calibration.mounting_report import MountingSearch, finish
 from framerunner.commands.camera import extrinsics
 from framerunner.commands.fly import fly
 from framerunner.flying.plan import FlightPlan
@@ -20,7 +22,10 @@ from scenarios.models import Camera as CameraSettings
 from scenarios.models import Scenario
 from sitl.camera import Camera
 from tests.vision.calibration.seen_frames import FOCAL_PX
-from vision.calibration.model import Calibration
+from vision.calibration.model import Calibration, CalibrationError
+from vision.calibration.mounting import MountingFit
+from vision.calibration.movement import Movement
+from vision.calibration.sightings import Sightings, Values
 from vision.detectors import new_detector
 from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 
@@ -37,13 +42,13 @@ states:
     during: [fly_to_goal]
     transitions: [{when: distance_to_goal_m < 0.15, to: here}]
   here:
-    enter: [cmd.rot_z = 0.5]
+    enter: [cmd.rot_z = 0.7]
     during: [fly_to_goal]
-    transitions: [{when: seconds_in_state > 13, to: there}]
+    transitions: [{when: seconds_in_state > 9.3, to: there}]
   there:
-    enter: [cmd.rot_z = 0.5, "goal_m = (memory.x0 + 1.4, memory.y0 + 1.2, memory.z0 + 1)"]
+    enter: [cmd.rot_z = 0.7, "goal_m = (memory.x0 + 1.4, memory.y0 + 1.2, memory.z0 + 1)"]
     during: [fly_to_goal]
-    transitions: [{when: seconds_in_state > 14, to: down}]
+    transitions: [{when: seconds_in_state > 10, to: down}]
   down:
     enter: [land]
     final: true
@@ -74,6 +79,42 @@ def test_a_recorded_flight_gives_the_mounting(tmp_path: Path, capsys: pytest.Cap
         assert abs(degrees(found - angle)) < 0.2
     plan = FlightPlan(scenario, calibration=load_calibration(file))
     assert plan.camera.mounting_frd_rad == mounting.angles_frd_rad
+
+
+def search(*, missing: tuple[str, ...] = (), pitch_rad: float = 0.1, rms_px: float = 0.4) -> MountingSearch:
+    """A mounting that was found, its images 0.093 s late."""
+    nothing = np.empty(0)
+    seen = Sightings(nothing.astype(str), nothing, nothing, nothing, nothing, nothing)
+    found = Values((0.03, pitch_rad, -0.05), (0.08, 0.0, 0.0), 0.093)
+    std = Values((0.001, 0.001, 0.002), (0.002, 0.003, 0.02), 0.001)
+    fit = MountingFit(found, std, seen, nothing.astype(int), nothing.reshape(0, 3), rms_px)
+    return MountingSearch(fit, Movement(300, 3, 150.0, 2.0), missing)
+
+
+@pytest.mark.parametrize("stamped", [False, True])
+def test_the_delay_is_written_for_images_without_time_stamps(tmp_path: Path, stamped: bool) -> None:
+    file, lines = tmp_path / "camera.yaml", []
+    finish(search(), Calibration.ideal(320, 240, FOCAL_PX), file, lines.append, stamped=stamped)
+    written = load_calibration(file)
+    assert written.delay_s == (None if stamped else 0.093)
+    assert written.mounting is not None
+    assert written.mounting.angles_frd_rad == (0.03, 0.1, -0.05)
+    assert any("pitch     5.73 degrees upwards (1 sigma 0.06)" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("what", "words"),
+    [
+        ({"missing": ("yaw the drone further",)}, "not known: yaw the drone further"),
+        ({"pitch_rad": 0.9}, "an angle of 52 degrees was found"),
+        ({"rms_px": 4.0}, "corners are 4.0 pixels from where they should be"),
+    ],
+)
+def test_what_is_not_known_or_cannot_be_is_not_written(tmp_path: Path, what: dict, words: str) -> None:
+    file = tmp_path / "camera.yaml"
+    with pytest.raises(CalibrationError, match=words):
+        finish(search(**what), Calibration.ideal(320, 240, FOCAL_PX), file, print, stamped=True)
+    assert not file.exists()
 
 
 def test_the_navigator_sees_frames_where_they_are_with_a_turned_camera() -> None:

@@ -10,7 +10,6 @@ import pytest_asyncio
 from playwright.async_api import expect
 
 from benchmarks.editor import drag, large_mission
-from tests.chromium import chromium
 from tests.framerunner.editing.editor_program import editor, free_port
 from tests.framerunner.editing.editor_user import SIZE, EditorUser, box_of
 
@@ -38,12 +37,6 @@ states:
     final: true
 # the end
 """
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser():
-    async with chromium() as opened:
-        yield opened
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")

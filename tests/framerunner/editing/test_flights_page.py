@@ -7,7 +7,6 @@ import pytest_asyncio
 from playwright.async_api import expect
 
 from framerunner.course.lessons import find_lesson
-from tests.chromium import chromium
 from tests.framerunner.editing.editor_program import editor
 from tests.framerunner.editing.editor_user import EditorUser, box_of
 
@@ -16,12 +15,6 @@ LAPTOP = {"width": 1366, "height": 768}
 CLIMB, LANDING = "climb_to_the_point_above_the_base", "land_wherever_the_drone_is_just_now"
 MISSION = find_lesson("1").start.replace("rise", CLIMB).replace("landing", LANDING)
 GUARD = "1: distance_to_goal_m < 0.1"
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser():
-    async with chromium() as opened:
-        yield opened
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")

@@ -7,7 +7,6 @@ import pytest_asyncio
 from playwright.async_api import expect
 
 from framerunner.course.lessons import find_lesson
-from tests.chromium import chromium
 from tests.framerunner.editing.editor_program import editor
 from tests.framerunner.editing.editor_user import EditorUser
 
@@ -17,12 +16,6 @@ LESSON_4 = find_lesson("4")
 CARELESS = LESSON_4.solution.replace(
     "- cmd.vel_x = 0.3\n    during:\n      - look_to_frame", "- cmd.vel_x = 0.3"
 )
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser():
-    async with chromium() as opened:
-        yield opened
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")

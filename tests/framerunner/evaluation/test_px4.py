@@ -155,3 +155,22 @@ def test_a_flight_that_is_interrupted_twice_still_ends_in_order():
         asyncio.run(interrupted_once(flight()))
     assert ended
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_lock_in_the_shared_folder_neither_changes_nor_waits_for_other_files(monkeypatch, tmp_path):
+    monkeypatch.setattr(px4_flight, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(px4_flight, "INSTANCES", 3)
+    monkeypatch.setattr(px4_flight, "_TCP_PORTS", (24560,))
+    monkeypatch.setattr(px4_flight, "_UDP_PORTS", (24580,))
+    valuable = tmp_path / "valuable"
+    valuable.write_text("kept")
+    (tmp_path / "framerunner-px4-0.lock").symlink_to(valuable)
+    left = tmp_path / "framerunner-px4-1.lock"  # by an earlier flight of another user
+    left.write_text("theirs")
+    left.chmod(0o444)
+    with claimed_instance() as instance:
+        assert instance == 1
+    assert (valuable.read_text(), left.read_text()) == ("kept", "theirs")
+    with claimed_instance(), claimed_instance() as instance:
+        assert instance == 2
+    assert (tmp_path / "framerunner-px4-2.lock").stat().st_mode & 0o777 == 0o644

@@ -125,6 +125,33 @@ def test_a_landing_whose_answer_is_lost_is_not_ended_by_hold(tmp_path):
     assert came_down(flight)
 
 
+@pytest.mark.parametrize("abort", ["stop", "camera"])
+def test_a_landing_that_is_lost_is_requested_again(tmp_path, abort):
+    operator, lost = Operator(needs_go=False), []
+
+    def lose_landings(vehicle):
+        command = vehicle.command
+
+        async def lossy(act):
+            if act == vehicle.autopilot.land and len(lost) < 2:
+                lost.append(vehicle.time_us)
+                raise MavsdkError("TIMEOUT")
+            await command(act)
+
+        vehicle.command = lossy
+
+    def end(vehicle):
+        if abort == "stop":
+            operator.press_stop()
+        else:
+            vehicle.video = Direction(SILENT, Random(0))
+
+    flight = fly(tmp_path, operator=operator, events=[(11.9, lose_landings), (12.0, end)])
+    assert len(lost) == 2
+    assert flight.outcome.reason.endswith("hold was requested instead; it landed later")
+    assert came_down(flight)
+
+
 def test_a_vehicle_that_others_arm_before_the_go_is_left_to_them(tmp_path):
     operator = Operator()
     events = [(12.0, lambda vehicle: vehicle.autopilot.arm()), (15.0, lambda _: operator.give_go())]

@@ -4,7 +4,7 @@ import pytest
 
 from framerunner.doctor import listen
 from framerunner.flying.plan import FlightPlan
-from framerunner.preflight import run, session
+from framerunner.preflight import prepare, run, session
 from offboard.mission import load_mission
 from offboard.safety.caps import Caps
 from scenarios.loader import load_scenario
@@ -32,4 +32,5 @@ def link(scenario, monkeypatch):
     monkeypatch.setattr(session, "time", clock)
     monkeypatch.setattr(listen, "time", clock)
     monkeypatch.setattr(run, "open_link", lambda url: bench)
+    monkeypatch.setattr(prepare, "open_link", lambda url: bench)
     return bench

@@ -10,6 +10,7 @@ from framerunner.preflight.check_names import CHECK_NAMES
 from framerunner.preflight.fence_upload import FenceItem, download_fence, is_same_fence, upload_fence
 from framerunner.preflight.kept import KeptState, check_vehicle, load_kept, restore
 from framerunner.preflight.parameters import read_parameters, set_parameter
+from framerunner.preflight.prepare import own_simulator_id
 from framerunner.preflight.run import NotArmedError, PreflightSettings, run_preflight
 from framerunner.preflight.session import VehicleSession
 from offboard.drone import DroneError
@@ -273,6 +274,13 @@ async def test_two_vehicles_with_the_same_id_are_refused(link, plan, tmp_path, l
     assert check.outcome is Outcome.FAIL
     assert check.value.startswith("two vehicles have this system id")
     assert not report.may_arm
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.3, 20.0])
+async def test_a_simulated_drone_beside_another_vehicle_with_its_id_is_no_simulation(link, plan, later_s):
+    assert await own_simulator_id("udpin://127.0.0.1:14599", None) == 1
+    link.add_vehicle(plan.scenario, later_s)
+    assert await own_simulator_id("udpin://127.0.0.1:14599", None) is None
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.05, 0.3])

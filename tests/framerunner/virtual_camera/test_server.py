@@ -12,6 +12,7 @@ from framerunner.virtual_camera.camera import VirtualCamera
 from framerunner.virtual_camera.server import CameraServer
 from scenarios.loader import load_scenario
 from sitl.video import VideoServer
+from tests.waiting import until
 from wire.dialect import mavlink
 from wire.transports.urls import LinkError
 
@@ -53,12 +54,6 @@ class Link:
 
     def close(self):
         self.closed = True
-
-
-async def until(condition):
-    async with asyncio.timeout(20):
-        while not condition():  # noqa: ASYNC110 - it is changed by another thread
-            await asyncio.sleep(0.01)
 
 
 @asynccontextmanager

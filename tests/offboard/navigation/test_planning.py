@@ -107,7 +107,7 @@ def test_a_gate_is_crossed_only_in_its_direction():
     goals = [gate, Point((0.0, 0.0, 1.0))]
     path = plan(Motion((-2.0, 0.0, 1.0)), goals, obstacles=Obstacles((gate,)), arena=Arena(), style=CONTEST)
     assert isinstance(path, Path)
-    assert path.at(path.gate_times_s[0]).velocity_m_s[0] < -0.3
+    assert path.at(path.crossings[0].time_s).velocity_m_s[0] < -0.3
     assert touching(Sampled(path), gate) == []
 
 

@@ -38,14 +38,18 @@ class Pages:
             PageMessage(page=page, name="Ada", what=what, beat=beat, flight=flight), self.now_s
         )
 
+    def hold_go_until_given(self):
+        """A page holds the button; the go is given between 0.8 and 1.2 s."""
+        self.pass_time(0.8, "go")
+        assert not self.operator.has_go
+        self.pass_time(0.4, "go")
+        assert self.operator.has_go
+
 
 def test_a_button_that_is_held_gives_the_go():
     pages = Pages()
     pages.pass_time(1.0, "here")
-    pages.pass_time(0.8, "go")
-    assert not pages.operator.has_go
-    pages.pass_time(0.4, "go")
-    assert pages.operator.has_go
+    pages.hold_go_until_given()
 
 
 def test_a_button_that_is_let_go_gives_none():
@@ -61,10 +65,7 @@ def test_what_was_held_before_it_was_asked_for_does_not_count():
     pages = Pages(asks=False)
     pages.pass_time(3.0, "go")
     pages.operator.ask_for_go()
-    pages.pass_time(0.8, "go")
-    assert not pages.operator.has_go
-    pages.pass_time(0.4, "go")
-    assert pages.operator.has_go
+    pages.hold_go_until_given()
 
 
 def test_messages_that_a_connection_has_kept_back_give_no_go():

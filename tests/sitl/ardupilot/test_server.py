@@ -23,22 +23,12 @@ from sitl.server_settings import ServerSettings
 from sitl.time_grants import Grant, Held, TimeGrants
 from tests.processes import free_instance
 from tests.sitl.ardupilot.fake_ardupilot import FakeArduPilot
+from tests.waiting import stopped, until
 from wire.dialect import mavlink
 from wire.framing import PacketReader
 
 STILL, CLIMB = [1000] * 4, [1400] * 4
 FAKE = Path(__file__).with_name("fake_ardupilot.py")
-
-
-async def until(condition, limit_s=20.0):
-    async with asyncio.timeout(limit_s):
-        while not condition():  # noqa: ASYNC110 - what is awaited has no event
-            await asyncio.sleep(0.01)
-
-
-async def stopped(task):
-    task.cancel()
-    await asyncio.gather(task, return_exceptions=True)
 
 
 def server_with(lines, made, *, process=None, sensors="ideal", grants=None, instance=None):

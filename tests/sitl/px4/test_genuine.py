@@ -20,6 +20,7 @@ from sitl.px4.transmitter import CENTRED
 from sitl.sensors.suite import load_suite
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
+from tests.waiting import stopped
 from wire.px4_modes import px4_name
 
 PX4_DIR = os.environ.get("FRAMERUNNER_PX4_DIR", "")
@@ -38,8 +39,7 @@ async def test_lockstep_loses_and_doubles_no_step(tmp_path):
             await asyncio.sleep(0.1)
             assert not task.done(), lines
     assert server.link.unexpected == 0
-    task.cancel()
-    await asyncio.gather(task, return_exceptions=True)
+    await stopped(task)
 
 
 async def test_sticks_and_switches_of_a_transmitter(tmp_path):
@@ -98,8 +98,7 @@ async def test_sticks_and_switches_of_a_transmitter(tmp_path):
     channels[5] = 2000
     await until(lambda: max(made[-1].world.dynamics.motor_speeds_rad_s()) < 1.0)
     await until(lambda: not made[-1].armed)
-    task.cancel()
-    await asyncio.gather(task, return_exceptions=True)
+    await stopped(task)
     link.close()
 
 

@@ -25,6 +25,7 @@ from sitl.px4.simulation import MotionError, Px4Simulation
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.sitl.px4.fake_px4 import FakePx4
+from tests.waiting import stopped, until
 from wire.transports.urls import LinkError
 
 FAKE = Path(__file__).with_name("fake_px4.py")
@@ -45,17 +46,6 @@ def serving(lines, speed=20.0):
     settings = ServerSettings(instance=instance, speed=speed)
     server = Px4Server(make, settings, AutopilotStart(None, "px4"), notice=lines.append)
     return server, FIRST_PORT + instance, made
-
-
-async def until(condition, limit_s=20.0):
-    async with asyncio.timeout(limit_s):
-        while not condition():  # noqa: ASYNC110 - what is awaited has no event
-            await asyncio.sleep(0.01)
-
-
-async def stopped(task):
-    task.cancel()
-    await asyncio.gather(task, return_exceptions=True)
 
 
 def run_fake(port, fakes, **options):

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from errors import SettingError
 from scenarios.faults.parse import FaultError, parse_fault
 from scenarios.loader import load_scenario
+from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.px4.messages import ActuatorControls
 from sitl.px4.parameters import RC_PARAMETERS
 from sitl.px4.simulation import Px4Simulation
@@ -65,12 +66,15 @@ def test_a_receiver_that_is_stuck_repeats_what_it_had_and_a_fault_brings_its_tra
     ] * 49  # not in the first tick
 
 
-def test_our_own_autopilot_has_no_remote_control_and_px4_has_a_link_of_its_own():
+def test_our_own_autopilot_has_no_remote_control_and_others_have_a_link_of_their_own():
     scenario = load_scenario("test-case-1").model_copy(update={"sensors": "mocap"})
     with pytest.raises(FaultError, match="only a drone that PX4 flies has a remote control"):
         Simulation(scenario.model_copy(update={"faults": (parse_fault("rc off at 1 s"),)}))
-    with pytest.raises(FaultError, match="the link to the app is PX4's own"):
-        Px4Simulation(scenario.model_copy(update={"faults": (parse_fault("link off at 1 s"),)}))
+    for vehicle, name in ((Px4Simulation, "PX4"), (ArduPilotSimulation, "ArduPilot")):
+        with pytest.raises(
+            FaultError, match=f"the link to the app is {name}'s own; leave it out with {name}"
+        ):
+            vehicle(scenario.model_copy(update={"faults": (parse_fault("link off at 1 s"),)}))
 
 
 def test_a_joystick_moves_the_channels_until_it_is_pulled_out(tmp_path):

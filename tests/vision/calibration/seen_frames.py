@@ -1,13 +1,13 @@
 """What a camera that is turned on a drone sees of frames while the drone flies, without painting images."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import cos, radians, sin
 
 import numpy as np
 
-from geometry.rotations import mounting_flu, quaternion_from_euler
-from vision.calibration.motion import Motion, MotionReport, matrices
+from geometry.rotations import quaternion_from_euler
+from vision.calibration.motion import Motion, MotionReport, matrices, mounting_matrix
 from vision.calibration.sightings import Sightings, Values, sightings_of
 from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M
 from vision.types import Detections, FrameCorner, FramePose, FrameSighting
@@ -61,7 +61,7 @@ def fly(
     for time_s in np.arange(0.3, seconds, 1.0 / rate_hz):
         x, y, z, *angles = path(time_s)
         body = matrices(np.array([quaternion_from_euler(*angles)]))[0]
-        camera = body @ matrices(np.array([mounting_flu(true.angles_frd_rad)]))[0]
+        camera = body @ mounting_matrix(true.angles_frd_rad)
         eye = np.array((x, y, z)) + body @ np.array(true.position_flu_m)
         found = (sighting(each, eye, camera, stream, noise_px) for each in rectangles)
         frames = tuple(each for each in found if each is not None)
@@ -103,7 +103,3 @@ def sighting(
 
 def sightings(images: list[Detections], motion: Motion, delay_s: float = 0.0) -> Sightings:
     return sightings_of(images, motion, HALF_HEIGHT_PX, 0.0, delay_s)
-
-
-def with_delay(values: Values, delay_s: float) -> Values:
-    return replace(values, delay_s=delay_s)

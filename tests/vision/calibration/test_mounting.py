@@ -72,5 +72,6 @@ def test_without_movement_it_is_said_what_is_missing() -> None:
     assert frames.startswith("let the camera see frames") and "0 different views so far" in frames
     *_, turn, approach = missing(hovering)
     assert turn.startswith("yaw the drone by 20 degrees at least") and "(2 so far)" in turn
+    assert approach.startswith("fly towards a frame and away from it, by 0.6 m at least")
     (approach,) = missing(turning)
     assert approach == "fly towards a frame and away from it, by 0.6 m at least (0.0 m so far)"

@@ -22,10 +22,11 @@ class OperatorPage {
   #beat = null;
   #beatAt = 0;
   #ended = "";
+  #isLost = false; // the flight has not ended for certain: it may be connected again
   #open = false;
   #refused = "";
   #stoppedAt = 0;
-  #pendingStop = ""; // the flight that is to be stopped once there is a connection
+  #pendingStop = ""; // the flight that is to be stopped and has not said yet that it is
   #status = null;
 
   /** @param {HTMLElement} root @param {boolean} mayFly */
@@ -75,11 +76,15 @@ class OperatorPage {
     else if (message.kind === "flight") this.#takeFlight(message);
     else if (message.kind === "beat") this.#takeBeat(message);
     else if (message.kind === "answer") setText(this.#parts.answer, message.text);
-    else if (message.kind === "end") this.#end(message.words);
+    else if (message.kind === "end") this.#end(message);
   }
 
   #takeFlight(flight) {
-    if (this.#flight?.flight !== flight.flight) setText(this.#parts.answer, "");
+    if (this.#flight?.flight !== flight.flight) {
+      setText(this.#parts.answer, "");
+      this.#beat = null;
+    }
+    if (this.#pendingStop !== flight.flight) this.#pendingStop = "";
     this.#flight = flight;
     this.#ended = "";
     if (this.#beat === null) this.#beatAt = performance.now(); // an app that hangs never sends the first one
@@ -93,14 +98,17 @@ class OperatorPage {
     this.#beat = beat;
     this.#beatAt = performance.now();
     this.#send("here");
-    if (this.#pendingStop) this.#stop();
+    if (beat.stops) this.#pendingStop = "";
+    if (this.#pendingStop) this.#send("stop");
     this.#show();
   }
 
-  #end(words) {
+  /** @param {{words: string, lost?: boolean}} message */
+  #end({ words, lost = false }) {
     this.#ended = words;
+    this.#isLost = lost;
     this.#beat = null;
-    this.#pendingStop = "";
+    if (!lost) this.#pendingStop = "";
     this.#go.release();
     this.#show();
   }
@@ -110,13 +118,17 @@ class OperatorPage {
     return this.#socket?.send({ what, beat: this.#beat?.beat ?? -1, flight }) ?? false;
   }
 
-  /** Land. A stop that cannot be sent is sent as soon as there is a connection, to the same flight only. */
+  /** Land. The stop is sent at each beat until the flight says that it is stopped, to the same flight only. */
   #stop() {
-    if (!this.#flight || this.#ended) return;
-    const { flight } = this.#flight;
-    if (this.#pendingStop && this.#pendingStop !== flight) this.#pendingStop = "";
-    else this.#pendingStop = this.#send("stop") && this.#isAlive ? "" : flight;
+    if (!this.#mayGoOn || this.#beat?.stops) return;
+    this.#pendingStop = this.#flight.flight;
+    this.#send("stop");
     this.#show();
+  }
+
+  /** Whether there is a flight that can be stopped, as far as it is known here. */
+  get #mayGoOn() {
+    return this.#flight !== null && (!this.#ended || this.#isLost);
   }
 
   get #isAlive() {
@@ -160,7 +172,7 @@ class OperatorPage {
     setText(this.#parts.title, this.#flight?.title ?? "");
     const stops = this.#beat?.stops ?? 0;
     go.disabled = !(this.#isAlive && this.#beat.asks);
-    land.disabled = !hasFlight || stops > 0;
+    land.disabled = !this.#mayGoOn || stops > 0;
     setText(land.firstElementChild, this.#pendingStop ? "Land: being sent" : stops ? "Landing" : "Land");
     motors.disabled = !(this.#isAlive && stops === 1 && performance.now() - this.#stoppedAt > MOTORS_AFTER_MS);
     this.#showFigures();
