@@ -185,7 +185,11 @@ def _parsed(line: str) -> ParameterValue:
     if len(fields) != _FIELDS:
         raise ValueError(line)
     name, value, kind = fields[2], float(fields[3]), int(fields[4])
-    sendable = abs(value) <= _MAX_FLOAT if kind == _FLOAT else value in _WHOLE.get(kind, ())
+    sendable = (
+        abs(value) <= _MAX_FLOAT
+        if kind == _FLOAT
+        else value.is_integer() and int(value) in _WHOLE.get(kind, ())
+    )
     if not name.isascii() or not name.isprintable() or not 0 < len(name) <= _NAME_BYTES or not sendable:
         raise ValueError(line)
     return ParameterValue(name, value, kind)
