@@ -129,7 +129,7 @@ class OperatorDesk:
         self._flight = writer
         is_open = False  # it has sent a message, and not its last one
         try:
-            with contextlib.suppress(OSError, ValueError):
+            with contextlib.suppress(OSError, ValueError, RecursionError):
                 while line := await reader.readline():
                     is_open = not self._pass_on(line)
         finally:
@@ -142,10 +142,13 @@ class OperatorDesk:
     def _pass_on(self, line: bytes) -> bool:
         """Pass a flight's message on to its page or to all; True if it is its last one."""
         message = json.loads(line)  # ValueError ends the connection
+        if not isinstance(message, dict):
+            raise ValueError("not a message of a flight")
         text = line.decode()
         kind = message.get("kind")
         if kind == "answer":
-            page = self._pages.get(message.get("page"))
+            number = message.get("page")
+            page = self._pages.get(number) if isinstance(number, int) else None
             if page is not None:
                 page.put(text)
             return False

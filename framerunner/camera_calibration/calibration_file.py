@@ -30,16 +30,22 @@ def load_calibration(path: Path) -> Calibration:
 
 
 def save_calibration(calibration: Calibration, path: Path) -> None:
-    """Write a file.
+    """Write a file, completely or not at all: one that was there before is kept if the disk is full.
 
     Raises:
         SettingError: it cannot be written.
     """
     content = finite(calibration.model_dump(mode="json", exclude_none=True), _DECIMALS)
     text = _HEAD + yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
+    file = path.resolve()  # a link stays one
+    part = file.with_name(f".{file.name}.part")
     try:
-        path.write_text(text, encoding="utf-8")
+        try:
+            part.write_text(text, encoding="utf-8")
+            part.replace(file)
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise
     except OSError as error:
-        raise SettingError(
-            f"--out {path}: cannot be written to ({error.strerror}); {write_advice(error)}"
-        ) from error
+        message = f"{path}: cannot be written to ({error.strerror}); {write_advice(error)}"
+        raise SettingError(message) from error

@@ -5,12 +5,16 @@ from __future__ import annotations
 import asyncio
 import fcntl
 import os
-from collections.abc import Iterator
+import signal
+import threading
+from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
-from typing import BinaryIO
+from types import FrameType
+from typing import BinaryIO, TypeVar
 
 from errors import SettingError
 from framerunner.flying.fly import FinishedFlight
@@ -24,6 +28,8 @@ from sitl.px4.side_link import CAMERA_PORT
 from sitl.server_settings import VIDEO_PORT
 from wire.transports.sockets import bind_udp, listen_tcp
 from wire.transports.urls import LinkError
+
+T = TypeVar("T")
 
 INSTANCES = 10
 _TCP_PORTS = (FIRST_PORT, VIDEO_PORT)
@@ -56,7 +62,25 @@ def fly_with_px4(plan: FlightPlan, use: Px4Use) -> FinishedFlight:
         folder.write_plan(plan.scenario, plan.chart)
         px4 = GenuineAutopilot("px4", use.folder)
         settings = RealTimeSettings(speed=use.speed, instance=instance, autopilot=px4, unattended=True)
-        return asyncio.run(fly_in_real_time(plan, settings, RunRecords(folder, None), None))
+        return asyncio.run(interrupted_once(fly_in_real_time(plan, settings, RunRecords(folder, None), None)))
+
+
+async def interrupted_once(work: Coroutine[object, object, T]) -> T:
+    """Do some work of `asyncio.run`, which ends in order at Ctrl-C, also if it is pressed again meanwhile."""
+    if threading.current_thread() is not threading.main_thread():  # no signals come here
+        return await work
+    before = signal.getsignal(signal.SIGINT)  # asyncio's, which cancels only once
+    interrupts = count()
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        if next(interrupts) == 0 and callable(before):
+            before(number, frame)
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        return await work
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

@@ -17,7 +17,7 @@ FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 _INCLUSION = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 _UPLOAD_S = 5.0
 _REQUESTS = ("MISSION_REQUEST_INT", "MISSION_REQUEST")
-_MAX_ITEMS = 1000
+MAX_ITEMS = 1000
 
 Vertex = tuple[int, int]
 """Latitude and longitude, 1e-7 degrees."""
@@ -100,7 +100,7 @@ def download_fence(session: VehicleSession) -> tuple[FenceItem, ...]:
         mavlink.MAVLink_mission_request_list_message(*target, FENCE),
         lambda each: each.count if _is(each, "MISSION_COUNT") else None,
     )
-    if count is None or count > _MAX_ITEMS:
+    if count is None or count > MAX_ITEMS:
         raise DroneError("the vehicle does not tell its fence; check that it takes fences")
     items = []
     for seq in range(count):

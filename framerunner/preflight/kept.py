@@ -13,7 +13,7 @@ from math import isfinite
 from pathlib import Path
 
 from errors import SettingError
-from framerunner.preflight.fence_upload import FenceItem, upload_fence
+from framerunner.preflight.fence_upload import MAX_ITEMS, FenceItem, upload_fence
 from framerunner.preflight.parameters import ParameterValue, set_parameter
 from framerunner.preflight.session import VehicleSession
 from offboard.drone import DroneError
@@ -27,6 +27,20 @@ _UID, _FENCE, _ITEM = "# vehicle-uid", "# fence-items", "# fence-item"
 _NAME_BYTES = 16
 _FIELDS = 5
 _ITEM_FIELDS = 10
+_MAX_FILE_BYTES = 1 << 20  # thousands of parameters
+_MAX_FLOAT = 3.4028235e38  # of 32 bits, as MAVLink sends them
+_WHOLE = {  # MAV_PARAM_TYPE and the numbers that it can hold; PARAM_SET has no place for 64 bits
+    kind: range(-(1 << bits - 1), 1 << bits - 1) if signed else range(1 << bits)
+    for kind, bits, signed in (
+        (mavlink.MAV_PARAM_TYPE_UINT8, 8, False),
+        (mavlink.MAV_PARAM_TYPE_INT8, 8, True),
+        (mavlink.MAV_PARAM_TYPE_UINT16, 16, False),
+        (mavlink.MAV_PARAM_TYPE_INT16, 16, True),
+        (mavlink.MAV_PARAM_TYPE_UINT32, 32, False),
+        (mavlink.MAV_PARAM_TYPE_INT32, 32, True),
+    )
+}
+_INT32 = _WHOLE[mavlink.MAV_PARAM_TYPE_INT32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +82,14 @@ def load_kept(path: Path) -> KeptState:
     """Read a file for return, of this program or of QGroundControl.
 
     Raises:
-        SettingError: there is none, or a line is not understood.
+        SettingError: there is none, it is too large, or a line is not understood or cannot be sent.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open("rb") as file:
+            data = file.read(_MAX_FILE_BYTES + 1)
+        if len(data) > _MAX_FILE_BYTES:
+            raise SettingError(f"{OPTION} {path}: has more than {_MAX_FILE_BYTES} bytes; use a copy")
+        text = data.decode()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "no text"
         raise SettingError(f"{OPTION} {path}: cannot be read ({reason})") from None
@@ -91,13 +109,16 @@ def load_kept(path: Path) -> KeptState:
                 parameters.append(_parsed(line))
         except ValueError:
             raise SettingError(
-                f"{OPTION} {path}: line {number} is not understood; a parameter is vehicle, component, name, "
-                "value and type, separated by tabs"
+                f"{OPTION} {path}: line {number} is not understood, or a number is too large; a parameter is "
+                "vehicle, component, name, value and type, separated by tabs"
             ) from None
     if count is None and not parameters:
         raise SettingError(f"{OPTION} {path}: holds no parameters and no fence")
-    if len(items) != (count or 0):
-        raise SettingError(f"{OPTION} {path}: has {len(items)} items of a fence of {count or 0}; use a copy")
+    if len(items) != (count or 0) or len(items) > MAX_ITEMS:
+        raise SettingError(
+            f"{OPTION} {path}: has {len(items)} items of a fence of {count or 0} (at most {MAX_ITEMS}); "
+            "use a copy"
+        )
     return KeptState(uid, tuple(parameters), None if count is None else tuple(items))
 
 
@@ -151,9 +172,12 @@ def _parsed_item(text: str) -> FenceItem:
     fields = text.split("\t")
     if len(fields) != _ITEM_FIELDS - 1:
         raise ValueError(text)
-    first, second, third, fourth = map(float, fields[2:6])  # a circle's unused ones may be NaN
-    whole = (int(fields[0]), int(fields[1]))
-    return FenceItem(*whole, (first, second, third, fourth), int(fields[6]), int(fields[7]), float(fields[8]))
+    params = (float(fields[2]), float(fields[3]), float(fields[4]), float(fields[5]))
+    command, frame, x, y, z = *map(int, (*fields[:2], *fields[6:8])), float(fields[8])
+    floats_fit = all(not isfinite(each) or abs(each) <= _MAX_FLOAT for each in (*params, z))  # unused: NaN
+    if not floats_fit or not (0 <= command < 1 << 16 and 0 <= frame < 1 << 8 and x in _INT32 and y in _INT32):
+        raise ValueError(text)
+    return FenceItem(command, frame, params, x, y, z)
 
 
 def _parsed(line: str) -> ParameterValue:
@@ -161,7 +185,11 @@ def _parsed(line: str) -> ParameterValue:
     if len(fields) != _FIELDS:
         raise ValueError(line)
     name, value, kind = fields[2], float(fields[3]), int(fields[4])
-    whole = kind == _FLOAT or value.is_integer()
-    if not 0 < len(name.encode()) <= _NAME_BYTES or not isfinite(value) or not whole:
+    sendable = (
+        abs(value) <= _MAX_FLOAT
+        if kind == _FLOAT
+        else value.is_integer() and int(value) in _WHOLE.get(kind, ())
+    )
+    if not name.isascii() or not name.isprintable() or not 0 < len(name) <= _NAME_BYTES or not sendable:
         raise ValueError(line)
     return ParameterValue(name, value, kind)

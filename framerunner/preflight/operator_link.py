@@ -31,6 +31,7 @@ from wire.operator_messages import (
 )
 
 _AGAIN_S = 1.0
+_REFUSAL_S = 0.5  # in which a monitor that has a flight closes another one's connection
 _MAX_WAITING_BYTES = 1 << 20  # that a monitor which hangs has not read
 
 logger = logging.getLogger(__name__)
@@ -69,7 +70,7 @@ class OperatorLink:
         """Connect.
 
         Raises:
-            SettingError: no monitor listens there.
+            SettingError: no monitor listens there, or it has another flight.
         """
         try:
             reader = await self._open()
@@ -79,6 +80,11 @@ class OperatorLink:
                 f"--operator-socket {self._path}: no monitor listens there ({reason}); start framerunner "
                 f"monitor --operator-socket {self._path}"
             ) from None
+        if await _is_refused(reader):
+            raise SettingError(
+                f"--operator-socket {self._path}: the monitor there has another flight already; end it, or "
+                "start another monitor with another socket"
+            )
         self._tasks = [asyncio.create_task(each) for each in (self._serve(reader), self._beat_forever())]
         return self
 
@@ -166,3 +172,13 @@ class OperatorLink:
             writer.transport.abort()  # a monitor that hangs; its pages are lost
             return
         writer.write(message.model_dump_json().encode() + b"\n")
+
+
+async def _is_refused(reader: asyncio.StreamReader) -> bool:
+    """Whether a monitor closes a new connection at once."""
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(_REFUSAL_S):
+            while not reader.at_eof() and reader.exception() is None:  # noqa: ASYNC110 - a read would take what is for `_serve`
+                await asyncio.sleep(0.02)
+            return True
+    return False

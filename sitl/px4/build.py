@@ -14,6 +14,7 @@ from sitl.autopilots.process import AutopilotProcess
 
 MODEL = "none_iris"
 """The start-up script of PX4's that waits for a simulator on TCP; its parameters are overwritten by ours."""
+_TAKEN = "already running for instance"  # PX4's own words, before it ends
 _PLACES = ("", "build/px4_sitl_default", "px4_sitl_default")
 
 
@@ -82,6 +83,11 @@ class Px4Process(AutopilotProcess):
             *(str(self._build / "bin" / "px4"), "-d", "-i", str(self._instance)),
             *("-w", str(self.folder), str(self._build / "etc")),
         ]
+
+    async def ended(self) -> str:
+        """Wait until it ends; how, in words, and what to do where another PX4 has its instance."""
+        words = await super().ended()
+        return f"{words}; choose another --instance" if _TAKEN in words else words
 
     def inherits(self, name: str) -> bool:
         """Not what would set a parameter."""

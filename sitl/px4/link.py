@@ -46,7 +46,7 @@ class Px4Link:
     """
 
     def __init__(self, place: Address, notice: Callable[[str], None]) -> None:
-        self._listener = listen_tcp(place)
+        self._listener = listen_tcp(place, "choose another --instance")
         self._notice = notice
         self._stream: Stream | None = None
         self._reader = ControlsReader()

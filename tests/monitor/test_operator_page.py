@@ -53,8 +53,8 @@ async def monitor(folder, **changed):
         if line.startswith("monitor: ") and not started.done():
             started.set_result(line.removeprefix("monitor: "))
 
-    database, socket = f"sqlite:///{folder / 'monitor.db'}", folder / "operator.sock"
-    settings = MonitorSettings(port=0, database=database, operator_socket=socket, **changed)
+    database, path = f"sqlite:///{folder / 'monitor.db'}", folder / "operator.sock"
+    settings = MonitorSettings(port=0, database=database, operator_socket=path, **changed)
     task = asyncio.create_task(serve(EQUIPMENT, settings, say))
     try:
         await asyncio.wait({task, started}, return_when=asyncio.FIRST_COMPLETED, timeout=30.0)
@@ -297,10 +297,26 @@ async def test_the_socket_is_this_users_alone_and_a_second_flight_is_refused(tmp
         reader, writer = await asyncio.open_unix_connection(str(path))
         assert await reader.read() == b""
         writer.close()
+        with pytest.raises(SettingError, match="the monitor there has another flight already"):
+            async with link_to(tmp_path, Operator()):
+                pass
     assert not path.exists()
     with pytest.raises(SettingError, match="no monitor listens there"):
         async with link_to(tmp_path, Operator()):
             pass
+
+
+@pytest.mark.parametrize("line", [b"[1]", b'{"kind": "answer", "page": [1]}', b"[" * 100_000, b"\xff"])
+async def test_what_no_flight_sends_leaves_the_monitor_ready(tmp_path, line, caplog):
+    async with monitor(tmp_path):
+        reader, writer = await asyncio.open_unix_connection(str(tmp_path / "operator.sock"))
+        writer.write(line + b"\n")
+        writer.write_eof()
+        assert await reader.read() == b""
+        writer.close()
+        async with link_to(tmp_path, Operator()):
+            pass
+    assert not [each for each in caplog.records if each.exc_info]
 
 
 async def test_the_socket_of_a_monitor_that_runs_is_left_alone_and_one_that_was_killed_replaced(tmp_path):
@@ -325,10 +341,10 @@ async def test_what_no_page_sends_ends_the_connection(tmp_path, text):
         monitor(tmp_path) as (url, _),
         link_to(tmp_path, operator),
         aiohttp.ClientSession() as web,
-        web.ws_connect(f"{url}ws/operator") as socket,
+        web.ws_connect(f"{url}ws/operator") as page,
     ):
-        await socket.send_str(text)
-        async for _ in socket:
+        await page.send_str(text)
+        async for _ in page:
             pass
-        assert socket.close_code == 4400
+        assert page.close_code == 4400
     assert operator.stops == 0

@@ -202,9 +202,14 @@ def resolved_ipv4(place: Address, what: str = "UDP") -> Address:
     return cast(Address, found[0][4])
 
 
-def listen_tcp(place: Address) -> socket.socket:
-    """A socket that takes TCP connections and does not block."""
-    with _explained(f"TCP {_name(place)} cannot be listened on", "choose another port"):
+def listen_tcp(place: Address, advice: str = "choose another port") -> socket.socket:
+    """A socket that takes TCP connections and does not block.
+
+    Args:
+        place: the local address.
+        advice: what to do when the port is taken.
+    """
+    with _explained(f"TCP {_name(place)} cannot be listened on", advice):
         family, address = _local(place, socket.SOCK_STREAM)
         listener = socket.create_server(address, family=family)
     listener.setblocking(False)

@@ -1,5 +1,6 @@
 """`framerunner camera colours` as its user calls it."""
 
+import resource
 from pathlib import Path
 
 import cv2
@@ -41,3 +42,17 @@ def test_wrong_sources_are_one_line(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match="not an image"):
         learn([*pairs, f"blue={tmp_path}/none.png"], tmp_path / "camera.yaml", ask)
     assert load_calibration(tmp_path / "camera.yaml").colour_matrix is None
+
+
+def test_a_calibration_that_cannot_be_written_again_is_kept(tmp_path: Path) -> None:
+    file = tmp_path / "camera.yaml"
+    save_calibration(Calibration.ideal(320, 240, 200.0), file)
+    before, limits = file.read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        with pytest.raises(SettingError, match=r"camera\.yaml: cannot be written to \(File too large\)"):
+            save_calibration(Calibration.ideal(640, 480, 400.0), file)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert file.read_bytes() == before
+    assert not list(tmp_path.glob(".*"))

@@ -1,6 +1,9 @@
 """`framerunner evaluate --px4`: no PX4 is needed, its flights are lockstep flights here."""
 
+import asyncio
 import json
+import os
+import signal
 import socket
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +14,7 @@ from errors import SettingError
 from framerunner.cli import run
 from framerunner.evaluation import px4_flight, runner
 from framerunner.evaluation.plan import plan_files
-from framerunner.evaluation.px4_flight import claimed_instance
+from framerunner.evaluation.px4_flight import claimed_instance, interrupted_once
 from framerunner.flying.lockstep import fly_lockstep
 from offboard.mission import load_mission
 from scenarios.faults.parse import parse_fault
@@ -133,6 +136,25 @@ def test_each_flight_at_once_has_an_instance_of_its_own(monkeypatch, tmp_path):
                 pass
         with claimed_instance() as again:
             assert again == 0
+
+
+def test_a_flight_that_is_interrupted_twice_still_ends_in_order():
+    ended = []
+
+    async def flight():
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            await asyncio.sleep(20.0)
+        finally:
+            await asyncio.sleep(0.01)
+            os.kill(os.getpid(), signal.SIGINT)
+            await asyncio.sleep(0.01)
+            ended.append(True)
+
+    with pytest.raises(KeyboardInterrupt):
+        asyncio.run(interrupted_once(flight()))
+    assert ended
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_lock_in_the_shared_folder_neither_changes_nor_waits_for_other_files(monkeypatch, tmp_path):

@@ -190,9 +190,18 @@ def test_a_parameter_that_is_not_there_is_left_out(link):
         "1 1 NAME 2 9\n",
         "1\t1\tNAME\tnan\t9\n",
         "1\t1\tNAME\t1.5\t6\n",
+        "1\t1\tNAME\t1e300\t9\n",
+        "1\t1\tNAME\t99999999999\t6\n",
+        "1\t1\tNAME\t1\t99\n",
+        "1\t1\tNAME\0\t1\t6\n",
+        "# fence-items\t1\n# fence-item\t5001\t0\t1e300\t0\t0\t0\t1\t1\t0\n",
+        "# fence-items\t1\n# fence-item\t5001\t0\t3\t0\t0\t0\t99999999999\t1\t0\n",
+        "# fence-items\t1001\n" + "# fence-item\t5001\t0\t3\t0\t0\t0\t1\t1\t0\n" * 1001,
+        "1\t1\tNAME\t1\t6\n" * 100_000,
     ],
+    ids=range(15),
 )
-def test_a_file_that_holds_no_parameters_is_refused_in_a_line(tmp_path, text):
+def test_a_file_that_cannot_be_returned_is_refused_in_a_line(tmp_path, text):
     path = tmp_path / "old.params"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(SettingError, match=r"--restore-parameters .*old.params"):

@@ -26,6 +26,7 @@ from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.sitl.px4.fake_px4 import FakePx4
 from tests.waiting import stopped, until
+from wire.transports.urls import LinkError
 
 FAKE = Path(__file__).with_name("fake_px4.py")
 
@@ -181,6 +182,23 @@ async def test_a_px4_that_ends_at_once_is_reported_with_its_error(tmp_path):
     assert await process.ended() == "PX4 ended with code 3: ERROR [init] no airframe"
     assert "PX4_PARAM_MPC_THR_HOVER=0.5" in process.log.read_text()
     assert "PX4_SIM_MODEL=none_iris" in process.log.read_text()
+
+
+async def test_what_to_do_where_another_px4_has_the_instance_is_said(tmp_path):
+    taken = "INFO  [px4] PX4 server already running for instance 0"
+    process = Px4Process(build_of(tmp_path, f"echo '{taken}'; exit 255"), 0, tmp_path / "files", {})
+    await process.start()
+    assert await process.ended() == f"PX4 ended with code 255: {taken}; choose another --instance"
+
+
+async def test_a_second_simulator_of_the_same_instance_says_what_to_do():
+    place = ("127.0.0.1", FIRST_PORT + free_instance())
+    first = Px4Link(place, lambda line: None)
+    try:
+        with pytest.raises(LinkError, match=r"cannot be listened on .*; choose another --instance"):
+            Px4Link(place, lambda line: None)
+    finally:
+        first.close()
 
 
 async def test_a_px4_that_is_restarted_goes_on_with_its_log(tmp_path):
