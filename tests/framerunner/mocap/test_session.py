@@ -11,10 +11,11 @@ from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
 from framerunner.doctor.findings import Level
 from framerunner.doctor.listen import Record
-from framerunner.mocap.judgement import Facts, is_fused, judge, line
+from framerunner.mocap.facts import Facts, SendSettings
+from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison
 from framerunner.mocap.poses import Pose
-from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession, SendSettings
+from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession
 from framerunner.mocap.sources import SitlSource, TimedPose
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
@@ -198,12 +199,12 @@ def test_a_faster_source_is_thinned_out():
     assert trial.facts().rate_hz == pytest.approx(25.0, abs=1.0)
 
 
-def recorded(flags, *, parameters=None, autopilot=mavlink.MAV_AUTOPILOT_PX4):
+def recorded(flags, *, parameters=None):
     """A record of a PX4 vehicle, which sends no health of vision."""
     record, packer = Record(), mavlink.MAVLink(None, 1, 1)
     reader = PacketReader()
     for message in (
-        mavlink.MAVLink_heartbeat_message(2, autopilot, 29, 0x03040000, 3, 3),
+        mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3),
         mavlink.MAVLink_sys_status_message(0x2F, 0x2F, 0x2F, *[0] * 12, 0),
         mavlink.MAVLink_estimator_status_message(1, flags, *[0.0] * 8),
     ):
@@ -238,7 +239,6 @@ def test_whether_px4_uses_the_poses(flags, control, distance_m, expected):
     ("changes", "subject", "advice"),
     [
         ({"parameters": {"EKF2_EV_CTRL": 0}}, "fused", "EKF2_EV_CTRL is 0: set it to 15"),
-        ({"flags": 0, "autopilot": 3}, "fused", "VISO_TYPE"),
         ({"comparison": replace(RIGHT, tilt_deg=90.0)}, "tilt", "--frame"),
         ({"comparison": replace(RIGHT, heading_deg=90.0)}, "heading", "--forward"),
         ({"comparison": replace(RIGHT, distance_m=0.3)}, "position", "step 6"),
@@ -253,8 +253,7 @@ def test_whether_px4_uses_the_poses(flags, control, distance_m, expected):
 )
 def test_what_is_missing_and_what_to_do(changes, subject, advice):
     parameters = changes.pop("parameters", {"EKF2_EV_CTRL": 15})
-    kind = changes.pop("autopilot", mavlink.MAV_AUTOPILOT_PX4)
-    record = recorded(changes.pop("flags", RELATIVE), parameters=parameters, autopilot=kind)
+    record = recorded(changes.pop("flags", RELATIVE), parameters=parameters)
     given = {"comparison": RIGHT, "sent": 100, "rate_hz": 50.0} | changes
     found = {each.subject: each for each in judge(Facts(record, **given)) if each.level is Level.MISSING}
     assert advice in found[subject].advice
