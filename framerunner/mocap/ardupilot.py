@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import pi, sqrt
 from types import MappingProxyType
 
 from framerunner.doctor.findings import Finding, Findings, Level
@@ -24,6 +25,7 @@ from framerunner.mocap.facts import (
 )
 from framerunner.mocap.messages import odometry, vision_position
 from framerunner.mocap.poses import Pose
+from wire.ardupilot_messages import POSE_ARRIVAL_EARLY_MS
 from wire.dialect import Message, mavlink
 
 _EXTERNAL_NAVIGATION = 6
@@ -82,7 +84,7 @@ class ArduPilotPoses:
     parameters: tuple[str, ...] = (
         *("AHRS_EKF_TYPE", "EK3_SRC1_POSXY", "EK3_SRC1_POSZ", "EK3_SRC1_VELXY", "EK3_SRC1_VELZ"),
         *("EK3_SRC1_YAW", "VISO_TYPE", "VISO_DELAY_MS", "VISO_POS_M_NSE", "VISO_YAW_M_NSE"),
-        *("VISO_QUAL_MIN", "VISO_SCALE"),
+        *("VISO_QUAL_MIN", "VISO_SCALE", "INS_GYRO_FILTER"),
     )
     rates_hz: Mapping[str, float] = MappingProxyType(
         {"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 30.0, "EKF_STATUS_REPORT": 2.0, "SYS_STATUS": 2.0}
@@ -158,20 +160,26 @@ class ArduPilotPoses:
 
     def delay(self, facts: Facts) -> Findings:
         """VISO_DELAY_MS against the age of poses on their arrival."""
-        age_s = facts.comparison.delay_s + facts.settings.delay_s + facts.transit_s
+        behind_gyro_s = facts.comparison.delay_s + facts.settings.delay_s + facts.transit_s
+        age_s = behind_gyro_s + _gyro_delay_s(facts.record.parameters.get("INS_GYRO_FILTER", 0.0))
+        wanted_ms = min(_MAX_DELAY_MS, max(0.0, age_s * 1000 - POSE_ARRIVAL_EARLY_MS))
         given_ms = facts.record.parameters.get("VISO_DELAY_MS")
         words = f"poses are {age_s * 1000:.0f} ms old on their arrival"
         if given_ms is None:
-            yield note("delay", words, "set VISO_DELAY_MS to it")
+            yield note("delay", words, f"set VISO_DELAY_MS to {wanted_ms:.0f}")
             return
-        wrong_s = abs(age_s - given_ms / 1000.0)
+        wrong_s = abs(wanted_ms - given_ms) / 1000.0
         if wrong_s <= DELAY_S:
             yield good("delay", words)
             return
-        wanted_ms = min(_MAX_DELAY_MS, max(0.0, age_s * 1000))
         advice = f"VISO_DELAY_MS is {given_ms:g}: set it to {wanted_ms:.0f}, then restart the vehicle"
         level = Level.MISSING if wrong_s > _FAR_DELAY_S else Level.NOTE
         yield Finding(level, "delay", words, advice)
+
+
+def _gyro_delay_s(cutoff_hz: float) -> float:
+    """By how much the body rates of ATTITUDE are late: they pass a Butterworth filter of second order."""
+    return sqrt(2.0) / (2.0 * pi * cutoff_hz) if cutoff_hz > 0.0 else 0.0
 
 
 def _wrong_parameters(facts: Facts) -> Findings:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from statistics import median
 
 from framerunner.doctor.listen import Record
 from framerunner.mocap.dialects import PoseDialect, dialect_of
@@ -71,13 +72,24 @@ class Vehicle:
 
     @property
     def offset_s(self) -> float | None:
-        """Vehicle time less this program's; None: not known yet."""
-        return min(self._offsets)[1] if self._offsets else None
+        """Vehicle time less this program's; None: not known yet.
+
+        The median of the quicker half: the very quickest answers are those of a simulator that is catching
+        up, whose clock is late meanwhile.
+        """
+        return median(offset for _, offset in self._quicker_half()) if self._offsets else None
 
     @property
     def transit_s(self) -> float:
-        """Half of the shortest way there and back of late; 0: not known yet."""
-        return min(self._offsets)[0] / 2.0 if self._offsets else 0.0
+        """Half of a quick way there and back; 0: not known yet."""
+        return (
+            median(there_and_back for there_and_back, _ in self._quicker_half()) / 2.0
+            if self._offsets
+            else 0.0
+        )
+
+    def _quicker_half(self) -> list[tuple[float, float]]:
+        return sorted(self._offsets)[: (len(self._offsets) + 1) // 2]
 
     def stamp_us(self, now_s: float) -> int:
         """A time of this program as time stamps and TIMESYNC carry it: above zero."""

@@ -142,7 +142,7 @@ def test_no_origin_is_set_where_one_is_known_or_motors_run(state):
 
 
 def test_a_turned_vehicle_shows_axes_and_delay():
-    trial = with_source({"VISO_DELAY_MS": 40}, {"origin": HALL}, delay_s=0.03)
+    trial = with_source({"VISO_DELAY_MS": 20}, {"origin": HALL}, delay_s=0.03)
     trial.vehicle.turning = True
     trial.run(25.0)
     assert trial.facts().comparison.delay_s == pytest.approx(0.03, abs=0.01)
@@ -154,8 +154,7 @@ def test_a_delay_that_is_wrong_by_a_tenth_of_a_second_is_missing():
     trial = with_source({"VISO_DELAY_MS": 10}, {"origin": HALL}, delay_s=0.11)
     trial.vehicle.turning = True
     trial.run(25.0)
-    advice = trial.found()["delay"].advice
-    assert "VISO_DELAY_MS is 10: set it to 1" in advice
+    assert "VISO_DELAY_MS is 10: set it to" in trial.found()["delay"].advice
 
 
 def test_a_delay_given_to_this_program_does_not_hide_a_wrong_parameter():
