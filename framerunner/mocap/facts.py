@@ -68,7 +68,9 @@ class Facts:
         fault: what was wrong with the last of them.
         settings: how poses are sent.
         has_velocity: the source gives velocities.
-        transit_s: time that a packet takes to the vehicle, half of the shortest way there and back.
+        transit_s: time that a packet takes to the vehicle, half of a quick way there and back.
+        unused_s: for how long it did not use the poses that came, after it had used some.
+        farthest_m: from the pose of the same time, meanwhile.
     """
 
     record: Record
@@ -84,3 +86,5 @@ class Facts:
     settings: SendSettings = SendSettings()
     has_velocity: bool = False
     transit_s: float = 0.0
+    unused_s: float = 0.0
+    farthest_m: float = 0.0

@@ -11,6 +11,7 @@ from framerunner.mocap.facts import NEAR_M, Facts, good, missing, note
 
 MIN_RATE_HZ = 30.0
 GAP_S = 0.2
+MAX_UNUSED_S = 3.0
 HEADING_DEG, TILT_DEG = 10.0, 8.0
 _CORRELATED = 0.7
 
@@ -82,6 +83,10 @@ def _fused(facts: Facts) -> Iterator[Finding]:
         yield note("fused", f"in part: {part[0]}", part[1])
     else:
         yield good("fused", "the vehicle uses the poses")
+    if facts.unused_s > MAX_UNUSED_S:
+        words = f"for {facts.unused_s:.0f} s it did not use the poses that came"
+        far = f", up to {facts.farthest_m:.1f} m from them" if facts.farthest_m else ""
+        yield missing("used", words + far, "see axes and delay; carry it by hand before it flies")
     ratio = f"innovation ratio up to {facts.worst_ratio:.2f}"
     if facts.worst_ratio > 1.0:
         recovered = fused and facts.comparison.distance_m <= NEAR_M

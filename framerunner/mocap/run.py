@@ -12,7 +12,7 @@ from rich.text import Text
 from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.page import findings_table
 from framerunner.mocap.facts import Facts, SendSettings
-from framerunner.mocap.judgement import judge, line
+from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.session import MocapSession
 from framerunner.mocap.sources import PoseSource
 from wire.transports.vehicle_link import VehicleLink
@@ -77,6 +77,7 @@ def _run(
         if now_s >= line_s:
             line_s = now_s + _LINE_S
             facts = _facts(session, now_s)
+            session.note_use(is_fused(facts), facts.comparison.distance_m, _LINE_S)
             show(line(facts) if session.vehicle.found else "waiting for a vehicle")
 
 
@@ -111,6 +112,8 @@ def _facts(session: MocapSession, now_s: float) -> Facts:
         session.settings,
         session.has_velocity,
         vehicle.transit_s,
+        session.unused_s,
+        session.farthest_m,
     )
 
 

@@ -183,6 +183,24 @@ def test_poses_that_stop_are_not_fused_any_more():
     assert "no poses arrive now" in trial.found()["fused"].advice
 
 
+def test_a_vehicle_that_left_the_poses_and_came_back_is_told():
+    trial = Trial(origin=HALL).run(8.0)
+    session = trial.session
+    session.note_use(False, 50.0, 10.0)  # it has used none yet
+    session.note_use(True, 0.0, 1.0)
+    session.note_use(False, 50.0, 2.0)
+    session.note_use(False, nan, 10.0)
+    assert (session.unused_s, session.farthest_m) == (12.0, 50.0)
+    trial.source.stopped = True
+    trial.run(1.0)
+    session.note_use(False, 50.0, 10.0)
+    trial.source.stopped = False
+    trial.vehicle.restart()
+    trial.run(2.0)
+    session.note_use(False, 50.0, 10.0)
+    assert session.unused_s == 12.0
+
+
 def test_visual_odometry_that_is_off():
     trial = Trial({"VISO_TYPE": 0}, origin=HALL).run(8.0)
     assert "NOT fused" in line(trial.facts())

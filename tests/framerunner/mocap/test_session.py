@@ -244,6 +244,7 @@ def test_whether_px4_uses_the_poses(flags, control, distance_m, expected):
         ({"comparison": replace(RIGHT, distance_m=0.3)}, "position", "step 6"),
         ({"comparison": replace(RIGHT, correlation=0.2)}, "axes", "rigid"),
         ({"sent": 0}, "poses", "tracked"),
+        ({"unused_s": 12.0, "farthest_m": 50.0}, "used", "by hand"),
         (
             {"worst_ratio": 2.0, "comparison": replace(RIGHT, distance_m=0.4)},
             "innovation",
