@@ -164,7 +164,7 @@ class ArduPilotPoses:
         age_s = behind_gyro_s + _gyro_delay_s(facts.record.parameters.get("INS_GYRO_FILTER", 0.0))
         wanted_ms = min(_MAX_DELAY_MS, max(0.0, age_s * 1000 - POSE_ARRIVAL_EARLY_MS))
         given_ms = facts.record.parameters.get("VISO_DELAY_MS")
-        words = f"poses are {age_s * 1000:.0f} ms old on their arrival"
+        words = f"poses are {round(age_s * 1000)} ms old on their arrival"
         if given_ms is None:
             yield note("delay", words, f"set VISO_DELAY_MS to {wanted_ms:.0f}")
             return

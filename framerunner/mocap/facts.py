@@ -52,6 +52,21 @@ class SendSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class Unused:
+    """The time in which a vehicle did not use the poses that came, after it had used some.
+
+    Attributes:
+        seconds: how long, in all.
+        farthest_m: from the pose of the same time.
+        track: how it moved otherwise than the poses, in words; empty: it is not known.
+    """
+
+    seconds: float = 0.0
+    farthest_m: float = 0.0
+    track: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Facts:
     """What is known at the end, or once a second.
 
@@ -69,8 +84,7 @@ class Facts:
         settings: how poses are sent.
         has_velocity: the source gives velocities.
         transit_s: time that a packet takes to the vehicle, half of a quick way there and back.
-        unused_s: for how long it did not use the poses that came, after it had used some.
-        farthest_m: from the pose of the same time, meanwhile.
+        unused: when it did not use the poses that came.
     """
 
     record: Record
@@ -86,5 +100,4 @@ class Facts:
     settings: SendSettings = SendSettings()
     has_velocity: bool = False
     transit_s: float = 0.0
-    unused_s: float = 0.0
-    farthest_m: float = 0.0
+    unused: Unused = Unused()

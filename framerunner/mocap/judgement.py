@@ -7,7 +7,7 @@ from math import isfinite, isnan
 
 from framerunner.doctor.findings import Finding, Level
 from framerunner.mocap.dialects import dialect_of
-from framerunner.mocap.facts import NEAR_M, Facts, good, missing, note
+from framerunner.mocap.facts import NEAR_M, Facts, Unused, good, missing, note
 
 MIN_RATE_HZ = 30.0
 GAP_S = 0.2
@@ -60,7 +60,7 @@ def _sent(facts: Facts) -> Iterator[Finding]:
     )
     if facts.sent == 0:
         yield missing("poses", "none was sent", "does the source send, and is the body tracked?")
-    elif facts.rate_hz < MIN_RATE_HZ:
+    elif 0.0 < facts.rate_hz < MIN_RATE_HZ:
         yield note("poses", words, f"the vehicle wants {MIN_RATE_HZ:g} a second or more")
     elif facts.longest_gap_s > GAP_S or facts.dropouts:
         yield note("poses", words, "see why the source stops: the vehicle lands when poses stay away")
@@ -83,10 +83,8 @@ def _fused(facts: Facts) -> Iterator[Finding]:
         yield note("fused", f"in part: {part[0]}", part[1])
     else:
         yield good("fused", "the vehicle uses the poses")
-    if facts.unused_s > MAX_UNUSED_S:
-        words = f"for {facts.unused_s:.0f} s it did not use the poses that came"
-        far = f", up to {facts.farthest_m:.1f} m from them" if facts.farthest_m else ""
-        yield missing("used", words + far, "see axes and delay; carry it by hand before it flies")
+    if facts.unused.seconds > MAX_UNUSED_S:
+        yield _unused(facts.unused)
     ratio = f"innovation ratio up to {facts.worst_ratio:.2f}"
     if facts.worst_ratio > 1.0:
         recovered = fused and facts.comparison.distance_m <= NEAR_M
@@ -95,6 +93,15 @@ def _fused(facts: Facts) -> Iterator[Finding]:
     elif fused:
         yield good("innovation", ratio)
     yield from dialect.settings(facts)
+
+
+def _unused(unused: Unused) -> Finding:
+    words = f"for {unused.seconds:.0f} s it did not use the poses that came"
+    if unused.farthest_m:
+        words += f", up to {unused.farthest_m:.1f} m from them"
+    if unused.track:
+        words += f"; it moved otherwise: {unused.track}"
+    return missing("used", words, "see axes and delay; carry it by hand before it flies")
 
 
 def _near(facts: Facts) -> Iterator[Finding]:

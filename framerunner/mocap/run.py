@@ -77,7 +77,7 @@ def _run(
         if now_s >= line_s:
             line_s = now_s + _LINE_S
             facts = _facts(session, now_s)
-            session.note_use(is_fused(facts), facts.comparison.distance_m, _LINE_S)
+            session.note_use(is_fused(facts), facts.comparison, _LINE_S)
             show(line(facts) if session.vehicle.found else "waiting for a vehicle")
 
 
@@ -112,8 +112,7 @@ def _facts(session: MocapSession, now_s: float) -> Facts:
         session.settings,
         session.has_velocity,
         vehicle.transit_s,
-        session.unused_s,
-        session.farthest_m,
+        session.unused,
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from framerunner.mocap.facts import SendSettings
+from framerunner.mocap.facts import SendSettings, Unused
 from framerunner.mocap.motion import MotionCheck, PoseComparison, SentPose
 from framerunner.mocap.poses import with_forward
 from framerunner.mocap.sources import PoseSource, TimedPose
@@ -48,8 +48,7 @@ class MocapSession:
         silent: the source has stopped; nothing is sent.
         dropouts: how often it stopped.
         has_velocity: the source gives velocities.
-        unused_s: for how long the vehicle did not use the poses that came, after it had used some.
-        farthest_m: from the pose of the same time, meanwhile.
+        unused: when the vehicle did not use the poses that came.
     """
 
     def __init__(
@@ -63,7 +62,8 @@ class MocapSession:
         self._link, self._source, self._settings, self._say = link, source, settings, say
         self.vehicle = Vehicle(settings.rate_hz if source.needs_truth else 0.0, settings.origin, zero_s)
         self.sent = self.dropouts = 0
-        self.longest_gap_s = self.unused_s = self.farthest_m = 0.0
+        self.longest_gap_s = 0.0
+        self.unused = Unused()
         self._used_in_boot: int | None = None  # number of the vehicle's restarts when it used poses
         self.silent = self.has_velocity = False
         self._motion = MotionCheck()
@@ -137,14 +137,18 @@ class MocapSession:
             time_us = round((taken_s + offset_s) * 1e6)
             self._motion.note(SentPose(time_us, pose.position_ned_m, pose.attitude))
 
-    def note_use(self, fused: bool | None, distance_m: float, span_s: float) -> None:
-        """Note whether the vehicle uses the poses and how far from them it is, once for each `span_s`."""
+    def note_use(self, fused: bool | None, comparison: PoseComparison, span_s: float) -> None:
+        """Note whether the vehicle uses the poses and how it moves, once for each `span_s`."""
         boot = self.vehicle.record.telemetry.restarts
         if fused:
             self._used_in_boot = boot
         elif fused is False and self._used_in_boot == boot and not self.silent:
-            self.unused_s += span_s
-            self.farthest_m = max(self.farthest_m, distance_m)  # NaN is never larger
+            before = self.unused
+            self.unused = Unused(
+                before.seconds + span_s,
+                max(before.farthest_m, comparison.distance_m),  # NaN is never larger
+                comparison.track or before.track,
+            )
 
     def rate_hz(self, now_s: float) -> float:
         """Poses sent a second, over the last two."""

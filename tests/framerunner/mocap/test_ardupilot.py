@@ -5,8 +5,9 @@ from math import cos, nan, pi, sin
 import pytest
 
 from framerunner.doctor.findings import Level
-from framerunner.mocap.facts import Facts, Origin, SendSettings
+from framerunner.mocap.facts import Facts, Origin, SendSettings, Unused
 from framerunner.mocap.judgement import is_fused, judge, line
+from framerunner.mocap.motion import PoseComparison
 from framerunner.mocap.poses import Pose
 from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession
 from framerunner.mocap.sources import SitlSource, TimedPose
@@ -186,19 +187,20 @@ def test_poses_that_stop_are_not_fused_any_more():
 def test_a_vehicle_that_left_the_poses_and_came_back_is_told():
     trial = Trial(origin=HALL).run(8.0)
     session = trial.session
-    session.note_use(False, 50.0, 10.0)  # it has used none yet
-    session.note_use(True, 0.0, 1.0)
-    session.note_use(False, 50.0, 2.0)
-    session.note_use(False, nan, 10.0)
-    assert (session.unused_s, session.farthest_m) == (12.0, 50.0)
+    away = PoseComparison(50.0, track="north is mirrored")
+    session.note_use(False, away, 10.0)  # it has used none yet
+    session.note_use(True, PoseComparison(0.0), 1.0)
+    session.note_use(False, away, 2.0)
+    session.note_use(False, PoseComparison(), 10.0)
+    assert session.unused == Unused(12.0, 50.0, "north is mirrored")
     trial.source.stopped = True
     trial.run(1.0)
-    session.note_use(False, 50.0, 10.0)
+    session.note_use(False, away, 10.0)
     trial.source.stopped = False
     trial.vehicle.restart()
     trial.run(2.0)
-    session.note_use(False, 50.0, 10.0)
-    assert session.unused_s == 12.0
+    session.note_use(False, away, 10.0)
+    assert session.unused.seconds == 12.0
 
 
 def test_visual_odometry_that_is_off():

@@ -11,7 +11,7 @@ from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
 from framerunner.doctor.findings import Level
 from framerunner.doctor.listen import Record
-from framerunner.mocap.facts import Facts, SendSettings
+from framerunner.mocap.facts import Facts, SendSettings, Unused
 from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison
 from framerunner.mocap.poses import Pose
@@ -244,7 +244,7 @@ def test_whether_px4_uses_the_poses(flags, control, distance_m, expected):
         ({"comparison": replace(RIGHT, distance_m=0.3)}, "position", "step 6"),
         ({"comparison": replace(RIGHT, correlation=0.2)}, "axes", "rigid"),
         ({"sent": 0}, "poses", "tracked"),
-        ({"unused_s": 12.0, "farthest_m": 50.0}, "used", "by hand"),
+        ({"unused": Unused(12.0, 50.0)}, "used", "by hand"),
         (
             {"worst_ratio": 2.0, "comparison": replace(RIGHT, distance_m=0.4)},
             "innovation",
