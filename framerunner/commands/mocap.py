@@ -31,7 +31,8 @@ class Sending:
         str | None,
         Parameter(
             help="LATITUDE,LONGITUDE,ALTITUDE of the room, degrees and metres: set in an ArduPilot that has "
-            "none"
+            "none",
+            allow_leading_hyphen=True,
         ),
     ] = None
 
@@ -124,7 +125,7 @@ def _origin(text: str) -> Origin:
     check_range("altitude of --origin", altitude, -1000.0, 10_000.0)
     if latitude == longitude == 0.0:
         raise SettingError(
-            f"--origin {text}: latitude and longitude 0 mean that none is known; give the hall's"
+            f"--origin {text}: latitude and longitude 0 mean that none is known; give the room's"
         )
     return Origin(latitude, longitude, altitude)
 

@@ -216,7 +216,7 @@ def _origin(facts: Facts) -> Finding:
         return good("origin", f"its place on Earth is {place}")
     if facts.settings.origin is None:
         text = "it has none, so it can neither be armed for GUIDED nor has it a fence"
-        return missing("origin", text, "give --origin LATITUDE,LONGITUDE,ALTITUDE of the hall")
+        return missing("origin", text, "give --origin LATITUDE,LONGITUDE,ALTITUDE of the room")
     if facts.record.armed:
         return missing("origin", "it has none, and is armed: none is set in flight", "disarm it")
     text = "it has not taken the one that was sent"
