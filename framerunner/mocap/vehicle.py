@@ -82,11 +82,9 @@ class Vehicle:
     @property
     def transit_s(self) -> float:
         """Half of a quick way there and back; 0: not known yet."""
-        return (
-            median(there_and_back for there_and_back, _ in self._quicker_half()) / 2.0
-            if self._offsets
-            else 0.0
-        )
+        if not self._offsets:
+            return 0.0
+        return median(round_trip_s for round_trip_s, _ in self._quicker_half()) / 2.0
 
     def _quicker_half(self) -> list[tuple[float, float]]:
         return sorted(self._offsets)[: (len(self._offsets) + 1) // 2]
@@ -141,7 +139,7 @@ class Vehicle:
         return None
 
     def requests(self, now_s: float) -> Iterator[Message]:
-        """What is due to be sent, except poses. Nothing in the vehicle is changed but rates of this link."""
+        """What is due to be sent, except poses. Only rates of this link and a missing origin are set."""
         if self._is_due("heartbeat", now_s, _HEARTBEAT_S):
             yield companion_heartbeat()  # over udpout the vehicle cannot send before it has this address
         system_id = self.record.system_id
