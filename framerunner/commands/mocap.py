@@ -30,8 +30,7 @@ class Sending:
     origin: Annotated[
         str | None,
         Parameter(
-            help="LATITUDE,LONGITUDE,ALTITUDE of the room, degrees and metres: set in an ArduPilot that has "
-            "none",
+            help="LATITUDE,LONGITUDE,ALTITUDE of the room, degrees and metres: set in a drone that has none",
             allow_leading_hyphen=True,
         ),
     ] = None

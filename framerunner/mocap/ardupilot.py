@@ -133,7 +133,7 @@ class ArduPilotPoses:
         return None
 
     def settings(self, facts: Facts) -> Findings:
-        """Its parameters, one line for each that is wrong; --delay; the origin."""
+        """Its parameters, one line for each that is wrong, and --delay."""
         found, parameters = list(_wrong_parameters(facts)), facts.record.parameters
         yield from found
         unknown = [rule.name for rule in _RULES if rule.name not in parameters]
@@ -150,7 +150,6 @@ class ArduPilotPoses:
         if facts.settings.delay_s:
             text = "has no effect: ArduPilot measures times from the quickest pose"
             yield note("--delay", text, "leave it out and set VISO_DELAY_MS")
-        yield _origin(facts)
 
     def heading_advice(self, facts: Facts) -> tuple[str, str]:
         """By EK3_SRC1_YAW."""
@@ -207,17 +206,3 @@ def _wrong_parameters(facts: Facts) -> Findings:
         if noise > highest:
             text = f"{noise:g} {unit}: it follows poses slowly, however exact they are"
             yield note(name, text, f"set it to {wanted} for poses as good as that")
-
-
-def _origin(facts: Facts) -> Finding:
-    told = facts.record.latest.get("GPS_GLOBAL_ORIGIN")
-    if told is not None:
-        place = f"{told.latitude / 1e7:.7g}, {told.longitude / 1e7:.7g}, {told.altitude / 1e3:.4g} m"
-        return good("origin", f"its place on Earth is {place}")
-    if facts.settings.origin is None:
-        text = "it has none, so it can neither be armed for GUIDED nor has it a fence"
-        return missing("origin", text, "give --origin LATITUDE,LONGITUDE,ALTITUDE of the room")
-    if facts.record.armed:
-        return missing("origin", "it has none, and is armed: none is set in flight", "disarm it")
-    text = "it has not taken the one that was sent"
-    return missing("origin", text, "wait for its estimator to start, some 20 s after the vehicle")

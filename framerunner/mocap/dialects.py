@@ -27,7 +27,7 @@ class PoseDialect(Protocol):
         rates_hz: messages that are requested.
         truth: the message with a simulator's true pose.
         estimator: the message with the estimator's state.
-        needs_origin: it has no position on Earth without GPS until one is set.
+        needs_origin: without GPS it cannot be armed before its place on Earth is set.
     """
 
     name: str
@@ -56,7 +56,7 @@ class PoseDialect(Protocol):
         """Which setting keeps it from using all of a pose, and what to do; None: it uses all."""
 
     def settings(self, facts: Facts) -> Findings:
-        """Its other parameters, and its origin."""
+        """Its other parameters."""
         ...
 
     def heading_advice(self, facts: Facts) -> tuple[str, str]:

@@ -39,7 +39,7 @@ class SendSettings:
         position_sigma_m: standard deviation of each axis.
         attitude_sigma_rad: standard deviation about each axis.
         velocity_sigma_m_s: standard deviation of each axis.
-        origin: set in a vehicle that needs one and has none; None: nothing is set.
+        origin: set in a vehicle that has none; None: nothing is set.
     """
 
     rate_hz: float = 50.0

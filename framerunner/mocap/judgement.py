@@ -38,7 +38,7 @@ def line(facts: Facts) -> str:
         parts.append("turn it to test axes and delay")
     else:
         parts.append("axes right")
-    if dialect.needs_origin and "GPS_GLOBAL_ORIGIN" not in facts.record.latest:
+    if _wants_origin(facts) and "GPS_GLOBAL_ORIGIN" not in facts.record.latest:
         parts.append("NO origin")
     if isfinite(comparison.delay_s):
         parts.append(f"delay {comparison.delay_s * 1000:.0f} ms")
@@ -93,6 +93,26 @@ def _fused(facts: Facts) -> Iterator[Finding]:
     elif fused:
         yield good("innovation", ratio)
     yield from dialect.settings(facts)
+    if _wants_origin(facts):
+        yield _origin(facts)
+
+
+def _wants_origin(facts: Facts) -> bool:
+    return dialect_of(facts.record).needs_origin or facts.settings.origin is not None
+
+
+def _origin(facts: Facts) -> Finding:
+    told = facts.record.latest.get("GPS_GLOBAL_ORIGIN")
+    if told is not None:
+        place = f"{told.latitude / 1e7:.7g}, {told.longitude / 1e7:.7g}, {told.altitude / 1e3:.4g} m"
+        return good("origin", f"its place on Earth is {place}")
+    if facts.settings.origin is None:
+        text = "it has none, so it can neither be armed for GUIDED nor has it a fence"
+        return missing("origin", text, "give --origin LATITUDE,LONGITUDE,ALTITUDE of the room")
+    if facts.record.armed:
+        return missing("origin", "it has none, and is armed: none is set in flight", "disarm it")
+    text = "it has not taken the one that was sent"
+    return missing("origin", text, "wait for its estimator to start, some 20 s after the vehicle")
 
 
 def _unused(unused: Unused) -> Finding:

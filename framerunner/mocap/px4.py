@@ -81,12 +81,10 @@ class Px4Poses:
         return f"EKF2_EV_CTRL is {control}", "set it to 15"
 
     def settings(self, facts: Facts) -> Findings:
-        """The reference of height, and an origin that is not needed."""
+        """The reference of height."""
         reference = facts.record.parameters.get("EKF2_HGT_REF")
         if reference is not None and int(reference) != _HEIGHT_BY_VISION:
             yield note("height", f"EKF2_HGT_REF is {reference:g}, not vision", "set it to 3")
-        if facts.settings.origin is not None:
-            yield note("origin", "PX4 needs none: nothing was set", "leave out --origin")
 
     def heading_advice(self, facts: Facts) -> tuple[str, str]:
         """By EKF2_EV_CTRL."""

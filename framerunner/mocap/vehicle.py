@@ -38,7 +38,7 @@ class Vehicle:
 
     Args:
         needs_truth_hz: a simulator's true pose is requested, so many a second; 0: it is not.
-        origin: set while the vehicle is disarmed, if it needs one and has none; None: nothing is set.
+        origin: set while the vehicle is disarmed, if it has none; None: nothing is set.
         zero_s: reading of the clock of the time stamps at this program's time 0.
 
     Attributes:
@@ -151,7 +151,8 @@ class Vehicle:
             yield from self._parameter_request(system_id, now_s)
         if self._is_due("rates", now_s, _REQUEST_S):
             yield from self._rate_requests(system_id, now_s)
-        if self.dialect.needs_origin and self._is_due("origin", now_s, _ORIGIN_S):
+        wants_origin = self.dialect.needs_origin or self._origin is not None
+        if wants_origin and self._is_due("origin", now_s, _ORIGIN_S):
             yield from self._origin_requests(system_id)
 
     def _is_due(self, what: str, now_s: float, period_s: float) -> bool:

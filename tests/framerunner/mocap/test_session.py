@@ -11,12 +11,13 @@ from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
 from framerunner.doctor.findings import Level
 from framerunner.doctor.listen import Record
-from framerunner.mocap.facts import Facts, SendSettings, Unused
+from framerunner.mocap.facts import Facts, Origin, SendSettings, Unused
 from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison
 from framerunner.mocap.poses import Pose
 from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession
 from framerunner.mocap.sources import SitlSource, TimedPose
+from framerunner.mocap.vehicle import Vehicle
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 from wire.dialect import mavlink
@@ -102,6 +103,7 @@ class Trial:
             session.dropouts,
             session.vehicle.worst_ratio,
             session.vehicle.converts_stamps,
+            settings=session.settings,
         )
 
     def missing(self):
@@ -264,3 +266,19 @@ def test_a_right_setup_has_no_missing_finding():
     record = recorded(RELATIVE, parameters={"EKF2_EV_CTRL": 15, "EKF2_HGT_REF": 3})
     facts = Facts(record, RIGHT, 100, 50.0, 0.03, converts_stamps=True)
     assert {finding.level for finding in judge(facts)} == {Level.GOOD}
+
+
+@pytest.mark.parametrize("origin", [None, Origin(47.4, 8.5, 400.0)])
+def test_an_origin_is_set_in_a_px4_only_if_one_is_given(origin):
+    vehicle, reader = Vehicle(origin=origin), PacketReader()
+    heartbeat = mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3)
+    for message in reader.feed(heartbeat.pack(mavlink.MAVLink(None, 1, 1))):
+        vehicle.take(message, 0.0)
+    kinds = {message.get_type() for tick in range(30) for message in vehicle.requests(tick / 10)}
+    assert ("SET_GPS_GLOBAL_ORIGIN" in kinds) == (origin is not None)
+
+
+def test_no_origin_is_set_in_a_drone_that_has_one():
+    trial = Trial(origin=Origin(47.4, 8.5, 400.0)).run(6.0)
+    assert trial.sent_of("SET_GPS_GLOBAL_ORIGIN") == []
+    assert "origin" in {finding.subject for finding in judge(trial.facts())}
