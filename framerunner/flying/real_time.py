@@ -118,7 +118,9 @@ async def fly_in_real_time(
 
         def timing() -> dict[str, Timing]:
             factor, fused = records.recorder.real_time_factor, plan.chart.vision == "frames"
-            return {"timing": flight_timing(drone, perception, clock, factor, settings.speed, fused=fused)}
+            measured = (drone, perception, clock, factor, settings.speed)
+            repeats = settings.autopilot is None or settings.autopilot.repeats
+            return {"timing": flight_timing(*measured, fused=fused, repeats=repeats)}
 
         what = (plan, drone, perception, judge, (records.see, reporter.see))
         flown = await fly(*what, run=run, measured=timing, before_tick=reporter.look, safety=safety)

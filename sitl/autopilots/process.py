@@ -140,6 +140,19 @@ class AutopilotStart:
     command: str  # by which a user starts it
 
 
+def may_use_real_time() -> bool:
+    """Whether a program that is started here may give its threads real-time priorities; Linux only."""
+    if sys.platform != "linux":
+        return False
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(os.sched_get_priority_max(os.SCHED_FIFO)))
+    except OSError:
+        return False
+    os.sched_setscheduler(0, *before)
+    return True
+
+
 def _before_start(processor: int | None) -> Callable[[], None] | None:
     """What the child calls before it becomes the autopilot: Linux ends it when this process ends."""
     if sys.platform != "linux":
