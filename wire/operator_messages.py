@@ -98,7 +98,7 @@ class BeatMessage(_Message):
         beat: its number.
         phase: what the flight does; see `offboard.safety.operator`.
         asks: it waits for the go.
-        stops: 0, 1: stopped, 2: motors stopped.
+        stops: what the operator has demanded: 0 nothing, 1 a landing, 2 that the motors stop.
         terminal: the flight's terminal can stop it, too.
         words: on the state, for people.
         pages: all that are connected.

@@ -152,10 +152,21 @@ async def test_checks_go_landing_and_motors_on_a_phone(tmp_path, open_window):
         await press(window, window.land, 0.0)
         await until(lambda: operator.stops == 1)
         operator.phase = "landing"
-        await expect(window.land).to_be_disabled()
+        await expect(window.land).to_have_text(re.compile("^Land again"))
+        landings = operator.landings
+        await press(window, window.land, 0.0)
+        await until(lambda: operator.landings > landings)
         await expect(window.motors).to_be_enabled()
         await press(window, window.motors, 0.0)
         await until(lambda: operator.kills)
+        operator.phase = "stopping motors"
+        await expect(window.motors).to_have_text(re.compile("^Stop motors again"))
+        motor_stops = operator.motor_stops
+        await press(window, window.motors, 0.0)
+        await until(lambda: operator.motor_stops > motor_stops)
+        operator.phase = "motors stopped"
+        await expect(window.motors).to_be_disabled()
+        await expect(window.land).to_be_disabled()
         assert window.complaints == []
 
 
@@ -244,7 +255,7 @@ async def test_a_stop_is_sent_until_the_flight_has_it(tmp_path, open_window):
             await expect(window.land).to_be_enabled()
             del link._take
             await until(lambda: operator.stops == 1)  # it has connected again
-            await expect(window.land).to_have_text(re.compile("^Landing"))
+            await expect(window.land).to_have_text(re.compile("^Land again"))
         operator = Operator()
         async with link_to(tmp_path, operator):
             await expect(window.head).to_have_text("Checks")
