@@ -24,7 +24,14 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from monitor.access import refuse
 from monitor.pilot_channel import Allowance
 from monitor.settings import MonitorError
-from wire.operator_messages import MAX_LINE_BYTES, EndMessage, PageDemand, PageMessage
+from wire.operator_messages import (
+    ALL_PAGES,
+    MAX_LINE_BYTES,
+    AnswerMessage,
+    EndMessage,
+    PageDemand,
+    PageMessage,
+)
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
@@ -35,6 +42,7 @@ BAD_MESSAGE_CODE, TOO_MANY_CODE = 4400, 4429
 _MAX_QUEUE = 100  # messages to a page; beats come five times a second
 _MAX_UNSENT_BYTES = 1 << 16
 _TRIAL_S = 1.0
+REFUSED = "another flight has tried to connect and was refused; end this one first"
 _NO_FLIGHT: dict[str, Any] = {"kind": "none"}
 
 logger = logging.getLogger(__name__)
@@ -124,6 +132,7 @@ class OperatorDesk:
         """One flight's connection; a second flight is refused."""
         if self._flight is not None:
             logger.warning("a second flight with an operator was refused; end the first one")
+            self._show_all(AnswerMessage(page=ALL_PAGES, text=REFUSED).model_dump_json())
             writer.close()
             return
         self._flight = writer

@@ -115,8 +115,12 @@ class BeatMessage(_Message):
     pages: tuple[PageState, ...] = ()
 
 
+ALL_PAGES = 0
+"""Instead of a page's number."""
+
+
 class AnswerMessage(_Message):
-    """Why a page's demand was not done."""
+    """Why a page's demand, or what somebody else wanted of the flight, was not done."""
 
     kind: Literal["answer"] = "answer"
     page: int

@@ -13,6 +13,7 @@ from playwright.async_api import expect
 from errors import SettingError
 from framerunner.preflight.card import FlightCard, Section
 from framerunner.preflight.operator_link import OperatorLink
+from monitor.operator_channel import REFUSED
 from monitor.run import serve
 from monitor.settings import MonitorError, MonitorSettings
 from offboard.safety.operator import Operator
@@ -274,6 +275,16 @@ async def test_what_ended_a_flight_stays_on_the_page(tmp_path, open_window):
                 await expect(window.state).to_contain_text("failed: battery")
                 raise SettingError("not armed: a check has failed (battery)")
         await expect(window.state).to_contain_text("not armed: a check has failed (battery)")
+
+
+async def test_that_a_second_flight_was_refused_is_told_on_the_page(tmp_path, open_window):
+    async with monitor(tmp_path) as (url, _), link_to(tmp_path, Operator()):
+        window = await open_window(url)
+        await expect(window.head).to_have_text("Checks")
+        with pytest.raises(SettingError):
+            await link_to(tmp_path, Operator()).__aenter__()
+        await expect(window.page.locator(".o-answer")).to_have_text(REFUSED)
+        await expect(window.head).to_have_text("Checks")
 
 
 async def test_a_viewer_operates_nothing_and_one_who_logged_in_does(tmp_path, open_window):
