@@ -68,37 +68,34 @@ class OperatorDesk:
     """The flight that is connected, and the pages that show it.
 
     Args:
-        path: of the socket at which flights connect.
+        path: of the socket at which flights connect; it is opened here, and listens in `run`.
+
+    Raises:
+        MonitorError: the socket cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        try:
+            self._listener = _opened_socket(path)
+        except OSError as error:
+            raise MonitorError(
+                f"monitor: --operator-socket {path}: cannot be opened ({error.strerror or error}); "
+                "give the path of a new file in a folder of yours"
+            ) from None
         self._pages: dict[int, _Page] = {}
         self._numbers = count(1)
         self._flight: asyncio.StreamWriter | None = None
         self._shown = json.dumps(_NO_FLIGHT)  # what a page that opens is sent first
 
     async def run(self) -> None:
-        """Listen for flights until cancelled.
-
-        Raises:
-            MonitorError: the socket cannot be opened.
-        """
-        path = self._path
-        try:
-            server = await asyncio.start_unix_server(
-                self._serve, sock=_listening_socket(path), limit=MAX_LINE_BYTES
-            )
-        except OSError as error:
-            raise MonitorError(
-                f"monitor: --operator-socket {path}: cannot be opened ({error.strerror or error}); "
-                "give the path of a new file in a folder of yours"
-            ) from None
+        """Listen for flights until cancelled."""
+        server = await asyncio.start_unix_server(self._serve, sock=self._listener, limit=MAX_LINE_BYTES)
         try:
             await server.serve_forever()
         finally:
             with contextlib.suppress(OSError):
-                path.unlink()
+                self._path.unlink()
 
     def enter(self, name: str) -> _Page | None:
         """Add a page of a person; None if there are too many."""
@@ -173,7 +170,7 @@ class OperatorDesk:
             page.put(text)
 
 
-def _listening_socket(path: Path) -> socket.socket:
+def _opened_socket(path: Path) -> socket.socket:
     """A socket that only this user may open, in the place of one that a monitor left when it was killed.
 
     Raises:

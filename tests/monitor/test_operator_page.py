@@ -356,6 +356,14 @@ async def test_the_socket_of_a_monitor_that_runs_is_left_alone_and_one_that_was_
         assert path.stat().st_mode & 0o077 == 0
 
 
+async def test_a_socket_that_cannot_be_opened_is_told_before_any_url(tmp_path):
+    database, path = f"sqlite:///{tmp_path / 'monitor.db'}", tmp_path / "missing" / "operator.sock"
+    settings, lines = MonitorSettings(port=0, database=database, operator_socket=path), []
+    with pytest.raises(MonitorError, match=r"--operator-socket .*: cannot be opened \(No such file"):
+        await serve(EQUIPMENT, settings, lines.append)
+    assert lines == []
+
+
 @pytest.mark.parametrize("text", ["", "{}", '{"what": "arm"}', '{"what": "go", "beat": 1e99}', "x" * 600])
 async def test_what_no_page_sends_ends_the_connection(tmp_path, text):
     operator = Operator()
