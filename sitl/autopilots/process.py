@@ -13,9 +13,9 @@ from asyncio.subprocess import DEVNULL, Process
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from errors import SettingError, UserError
+from sitl.autopilots.own_folder import OwnFolder
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 _LAST_BYTES = 2000
@@ -45,10 +45,9 @@ class AutopilotProcess(ABC):
         processor: int | None = None,
     ) -> None:
         self._name, self._option = name, option
-        prefix = f"framerunner-{name.lower()}-"
         if folder is None:
-            self._temporary = TemporaryDirectory(prefix=prefix)
-            folder = Path(self._temporary.name)
+            self._temporary = OwnFolder(f"framerunner-files-{name.lower()}-")
+            folder = self._temporary.path
         self.folder = folder.absolute()
         self._environment = dict(environment)
         self._processor = processor
