@@ -170,7 +170,9 @@ class World:
 
     def repair(self) -> None:
         """Let the motors of a drone that has crashed turn again."""
-        self.crash = ""
+        if self.crash:
+            self.crash = ""
+            self.dynamics.push(*self._pushed)
 
     def box(self, name: str) -> Solid:
         """The drone's box, upright, with its heading now: a solid for other drones."""

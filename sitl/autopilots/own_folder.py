@@ -29,9 +29,9 @@ class OwnFolder:
 
     def __init__(self, prefix: str) -> None:
         place = Path(gettempdir())
-        for entry in list(os.scandir(place)):
-            if entry.name.startswith(prefix):
-                _remove_if_left(Path(entry.path))
+        with contextlib.suppress(OSError):  # it may not be listed
+            for left in [each for each in place.iterdir() if each.name.startswith(prefix)]:
+                _remove_if_left(left)
         new = Path(mkdtemp(prefix=_NEW))  # nobody removes it before it is locked
         lock = _locked(new)
         self.path = new.rename(place / new.name.replace(_NEW, prefix, 1))

@@ -114,7 +114,7 @@ class Px4Link:
         return False
 
     def _accept(self) -> None:
-        with suppress(BlockingIOError):
+        with suppress(OSError):  # there are no more, or one has gone again
             while True:
                 self._candidates.append(_Candidate(*self._listener.accept()))
                 self._close_candidates(_MAX_CANDIDATES)
