@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from tempfile import TemporaryDirectory, gettempdir
+from tempfile import gettempdir
 from types import FrameType
 from typing import BinaryIO, TypeVar
 
@@ -23,6 +23,7 @@ from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
 from framerunner.flying.simulator_process import GenuineAutopilot
 from framerunner.runs.recorder import RunRecords
 from framerunner.runs.run_folder import RunFolder
+from sitl.autopilots.own_folder import OwnFolder
 from sitl.px4.link import FIRST_PORT
 from sitl.px4.side_link import CAMERA_PORT
 from sitl.server_settings import VIDEO_PORT
@@ -57,12 +58,21 @@ def fly_with_px4(plan: FlightPlan, use: Px4Use) -> FinishedFlight:
         SettingError: simulator or PX4 cannot be started, or have ended.
         ValueError: the plan has no mission.
     """
-    with claimed_instance() as instance, TemporaryDirectory(prefix="framerunner-") as out:
-        folder = RunFolder(Path(out), plan.scenario.name)
+    with claimed_instance() as instance, _temporary_folder() as out:
+        folder = RunFolder(out, plan.scenario.name)
         folder.write_plan(plan.scenario, plan.chart)
         px4 = GenuineAutopilot("px4", use.folder)
         settings = RealTimeSettings(speed=use.speed, instance=instance, autopilot=px4, unattended=True)
         return asyncio.run(interrupted_once(fly_in_real_time(plan, settings, RunRecords(folder, None), None)))
+
+
+@contextmanager
+def _temporary_folder() -> Iterator[Path]:
+    own = OwnFolder("framerunner-flight-")
+    try:
+        yield own.path
+    finally:
+        own.close()
 
 
 async def interrupted_once(work: Coroutine[object, object, T]) -> T:
