@@ -22,9 +22,8 @@ from vision.worker_process import Answer, WorkerEndedError, WorkerProcess
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
 MAX_FILE_BYTES = 64 * 1024 * 1024
 _TIME = re.compile(r"(\d{1,18})us$")
-_NETWORK = ("rtsp", "tcp", "udp", "rtp")
-_NO_KEY_FRAME = "does it send a key frame each second?"
-_NO_VIDEO = f"is H.264 sent to this port of this machine? {_NO_KEY_FRAME}"
+_NO_VIDEO = "; is H.264 sent to this port of this machine, with a key frame each second?"
+_HINTS = {"rtsp": "; does it send a key frame each second?", "udp": _NO_VIDEO, "rtp": _NO_VIDEO}
 _PROBLEMS = {
     Problem.UNKNOWN: "cannot be opened; is it there, and is it video?",
     Problem.NO_LOGIN: "user name or password is missing or wrong; write them as rtsp://USER:PASSWORD@HOST/PATH",
@@ -33,7 +32,7 @@ _PROBLEMS = {
     Problem.UNKNOWN_HOST: "there is no host of this name; check it, or give its address",
     Problem.UNREACHABLE: "the host cannot be reached; check the address and the network",
     Problem.NOT_OUR_ADDRESS: "is no address of this machine; write 0.0.0.0 to receive at all of them",
-    Problem.PORT_IN_USE: "another program receives at this port; end it, or send to another port",
+    Problem.PORT_IN_USE: "another program receives at this port, or at the next one, which rtp:// needs too",
 }
 _VIDEO_FILE = re.compile(r"\.(mp4|mkv|avi|mov|webm|ts|m3u8|mpd|sdp)$", re.IGNORECASE)
 
@@ -108,7 +107,7 @@ class CaptureSource:
         self.bad_frames = 0
         self._url = url
         self._name = f"camera {shown_url(str(url))}"
-        self._scheme = str(url).partition("://")[0].lower()
+        self._hint = _HINTS.get(str(url).partition("://")[0].lower(), "")
         self._timeout_s = timeout_s
         self._worker = WorkerProcess()
 
@@ -119,8 +118,8 @@ class CaptureSource:
             async with asyncio.timeout(self._timeout_s):
                 answer = await self._request(Request.OPEN, settings)
         except TimeoutError:
-            hint = f"; {_NO_VIDEO}" if self._scheme in ("udp", "rtp") else ""
-            raise CameraError(f"{self._name}: did not open within {self._timeout_s:g} s{hint}") from None
+            problem = f"did not open within {self._timeout_s:g} s{self._hint}"
+            raise CameraError(f"{self._name}: {problem}") from None
         if answer.reply is not Reply.OPENED:
             self._worker.end()
             raise CameraError(f"{self._name}: {_PROBLEMS[answer.problem]}")
@@ -133,7 +132,7 @@ class CaptureSource:
     async def frames(self) -> AsyncIterator[CameraFrame]:
         """Always the latest image; its vehicle time is unknown. Raises `CameraError`."""
         loop = asyncio.get_running_loop()
-        hint = f"; {_NO_KEY_FRAME}" if self._scheme in _NETWORK else ""  # until the first image
+        hint = self._hint
         deadline_s = loop.time() + self._timeout_s
         while True:
             try:

@@ -41,8 +41,11 @@ _LIVE_OPTIONS = {  # FFmpeg's, in OpenCV's form; of live streams the latest imag
     "rtsp": f"rtsp_transport;tcp|{_LATEST}",
     "tcp": _LATEST,
     "udp": _LATEST,
-    "rtp": f"protocol_whitelist;file,udp,rtp|{_LATEST}",
+    # FFmpeg's queue for packets in the wrong order refuses all packets of a sender that was restarted.
+    "rtp": f"protocol_whitelist;file,udp,rtp|reorder_queue_size;0|{_LATEST}",
 }
+_WITHOUT_END = ("udp://", "rtp://")  # an error is one packet that is damaged or somebody else's
+_RETRY_S = 0.01
 _DEVICE = re.compile(r"/dev/video(\d{1,3})")
 _ERRORS_ONLY = "16"  # AV_LOG_ERROR of FFmpeg
 _OUTPUTS = (1, 2)  # OpenCV prints FFmpeg's log to the standard output
@@ -115,6 +118,7 @@ class _Capture:
             self._capture = _opened(url, limit_ms) if device is None else cv2.VideoCapture(device)
             self.problem = Problem.UNKNOWN if self._capture.isOpened() else problem_in(log())
         self._is_file = self._capture.get(cv2.CAP_PROP_FRAME_COUNT) > 0
+        self._has_end = not url.lower().startswith(_WITHOUT_END)
         self._clock = StreamClock() if device is None else None
         self._latest: tuple[Image, float] | None = None
         self._ended = False
@@ -163,10 +167,12 @@ class _Capture:
             with self._changed:
                 if done and image is not None:
                     self._latest = (np.asarray(image, np.uint8), self._captured_s())
-                self._ended = not done
+                self._ended = not done and self._has_end
                 self._changed.notify()
-            if not done:
+            if self._ended:
                 return
+            if not done:
+                time.sleep(_RETRY_S)
             next_s += period_s
             time.sleep(max(0.0, next_s - time.monotonic()) if period_s else 0.0)
 
