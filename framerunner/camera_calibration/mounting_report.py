@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import date
 from math import degrees
 from pathlib import Path
 
@@ -128,6 +129,7 @@ def _with_mounting(calibration: Calibration, fit: MountingFit, *, stamped: bool)
         angles_std_rad=std.angles_frd_rad,
         position_flu_m=found.position_flu_m,
         position_std_m=std.position_flu_m,
+        measured_on=date.today(),
     )
     update: dict[str, object] = {"mounting": mounting}
     if not stamped and std.delay_s <= MAX_DELAY_STD_S and 0.0 <= found.delay_s <= _MAX_DELAY_S:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 from contextlib import closing
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -14,11 +16,20 @@ def doctor(
     *,
     drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
     seconds: Annotated[float, Parameter(help="how long to listen")] = 6.0,
+    camera: Annotated[
+        str | None, Parameter(help="URL or device of its camera, as for `fly --camera`: it is watched, too")
+    ] = None,
+    calibration: Annotated[
+        Path | None, Parameter(help="calibration of its camera, a file of `framerunner camera calibrate`")
+    ] = None,
 ) -> int:
     """Listen to a drone, request its data, and say in one page whether it can fly the challenge.
 
     Any vehicle with PX4 or ArduPilot, simulated or real. It is never armed and none of its parameters is
     changed; ArduPilot is asked for streams of messages on this link, since it sends none by itself.
+
+    With --camera the rate, size, gaps and delay of its images are measured, and with --calibration it is said
+    whether they fit it, how old it is, and whether the camera's mounting on the drone is known.
 
     Exit code 0: it can fly, 1: something is missing, 2: bad input.
 
@@ -29,19 +40,28 @@ def doctor(
         framerunner doctor --drone udpin://0.0.0.0:14540
 
         framerunner doctor --drone serial:///dev/ttyUSB0:57600 --seconds 15
+
+        framerunner doctor --camera rtsp://10.0.0.2/1 --calibration camera.yaml
     """
     check_range("--seconds", seconds, 2.0, 600.0)
 
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
+    from framerunner.camera_calibration.calibration_file import load_calibration
+    from framerunner.doctor.camera import LOOK_S, examine_camera
     from framerunner.doctor.checks import can_fly, examine
     from framerunner.doctor.listen import COMPONENT_ID, FIND_S, SYSTEM_ID, Record, find, listen
-    from framerunner.doctor.page import print_page
+    from framerunner.doctor.page import findings_table, print_page
+    from framerunner.preflight.camera import measure_camera
+    from vision.sources import open_source
     from wire.transports.vehicle_link import VehicleLink
 
+    known = None if calibration is None else load_calibration(calibration)
+    if camera is not None:
+        open_source(camera)  # says in a line what can be no camera
     record = Record()
-    errors = Console(stderr=True)
+    errors, page = Console(stderr=True), Console(highlight=False)
     bar = Progress(TextColumn("{task.description}"), BarColumn(), console=errors, transient=True)
     with closing(VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)) as link, bar:
         task = bar.add_task("", total=1.0)
@@ -49,15 +69,23 @@ def doctor(
         def show(what: str, share: float) -> None:
             bar.update(task, description=what, completed=share)
 
-        if not find(link, record, show):
-            errors.print(
-                f"no vehicle was heard on {link.url} within {FIND_S:g} s; "
-                "is it running and sending to this address?",
-                highlight=False,
-                soft_wrap=True,
-            )
-            return 1
-        listen(link, record, seconds, show)
-    findings = examine(record)
-    print_page(Console(highlight=False), link.url, record, findings)
+        heard = find(link, record, show)
+        if heard:
+            listen(link, record, seconds, show)
+        show("watching the camera", 0.0)
+        times = None if camera is None else asyncio.run(measure_camera(camera, LOOK_S))
+    clock_ms = record.clock_ms[-1] if record.clock_ms else None
+    of_camera = [] if camera is None and known is None else examine_camera(times, known, clock_ms)
+    if not heard:
+        errors.print(
+            f"no vehicle was heard on {link.url} within {FIND_S:g} s; "
+            "is it running and sending to this address?",
+            highlight=False,
+            soft_wrap=True,
+        )
+        if of_camera:
+            page.print(findings_table(of_camera))
+        return 1
+    findings = examine(record) + of_camera
+    print_page(page, link.url, record, findings)
     return 0 if can_fly(findings) else 1

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from datetime import date
 from math import atan
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from errors import UserError
 from geometry.lens import Coefficients
@@ -18,6 +19,17 @@ _Angle = Annotated[float, Field(ge=-MAX_MOUNTING_RAD, le=MAX_MOUNTING_RAD)]
 _Offset = Annotated[float, Field(ge=-2, le=2)]
 _Deviation = Annotated[float, Field(ge=0, le=10)]
 ColourMatrix = tuple[_Weights, _Weights, _Weights]
+
+
+def _day_of(value: object) -> object:
+    """A file has a day as text."""
+    try:
+        return date.fromisoformat(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
+
+
+_Day = Annotated[date, BeforeValidator(_day_of)]
 
 
 class CalibrationError(UserError):
@@ -36,7 +48,7 @@ class Mounting(BaseModel):
         description="roll, pitch and yaw; to the right, up and to the right are positive"
     )
     angles_std_rad: tuple[_Deviation, _Deviation, _Deviation] | None = Field(
-        None, description="standard deviations of the angles"
+        None, description="standard deviations of the angles, that of yaw against the telemetry's heading"
     )
     position_flu_m: tuple[_Offset, _Offset, _Offset] | None = Field(
         None, description="of the lens from the drone's centre: forward, left, up; None: the scenario's"
@@ -44,6 +56,7 @@ class Mounting(BaseModel):
     position_std_m: tuple[_Deviation, _Deviation, _Deviation] | None = Field(
         None, description="standard deviations of the position"
     )
+    measured_on: _Day | None = Field(None, description="the day of the measurement")
 
 
 class Calibration(BaseModel):
@@ -81,6 +94,7 @@ class Calibration(BaseModel):
         None, ge=0, description="root mean square of what is left of the corners' errors"
     )
     images: int | None = Field(None, ge=1, description="how many images it was made from")
+    made_on: _Day | None = Field(None, description="the day on which the lens was calibrated")
 
     @classmethod
     def ideal(
