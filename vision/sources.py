@@ -24,6 +24,9 @@ MAX_FILE_BYTES = 64 * 1024 * 1024
 _TIME = re.compile(r"(\d{1,18})us$")
 _NO_VIDEO = "; is H.264 sent to this port of this machine, with a key frame each second?"
 _HINTS = {"rtsp": "; does it send a key frame each second?", "udp": _NO_VIDEO, "rtp": _NO_VIDEO}
+_NO_DEVICE = (
+    "cannot be opened; is it in `ls /dev/video*`, may you use it (group video), and does no other program?"
+)
 _PROBLEMS = {
     Problem.UNKNOWN: "cannot be opened; is it there, and is it video?",
     Problem.NO_LOGIN: "user name or password is missing or wrong; write them as rtsp://USER:PASSWORD@HOST/PATH",
@@ -122,8 +125,12 @@ class CaptureSource:
             raise CameraError(f"{self._name}: {problem}") from None
         if answer.reply is not Reply.OPENED:
             self._worker.end()
-            raise CameraError(f"{self._name}: {_PROBLEMS[answer.problem]}")
+            raise CameraError(f"{self._name}: {self._why(answer.problem)}")
         return self
+
+    def _why(self, problem: Problem) -> str:
+        is_device = str(self._url).isdecimal() or str(self._url).startswith("/dev/")
+        return _NO_DEVICE if is_device else _PROBLEMS[problem]
 
     async def __aexit__(self, *exc_info: object) -> None:
         """Close it."""
