@@ -3,13 +3,13 @@
 import asyncio
 import os
 import random
-import socket
 import struct
 import time
 import zlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
+from typing import cast
 
 import cv2
 import numpy as np
@@ -476,19 +476,40 @@ async def test_h264_over_rtp_is_received() -> None:
     assert all(0.0 <= time.monotonic() - at_s < 5.0 for at_s in times_s)
 
 
+class Renumbering(asyncio.DatagramProtocol):
+    """Passes RTP packets on, with sequence numbers that count from a start."""
+
+    def __init__(self, port: int, number: int) -> None:
+        self._port, self.number = port, number
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.DatagramTransport, transport)
+
+    def datagram_received(self, data: bytes, addr: object) -> None:
+        self.pass_on(data[:2], data[4:])
+
+    def pass_on(self, kind: bytes, rest: bytes) -> None:
+        self._transport.sendto(kind + struct.pack(">H", self.number) + rest, ("127.0.0.1", self._port))
+        self.number += 1
+
+
 async def test_rtp_outlives_foreign_packets_and_a_restart_of_its_sender() -> None:
-    port = free_port()
+    sent_to, _, port = free_port(), free_port(), free_port()  # RTP uses the next port, too
+    loop, source = asyncio.get_running_loop(), CaptureSource(f"rtp://127.0.0.1:{port}", 8.0)
+    relay = Renumbering(port, 10_000)
     async with AsyncExitStack() as stack:
-        source = CaptureSource(f"rtp://127.0.0.1:{port}", 8.0)
-        async with sending_rtp(port):
+        transport, _ = await loop.create_datagram_endpoint(lambda: relay, local_addr=("127.0.0.1", sent_to))
+        stack.callback(transport.close)
+        async with sending_rtp(sent_to):
             await stack.enter_async_context(source)
             frames = source.frames()
             first = await anext(frames)
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as foreign:
-            for number in range(100):
-                foreign.sendto(random.Random(number).randbytes(700), ("127.0.0.1", port))
-        stopped_s = time.monotonic()
-        async with sending_rtp(port):
+        noise = random.Random(1)
+        for _ in range(200):
+            relay.pass_on(b"\x80\xe0", noise.randbytes(700))
+            await asyncio.sleep(0.002)
+        relay.number, stopped_s = 5_000, time.monotonic()  # of a new sender, before those of the last one
+        async with sending_rtp(sent_to):
             while (again := await anext(frames)).received_s <= stopped_s + 0.2:
                 pass
     assert again.image.shape == first.image.shape
