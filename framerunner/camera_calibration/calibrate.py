@@ -52,7 +52,7 @@ def calibrate(
     )
     report = board.calibrate(collection.views)
     _show(report, collection)
-    save_calibration(report.calibration.model_copy(update={"made_on": date.today()}), out)
+    save_calibration(report.calibration.model_copy(update={"made_on": date.today().isoformat()}), out)
     print(f"written to {out}; use it with `framerunner fly --calibration {out}`")
 
 

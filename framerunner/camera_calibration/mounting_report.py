@@ -117,8 +117,8 @@ def _tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) 
         say(f"{name:8s}{degrees(abs(angle)):6.2f} degrees {way} (1 sigma {degrees(one):.2f})")
     body_deg = hypot(degrees(std.angles_frd_rad[2]), _HEADING_STD_DEG)
     say(
-        f"        yaw is measured from the heading that telemetry reports, as a flight needs it; from the "
-        f"drone's body 1 sigma is {body_deg:.2f}, if that heading is known to {_HEADING_STD_DEG:g}"
+        "        yaw is from the heading that telemetry reports, as a flight needs it; from the drone's body its "
+        f"1 sigma is {body_deg:.2f}, if that heading is wrong by {_HEADING_STD_DEG:g} (1 sigma)"
     )
     for name, place, one in zip(
         ("forward", "left", "up"), found.position_flu_m, std.position_flu_m, strict=True
@@ -139,7 +139,7 @@ def _with_mounting(calibration: Calibration, fit: MountingFit, *, stamped: bool)
         angles_std_rad=std.angles_frd_rad,
         position_flu_m=found.position_flu_m,
         position_std_m=std.position_flu_m,
-        measured_on=date.today(),
+        measured_on=date.today().isoformat(),
     )
     update: dict[str, object] = {"mounting": mounting}
     if not stamped and std.delay_s <= MAX_DELAY_STD_S and 0.0 <= found.delay_s <= _MAX_DELAY_S:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import asyncio
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from framerunner.commands import check_range
+
+if TYPE_CHECKING:
+    from vision.calibration.model import Calibration
 
 
 def doctor(
@@ -45,21 +48,27 @@ def doctor(
     """
     check_range("--seconds", seconds, 2.0, 600.0)
 
+    from framerunner.camera_calibration.calibration_file import load_calibration
+    from vision.sources import open_source
+
+    known = None if calibration is None else load_calibration(calibration)
+    if camera is not None:
+        open_source(camera)  # says in a line what can be no camera
+    return _examine(drone, seconds, camera, known)
+
+
+def _examine(drone: str, seconds: float, camera: str | None, calibration: Calibration | None) -> int:
+    """Listen, watch, and print the page; returns the exit code."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from framerunner.camera_calibration.calibration_file import load_calibration
     from framerunner.doctor.camera import LOOK_S, examine_camera
     from framerunner.doctor.checks import can_fly, examine
     from framerunner.doctor.listen import COMPONENT_ID, FIND_S, SYSTEM_ID, Record, find, listen
     from framerunner.doctor.page import findings_table, print_page
     from framerunner.preflight.camera import measure_camera
-    from vision.sources import open_source
     from wire.transports.vehicle_link import VehicleLink
 
-    known = None if calibration is None else load_calibration(calibration)
-    if camera is not None:
-        open_source(camera)  # says in a line what can be no camera
     record = Record()
     errors, page = Console(stderr=True), Console(highlight=False)
     bar = Progress(TextColumn("{task.description}"), BarColumn(), console=errors, transient=True)
@@ -72,20 +81,19 @@ def doctor(
         heard = find(link, record, show)
         if heard:
             listen(link, record, seconds, show)
-        show("watching the camera", 0.0)
-        times = None if camera is None else asyncio.run(measure_camera(camera, LOOK_S))
-    clock_ms = record.clock_ms[-1] if record.clock_ms else None
-    of_camera = [] if camera is None and known is None else examine_camera(times, known, clock_ms)
-    if not heard:
-        errors.print(
-            f"no vehicle was heard on {link.url} within {FIND_S:g} s; "
-            "is it running and sending to this address?",
-            highlight=False,
-            soft_wrap=True,
-        )
-        if of_camera:
-            page.print(findings_table(of_camera))
-        return 1
-    findings = examine(record) + of_camera
-    print_page(page, link.url, record, findings)
-    return 0 if can_fly(findings) else 1
+        times = None
+        if camera is not None:
+            show("watching the camera", 0.0)
+            times = asyncio.run(measure_camera(camera, LOOK_S))
+    of_camera = []
+    if camera is not None or calibration is not None:
+        of_camera = examine_camera(times, calibration, record.clock_ms[-1] if record.clock_ms else None)
+    if heard:
+        findings = examine(record) + of_camera
+        print_page(page, link.url, record, findings)
+        return 0 if can_fly(findings) else 1
+    silent = f"no vehicle was heard on {link.url} within {FIND_S:g} s; "
+    errors.print(f"{silent}is it running and sending to this address?", highlight=False, soft_wrap=True)
+    if of_camera:
+        page.print(findings_table(of_camera))
+    return 1

@@ -97,5 +97,8 @@ def calibration_facts(calibration: Calibration | None, size_px: tuple[int, int])
     return CalibrationFacts(calibrated_px, size_px, *angles, made_days, days)
 
 
-def _days_since(day: date | None) -> int | None:
-    return None if day is None else (date.today() - day).days
+def _days_since(day: str | None) -> int | None:
+    with contextlib.suppress(ValueError):  # such as the 30th of February
+        if day is not None:
+            return (date.today() - date.fromisoformat(day)).days
+    return None

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from datetime import date
 from math import atan
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from errors import UserError
 from geometry.lens import Coefficients
@@ -18,18 +17,8 @@ _Weights = tuple[_Weight, _Weight, _Weight]
 _Angle = Annotated[float, Field(ge=-MAX_MOUNTING_RAD, le=MAX_MOUNTING_RAD)]
 _Offset = Annotated[float, Field(ge=-2, le=2)]
 _Deviation = Annotated[float, Field(ge=0, le=10)]
+_Day = Annotated[str, Field(pattern=r"^20\d\d-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])$")]
 ColourMatrix = tuple[_Weights, _Weights, _Weights]
-
-
-def _day_of(value: object) -> object:
-    """A file has a day as text."""
-    try:
-        return date.fromisoformat(value) if isinstance(value, str) else value
-    except ValueError:
-        return value
-
-
-_Day = Annotated[date, BeforeValidator(_day_of)]
 
 
 class CalibrationError(UserError):
@@ -56,7 +45,7 @@ class Mounting(BaseModel):
     position_std_m: tuple[_Deviation, _Deviation, _Deviation] | None = Field(
         None, description="standard deviations of the position"
     )
-    measured_on: _Day | None = Field(None, description="the day of the measurement")
+    measured_on: _Day | None = Field(None, description="the day of the measurement, year-month-day")
 
 
 class Calibration(BaseModel):
@@ -94,7 +83,7 @@ class Calibration(BaseModel):
         None, ge=0, description="root mean square of what is left of the corners' errors"
     )
     images: int | None = Field(None, ge=1, description="how many images it was made from")
-    made_on: _Day | None = Field(None, description="the day on which the lens was calibrated")
+    made_on: _Day | None = Field(None, description="the day on which the lens was calibrated, year-month-day")
 
     @classmethod
     def ideal(

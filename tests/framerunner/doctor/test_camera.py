@@ -16,11 +16,11 @@ def levels(*arguments):
 
 
 def calibration(**values):
-    return Calibration.ideal(320, 240, 160.0).model_copy(update={"made_on": TODAY, **values})
+    return Calibration.ideal(320, 240, 160.0).model_copy(update={"made_on": TODAY.isoformat(), **values})
 
 
 def test_all_is_known():
-    mounting = Mounting(angles_frd_rad=(0.0, 0.0, 0.0), measured_on=TODAY - timedelta(days=2))
+    mounting = Mounting(angles_frd_rad=(0.0, 0.0, 0.0), measured_on=(TODAY - timedelta(days=2)).isoformat())
     known = calibration(mounting=mounting, delay_s=0.08)
     findings = {each.subject: each for each in examine_camera(TIMES, known, None)}
     assert {each.level for each in findings.values()} == {Level.GOOD}
