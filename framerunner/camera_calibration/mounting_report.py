@@ -117,8 +117,8 @@ def _tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) 
         say(f"{name:8s}{degrees(abs(angle)):6.2f} degrees {way} (1 sigma {degrees(one):.2f})")
     body_deg = hypot(degrees(std.angles_frd_rad[2]), _HEADING_STD_DEG)
     say(
-        "        yaw is from the heading that telemetry reports, as a flight needs it; from the drone's body its "
-        f"1 sigma is {body_deg:.2f}, if that heading is wrong by {_HEADING_STD_DEG:g} (1 sigma)"
+        "        yaw is from the heading that telemetry reports, as a flight needs it; from the drone's body "
+        f"its 1 sigma is {body_deg:.2f}, if that heading is wrong by {_HEADING_STD_DEG:g} (1 sigma)"
     )
     for name, place, one in zip(
         ("forward", "left", "up"), found.position_flu_m, std.position_flu_m, strict=True
