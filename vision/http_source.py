@@ -125,7 +125,8 @@ class HttpSource:
                 response = await session.get(self._url, max_redirects=3)
             if response.status != 200:
                 problem = f"HTTP {response.status} {_first_line(response.reason)}"
-                raise CameraError(f"{self._name}: {problem}")
+                login = "; write user and password as http://USER:PASSWORD@HOST/PATH"
+                raise CameraError(f"{self._name}: {problem}{login if response.status == 401 else ''}")
             return response, MjpegReader(response.headers.get("Content-Type", ""))
         except TimeoutError as error:
             raise CameraError(f"{self._name}: no answer within {self._timeout_s:g} s") from error

@@ -16,12 +16,27 @@ from urllib.parse import urlsplit
 from vision.decoder import ImageDecoder
 from vision.jpeg import JPEG_START, ImageError
 from vision.types import CameraError, CameraFrame, CameraSource, shown_url
-from vision.worker import Reply, Request
+from vision.worker import Problem, Reply, Request
 from vision.worker_process import Answer, WorkerEndedError, WorkerProcess
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
 MAX_FILE_BYTES = 64 * 1024 * 1024
 _TIME = re.compile(r"(\d{1,18})us$")
+_NO_VIDEO = "; is H.264 sent to this port of this machine, with a key frame each second?"
+_HINTS = {"rtsp": "; does it send a key frame each second?", "udp": _NO_VIDEO, "rtp": _NO_VIDEO}
+_NO_DEVICE = (
+    "cannot be opened; is it in `ls /dev/video*`, may you use it (group video), and does no other program?"
+)
+_PROBLEMS = {
+    Problem.UNKNOWN: "cannot be opened; is it there, and is it video?",
+    Problem.NO_LOGIN: "user name or password is missing or wrong; write them as rtsp://USER:PASSWORD@HOST/PATH",
+    Problem.NOT_FOUND: "the server has no such stream; check the path after the host",
+    Problem.REFUSED: "connection refused; is the camera's server running, and is the port right?",
+    Problem.UNKNOWN_HOST: "there is no host of this name; check it, or give its address",
+    Problem.UNREACHABLE: "the host cannot be reached; check the address and the network",
+    Problem.NOT_OUR_ADDRESS: "is no address of this machine; write 0.0.0.0 to receive at all of them",
+    Problem.PORT_IN_USE: "another program receives at this port, or at the next one, which rtp:// needs too",
+}
 _VIDEO_FILE = re.compile(r"\.(mp4|mkv|avi|mov|webm|ts|m3u8|mpd|sdp)$", re.IGNORECASE)
 
 
@@ -33,7 +48,7 @@ def open_source(
     Args:
         url_or_path: http(s):// is MJPEG over HTTP, unless it ends like a video file; a folder is its
             images; a number is a video device; rtp://HOST:PORT is H.264 sent to this UDP port; anything
-            else is left to OpenCV (rtsp://, udp://, files).
+            else is left to OpenCV (rtsp://, udp://, tcp://, files).
         timeout_s: how long to wait for the camera, and for each of its images.
         size_px: width and height of an MJPEG camera's images, others are skipped; None for any.
 
@@ -95,6 +110,7 @@ class CaptureSource:
         self.bad_frames = 0
         self._url = url
         self._name = f"camera {shown_url(str(url))}"
+        self._hint = _HINTS.get(str(url).partition("://")[0].lower(), "")
         self._timeout_s = timeout_s
         self._worker = WorkerProcess()
 
@@ -105,11 +121,16 @@ class CaptureSource:
             async with asyncio.timeout(self._timeout_s):
                 answer = await self._request(Request.OPEN, settings)
         except TimeoutError:
-            raise CameraError(f"{self._name}: did not open within {self._timeout_s:g} s") from None
+            problem = f"did not open within {self._timeout_s:g} s{self._hint}"
+            raise CameraError(f"{self._name}: {problem}") from None
         if answer.reply is not Reply.OPENED:
             self._worker.end()
-            raise CameraError(f"{self._name}: cannot be opened; is it there, and is it video?")
+            raise CameraError(f"{self._name}: {self._why(answer.problem)}")
         return self
+
+    def _why(self, problem: Problem) -> str:
+        is_device = str(self._url).isdecimal() or str(self._url).startswith("/dev/")
+        return _NO_DEVICE if is_device else _PROBLEMS[problem]
 
     async def __aexit__(self, *exc_info: object) -> None:
         """Close it."""
@@ -118,13 +139,14 @@ class CaptureSource:
     async def frames(self) -> AsyncIterator[CameraFrame]:
         """Always the latest image; its vehicle time is unknown. Raises `CameraError`."""
         loop = asyncio.get_running_loop()
+        hint = self._hint
         deadline_s = loop.time() + self._timeout_s
         while True:
             try:
                 async with asyncio.timeout_at(deadline_s):
                     answer = await self._request(Request.NEXT)
             except TimeoutError:
-                raise CameraError(f"{self._name}: no image for {self._timeout_s:g} s") from None
+                raise CameraError(f"{self._name}: no image for {self._timeout_s:g} s{hint}") from None
             if answer.reply is Reply.END_OF_FILE:
                 return
             if answer.reply is Reply.END_OF_STREAM:
@@ -132,6 +154,7 @@ class CaptureSource:
             if answer.image is None:
                 self.bad_frames += 1
                 continue
+            hint = ""
             yield CameraFrame(answer.image, None, answer.received_s)
             deadline_s = loop.time() + self._timeout_s
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import mmap
 import os
+import re
 import resource
 import signal
 import socket
@@ -20,7 +21,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from enum import IntEnum
 
 import cv2
@@ -35,15 +36,27 @@ MEMORY_LIMIT_BYTES = 4 << 30
 DECODE_LIMIT_S = 0.5
 """Longest time for one image: thirty times what a baseline JPEG of 1920 x 1080 pixels takes."""
 _PARENT_CHECK_S = 1.0
-_LATEST = "fflags;nobuffer|flags;low_delay|analyzeduration;1000000|fpsprobesize;0"
+_LATEST = "fflags;nobuffer|analyzeduration;1000000|fpsprobesize;0"
 _LIVE_OPTIONS = {  # FFmpeg's, in OpenCV's form; of live streams the latest image is wanted, not every one
     "rtsp": f"rtsp_transport;tcp|{_LATEST}",
+    "tcp": _LATEST,
     "udp": _LATEST,
-    "rtp": f"protocol_whitelist;file,udp,rtp|{_LATEST}",
+    # FFmpeg's queue for packets in the wrong order refuses all packets of a sender that was restarted.
+    "rtp": f"protocol_whitelist;file,udp,rtp|reorder_queue_size;0|{_LATEST}",
 }
+_WITHOUT_END = ("udp://", "rtp://")  # an error is one packet that is damaged or somebody else's
+_RETRY_S = 0.01
+_DEVICE = re.compile(r"/dev/video(\d{1,3})")
+_ERRORS_ONLY = "16"  # AV_LOG_ERROR of FFmpeg
+_OUTPUTS = (1, 2)  # OpenCV prints FFmpeg's log to the standard output
+_MAX_LOG_BYTES = 1 << 16
+_MAX_DEVICE_DELAY_S = 1.0
 REQUEST = struct.Struct("<BI")  # kind, and the number of bytes that follow
 ANSWER = struct.Struct("<BIId")
-"""Kind, width and height (pixels), monotonic time of capture or arrival (seconds)."""
+"""Kind, width and height (pixels), monotonic time of capture or arrival (seconds).
+
+With `Reply.NOT_OPENED` the first number is a `Problem`.
+"""
 
 
 class Request(IntEnum):
@@ -66,15 +79,47 @@ class Reply(IntEnum):
     END_OF_STREAM = 7
 
 
+class Problem(IntEnum):
+    """Why a camera could not be opened, as far as FFmpeg's log tells."""
+
+    UNKNOWN = 0
+    NO_LOGIN = 1
+    NOT_FOUND = 2
+    REFUSED = 3
+    UNKNOWN_HOST = 4
+    UNREACHABLE = 5
+    NOT_OUR_ADDRESS = 6
+    PORT_IN_USE = 7
+
+
+_LOGGED = (
+    (r"(failed:|HTTP error) 40[13]\b", Problem.NO_LOGIN),
+    (r"(failed:|HTTP error) 404\b", Problem.NOT_FOUND),
+    (r"failed: Connection refused", Problem.REFUSED),
+    (r"Failed to resolve hostname", Problem.UNKNOWN_HOST),
+    (r"failed: (No route to host|Network is unreachable)", Problem.UNREACHABLE),
+    (r"failed: Cannot assign requested address", Problem.NOT_OUR_ADDRESS),
+    (r"failed: Address already in use", Problem.PORT_IN_USE),
+)
+
+
+def problem_in(log: str) -> Problem:
+    """Why FFmpeg could not open something, by the errors that it logged."""
+    return next((problem for words, problem in _LOGGED if re.search(words, log)), Problem.UNKNOWN)
+
+
 class _Capture:
     """What OpenCV opens, read on a thread because it blocks; only the latest image is kept."""
 
     def __init__(self, url: str, limit_ms: int) -> None:
         self._parent = os.getppid()
-        with _limited(2 * limit_ms / 1000):
-            self._capture = _opened(url, limit_ms)
+        device = _device_number(url)
+        with _limited(2 * limit_ms / 1000), _logged() as log:
+            self._capture = _opened(url, limit_ms) if device is None else cv2.VideoCapture(device)
+            self.problem = Problem.UNKNOWN if self._capture.isOpened() else problem_in(log())
         self._is_file = self._capture.get(cv2.CAP_PROP_FRAME_COUNT) > 0
-        self._clock = StreamClock()
+        self._has_end = not url.lower().startswith(_WITHOUT_END)
+        self._clock = StreamClock() if device is None else None
         self._latest: tuple[Image, float] | None = None
         self._ended = False
         self._changed = threading.Condition()
@@ -104,7 +149,11 @@ class _Capture:
         now_s = time.monotonic()
         if self._is_file:
             return now_s
-        return self._clock.captured_s(self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0, now_s)
+        stamp_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        if self._clock is not None:
+            return self._clock.captured_s(stamp_s, now_s)
+        # Most drivers stamp images with this machine's monotonic clock, others with the time of day.
+        return stamp_s if 0.0 <= now_s - stamp_s < _MAX_DEVICE_DELAY_S else now_s
 
     def _read(self) -> None:
         rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
@@ -118,22 +167,57 @@ class _Capture:
             with self._changed:
                 if done and image is not None:
                     self._latest = (np.asarray(image, np.uint8), self._captured_s())
-                self._ended = not done
+                self._ended = not done and self._has_end
                 self._changed.notify()
-            if not done:
+            if self._ended:
                 return
+            if not done:
+                time.sleep(_RETRY_S)
             next_s += period_s
             time.sleep(max(0.0, next_s - time.monotonic()) if period_s else 0.0)
 
 
-def _opened(url: str, limit_ms: int) -> cv2.VideoCapture:
+def _device_number(url: str) -> int | None:
+    """The number of a video device of this machine; None if it is something else."""
     if url.isdecimal():
-        return cv2.VideoCapture(int(url))
+        return int(url)
+    found = _DEVICE.fullmatch(os.path.realpath(url)) if url.startswith("/dev/") else None
+    return None if found is None else int(found.group(1))
+
+
+@contextlib.contextmanager
+def _logged() -> Iterator[Callable[[], str]]:
+    """Collect what native code logs; gives a function that returns the beginning of it."""
+    os.environ |= {"OPENCV_FFMPEG_DEBUG": "1", "OPENCV_FFMPEG_LOGLEVEL": _ERRORS_ONLY}
+    receiver, sender = os.pipe()
+    os.set_blocking(sender, False)  # when the pipe is full, the rest is lost
+    os.set_blocking(receiver, False)
+    before = [os.dup(each) for each in _OUTPUTS]
+    for each in _OUTPUTS:
+        os.dup2(sender, each)
+
+    def log() -> str:
+        try:
+            return os.read(receiver, _MAX_LOG_BYTES).decode("ascii", "replace")
+        except BlockingIOError:
+            return ""
+
+    try:
+        yield log
+    finally:
+        for each, was in zip(_OUTPUTS, before, strict=True):
+            os.dup2(was, each)
+        for each in (*before, sender, receiver):
+            os.close(each)
+
+
+def _opened(url: str, limit_ms: int) -> cv2.VideoCapture:
     settings = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, limit_ms, cv2.CAP_PROP_READ_TIMEOUT_MSEC, limit_ms]
     scheme, _, place = url.partition("://")
     options = _LIVE_OPTIONS.get(scheme.lower())
     if options is not None:
         os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", options)
+        settings += [cv2.CAP_PROP_N_THREADS, 1]  # with more, images come later by one for each
     if scheme.lower() != "rtp":
         capture = cv2.VideoCapture(url, cv2.CAP_FFMPEG, settings)
         return capture if capture.isOpened() or options is not None else cv2.VideoCapture(url)
@@ -184,15 +268,16 @@ def _serve(link: socket.socket, memory: mmap.mmap) -> None:
         kind, length = REQUEST.unpack(_received(link, REQUEST.size))
         data = _received(link, length)
         reply, image, received_s = Reply.NO_IMAGE, None, 0.0
+        height, width = 0, 0
         if kind == Request.DECODE:
             image = _decoded(data)
         elif kind == Request.OPEN:
             limit_ms, _, url = data.decode().partition(" ")
             capture = _Capture(url, int(limit_ms))
             reply = Reply.OPENED if capture.start() else Reply.NOT_OPENED
+            width = capture.problem
         elif capture is not None:
             reply, image, received_s = capture.next()
-        height, width = 0, 0
         if image is not None:
             fits = image.ndim == 3 and image.shape[2] == 3 and image.size <= MAX_IMAGE_BYTES
             reply = Reply.IMAGE if fits else Reply.NO_IMAGE

@@ -18,7 +18,7 @@ from typing import BinaryIO, cast
 import numpy as np
 
 from vision.types import Image
-from vision.worker import ANSWER, MAX_IMAGE_BYTES, REQUEST, Reply, Request
+from vision.worker import ANSWER, MAX_IMAGE_BYTES, REQUEST, Problem, Reply, Request
 
 _START_LIMIT_S = 10.0
 
@@ -34,6 +34,7 @@ class Answer:
     reply: Reply
     image: Image | None  # BGR, shape (height, width, 3), uint8; None unless `reply` is `Reply.IMAGE`
     received_s: float  # monotonic wall time at which a captured image arrived, seconds
+    problem: Problem = Problem.UNKNOWN  # with `Reply.NOT_OPENED`
 
 
 class WorkerProcess:
@@ -130,13 +131,15 @@ class WorkerProcess:
         assert self._memory is not None
         kind, width, height, received_s = ANSWER.unpack(answer)
         size_fits = 0 < width * height * 3 <= MAX_IMAGE_BYTES
-        if kind not in tuple(Reply) or (kind == Reply.IMAGE and not size_fits):
+        known = kind in tuple(Reply) and (kind != Reply.NOT_OPENED or width in tuple(Problem))
+        if not known or (kind == Reply.IMAGE and not size_fits):
             raise WorkerEndedError("the process that decodes images sent an invalid answer")
         image: Image | None = None
         if kind == Reply.IMAGE:
             shared = np.frombuffer(self._memory, np.uint8, width * height * 3)
             image = shared.reshape(height, width, 3).copy()
-        return Answer(Reply(kind), image, received_s)
+        problem = Problem(width) if kind == Reply.NOT_OPENED else Problem.UNKNOWN
+        return Answer(Reply(kind), image, received_s, problem)
 
 
 def _shared_file() -> BinaryIO:

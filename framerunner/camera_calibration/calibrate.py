@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
+from datetime import date
 from pathlib import Path
 
 from rich import box
@@ -51,7 +52,7 @@ def calibrate(
     )
     report = board.calibrate(collection.views)
     _show(report, collection)
-    save_calibration(report.calibration, out)
+    save_calibration(report.calibration.model_copy(update={"made_on": date.today().isoformat()}), out)
     print(f"written to {out}; use it with `framerunner fly --calibration {out}`")
 
 

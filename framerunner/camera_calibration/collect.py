@@ -12,7 +12,7 @@ import cv2
 from vision.calibration.board import MIN_COVERAGE, SAME_VIEW, Board, View, coverage_of
 from vision.calibration.model import CalibrationError
 from vision.sources import IMAGE_SUFFIXES, open_source
-from vision.types import Image
+from vision.types import CameraError, Image
 
 MAX_VIEWS = 60
 
@@ -53,21 +53,32 @@ async def collect(
 
     Raises:
         CalibrationError: an image file cannot be read.
-        CameraError: a camera cannot be opened or has failed.
+        CameraError: a camera cannot be opened or has failed before there was any view.
     """
     collection = Collection()
     for source in sources:
-        live = _is_live(source)
-        async for name, image in _images(source):
-            new = collection.add(board, image, name)
-            views = len(collection.views)
-            if new and live:
-                seen = 100 * coverage_of(collection.views)
-                say(f"view {views} of {wanted}, {seen:.0f} % of the image covered; move and tilt the board")
-            enough = views >= wanted and coverage_of(collection.views) >= MIN_COVERAGE
-            if (live and enough) or views >= MAX_VIEWS:
-                break
+        try:
+            await _collect_from(source, collection, board, wanted, say)
+        except CameraError as error:
+            if not collection.views:
+                raise
+            say(f"{error}; the {len(collection.views)} views so far are used")
     return collection
+
+
+async def _collect_from(
+    source: str, collection: Collection, board: Board, wanted: int, say: Callable[[str], None]
+) -> None:
+    live = _is_live(source)
+    async for name, image in _images(source):
+        new = collection.add(board, image, name)
+        views = len(collection.views)
+        if new and live:
+            seen = 100 * coverage_of(collection.views)
+            say(f"view {views} of {wanted}, {seen:.0f} % of the image covered; move and tilt the board")
+        enough = views >= wanted and coverage_of(collection.views) >= MIN_COVERAGE
+        if (live and enough) or views >= MAX_VIEWS:
+            break
 
 
 def _is_live(source: str) -> bool:

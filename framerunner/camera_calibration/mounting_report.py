@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import degrees
+from datetime import date
+from math import degrees, hypot
 from pathlib import Path
 
 from framerunner.camera_calibration.calibration_file import save_calibration
@@ -29,6 +30,11 @@ _ANGLES = (
     ("pitch", "upwards", "downwards"),
     ("yaw", "to the right", "to the left"),
 )
+_HEADING_STD_DEG = 0.34
+"""Of a constant error of the reported heading, such as that of misaligned markers of a motion capture.
+
+No survey can tell it from the camera's yaw: only their sum is seen.
+"""
 _MAX_RMS_PX = 3.0
 _MAX_DELAY_S = 0.5
 
@@ -109,6 +115,11 @@ def _tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) 
     for (name, positive, negative), angle, one in angles:
         way = positive if angle >= 0.0 else negative
         say(f"{name:8s}{degrees(abs(angle)):6.2f} degrees {way} (1 sigma {degrees(one):.2f})")
+    body_deg = hypot(degrees(std.angles_frd_rad[2]), _HEADING_STD_DEG)
+    say(
+        "        yaw is from the heading that telemetry reports, as a flight needs it; from the drone's body "
+        f"its 1 sigma is {body_deg:.2f}, if that heading is wrong by {_HEADING_STD_DEG:g} (1 sigma)"
+    )
     for name, place, one in zip(
         ("forward", "left", "up"), found.position_flu_m, std.position_flu_m, strict=True
     ):
@@ -128,6 +139,7 @@ def _with_mounting(calibration: Calibration, fit: MountingFit, *, stamped: bool)
         angles_std_rad=std.angles_frd_rad,
         position_flu_m=found.position_flu_m,
         position_std_m=std.position_flu_m,
+        measured_on=date.today().isoformat(),
     )
     update: dict[str, object] = {"mounting": mounting}
     if not stamped and std.delay_s <= MAX_DELAY_STD_S and 0.0 <= found.delay_s <= _MAX_DELAY_S:

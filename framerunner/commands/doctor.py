@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+import asyncio
 from contextlib import closing
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from framerunner.commands import check_range
+
+if TYPE_CHECKING:
+    from vision.calibration.model import Calibration
 
 
 def doctor(
     *,
     drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
     seconds: Annotated[float, Parameter(help="how long to listen")] = 6.0,
+    camera: Annotated[
+        str | None, Parameter(help="URL or device of its camera, as for `fly --camera`: it is watched, too")
+    ] = None,
+    calibration: Annotated[
+        Path | None, Parameter(help="calibration of its camera, a file of `framerunner camera calibrate`")
+    ] = None,
 ) -> int:
     """Listen to a drone, request its data, and say in one page whether it can fly the challenge.
 
     Any vehicle with PX4 or ArduPilot, simulated or real. It is never armed and none of its parameters is
     changed; ArduPilot is asked for streams of messages on this link, since it sends none by itself.
+
+    With --camera the rate, size, gaps and delay of its images are measured, and with --calibration it is said
+    whether they fit it, how old it is, and whether the camera's mounting on the drone is known.
 
     Exit code 0: it can fly, 1: something is missing, 2: bad input.
 
@@ -29,19 +43,34 @@ def doctor(
         framerunner doctor --drone udpin://0.0.0.0:14540
 
         framerunner doctor --drone serial:///dev/ttyUSB0:57600 --seconds 15
+
+        framerunner doctor --camera rtsp://10.0.0.2/1 --calibration camera.yaml
     """
     check_range("--seconds", seconds, 2.0, 600.0)
 
+    from framerunner.camera_calibration.calibration_file import load_calibration
+    from vision.sources import open_source
+
+    known = None if calibration is None else load_calibration(calibration)
+    if camera is not None:
+        open_source(camera)  # says in a line what can be no camera
+    return _examine(drone, seconds, camera, known)
+
+
+def _examine(drone: str, seconds: float, camera: str | None, calibration: Calibration | None) -> int:
+    """Listen, watch, and print the page; returns the exit code."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
+    from framerunner.doctor.camera import LOOK_S, examine_camera
     from framerunner.doctor.checks import can_fly, examine
     from framerunner.doctor.listen import COMPONENT_ID, FIND_S, SYSTEM_ID, Record, find, listen
-    from framerunner.doctor.page import print_page
+    from framerunner.doctor.page import findings_table, print_page
+    from framerunner.preflight.camera import measure_camera
     from wire.transports.vehicle_link import VehicleLink
 
     record = Record()
-    errors = Console(stderr=True)
+    errors, page = Console(stderr=True), Console(highlight=False)
     bar = Progress(TextColumn("{task.description}"), BarColumn(), console=errors, transient=True)
     with closing(VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)) as link, bar:
         task = bar.add_task("", total=1.0)
@@ -49,15 +78,22 @@ def doctor(
         def show(what: str, share: float) -> None:
             bar.update(task, description=what, completed=share)
 
-        if not find(link, record, show):
-            errors.print(
-                f"no vehicle was heard on {link.url} within {FIND_S:g} s; "
-                "is it running and sending to this address?",
-                highlight=False,
-                soft_wrap=True,
-            )
-            return 1
-        listen(link, record, seconds, show)
-    findings = examine(record)
-    print_page(Console(highlight=False), link.url, record, findings)
-    return 0 if can_fly(findings) else 1
+        heard = find(link, record, show)
+        if heard:
+            listen(link, record, seconds, show)
+        times = None
+        if camera is not None:
+            show("watching the camera", 0.0)
+            times = asyncio.run(measure_camera(camera, LOOK_S))
+    of_camera = []
+    if camera is not None or calibration is not None:
+        of_camera = examine_camera(times, calibration, record.clock_ms[-1] if record.clock_ms else None)
+    if heard:
+        findings = examine(record) + of_camera
+        print_page(page, link.url, record, findings)
+        return 0 if can_fly(findings) else 1
+    silent = f"no vehicle was heard on {link.url} within {FIND_S:g} s; "
+    errors.print(f"{silent}is it running and sending to this address?", highlight=False, soft_wrap=True)
+    if of_camera:
+        page.print(findings_table(of_camera))
+    return 1

@@ -56,6 +56,8 @@ Subject = Literal[
     "WPNAV_SPEED_UP",
 ]
 
+CAMERA_SUBJECTS = ("camera", "camera delay", "camera calibration", "camera mounting")
+
 
 def finding(level: Level, subject: Subject, text: str, advice: str = "") -> Finding:
     """A finding of the doctor; see `Finding`."""

@@ -1,14 +1,16 @@
-"""Measures a camera for some seconds: rate, gaps and age of its images."""
+"""Measures a camera for some seconds: rate, gaps and age of its images; what is known of its calibration."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 from dataclasses import dataclass
+from datetime import date
 from itertools import pairwise
 from statistics import median
 
-from offboard.safety.vehicle_checks import CameraFacts
+from offboard.safety.vehicle_checks import CalibrationFacts, CameraFacts
+from vision.calibration.model import Calibration
 from vision.sources import open_source
 from vision.types import CameraError
 
@@ -76,3 +78,27 @@ async def measure_camera(url: str, seconds: float, size_px: tuple[int, int] | No
     if not received:
         return CameraTimes(problem=f"no image within {_FIRST_S:g} s")
     return CameraTimes(tuple(received), tuple(stamps), size)
+
+
+def calibration_facts(calibration: Calibration | None, size_px: tuple[int, int]) -> CalibrationFacts:
+    """What the checks need to know of a calibration today.
+
+    Args:
+        calibration: None: there is none.
+        size_px: width and height of the camera's images; zeros: there was none.
+    """
+    if calibration is None:
+        return CalibrationFacts(size_px=size_px)
+    calibrated_px, mounting = (calibration.width_px, calibration.height_px), calibration.mounting
+    made_days = _days_since(calibration.made_on)
+    if mounting is None:
+        return CalibrationFacts(calibrated_px, size_px, made_days=made_days)
+    angles, days = (mounting.angles_frd_rad, mounting.angles_std_rad), _days_since(mounting.measured_on)
+    return CalibrationFacts(calibrated_px, size_px, *angles, made_days, days)
+
+
+def _days_since(day: str | None) -> int | None:
+    with contextlib.suppress(ValueError):  # such as the 30th of February
+        if day is not None:
+            return (date.today() - date.fromisoformat(day)).days
+    return None

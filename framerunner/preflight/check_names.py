@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
-from framerunner.doctor.subjects import Subject
+from framerunner.doctor.subjects import CAMERA_SUBJECTS, Subject
 from offboard.safety.failsafes import DOCUMENTS, failsafe_rows
 
 _FAILSAFES = tuple(name for autopilot in DOCUMENTS for row in failsafe_rows(autopilot) for name in row.names)
@@ -18,7 +18,7 @@ REPLACED = frozenset(
 )
 RENAMED = {"estimator": "estimator settings"}
 """Findings of the doctor whose name is that of a check with a limit."""
-_OWN = ("battery", "estimator", "link loss", "link latency", "camera", "camera delay", "camera calibration")
+_OWN = ("battery", "estimator", "link loss", "link latency", *CAMERA_SUBJECTS)
 _OF_RUN = ("failsafes", "fence", "caps")
 
 CHECK_NAMES = frozenset(

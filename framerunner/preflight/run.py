@@ -18,7 +18,7 @@ from framerunner.doctor.checks import examine
 from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import Record
 from framerunner.flying.plan import CAMERA_DELAY_S, FlightPlan
-from framerunner.preflight.camera import CameraTimes, measure_camera
+from framerunner.preflight.camera import CameraTimes, calibration_facts, measure_camera
 from framerunner.preflight.check_names import CHECK_NAMES, RENAMED, REPLACED
 from framerunner.preflight.estimator import estimator_facts, has_global_position
 from framerunner.preflight.fence_upload import (
@@ -40,10 +40,9 @@ from offboard.safety.fence import FlightFence, flight_fence
 from offboard.safety.rules import AbortAction
 from offboard.safety.vehicle_checks import (
     BatteryFacts,
-    CalibrationFacts,
     LinkFacts,
     battery_check,
-    calibration_check,
+    calibration_checks,
     camera_checks,
     estimator_check,
     link_checks,
@@ -175,7 +174,7 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
         clock_ms = record.clock_ms[-1] if record.clock_ms else None
         checks += camera_checks(times.facts(clock_ms, settings.camera_delay_s))
         if plan.chart.vision == "frames":
-            checks.append(calibration_check(_calibration_facts(plan, times.size_px)))
+            checks += calibration_checks(calibration_facts(plan.calibration, times.size_px))
     accepted = tuple(accept(checks, settings.accepted))
     vehicle, system_id = _vehicle_words(record), measured.system_id
     return PreflightReport(vehicle, system_id, accepted, fence, measured.changes, measured.kept)
@@ -189,16 +188,6 @@ def tell(report: PreflightReport) -> None:
     lines = [check.line for check in report.checks]
     lines += [f"set      {each.name}: {each.before:g} -> {each.after:g}" for each in report.changes]
     print("\n".join(lines), file=sys.stderr, flush=True)
-
-
-def _calibration_facts(plan: FlightPlan, size_px: tuple[int, int]) -> CalibrationFacts:
-    calibration = plan.calibration
-    if calibration is None:
-        return CalibrationFacts(size_px=size_px)
-    mounting = calibration.mounting
-    calibrated_px = (calibration.width_px, calibration.height_px)
-    angles_rad = None if mounting is None else mounting.angles_frd_rad
-    return CalibrationFacts(calibrated_px, size_px, angles_rad)
 
 
 async def _camera(url: str) -> CameraTimes:

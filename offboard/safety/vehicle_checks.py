@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees, isfinite, isnan
 from statistics import median
 
@@ -17,6 +17,7 @@ MAX_CAMERA_AGE_S = 0.3
 CLOCK_TOLERANCE_S = 0.05  # of the vehicle's clock as the link shows it
 MIN_CAMERA_RATE_HZ = 8.0
 MAX_CAMERA_GAP_S = 0.5
+OLD_CALIBRATION_DAYS = 90
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +93,17 @@ class CalibrationFacts:
         calibrated_px: width and height of the images that it was made from; None: there is no calibration.
         size_px: width and height of the camera's images; zeros: there was none.
         angles_frd_rad: roll, pitch and yaw of the camera on the drone; None: never measured.
+        angles_std_rad: their standard deviations; None: not known.
+        made_days: since the lens was calibrated; None: not known.
+        mounting_days: likewise, since the mounting was measured.
     """
 
     calibrated_px: tuple[int, int] | None = None
     size_px: tuple[int, int] = (0, 0)
     angles_frd_rad: tuple[float, float, float] | None = None
+    angles_std_rad: tuple[float, float, float] | None = None
+    made_days: int | None = None
+    mounting_days: int | None = None
 
 
 def battery_check(facts: BatteryFacts) -> Check:
@@ -172,20 +179,38 @@ def camera_checks(facts: CameraFacts) -> list[Check]:
     return [rate, passed("camera delay", good, f"{facts.age_s:.2f} s", limit, "use a camera with less delay")]
 
 
-def calibration_check(facts: CalibrationFacts) -> Check:
+def calibration_checks(facts: CalibrationFacts) -> list[Check]:
     """Whether the camera's lens and its mounting on the drone were measured, for missions that map frames."""
     name = "camera calibration"
     if facts.calibrated_px is None:
         advice = "run framerunner camera calibrate, then camera extrinsics, and give --calibration"
-        return Check(name, Outcome.NOTE, "none: the scenario's camera is assumed", "", advice)
+        return [Check(name, Outcome.NOTE, "none: the scenario's camera is assumed", "", advice)]
     (width, height), (seen_width, seen_height) = facts.calibrated_px, facts.size_px
     limit = f"images of {width} × {height}"
     if any(facts.size_px) and facts.size_px != facts.calibrated_px:
         value = f"images have {seen_width} × {seen_height}"
-        return Check(name, Outcome.FAIL, value, limit, "calibrate it with images as it gives them in flight")
+        advice = "calibrate it with images as it gives them in flight"
+        return [Check(name, Outcome.FAIL, value, limit, advice), _mounting_check(facts)]
+    advice = "make it again if lens, focus or resolution were changed since"
+    return [_aged(Check(name, Outcome.PASS, "made", limit), facts.made_days, advice), _mounting_check(facts)]
+
+
+def _mounting_check(facts: CalibrationFacts) -> Check:
+    name = "camera mounting"
     if facts.angles_frd_rad is None:
-        value = "the mounting was never measured; the camera is taken to look straight ahead"
-        return Check(name, Outcome.NOTE, value, limit, "run framerunner camera extrinsics")
+        value = "never measured; the camera is taken to look straight ahead"
+        return Check(name, Outcome.NOTE, value, "", "run framerunner camera extrinsics")
     roll, pitch, yaw = (degrees(angle) for angle in facts.angles_frd_rad)
-    value = f"mounted at roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"
-    return Check(name, Outcome.PASS, value, limit)
+    value = f"roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"
+    if facts.angles_std_rad is not None:
+        value += f" (1 sigma {', '.join(f'{degrees(each):.2f}' for each in facts.angles_std_rad)})"
+    advice = "measure it again if the camera or the drone's markers were moved since"
+    return _aged(Check(name, Outcome.PASS, f"{value}, measured"), facts.mounting_days, advice)
+
+
+def _aged(check: Check, days: int | None, advice: str) -> Check:
+    """The check with its age in words; one that is old, or of unknown age, is noted."""
+    age = "on an unknown day" if days is None else "today" if days <= 0 else f"{days} days ago"
+    outcome = Outcome.PASS if days is not None and days <= OLD_CALIBRATION_DAYS else Outcome.NOTE
+    told = advice if outcome is Outcome.NOTE else ""
+    return replace(check, outcome=outcome, value=f"{check.value} {age}", advice=told)

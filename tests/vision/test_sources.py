@@ -2,12 +2,14 @@
 
 import asyncio
 import os
+import random
 import struct
 import time
 import zlib
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
+from typing import cast
 
 import cv2
 import numpy as np
@@ -447,8 +449,8 @@ async def test_latest_keeps_one_item_and_ends() -> None:
         await latest.get()
 
 
-async def test_h264_over_rtp_is_received() -> None:
-    port = free_port()
+@asynccontextmanager
+async def sending_rtp(port: int) -> AsyncIterator[None]:
     sender = RtpSender(("127.0.0.1", port), Camera())
 
     async def send() -> None:
@@ -458,11 +460,87 @@ async def test_h264_over_rtp_is_received() -> None:
 
     sending = asyncio.create_task(send())
     try:
-        frames = await take(CaptureSource(f"rtp://127.0.0.1:{port}", 8.0), 12)
+        yield
     finally:
         sending.cancel()
         await asyncio.to_thread(sender.close)
+
+
+async def test_h264_over_rtp_is_received() -> None:
+    port = free_port()
+    async with sending_rtp(port):
+        frames = await take(CaptureSource(f"rtp://127.0.0.1:{port}", 8.0), 12)
     assert {frame.image.shape for frame in frames} == {(240, 320, 3)}
     times_s = [frame.received_s for frame in frames]
     assert times_s == sorted(times_s)
     assert all(0.0 <= time.monotonic() - at_s < 5.0 for at_s in times_s)
+
+
+class Renumbering(asyncio.DatagramProtocol):
+    """Passes RTP packets on, with sequence numbers that count from a start."""
+
+    def __init__(self, port: int, number: int) -> None:
+        self._port, self.number = port, number
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.DatagramTransport, transport)
+
+    def datagram_received(self, data: bytes, addr: object) -> None:
+        self.pass_on(data[:2], data[4:])
+
+    def pass_on(self, kind: bytes, rest: bytes) -> None:
+        self._transport.sendto(kind + struct.pack(">H", self.number) + rest, ("127.0.0.1", self._port))
+        self.number += 1
+
+
+async def test_rtp_outlives_foreign_packets_and_a_restart_of_its_sender() -> None:
+    sent_to, _, port = free_port(), free_port(), free_port()  # RTP uses the next port, too
+    loop, source = asyncio.get_running_loop(), CaptureSource(f"rtp://127.0.0.1:{port}", 8.0)
+    relay = Renumbering(port, 10_000)
+    async with AsyncExitStack() as stack:
+        transport, _ = await loop.create_datagram_endpoint(lambda: relay, local_addr=("127.0.0.1", sent_to))
+        stack.callback(transport.close)
+        async with sending_rtp(sent_to):
+            await stack.enter_async_context(source)
+            frames = source.frames()
+            first = await anext(frames)
+        noise = random.Random(1)
+        for _ in range(200):
+            relay.pass_on(b"\x80\xe0", noise.randbytes(700))
+            await asyncio.sleep(0.002)
+        relay.number, stopped_s = 5_000, time.monotonic()  # of a new sender, before those of the last one
+        async with sending_rtp(sent_to):
+            while (again := await anext(frames)).received_s <= stopped_s + 0.2:
+                pass
+    assert again.image.shape == first.image.shape
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        ("401 Unauthorized", "user name or password is missing or wrong"),
+        ("404 Not Found", "the server has no such stream"),
+        ("500 Internal Server Error", "cannot be opened"),
+    ],
+)
+async def test_why_an_rtsp_camera_does_not_open(answer: str, words: str) -> None:
+    async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with suppress(asyncio.IncompleteReadError, ConnectionError):
+            while request := (await reader.readuntil(b"\r\n\r\n")).decode():
+                number = request.partition("CSeq: ")[2].split()[0]
+                status = "200 OK" if request.startswith("OPTIONS") else answer
+                login = 'WWW-Authenticate: Basic realm="x"'
+                writer.write(f"RTSP/1.0 {status}\r\nCSeq: {number}\r\n{login}\r\n\r\n".encode())
+        writer.close()
+
+    server = await asyncio.start_server(talk, "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    async with server:
+        message = await failure(CaptureSource(f"rtsp://me:secret@127.0.0.1:{port}/live", 5.0))
+    assert words in message and "secret" not in message
+
+
+async def test_nothing_listens_or_the_address_is_another_machines() -> None:
+    assert "connection refused" in await failure(CaptureSource(f"tcp://127.0.0.1:{free_port()}"))
+    assert "no address of this machine" in await failure(CaptureSource("udp://192.0.2.1:5600"))
+    assert "ls /dev/video*" in await failure(CaptureSource(999))

@@ -37,8 +37,21 @@ def test_a_stream_that_starts_anew_has_a_new_zero() -> None:
     assert clock.captured_s(0.2, 5010.13) == pytest.approx(5010.1, abs=1e-4)
 
 
-def test_stamps_of_this_machines_own_clock_are_the_answer() -> None:
-    assert StreamClock().captured_s(7000.0, 7000.045) == 7000.0
+def test_images_that_a_network_held_back_keep_their_times() -> None:
+    stamps = [0.033 * number for number in range(300)]
+    held = [9.0 if 6.0 < stamp_s < 8.9 else stamp_s for stamp_s in stamps]  # a stall of 3 s, then all at once
+    arrivals = [5000.05 + at_s + 1e-4 * number for number, at_s in enumerate(held)]
+    assert max(map(abs, errors_s(stamps, arrivals, 0.05)[20:])) < 0.04
+
+
+def test_one_image_with_a_wrong_stamp_moves_no_other() -> None:
+    stamps = [0.033 * number for number in range(300)]
+    clock = StreamClock()
+    found = []
+    for number, stamp_s in enumerate(stamps):
+        late_s = 0.02 if number == 50 else 0.0
+        found.append(clock.captured_s(stamp_s + late_s, 5000.05 + stamp_s) - 5000.05 - stamp_s)
+    assert max(map(abs, found)) < 1e-6
 
 
 def test_without_stamps_it_is_the_arrival() -> None:

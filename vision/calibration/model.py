@@ -17,6 +17,7 @@ _Weights = tuple[_Weight, _Weight, _Weight]
 _Angle = Annotated[float, Field(ge=-MAX_MOUNTING_RAD, le=MAX_MOUNTING_RAD)]
 _Offset = Annotated[float, Field(ge=-2, le=2)]
 _Deviation = Annotated[float, Field(ge=0, le=10)]
+_Day = Annotated[str, Field(pattern=r"^20\d\d-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])$")]
 ColourMatrix = tuple[_Weights, _Weights, _Weights]
 
 
@@ -36,7 +37,7 @@ class Mounting(BaseModel):
         description="roll, pitch and yaw; to the right, up and to the right are positive"
     )
     angles_std_rad: tuple[_Deviation, _Deviation, _Deviation] | None = Field(
-        None, description="standard deviations of the angles"
+        None, description="standard deviations of the angles, that of yaw against the telemetry's heading"
     )
     position_flu_m: tuple[_Offset, _Offset, _Offset] | None = Field(
         None, description="of the lens from the drone's centre: forward, left, up; None: the scenario's"
@@ -44,6 +45,7 @@ class Mounting(BaseModel):
     position_std_m: tuple[_Deviation, _Deviation, _Deviation] | None = Field(
         None, description="standard deviations of the position"
     )
+    measured_on: _Day | None = Field(None, description="the day of the measurement, year-month-day")
 
 
 class Calibration(BaseModel):
@@ -81,6 +83,7 @@ class Calibration(BaseModel):
         None, ge=0, description="root mean square of what is left of the corners' errors"
     )
     images: int | None = Field(None, ge=1, description="how many images it was made from")
+    made_on: _Day | None = Field(None, description="the day on which the lens was calibrated, year-month-day")
 
     @classmethod
     def ideal(

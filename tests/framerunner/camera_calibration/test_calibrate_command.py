@@ -3,10 +3,12 @@
 import cv2
 import pytest
 
+from framerunner.camera_calibration import collect
 from framerunner.camera_calibration.calibration_file import load_calibration
 from framerunner.cli import run
 from tests.vision.calibration.board_images import TRUE, board_images
 from vision.calibration.model import CalibrationError
+from vision.types import CameraError
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +39,23 @@ def test_too_few_photos_are_refused_in_one_line(photos, tmp_path, capsys):
     error = capsys.readouterr().err.splitlines()[-1]
     assert error.startswith("error: calibration: 4 different views of the board; 8 or more are needed")
     assert not (tmp_path / "camera.yaml").exists()
+
+
+def test_the_views_of_a_camera_that_fails_are_used(photos, tmp_path, capsys, monkeypatch):
+    folder = collect._images
+
+    async def failing(source):
+        if source == "rtsp://ends":
+            async for each in folder(str(photos)):
+                yield each
+        raise CameraError("camera rtsp://ends: the stream ended")
+
+    monkeypatch.setattr(collect, "_images", failing)
+    out = tmp_path / "camera.yaml"
+    assert run(["camera", "calibrate", "rtsp://gone", "--out", str(out)]) == 2
+    assert run(["camera", "calibrate", "rtsp://ends", "--out", str(out)]) == 0
+    assert "the stream ended; the 13 views so far are used" in capsys.readouterr().err
+    assert load_calibration(out).made_on is not None
 
 
 def test_the_board_is_written_with_its_measures(tmp_path, capsys):

@@ -100,6 +100,8 @@ def test_the_delay_is_written_for_images_without_time_stamps(tmp_path: Path, sta
     assert written.mounting is not None
     assert written.mounting.angles_frd_rad == (0.03, 0.1, -0.05)
     assert any("pitch     5.73 degrees upwards (1 sigma 0.06)" in line for line in lines)
+    assert any("from the drone's body its 1 sigma is 0.36" in line for line in lines)
+    assert written.mounting.measured_on is not None
 
 
 @pytest.mark.parametrize(

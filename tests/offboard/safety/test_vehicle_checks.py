@@ -12,7 +12,7 @@ from offboard.safety.vehicle_checks import (
     EstimatorFacts,
     LinkFacts,
     battery_check,
-    calibration_check,
+    calibration_checks,
     camera_checks,
     estimator_check,
     link_checks,
@@ -99,13 +99,21 @@ def test_a_name_that_is_no_checks_is_told_with_all_names():
 
 
 def test_a_mounting_that_was_never_measured_is_noted_and_another_size_fails():
-    size_px = (320, 240)
-    none = calibration_check(CalibrationFacts(size_px=size_px))
-    unmeasured = calibration_check(CalibrationFacts(size_px, size_px))
-    assert (none.outcome, unmeasured.outcome) == (Outcome.NOTE, Outcome.NOTE)
+    size_px, straight = (320, 240), (0.0, 0.1, 0.0)
+    (none,) = calibration_checks(CalibrationFacts(size_px=size_px))
+    lens, unmeasured = calibration_checks(CalibrationFacts(size_px, size_px, made_days=3))
+    assert (none.outcome, lens.outcome, unmeasured.outcome) == (Outcome.NOTE, Outcome.PASS, Outcome.NOTE)
     assert "never measured" in unmeasured.value and "camera extrinsics" in unmeasured.advice
-    measured = calibration_check(CalibrationFacts(size_px, size_px, (0.0, 0.1, 0.0)))
-    assert measured.outcome is Outcome.PASS and "pitch 5.7" in measured.value
-    assert failed(calibration_check(CalibrationFacts((640, 480), size_px, (0.0, 0.1, 0.0)))) == [
-        "camera calibration"
-    ]
+    _, measured = calibration_checks(
+        CalibrationFacts(size_px, size_px, straight, (0.001, 0.002, 0.003), made_days=3, mounting_days=0)
+    )
+    assert measured.outcome is Outcome.PASS
+    assert measured.value == "roll 0.0, pitch 5.7, yaw 0.0 degrees (1 sigma 0.06, 0.11, 0.17), measured today"
+    other_size, _ = calibration_checks(CalibrationFacts((640, 480), size_px, straight))
+    assert failed(other_size) == ["camera calibration"]
+
+
+@pytest.mark.parametrize(("days", "outcome"), [(90, Outcome.PASS), (91, Outcome.NOTE), (None, Outcome.NOTE)])
+def test_an_old_calibration_is_noted(days, outcome):
+    facts = CalibrationFacts((320, 240), (320, 240), (0.0, 0.0, 0.0), made_days=days, mounting_days=days)
+    assert [each.outcome for each in calibration_checks(facts)] == [outcome, outcome]

@@ -1,0 +1,45 @@
+"""What the doctor says about a camera that it is given."""
+
+from datetime import date, timedelta
+
+from framerunner.doctor.camera import examine_camera
+from framerunner.doctor.findings import Level
+from framerunner.preflight.camera import CameraTimes
+from vision.calibration.model import Calibration, Mounting
+
+TIMES = CameraTimes(tuple(0.1 * number for number in range(30)), (None,) * 30, (320, 240))
+TODAY = date.today()
+
+
+def levels(*arguments):
+    return {each.subject: each.level for each in examine_camera(*arguments)}
+
+
+def calibration(**values):
+    return Calibration.ideal(320, 240, 160.0).model_copy(update={"made_on": TODAY.isoformat(), **values})
+
+
+def test_all_is_known():
+    mounting = Mounting(angles_frd_rad=(0.0, 0.0, 0.0), measured_on=(TODAY - timedelta(days=2)).isoformat())
+    known = calibration(mounting=mounting, delay_s=0.08)
+    findings = {each.subject: each for each in examine_camera(TIMES, known, None)}
+    assert {each.level for each in findings.values()} == {Level.GOOD}
+    assert findings["camera"].text.startswith("10.0 images a second of 320 × 240")
+    assert findings["camera delay"].text.startswith("0.080 s by the calibration")
+    assert findings["camera mounting"].text.endswith("measured 2 days ago")
+
+
+def test_what_was_never_measured_is_noted():
+    expected = {
+        "camera": Level.GOOD,
+        "camera delay": Level.NOTE,
+        "camera calibration": Level.GOOD,
+        "camera mounting": Level.NOTE,
+    }
+    assert levels(TIMES, calibration(), None) == expected
+    assert levels(None, None, None) == {"camera calibration": Level.NOTE}
+
+
+def test_a_camera_that_gives_nothing_or_another_size_is_missing():
+    assert levels(CameraTimes(problem="gone"), None, None)["camera"] is Level.MISSING
+    assert levels(TIMES, calibration(width_px=640), None)["camera calibration"] is Level.MISSING
