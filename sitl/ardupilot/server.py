@@ -11,12 +11,15 @@ from sitl.ardupilot.poses import POSE_PORT, PoseLink
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.server import AutopilotServer
+from sitl.autopilots.sole_sender import SoleSender
 from sitl.server_settings import ServerSettings
 from sitl.time_grants import TimeGrants
 from wire.transports.sockets import Address, UdpSocket, bind_udp
 
 _SILENCE_S = 2.0  # wall time without a frame that is reported
 _LOST_S = 0.5  # wall time after which an answer to a frame that is repeated was lost
+_GONE_S = 3.5  # wall time without a frame after which another is accepted; it repeats one each 1.1 s
+_PACKETS_AT_ONCE = 200
 
 
 class FrameExchange:
@@ -97,6 +100,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         self.exchange = FrameExchange(self._simulation)
         self._link: UdpSocket | None = None
         self._poses: PoseLink | None = None
+        self._sender = SoleSender("ArduPilot", self._port, notice, _GONE_S)
         self._waiting: tuple[ServoFrame, Address] | None = None  # the last frame and its sender
         self._frame_s = 0.0  # wall time of the last frame
         self._connected = asyncio.Event()
@@ -109,7 +113,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         self._link = bind_udp((bind, self._port), "choose another --instance")
         if self._simulation.sends_poses:
             port, place = POSE_PORT + PORTS_AN_INSTANCE * instance, self._simulation.place
-            self._poses = PoseLink(bind, port, instance + 1, place)
+            self._poses = PoseLink(bind, port, instance + 1, place, self._notice)
 
     def _close(self) -> None:
         if self._poses is not None:
@@ -139,30 +143,33 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         return FIRST_PORT + PORTS_AN_INSTANCE * self._settings.instance
 
     def _receive(self) -> None:
-        """Answer the newest frame that has arrived, as soon as time is granted."""
-        link = self._link
+        """Answer ArduPilot's newest frame that has arrived, as soon as time is granted."""
+        link, before = self._link, self._sender.address
         assert link is not None, "it was opened"
-        newest: tuple[ServoFrame, Address] | None = None
-        while packet := link.read():
+        received: list[tuple[ServoFrame, Address]] = []
+        for _ in range(_PACKETS_AT_ONCE):
+            if not (packet := link.read()):
+                break
             frame = decode_frame(packet)
             if frame is not None and link.peer is not None:
-                newest = frame, link.peer
-        if newest is None or self._is_falling:
+                received.append((frame, link.peer))
+        if self._is_falling or not (frames := self._sender.select(received)):
             return
-        self._waiting, self._frame_s = newest, time.monotonic()
+        assert self._sender.address is not None, "it has sent frames"
+        self._waiting, self._frame_s = (frames[-1], self._sender.address), time.monotonic()
         if not self._connected.is_set():
             self._connected.set()
             self._notice("ArduPilot is connected")
-        if self._holding is not None:
-            return
         try:
-            self._take(newest[0])
+            self._take(frames[-1], is_other=before not in (None, self._sender.address))
         except Exception as error:  # it would be lost in the event loop
             self._fail(error)
 
-    def _take(self, frame: ServoFrame) -> None:
-        if self.exchange.is_restart(frame):
+    def _take(self, frame: ServoFrame, *, is_other: bool) -> None:
+        if is_other or self.exchange.is_restart(frame):
             self._restart()
+        if self._holding is not None:
+            return
         simulation = self._simulation
         is_due = simulation.time_us > self._until_us and simulation.is_at_control_tick
         if is_due and self.exchange.is_new(frame):
@@ -199,7 +206,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
             self._failed.set_exception(error)
 
     def _restart(self) -> None:
-        reason = "ArduPilot counts its frames from zero again"
+        reason = "ArduPilot has started again"
         if self._grants is not None:
             at_s = self._simulation.time_us / 1e6
             raise AutopilotEndedError(f"{reason} at {at_s:.1f} s of simulated time")
@@ -249,6 +256,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
             if not self._connected.is_set():
                 raise AutopilotEndedError(f"{reason} (its output: {process.log})")
             self._connected.clear()
+            self._sender.forget()
             self._is_falling = True
             await self._end_try(reason)
             self._is_falling = False
