@@ -8,12 +8,14 @@ from collections.abc import Callable
 
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
 from sitl.ardupilot.poses import POSE_PORT, PoseLink
+from sitl.ardupilot.relay import RELAY_PORT, AppRelay
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.server import AutopilotServer
 from sitl.autopilots.sole_sender import SoleSender
+from sitl.server import Pacer
 from sitl.server_settings import ServerSettings
-from sitl.time_grants import TimeGrants
+from sitl.time_grants import FREE_US, TimeGrants
 from wire.transports.sockets import Address, UdpSocket, bind_udp
 
 _SILENCE_S = 2.0  # wall time without a frame that is reported
@@ -100,6 +102,9 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         self.exchange = FrameExchange(self._simulation)
         self._link: UdpSocket | None = None
         self._poses: PoseLink | None = None
+        self._relay: AppRelay | None = None  # with a program that grants time
+        self._pacer: Pacer | None = None  # until that has granted time
+        self._pace = 0.0  # simulated seconds a second of the pacer
         self._sender = SoleSender("ArduPilot", self._port, notice, _GONE_S)
         self._waiting: tuple[ServoFrame, Address] | None = None  # the last frame and its sender
         self._frame_s = 0.0  # wall time of the last frame
@@ -114,10 +119,18 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         if self._simulation.sends_poses:
             port, place = POSE_PORT + PORTS_AN_INSTANCE * instance, self._simulation.place
             self._poses = PoseLink(bind, port, instance + 1, place, self._notice)
+        app = self._settings.onboard.remote
+        if self._grants is not None and app is not None:
+            port = RELAY_PORT + PORTS_AN_INSTANCE * instance
+            listening = bind_udp((bind, port), "choose another --instance")
+            sender = SoleSender("ArduPilot", port, self._notice)
+            self._relay = AppRelay(listening, app, sender, instance + 1)
 
     def _close(self) -> None:
         if self._poses is not None:
             self._poses.close()
+        if self._relay is not None:
+            self._relay.close()
         if self._link is not None:
             self._link.close()
 
@@ -126,12 +139,18 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         assert link is not None, "it was opened"
         self._failed = loop.create_future()
         loop.add_reader(link, self._receive)
+        if self._relay is not None:
+            loop.add_reader(self._relay.ardupilot, self._relay.from_ardupilot)
+            loop.add_reader(self._relay.app, self._relay.from_app)
         tasks = [asyncio.ensure_future(self._failed), asyncio.create_task(self._watch())]
         tasks.append(asyncio.create_task(self._run_process()))
         try:
             await asyncio.gather(*tasks)
         finally:
             loop.remove_reader(link)
+            if self._relay is not None:
+                loop.remove_reader(self._relay.ardupilot)
+                loop.remove_reader(self._relay.app)
             if self._holding is not None:
                 tasks.append(self._holding)
             for task in tasks:
@@ -171,13 +190,14 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         if self._holding is not None:
             return
         simulation = self._simulation
-        is_due = simulation.time_us > self._until_us and simulation.is_at_control_tick
-        if is_due and self.exchange.is_new(frame):
+        is_held = simulation.time_us > self._until_us or self._is_starting
+        if is_held and simulation.is_at_control_tick and self.exchange.is_new(frame):
             self._holding = asyncio.create_task(self._answer_when_granted())
         else:
-            self._answer()
+            self._answer(holds=self._until_us == FREE_US)
 
-    def _answer(self) -> None:
+    def _answer(self, *, holds: bool) -> None:
+        """Answer the last frame; what the app has sent goes on when time held, or is not granted."""
         assert self._waiting is not None
         assert self._link is not None
         frame, peer = self._waiting
@@ -187,16 +207,33 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
             return
         if is_new and simulation.pose is not None and self._poses is not None:
             self._poses.send(simulation.pose)  # before the answer that lets ArduPilot's time advance
+        if holds and self._relay is not None:
+            self._relay.flush()
         self._link.write(line, peer)
         if is_new and simulation.is_at_control_tick:
             self._video.step()  # while ArduPilot computes
 
+    @property
+    def _is_starting(self) -> bool:
+        """Whether a program will grant time, and has not yet."""
+        return self._grants is not None and not self._grants.used
+
+    async def _keep_pace(self) -> None:
+        """Wait until a step is due while the autopilot starts."""
+        time_us, now_s, pace = self._simulation.time_us, time.monotonic(), self._starting_speed()
+        if self._pacer is None or pace != self._pace:
+            self._pacer, self._pace = Pacer(pace, now_s, time_us), pace
+        self._pacer.give_up_lag(now_s, time_us)
+        await asyncio.sleep(self._pacer.wait_s(now_s, time_us))
+
     async def _answer_when_granted(self) -> None:
         try:
+            if self._is_starting:
+                await self._keep_pace()
             while self._simulation.time_us > self._until_us:
                 await self._hold()
             self._holding = None
-            self._answer()
+            self._answer(holds=True)
         except Exception as error:  # nobody waits for this task
             self._fail(error)
 

@@ -6,7 +6,7 @@ import asyncio
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.server import BURST_TICKS, Pacer
@@ -18,6 +18,8 @@ from sitl.world import CONTROL_PERIOD_US
 
 FALL_US = 3_000_000
 """For which a drone without its autopilot is simulated on."""
+_READY_US = 7_000_000  # by which the autopilot can be prepared for its flight
+_WAITING_SPEED = 0.2  # simulated seconds a second; a heartbeat still comes every 5 s
 
 V = TypeVar("V", bound=SimulatedVehicle)
 
@@ -36,9 +38,6 @@ class AutopilotServer(ABC, Generic[V]):
         grants: how far simulated time may advance; None: without a limit. With them the autopilot's end ends
             the server.
     """
-
-    SETPOINT_S: ClassVar[float] = 0.002
-    """Wall time in which it takes a setpoint that was sent before time was granted."""
 
     def __init__(
         self,
@@ -143,5 +142,12 @@ class AutopilotServer(ABC, Generic[V]):
         assert grants is not None, "time is granted"
         held_us = self._simulation.time_us - CONTROL_PERIOD_US
         await grants.hold(held_us, self._video.image_us, lambda: grants.setpoint)
-        if grants.setpoint is not None:
-            await asyncio.sleep(self.SETPOINT_S)
+
+    def _starting_speed(self) -> float:
+        """Simulated seconds a second until a program grants time: at most real time.
+
+        When the autopilot can be armed, time passes slowly, because that program begins its flight at a
+        whole multiple of ten seconds.
+        """
+        speed = 1.0 if self._simulation.time_us < _READY_US else _WAITING_SPEED
+        return min(speed, self._settings.speed)
