@@ -13,10 +13,11 @@ from __future__ import annotations
 from collections import deque
 
 from sitl.autopilots.sole_sender import SoleSender
-from wire.dialect import mavlink
+from wire.dialect import Message, mavlink
 from wire.framing import HEADER_BYTES_V2, MARKER_V1, MARKER_V2, PacketReader
 from wire.transports.sockets import Address, UdpSocket, connect_udp
 
+HEARTBEAT_S = 1.0
 RELAY_PORT = 9007
 """UDP port of instance 0, between those of the JSON interface."""
 _PACKETS_AT_ONCE = 200
@@ -72,6 +73,14 @@ class AppRelay:
             else:
                 (self._first if number in _FIRST else self._others).append(data)
 
+    def send_heartbeat(self) -> None:
+        """Keep the app's MAVLink library from forgetting the relay; each `HEARTBEAT_S` of wall time.
+
+        It sends nothing to an address from which nothing has come for some seconds, as while time stands.
+        """
+        kind, none = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
+        self._tell(mavlink.MAVLink_heartbeat_message(kind, none, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
+
     def flush(self) -> None:
         """Send to ArduPilot what the app has sent, in few datagrams; it must have sent something before."""
         address = self._sender.address
@@ -100,9 +109,12 @@ class AppRelay:
         for message in self._reader.feed(data):
             if message.get_type() == "PING" and message.target_system == 0:
                 sender = (message.get_srcSystem(), message.get_srcComponent())
-                answer = mavlink.MAVLink_ping_message(message.time_usec, message.seq, *sender)
-                self.app.write(answer.pack(self._codec))
-                self._codec.seq = (self._codec.seq + 1) % 256
+                self._tell(mavlink.MAVLink_ping_message(message.time_usec, message.seq, *sender))
+
+    def _tell(self, message: Message) -> None:
+        """Send a message of the relay to the app."""
+        self.app.write(message.pack(self._codec))
+        self._codec.seq = (self._codec.seq + 1) % 256
 
 
 def _message_id(packet: bytes) -> int | None:

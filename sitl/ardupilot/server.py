@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
 from sitl.ardupilot.poses import POSE_PORT, PoseLink
-from sitl.ardupilot.relay import RELAY_PORT, AppRelay
+from sitl.ardupilot.relay import HEARTBEAT_S, RELAY_PORT, AppRelay
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.server import AutopilotServer
@@ -139,18 +139,14 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         assert link is not None, "it was opened"
         self._failed = loop.create_future()
         loop.add_reader(link, self._receive)
-        if self._relay is not None:
-            loop.add_reader(self._relay.ardupilot, self._relay.from_ardupilot)
-            loop.add_reader(self._relay.app, self._relay.from_app)
         tasks = [asyncio.ensure_future(self._failed), asyncio.create_task(self._watch())]
         tasks.append(asyncio.create_task(self._run_process()))
+        if self._relay is not None:
+            tasks.append(asyncio.create_task(_serve(self._relay)))
         try:
             await asyncio.gather(*tasks)
         finally:
             loop.remove_reader(link)
-            if self._relay is not None:
-                loop.remove_reader(self._relay.ardupilot)
-                loop.remove_reader(self._relay.app)
             if self._holding is not None:
                 tasks.append(self._holding)
             for task in tasks:
@@ -303,3 +299,17 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         await self._connected.wait()
         if self._grants is not None:
             await self._grants.open()
+
+
+async def _serve(relay: AppRelay) -> None:
+    """Pass on what arrives at the relay, until cancelled."""
+    loop = asyncio.get_running_loop()
+    loop.add_reader(relay.ardupilot, relay.from_ardupilot)
+    loop.add_reader(relay.app, relay.from_app)
+    try:
+        while True:
+            relay.send_heartbeat()
+            await asyncio.sleep(HEARTBEAT_S)
+    finally:
+        loop.remove_reader(relay.ardupilot)
+        loop.remove_reader(relay.app)
