@@ -186,7 +186,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         if self._holding is not None:
             return
         simulation = self._simulation
-        is_held = simulation.time_us > self._until_us or self._is_starting
+        is_held = simulation.time_us > self._until_us or self._is_starting or not self._video_is_open.is_set()
         if is_held and simulation.is_at_control_tick and self.exchange.is_new(frame):
             self._holding = asyncio.create_task(self._answer_when_granted())
         else:
@@ -224,6 +224,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
 
     async def _answer_when_granted(self) -> None:
         try:
+            await self._video_is_open.wait()
             if self._is_starting:
                 await self._keep_pace()
             while self._simulation.time_us > self._until_us:
@@ -295,8 +296,9 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
             self._is_falling = False
 
     async def _open_grants(self) -> None:
-        """Once ArduPilot is connected, let the program that started this one grant time."""
+        """Once ArduPilot and video are connected, let the program that started this one grant time."""
         await self._connected.wait()
+        await self._video_is_open.wait()
         if self._grants is not None:
             await self._grants.open()
 

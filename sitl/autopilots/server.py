@@ -51,6 +51,7 @@ class AutopilotServer(ABC, Generic[V]):
         self._settings, self._autopilot, self._notice, self._grants = settings, start, notice, grants
         self._simulation = self._new()
         self._video = DroneVideo(self._simulation, settings)
+        self._video_is_open = asyncio.Event()  # from then on time passes
 
     async def run(self) -> None:
         """Open the ports, then run until cancelled.
@@ -61,18 +62,27 @@ class AutopilotServer(ABC, Generic[V]):
             SettingError: the autopilot cannot be started.
             AutopilotEndedError: it ended soon after its start, or time is granted by another program.
         """
+        tasks: list[asyncio.Task[None]] = []
         try:
             self._open()
-            await self._video.open()
-            self._notice(self._greeting())
-            await self._serve()
+            tasks = [asyncio.create_task(work) for work in (self._open_video(), self._serve())]
+            await asyncio.gather(*tasks)
         finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
             self._close()
             if self._autopilot.process is not None:
                 await self._autopilot.process.stop()
             if self._grants is not None:
                 await self._grants.close()
             await self._video.close()
+
+    async def _open_video(self) -> None:
+        """Open the video, which takes long, while the autopilot starts and connects."""
+        await self._video.open()
+        self._notice(self._greeting())
+        self._video_is_open.set()
 
     @abstractmethod
     def _open(self) -> None:

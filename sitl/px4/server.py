@@ -73,6 +73,7 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         while True:
             await self._start(link)
             self._notice("PX4 is connected")
+            await self._video_is_open.wait()
             with contextlib.suppress(Px4GoneError):
                 await self._run_paced(link)
             link.drop()
