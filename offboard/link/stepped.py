@@ -59,6 +59,32 @@ class _Echo:
             self._echo.set_result(None)
 
 
+class _Requests:
+    """MAV_CMDs, whose answers are awaited while time goes on."""
+
+    def __init__(self, messages: DirectMessages, direct: Any) -> None:  # noqa: ANN401
+        self._messages = messages
+        self._loop = asyncio.get_running_loop()
+        self._answers: dict[int, asyncio.Future[int]] = {}  # by the number of the command
+        synchronous(direct).subscribe_message("COMMAND_ACK", self._on_answer)
+
+    def send(self, number: int, *parameters: float) -> Awaitable[None]:
+        """Send a command at once; what is returned waits for the answer, and raises `CommandRefusedError`."""
+        answer: asyncio.Future[int] = self._loop.create_future()
+        self._answers[number] = answer
+        self._messages.send_command(number, *parameters)
+        return _accepted(answer)
+
+    def _on_answer(self, message: Any, _user: object) -> None:  # noqa: ANN401
+        fields = json.loads(message.fields_json)
+        self._loop.call_soon_threadsafe(self._answered, fields["command"], fields["result"])
+
+    def _answered(self, number: int, result: int) -> None:
+        answer = self._answers.get(number)
+        if answer is not None and not answer.done() and result != mavlink.MAV_RESULT_IN_PROGRESS:
+            answer.set_result(result)
+
+
 class SteppedDialect(ABC):
     """A vehicle, by MAVSDK's plugin `mavlink_direct`; see the module and `Dialect`.
 
@@ -77,12 +103,10 @@ class SteppedDialect(ABC):
     def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
         self.ended = False
         self._messages = DirectMessages(direct, system_id)
-        self._loop = asyncio.get_running_loop()
         self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
         self._sent_since_tick = False
         self._echo = _Echo(self._messages, direct, self.NAME)
-        self._answers: dict[int, asyncio.Future[int]] = {}  # by the number of the command
-        synchronous(direct).subscribe_message("COMMAND_ACK", self._on_answer)
+        self._requests = _Requests(self._messages, direct)
 
     @property
     def exchange(self) -> TickExchange:
@@ -164,19 +188,7 @@ class SteppedDialect(ABC):
         return self._request(mavlink.MAV_CMD_DO_SET_MODE, *parameters)
 
     def _request(self, number: int, *parameters: float) -> Awaitable[None]:
-        answer: asyncio.Future[int] = self._loop.create_future()
-        self._answers[number] = answer
-        self._messages.send_command(number, *parameters)
-        return _accepted(answer)
-
-    def _on_answer(self, message: Any, _user: object) -> None:  # noqa: ANN401
-        fields = json.loads(message.fields_json)
-        self._loop.call_soon_threadsafe(self._answered, fields["command"], fields["result"])
-
-    def _answered(self, number: int, result: int) -> None:
-        answer = self._answers.get(number)
-        if answer is not None and not answer.done() and result != mavlink.MAV_RESULT_IN_PROGRESS:
-            answer.set_result(result)
+        return self._requests.send(number, *parameters)
 
 
 async def _accepted(answer: asyncio.Future[int]) -> None:
