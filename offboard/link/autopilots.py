@@ -45,6 +45,7 @@ async def open_dialect(
         if stepped:
             return SteppedArduPilotDialect(direct, feed, system_id, room_above_m)
         return ArduPilotDialect(ActionAsync(system), direct, feed, system_id, room_above_m)
+    action = ActionAsync(system)  # requests EXTENDED_SYS_STATE once a second, for the first dialect, too
     if stepped:
         return SteppedPx4Dialect(direct, await system.get_system_id())
-    return Px4Dialect(OffboardAsync(system), ActionAsync(system))
+    return Px4Dialect(OffboardAsync(system), action)
