@@ -76,7 +76,9 @@ class AppRelay:
     def send_heartbeat(self) -> None:
         """Keep the app's MAVLink library from forgetting the relay; each `HEARTBEAT_S` of wall time.
 
-        It sends nothing to an address from which nothing has come for some seconds, as while time stands.
+        It sends nothing to an address from which nothing has come for some seconds, as while time stands. Not
+        before it knows ArduPilot: it would send NaN in commands, as to PX4, and ArduPilot's simulation ends
+        with a floating point exception.
         """
         kind, none = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
         self._tell(mavlink.MAVLink_heartbeat_message(kind, none, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))

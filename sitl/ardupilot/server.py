@@ -142,7 +142,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         tasks = [asyncio.ensure_future(self._failed), asyncio.create_task(self._watch())]
         tasks.append(asyncio.create_task(self._run_process()))
         if self._relay is not None:
-            tasks.append(asyncio.create_task(_serve(self._relay)))
+            tasks.append(asyncio.create_task(self._serve_relay(self._relay)))
         try:
             await asyncio.gather(*tasks)
         finally:
@@ -152,6 +152,20 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _serve_relay(self, relay: AppRelay) -> None:
+        """Pass on what arrives there, until cancelled."""
+        loop = asyncio.get_running_loop()
+        loop.add_reader(relay.ardupilot, relay.from_ardupilot)
+        loop.add_reader(relay.app, relay.from_app)
+        try:
+            while True:
+                if not self._is_starting:
+                    relay.send_heartbeat()
+                await asyncio.sleep(HEARTBEAT_S)
+        finally:
+            loop.remove_reader(relay.ardupilot)
+            loop.remove_reader(relay.app)
 
     @property
     def _port(self) -> int:
@@ -301,17 +315,3 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         await self._video_is_open.wait()
         if self._grants is not None:
             await self._grants.open()
-
-
-async def _serve(relay: AppRelay) -> None:
-    """Pass on what arrives at the relay, until cancelled."""
-    loop = asyncio.get_running_loop()
-    loop.add_reader(relay.ardupilot, relay.from_ardupilot)
-    loop.add_reader(relay.app, relay.from_app)
-    try:
-        while True:
-            relay.send_heartbeat()
-            await asyncio.sleep(HEARTBEAT_S)
-    finally:
-        loop.remove_reader(relay.ardupilot)
-        loop.remove_reader(relay.app)
