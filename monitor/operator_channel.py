@@ -24,7 +24,14 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from monitor.access import refuse
 from monitor.pilot_channel import Allowance
 from monitor.settings import MonitorError
-from wire.operator_messages import MAX_LINE_BYTES, EndMessage, PageDemand, PageMessage
+from wire.operator_messages import (
+    ALL_PAGES,
+    MAX_LINE_BYTES,
+    AnswerMessage,
+    EndMessage,
+    PageDemand,
+    PageMessage,
+)
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
@@ -35,6 +42,7 @@ BAD_MESSAGE_CODE, TOO_MANY_CODE = 4400, 4429
 _MAX_QUEUE = 100  # messages to a page; beats come five times a second
 _MAX_UNSENT_BYTES = 1 << 16
 _TRIAL_S = 1.0
+REFUSED = "another flight has tried to connect and was refused; end this one first"
 _NO_FLIGHT: dict[str, Any] = {"kind": "none"}
 
 logger = logging.getLogger(__name__)
@@ -60,37 +68,34 @@ class OperatorDesk:
     """The flight that is connected, and the pages that show it.
 
     Args:
-        path: of the socket at which flights connect.
+        path: of the socket at which flights connect; it is opened here, and listens in `run`.
+
+    Raises:
+        MonitorError: the socket cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        try:
+            self._listener = _opened_socket(path)
+        except OSError as error:
+            raise MonitorError(
+                f"monitor: --operator-socket {path}: cannot be opened ({error.strerror or error}); "
+                "give the path of a new file in a folder of yours"
+            ) from None
         self._pages: dict[int, _Page] = {}
         self._numbers = count(1)
         self._flight: asyncio.StreamWriter | None = None
         self._shown = json.dumps(_NO_FLIGHT)  # what a page that opens is sent first
 
     async def run(self) -> None:
-        """Listen for flights until cancelled.
-
-        Raises:
-            MonitorError: the socket cannot be opened.
-        """
-        path = self._path
-        try:
-            server = await asyncio.start_unix_server(
-                self._serve, sock=_listening_socket(path), limit=MAX_LINE_BYTES
-            )
-        except OSError as error:
-            raise MonitorError(
-                f"monitor: --operator-socket {path}: cannot be opened ({error.strerror or error}); "
-                "give the path of a new file in a folder of yours"
-            ) from None
+        """Listen for flights until cancelled."""
+        server = await asyncio.start_unix_server(self._serve, sock=self._listener, limit=MAX_LINE_BYTES)
         try:
             await server.serve_forever()
         finally:
             with contextlib.suppress(OSError):
-                path.unlink()
+                self._path.unlink()
 
     def enter(self, name: str) -> _Page | None:
         """Add a page of a person; None if there are too many."""
@@ -124,6 +129,7 @@ class OperatorDesk:
         """One flight's connection; a second flight is refused."""
         if self._flight is not None:
             logger.warning("a second flight with an operator was refused; end the first one")
+            self._show_all(AnswerMessage(page=ALL_PAGES, text=REFUSED).model_dump_json())
             writer.close()
             return
         self._flight = writer
@@ -164,7 +170,7 @@ class OperatorDesk:
             page.put(text)
 
 
-def _listening_socket(path: Path) -> socket.socket:
+def _opened_socket(path: Path) -> socket.socket:
     """A socket that only this user may open, in the place of one that a monitor left when it was killed.
 
     Raises:

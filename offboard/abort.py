@@ -8,7 +8,7 @@ import logging
 from collections.abc import Callable
 
 from offboard.drone import Drone, DroneError, DroneState
-from offboard.safety.operator import Phase
+from offboard.safety.operator import Operator, Phase
 from offboard.safety.rules import SafetyRules
 
 ATTEND_US = 120_000_000  # vehicle time for which an operator may stop the motors after an abort
@@ -34,7 +34,8 @@ class FlightAbort:
         self._see = see
         self._end_us: int | None = None  # vehicle time until which the drone is watched
         self._armed = True  # when it was seen last
-        self._landings = 0  # that were requested
+        self._landings = 0  # that were requested since the operator's last demand
+        self._is_landing = False  # a landing that the operator demands is under way
         self._hold_s: float | None = None  # for which it holds, then lands; None: it does not hold
         self._held_mode = ""  # in which it was first seen after hold was requested
         self._hold_end_us: int | None = None
@@ -42,9 +43,10 @@ class FlightAbort:
     async def bring_down(self) -> str:
         """Hold or land, as the rules and the operator say.
 
-        An operator's first stop lands whatever the rules say, the second one stops the motors. With an
-        operator this returns when the drone is disarmed, when the link stays lost, or after `ATTEND_US`, and
-        a drone that holds lands after the rules' time. A landing that fails is requested again.
+        When an operator demands a landing it lands whatever the rules say, and stops the motors when that is
+        demanded. Both are requested again when they are demanded again, as long as this runs: until the drone
+        is disarmed, the link stays lost, or nothing was demanded for `ATTEND_US`. A drone that holds lands
+        after the rules' time, and a landing that fails is requested again by itself.
 
         Returns:
             What is to be told beside the reason of the abort; empty if nothing.
@@ -52,19 +54,41 @@ class FlightAbort:
         operator = self._safety.operator
         if operator is None:
             return await self._end()
-        while not operator.kills:
+        motor_stops, problem = 0, ""  # that were requested; of the last request
+        while True:
+            if operator.motor_stops > motor_stops:
+                motor_stops = operator.motor_stops
+                operator.on_stop(None)  # a further demand must not interrupt this
+                problem = await self._stop_motors()
+                if not problem:
+                    return "the operator stopped the motors"
+                logger.warning("%s; K requests it again", problem)
+                continue
             if operator.stops:
                 logger.warning("the operator stops the flight: the drone lands; K stops its motors")
-            stops = operator.stops
-            work = asyncio.ensure_future(self._end_and_attend())
-            operator.on_stop(work.cancel)  # not this task: a stop while the work ends must not be lost
-            try:
-                return await work
-            except asyncio.CancelledError:
-                if operator.stops == stops:  # Ctrl-C
-                    raise
-        operator.on_stop(None)  # a third press must not interrupt this
-        return await self._kill()
+            landed = await self._until_next_demand(operator)
+            if landed is not None:
+                return "; ".join(filter(None, (problem, landed)))
+
+    async def _until_next_demand(self, operator: Operator) -> str | None:
+        """Bring it down until the operator demands something; what is to be told, None after a demand."""
+        motor_stops, is_interrupted = operator.motor_stops, False
+        self._landings, self._end_us = 0, None
+        work = asyncio.ensure_future(self._end_and_attend())
+
+        def interrupt() -> None:
+            nonlocal is_interrupted
+            if operator.motor_stops > motor_stops or not self._is_landing:
+                is_interrupted = True
+                work.cancel()  # not this task: a demand while the work ends must not be lost
+
+        operator.on_stop(interrupt)
+        try:
+            told = await work
+        except asyncio.CancelledError:
+            if not is_interrupted:  # Ctrl-C
+                raise
+        return None if is_interrupted else told
 
     async def _end_and_attend(self) -> str:
         problem, held_s = await self._end(), None
@@ -96,12 +120,15 @@ class FlightAbort:
         self._show("landing")
         self._hold_for(None)
         self._landings += 1
+        self._is_landing = demanded
         try:
             await self._drone.land_now(demanded=demanded)
         except DroneError as error:
             if self._landings < LAND_ATTEMPTS:
                 self._hold_for(LAND_AGAIN_S)
             return f"land: {error}"
+        finally:
+            self._is_landing = False
         return ""
 
     def _hold_for(self, seconds: float | None) -> None:
@@ -146,15 +173,17 @@ class FlightAbort:
                 await close()
         return False
 
-    async def _kill(self) -> str:
+    async def _stop_motors(self) -> str:
+        """Request it some times; why it failed, empty if it did not."""
         problem = ""
-        self._show("motors stopped")
+        self._show("stopping motors")
         for _ in range(KILL_ATTEMPTS):
             try:
                 await self._drone.motors_off()
             except DroneError as error:
                 problem = f"stopping the motors: {error}"
             else:
+                self._show("motors stopped")
                 logger.warning("the operator stopped the motors")
-                return "the operator stopped the motors"
+                return ""
         return problem

@@ -173,7 +173,7 @@ class _Flight:
         operator, task = self._operator, asyncio.current_task()
         if operator is None or task is None:
             return await self._run()
-        operator.on_stop(task.cancel)
+        operator.on_first_stop(task.cancel)
         try:
             if operator.stops:
                 return self._outcome("aborted", operator.stop_words)

@@ -474,6 +474,7 @@ class TrueState:
     contacts: tuple[str, ...] = ()  # what it touches: colours of frames, "pole", "wall", "base" or "floor"
     rate_frd_rad_s: Vec3 = ZERO3  # angular velocity, body axes forward, right, down; 0 if not known
     camera: CameraMotion | None = None  # of a camera on a gimbal; None: it is fixed to the drone
+    crash: str = ""  # in simulation: why it cannot fly on, as the predicate to "the drone"; empty: it can
 
 
 def is_over_base(base: Base, x_m: float, y_m: float) -> bool:

@@ -75,7 +75,8 @@ class CrashWatch:
     A crash is one of:
     - hitting the floor or the base at more than 2 m/s downward (hitting a frame is a contact, no crash);
     - half a second upside-down;
-    - after take-off, lying still on the floor for 5 s with the motors on, away from the base.
+    - after take-off, lying still on the floor for 5 s with the motors on, away from the base;
+    - what the simulation says of it (`TrueState.crash`).
 
     The surface touched is taken from `TrueState.contacts` or, when these are empty as for a real drone, from
     being within 2 cm of the ground.
@@ -97,6 +98,8 @@ class CrashWatch:
         Returns:
             What happened, as the predicate to "the drone", if it crashed now; else None.
         """
+        if state.crash:
+            return state.crash
         sinking_before_m_s, self._sinking_m_s = self._sinking_m_s, -state.velocity_arena_m_s[2]
         _, x, y, _ = state.attitude_arena
         if x * x + y * y > 0.5:  # the body's up axis points down, see `up_component`

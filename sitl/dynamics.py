@@ -73,7 +73,7 @@ class Dynamics:
         self._fdm = fdm = jsbsim.FGFDMExec(None)
         fdm.set_debug_level(0)
         fdm.set_dt(1.0 / rate_hz)  # before loading: the filters' coefficients are made from it
-        self._load(airframe)
+        self._load(airframe, rate_hz)
         self._start_ned_m = position_ned_m
         self._floor_ft = altitude_m / _METRES_PER_FOOT
         self._ground_m: float | None = None
@@ -92,11 +92,11 @@ class Dynamics:
         # JSBSim's zero of these three is not exactly the initial position.
         self._start_neu_ft = (self._north(), self._east(), self._up())
 
-    def _load(self, airframe: Airframe) -> None:
+    def _load(self, airframe: Airframe, rate_hz: int) -> None:
         with tempfile.TemporaryDirectory(prefix="framerunner-") as folder:
             model = Path(folder) / "aircraft" / airframe.name / f"{airframe.name}.xml"
             model.parent.mkdir(parents=True)
-            model.write_text(airframe_xml(airframe), encoding="utf-8")
+            model.write_text(airframe_xml(airframe, rate_hz), encoding="utf-8")
             fdm = self._fdm
             if not fdm.load_model_with_paths(
                 airframe.name, str(model.parent.parent), str(model.parent), str(model.parent), True
@@ -228,8 +228,8 @@ def _ignore(_speed_rad_s: float) -> bool:
     return False
 
 
-def airframe_xml(airframe: Airframe) -> str:
-    """The `fdm_config` document of an airframe."""
+def airframe_xml(airframe: Airframe, rate_hz: int) -> str:
+    """The `fdm_config` document of an airframe, for so many physics steps a second."""
     ixx, iyy, izz = airframe.inertia_kg_m2
     references = "".join(_location(ZERO3, name) for name in ("AERORP", "EYEPOINT", "VRP"))
     axes = "".join(f'<axis name="{name}"/>' for name in ("DRAG", "SIDE", "LIFT", "ROLL", "PITCH", "YAW"))
@@ -247,7 +247,7 @@ def airframe_xml(airframe: Airframe) -> str:
 </mass_balance>
 <ground_reactions>{_contacts(airframe)}</ground_reactions>
 <system name="motors">{_motors(airframe)}</system>
-<external_reactions>{_external_reactions(airframe)}</external_reactions>
+<external_reactions>{_external_reactions(airframe, rate_hz)}</external_reactions>
 <aerodynamics>{axes}</aerodynamics> <!-- JSBSim refuses a model without these axes -->
 </fdm_config>
 """
@@ -307,10 +307,14 @@ def _ground_effect(airframe: Airframe) -> str:
     return f'<fcs_function name="{_GROUND_EFFECT}"><function>{factor}</function></fcs_function>'
 
 
-def _product(factor: float, *properties: str, magnitude_of: str | None = None) -> str:
+def _product(
+    factor: float, *properties: str, magnitude_of: str | None = None, most: float | None = None
+) -> str:
+    """The product of a factor, properties, and a property's magnitude, which counts as `most` at most."""
     factors = "".join(f"<property>{name}</property>" for name in properties)
     if magnitude_of is not None:
-        factors += f"<abs><property>{magnitude_of}</property></abs>"
+        magnitude = f"<abs><property>{magnitude_of}</property></abs>"
+        factors += magnitude if most is None else f"<min>{magnitude}<value>{most}</value></min>"
     return f"<product><value>{factor}</value>{factors}</product>"
 
 
@@ -321,7 +325,16 @@ def _reaction(tag: str, name: str, direction: Vec3, content: str) -> str:
     return f'<{tag} name="{name}" frame="BODY">{content}{along}</{tag}>\n'
 
 
-def _external_reactions(airframe: Airframe) -> str:
+def _stopped_in_a_step_rad_s(airframe: Airframe, axis: int, rate_hz: int) -> float:
+    """The rate at which the body's drag, which grows with its square, would stop the rotation in one step.
+
+    A step takes the moment at its beginning for all of it, so above twice this rate the rotation would be
+    reversed and grow without end. At rates above this one the drag stops it in a step, and no more.
+    """
+    return airframe.inertia_kg_m2[axis] * rate_hz / airframe.drag.moment_nm_s2[axis]
+
+
+def _external_reactions(airframe: Airframe, rate_hz: int) -> str:
     """Each rotor's thrust and drag; forces and moments of the body's drag, touch and the rotors' torques."""
     motor, drag = airframe.motor, airframe.drag
     reactions, torques = "", ""
@@ -343,7 +356,8 @@ def _external_reactions(airframe: Airframe) -> str:
         reactions += _reaction("force", f"body-{letter}", unit, content)
     for axis, (letter, unit) in enumerate(_UNITS.items()):
         rate, factor = _RATE_RAD_S[axis], -drag.moment_nm_s2[axis] * _POUND_FEET_PER_NEWTON_METRE
-        total = _product(factor, rate, magnitude_of=rate)
+        most = _stopped_in_a_step_rad_s(airframe, axis, rate_hz) if factor else None
+        total = _product(factor, rate, magnitude_of=rate, most=most)
         total += _product(_POUND_FEET_PER_NEWTON_METRE, _TOUCH_MOMENTS[axis])
         total += torques if letter == "z" else ""
         content = f"<function><sum>{total}</sum></function>"

@@ -195,6 +195,7 @@ class SimulatedVehicle(ABC):
             self.faults.disarmed(self.time_us)
             return
         self.faults.armed(self.time_us)
+        self.world.repair()
         if self.referee.over:
             self.referee = Referee(self.scenario, self.world.airframe.envelope_m)  # a new try
 

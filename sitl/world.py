@@ -23,6 +23,9 @@ _SETTLING_STEPS = PHYSICS_RATE_HZ  # one second, to stand at rest before time st
 _MIN_MARGIN_M = 0.05  # how much nearer the drone may come within one control period (12 m/s)
 _SPEED_MARGIN = 1.25  # of the airframe's maximum speed
 _ACCELERATION_MARGIN = 2.0  # over full thrust and gravity together; a touch may be harder, but adds no speed
+MAX_TURN_RAD = 0.2  # in a step of the physics; of a faster rotation the steps are no longer a good measure
+MAX_RATE_RAD_S = MAX_TURN_RAD * PHYSICS_RATE_HZ
+_BRAKED = 0.5  # of a rotation that is too fast, in a step
 _MAX_FAR_TICKS = 250  # the longest time for which distant solids are not checked
 
 
@@ -41,12 +44,15 @@ class World:
         time_us: simulated time since the drone was switched on.
         position_arena_m: of the drone's centre.
         radius_m: of the sphere around the drone.
+        crash: why the motors stand and the drone cannot fly, as the predicate to "the drone"; empty: it can.
     """
 
     def __init__(self, scenario: Scenario, airframe: Airframe, seed: int = 0) -> None:
         self.scenario = scenario
         self.airframe = airframe
         self.time_us = 0
+        self.crash = ""
+        self._standing = (0.0,) * len(airframe.rotors)
         self._half_m: Vec3 = tuple(extent / 2 for extent in airframe.envelope_m)  # type: ignore[assignment]
         self._neighbours: tuple[Solid, ...] = ()
         self.radius_m = hypot(*self._half_m)
@@ -69,6 +75,7 @@ class World:
         self._near: tuple[Solid, ...] = ()
         self._ground_m = 0.0
         self._touching: dict[Solid, Vec3] = {}  # with the normal at the beginning of the touch
+        self._pushed: tuple[Vec3, Vec3] = (ZERO3, ZERO3)  # force and moment of the touches, body axes
         x_m, y_m, surface_m = start_position(scenario)
         self.dynamics = Dynamics(
             airframe,
@@ -96,10 +103,10 @@ class World:
     def begin_step(self, motor_speeds_rad_s: MotorSpeeds) -> None:
         """Begin a control period; `STEPS_PER_CONTROL` times `run_physics` and `end_step` must follow.
 
-        Between two of them `dynamics` may be read, and its motors commanded.
+        Between two of them `dynamics` may be read, and the motors commanded.
         """
         dynamics = self.dynamics
-        dynamics.command_motors(motor_speeds_rad_s)
+        self.command_motors(motor_speeds_rad_s)
         if self._wind is not None:
             dynamics.set_air_velocity(self._wind.step(dynamics.velocity_ned_m_s))
         self._is_near = self._far_ticks <= 0
@@ -108,15 +115,24 @@ class World:
         else:
             self._far_ticks -= 1
 
+    def command_motors(self, speeds_rad_s: MotorSpeeds) -> None:
+        """Set the commanded rotor speeds, rad/s; after a crash they stand."""
+        self.dynamics.command_motors(self._standing if self.crash else speeds_rad_s)
+
     def run_physics(self) -> None:
         """Advance by one step of the physics."""
         if self._is_near and (self._near or self._touching):
             self._push_from(self._near)
+        if self.crash:
+            self._brake()
         self.dynamics.run()
 
     def end_step(self) -> None:
-        """End a control period."""
+        """End a control period; a drone that turns faster than can be simulated has crashed."""
         dynamics = self.dynamics
+        rate_rad_s = dynamics.angular_rate_frd_rad_s()
+        if max(rate_rad_s) > MAX_RATE_RAD_S or min(rate_rad_s) < -MAX_RATE_RAD_S:
+            self.crash = f"turned faster than {MAX_RATE_RAD_S:g} rad/s"
         if self._is_near:
             dynamics.set_ground_height(self._ground_m)
         self.time_us += CONTROL_PERIOD_US
@@ -149,7 +165,14 @@ class World:
             motors_on,
             contacts,
             sensors.angular_rate_frd_rad_s,
+            crash=self.crash,
         )
+
+    def repair(self) -> None:
+        """Let the motors of a drone that has crashed turn again."""
+        if self.crash:
+            self.crash = ""
+            self.dynamics.push(*self._pushed)
 
     def box(self, name: str) -> Solid:
         """The drone's box, upright, with its heading now: a solid for other drones."""
@@ -223,7 +246,7 @@ class World:
         if not near:
             if self._touching:
                 self._touching = {}
-                dynamics.push(ZERO3, ZERO3)
+                self._push(ZERO3, ZERO3)
             return
         turn = rotation(flip_quaternion(dynamics.attitude()))
         rows = rotation_rows(turn)
@@ -243,10 +266,24 @@ class World:
                 force[i] += push[i]
                 moment[i] += twist[i]
         self._touching = touching
-        dynamics.push(
+        self._push(
             flip_vector(to_body(turn, force[0], force[1], force[2])),
             flip_vector(to_body(turn, moment[0], moment[1], moment[2])),
         )
+
+    def _push(self, force_frd_n: Vec3, moment_frd_nm: Vec3) -> None:
+        self._pushed = force_frd_n, moment_frd_nm
+        self.dynamics.push(force_frd_n, moment_frd_nm)
+
+    def _brake(self) -> None:
+        """Add a moment to those of the touches that slows a rotation about an axis which is too fast."""
+        force, moment = self._pushed
+        rate, inertia = self.dynamics.angular_rate_frd_rad_s(), self.airframe.inertia_kg_m2
+        braking = [
+            -_BRAKED * rate[i] * inertia[i] * PHYSICS_RATE_HZ if abs(rate[i]) > MAX_RATE_RAD_S / 2 else 0.0
+            for i in range(3)
+        ]
+        self.dynamics.push(force, (moment[0] + braking[0], moment[1] + braking[1], moment[2] + braking[2]))
 
     def _touch_force(self, depth_m: float, normal: Vec3, velocity_m_s: Vec3) -> Vec3:
         contact = self.airframe.contact

@@ -98,7 +98,7 @@ class BeatMessage(_Message):
         beat: its number.
         phase: what the flight does; see `offboard.safety.operator`.
         asks: it waits for the go.
-        stops: 0, 1: stopped, 2: motors stopped.
+        stops: what the operator has demanded: 0 nothing, 1 a landing, 2 that the motors stop.
         terminal: the flight's terminal can stop it, too.
         words: on the state, for people.
         pages: all that are connected.
@@ -115,8 +115,12 @@ class BeatMessage(_Message):
     pages: tuple[PageState, ...] = ()
 
 
+ALL_PAGES = 0
+"""Instead of a page's number."""
+
+
 class AnswerMessage(_Message):
-    """Why a page's demand was not done."""
+    """Why a page's demand, or what somebody else wanted of the flight, was not done."""
 
     kind: Literal["answer"] = "answer"
     page: int

@@ -18,6 +18,7 @@ from framerunner.commands import (
     check_range,
     for_genuine,
     load_mission_with,
+    say,
     with_faults,
     with_sensors,
 )
@@ -174,6 +175,12 @@ def _run(settings: FlightSettings, *, lifeline: bool) -> int:
     from framerunner.child_process import until_standard_input_ends
     from framerunner.flying.run import fly_once
 
+    autopilot = None if settings.real_time is None else settings.real_time.autopilot
+    if autopilot is not None and autopilot.name == "px4" and not autopilot.repeats:
+        say(
+            "PX4 may not use real-time priorities here, so its flights with the same seed are alike, not the "
+            "same (on Linux they are, as root or with `ulimit -r 99`)"
+        )
     work = fly_once(settings)
     return asyncio.run(until_standard_input_ends(work)) or 0 if lifeline else asyncio.run(work)
 

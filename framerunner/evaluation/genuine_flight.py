@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from tempfile import TemporaryDirectory, gettempdir
+from tempfile import gettempdir
 from types import FrameType
 from typing import BinaryIO, TypeVar
 
@@ -26,6 +26,7 @@ from framerunner.runs.run_folder import RunFolder
 from sitl.ardupilot import json_interface as ardupilot
 from sitl.ardupilot.poses import POSE_PORT
 from sitl.ardupilot.relay import RELAY_PORT
+from sitl.autopilots.own_folder import OwnFolder
 from sitl.px4 import link as px4
 from sitl.px4.side_link import CAMERA_PORT
 from sitl.server_settings import VIDEO_PORT
@@ -61,13 +62,22 @@ def fly_with_genuine(plan: FlightPlan, use: GenuineUse) -> FinishedFlight:
         SettingError: simulator or autopilot cannot be started, or have ended.
         ValueError: the plan has no mission.
     """
-    with claimed_instance() as instance, TemporaryDirectory(prefix="framerunner-") as out:
-        folder = RunFolder(Path(out), plan.scenario.name)
+    with claimed_instance() as instance, _temporary_folder() as out:
+        folder = RunFolder(out, plan.scenario.name)
         folder.write_plan(plan.scenario, plan.chart)
         settings = RealTimeSettings(
             speed=use.speed, instance=instance, autopilot=use.autopilot, unattended=True
         )
         return asyncio.run(interrupted_once(fly_in_real_time(plan, settings, RunRecords(folder, None), None)))
+
+
+@contextmanager
+def _temporary_folder() -> Iterator[Path]:
+    own = OwnFolder("framerunner-flight-")
+    try:
+        yield own.path
+    finally:
+        own.close()
 
 
 async def interrupted_once(work: Coroutine[object, object, T]) -> T:

@@ -48,6 +48,11 @@ class RealTimeSettings:
     monitor_socket: Path | None = None  # of the monitor that was started here
     unattended: bool = False  # one of many flights: nothing is shown, and there is no video
 
+    @property
+    def repeats(self) -> bool:
+        """Whether a flight whose time waits for this program depends on nothing else than its seed."""
+        return self.autopilot is None or self.autopilot.repeats
+
 
 @dataclass(frozen=True, slots=True)
 class _Endpoints:
@@ -117,8 +122,9 @@ async def fly_in_real_time(
             return outcome
 
         def timing() -> dict[str, Timing]:
-            factor, fused = records.recorder.real_time_factor, plan.chart.vision == "frames"
-            return {"timing": flight_timing(drone, perception, clock, factor, settings.speed, fused=fused)}
+            measured = (drone, perception, clock, records.recorder.real_time_factor, settings.speed)
+            fused, repeats = plan.chart.vision == "frames", settings.repeats
+            return {"timing": flight_timing(*measured, fused=fused, repeats=repeats)}
 
         what = (plan, drone, perception, judge, (records.see, reporter.see))
         flown = await fly(*what, run=run, measured=timing, before_tick=reporter.look, safety=safety)

@@ -18,6 +18,7 @@ from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate,
 from offboard.drone import DroneError, VelocityCommand
 from offboard.perception import CameraPerception
 from sitl.autopilots import TITLES
+from sitl.autopilots.process import may_use_real_time
 from sitl.server_settings import VIDEO_PORT
 from sitl.time_grants import FREE_US, Grant, Held, Velocity
 from sitl.world import CONTROL_PERIOD_US
@@ -44,6 +45,11 @@ class GenuineAutopilot:
     def title(self) -> str:
         """For people."""
         return TITLES[self.name]
+
+    @property
+    def repeats(self) -> bool:
+        """Whether it flies the same flight again with the same seed; else it is only alike."""
+        return self.name != "px4" or may_use_real_time()
 
 
 class SitlProcess(ChildProcess):

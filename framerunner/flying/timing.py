@@ -22,6 +22,7 @@ def flight_timing(
     speed: float,
     *,
     fused: bool,
+    repeats: bool = True,
 ) -> Timing:
     """What was late, and so whether the machine was fast enough for the requested speed.
 
@@ -32,6 +33,7 @@ def flight_timing(
         factor: vehicle time per wall time; None before two ticks.
         speed: the requested factor.
         fused: the mission's navigator uses images by their time stamps.
+        repeats: of a vehicle whose time waits, the flight depends on nothing else than its seed.
     """
     ticks, late = drone.ticks_in_flight
     slow = factor is not None and factor < SLOW_FACTOR * speed
@@ -48,11 +50,11 @@ def flight_timing(
         late_setpoints=setpoints,
         oldest_image_s=perception.oldest_s,
     )
-    return timing.model_copy(update={"words": in_words(timing, fused=fused)})
+    return timing.model_copy(update={"words": in_words(timing, fused=fused, repeats=repeats)})
 
 
-def in_words(timing: Timing, *, fused: bool) -> str:
-    """One line for people if the machine was too slow; empty if it was not. `fused`: see `flight_timing`."""
+def in_words(timing: Timing, *, fused: bool, repeats: bool) -> str:
+    """One line for people if the machine was too slow; empty if it was not. See `flight_timing`."""
     if timing.kept_up:
         return ""
     late = []
@@ -66,6 +68,8 @@ def in_words(timing: Timing, *, fused: bool) -> str:
         still = "was still fused by time stamps" if fused else "may differ from one on a free machine"
         return f"the machine did not keep up: {', '.join(late)}, {oldest}; the flight {still}"
     pace = f"the machine did not keep up: vehicle time ran at {timing.speed:.2f} of the requested speed"
-    if timing.vehicle_time_waits:
+    if timing.vehicle_time_waits and repeats:
         return f"{pace}; it waited for the app, so the flight is the same as on a free machine"
+    if timing.vehicle_time_waits:
+        return f"{pace}; it waited for the app, but the flight may differ from one on a free machine"
     return f"{pace}; nothing came late to the app"

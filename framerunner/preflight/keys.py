@@ -1,6 +1,7 @@
 """The operator's keys in a terminal: hold G to arm, the space bar to land, then K to stop the motors.
 
-A terminal sends no key releases, and a key that is held repeats. So no key means more when it comes again.
+A terminal sends no key releases, and a key that is held repeats. So no key means more when it comes again,
+and G is held when it comes more often than a person presses it.
 """
 
 from __future__ import annotations
@@ -17,9 +18,11 @@ from typing import Any
 
 from offboard.safety.operator import Controls, Operator
 
-HINT = "hold G for a second to arm; SPACE lands, then K stops the motors"
+HINT = "hold G for one to two seconds to arm; SPACE lands, then K stops the motors"
 FIRST_REPEAT_S = 0.8
 """From the first character of a held key to the second one, at most."""
+MIN_REPEATS = 10
+"""Characters of a held key within a second; terminals repeat it 11 to 30 times, a person taps it 7 times."""
 _GO, _STOP, _KILL = "gG", " ", "kK"
 
 
@@ -31,7 +34,7 @@ class KeyReader:
     """
 
     def __init__(self, operator: Operator) -> None:
-        self._controls = Controls(operator, FIRST_REPEAT_S)
+        self._controls = Controls(operator, FIRST_REPEAT_S, min_reports=MIN_REPEATS)
 
     def take(self, key: str, now_s: float) -> None:
         """Take a character at a time, seconds."""

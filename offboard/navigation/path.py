@@ -22,17 +22,15 @@ class Crossing:
         gate: the goal.
         heading_rad: in which it is crossed.
         time_s: when, since the path's start.
-        left_s: when the straight flight behind it ends; from then on the gate is no goal any more.
     """
 
     gate: Gate
     heading_rad: float
     time_s: float
-    left_s: float
 
     def moved(self, by_s: float) -> Crossing:
         """The same crossing on a path that began earlier by a time."""
-        return replace(self, time_s=self.time_s + by_s, left_s=self.left_s + by_s)
+        return replace(self, time_s=self.time_s + by_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +68,6 @@ class Path:
             start * a[1] + start_rate * a[4] + end * b[1] + end_rate * b[4],
             start * a[2] + start_rate * a[5] + end * b[2] + end_rate * b[5],
         )
-
-    def gates_left(self, time_s: float) -> tuple[Gate, ...]:
-        """The gates that have been crossed and left behind at a time: a new plan leaves them out."""
-        return tuple(crossing.gate for crossing in self.crossings if crossing.left_s <= time_s)
 
     def then(self, following: Path, from_s: float, until_s: float) -> Path:
         """This path from one time until another, and then another path, which starts with its motion then."""

@@ -91,7 +91,7 @@ class OperatorPages:
         if self._watched_s is None:
             self._watched_s = now_s
         if now_s - self._watched_s > LOST_S:
-            operator.press_stop(LOST)
+            operator.demand_landing(LOST)
 
     def states(self, now_s: float) -> tuple[PageState, ...]:
         """All pages, for the pages."""

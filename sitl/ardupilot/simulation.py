@@ -92,7 +92,7 @@ class ArduPilotSimulation(SimulatedVehicle):
         if self._steps == 0:
             world.begin_step(speeds)
         else:
-            world.dynamics.command_motors(speeds)
+            world.command_motors(speeds)
         world.run_physics()
         self._steps += 1
         if self._steps < STEPS_PER_CONTROL:

@@ -6,6 +6,7 @@ none of them sees a later time than the one that it was woken at.
 
 from __future__ import annotations
 
+import asyncio
 import os
 import sys
 import time
@@ -14,6 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 
 _PAUSE_S = 0.00005
+_ALONE_S = 0.002  # for which nothing else runs: most waits are shorter than a change to other tasks and back
 _START_PAUSE_S = 0.001
 _START_LOOKS = 3  # in a row
 _WAITING = "SZXI"  # states of threads that wait or have ended; one that is stopped (T) may have work
@@ -37,17 +39,24 @@ class IdleCheck:
         self._clock = _processor_clock(process_id)
         self._files: list[int] | None = None  # `stat` of the threads in `names`, open
 
-    def wait(self, limit_s: float) -> bool:
-        """Wait until the process is idle; False if that takes longer, or it has ended."""
+    async def wait(self, limit_s: float) -> bool:
+        """Wait until the process is idle; False if that takes longer, or it has ended.
+
+        After two milliseconds other tasks run between two looks.
+        """
         if not self._usable:
             return False
         try:
             files = self._opened() if self._files is None else self._files
-            end_s = time.monotonic() + limit_s
+            began_s = time.monotonic()
             while not self._is_idle(files):
-                if time.monotonic() > end_s:
+                waited_s = time.monotonic() - began_s
+                if waited_s > limit_s:
                     return False
-                time.sleep(_PAUSE_S)
+                if waited_s < _ALONE_S:
+                    time.sleep(_PAUSE_S)  # noqa: ASYNC251 - it is short
+                else:
+                    await asyncio.sleep(_PAUSE_S)
         except OSError:
             self.close()
             return False

@@ -14,9 +14,9 @@ from asyncio.subprocess import DEVNULL, Process
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from errors import SettingError, UserError
+from sitl.autopilots.own_folder import OwnFolder
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 _LAST_BYTES = 2000
@@ -46,10 +46,9 @@ class AutopilotProcess(ABC):
         processor: int | None = None,
     ) -> None:
         self._name, self._option = name, option
-        prefix = f"framerunner-{name.lower()}-"
         if folder is None:
-            self._temporary = TemporaryDirectory(prefix=prefix)
-            folder = Path(self._temporary.name)
+            self._temporary = OwnFolder(f"framerunner-files-{name.lower()}-")
+            folder = self._temporary.path
         self.folder = folder.absolute()
         self._environment = dict(environment)
         self._processor = processor
@@ -145,6 +144,19 @@ class AutopilotStart:
 
     process: AutopilotProcess | None
     command: str  # by which a user starts it
+
+
+def may_use_real_time() -> bool:
+    """Whether a program that is started here may give its threads real-time priorities; Linux only."""
+    if sys.platform != "linux":
+        return False
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(os.sched_get_priority_max(os.SCHED_FIFO)))
+    except OSError:
+        return False
+    os.sched_setscheduler(0, *before)
+    return True
 
 
 def _before_start(processor: int | None) -> Callable[[], None] | None:

@@ -1,7 +1,8 @@
 """The TCP connection to PX4: one HIL_ACTUATOR_CONTROLS for each HIL_SENSOR.
 
 PX4 is the client: it tries to connect every half millisecond until somebody listens. Once connected it never
-connects again, so it has to be started again after a simulator that ended.
+connects again, so it has to be started again after a simulator that ended. Other programs may connect, too:
+the first one whose heartbeat says that it is PX4 is PX4.
 """
 
 from __future__ import annotations
@@ -20,10 +21,33 @@ FIRST_PORT = 4560  # of PX4's instance 0
 _SOON_S = 0.004  # for which the event loop waits for an answer; it usually comes in a fraction of this
 _SILENCE_S = 2.0  # wall time without an answer that is reported
 _ANSWERS_IN_A_ROW = 10  # after which PX4 answers every HIL_SENSOR
+_LOOK_S = 0.01  # between two looks whether PX4 has connected
+_MAX_CANDIDATES = 16  # connections that may turn out to be PX4's
+_STRANGE_S = 3.0  # wall time after which a connection without PX4's heartbeat is reported
 
 
 class Px4GoneError(Exception):
     """PX4 has closed the connection or ended."""
+
+
+class _Candidate:
+    """A connection of which it is not known yet whether it is PX4's."""
+
+    def __init__(self, connection: socket.socket, peer: Address) -> None:
+        self.stream = Stream.of(connection, peer)
+        self.place = f"{peer[0]}:{peer[1]}"
+        self.reader = ControlsReader()
+        self.since_s = time.monotonic()
+        self.is_reported = False
+
+    def read(self) -> bool:
+        """Read what has arrived; whether the connection is still open."""
+        try:
+            for _ in self.reader.feed(self.stream.read()):
+                pass  # there was no HIL_SENSOR that it could answer
+        except OSError:
+            return False
+        return True
 
 
 class Px4Link:
@@ -49,6 +73,7 @@ class Px4Link:
         self._listener = listen_tcp(place, "choose another --instance")
         self._notice = notice
         self._stream: Stream | None = None
+        self._candidates: list[_Candidate] = []  # the oldest first
         self._reader = ControlsReader()
         self._poll = select.poll()
         self._in_a_row = 0
@@ -64,22 +89,44 @@ class Px4Link:
     async def connected(self) -> None:
         """Wait until PX4 has connected; one that was connected before is let go."""
         self.drop()
-        accepted = await asyncio.get_running_loop().sock_accept(self._listener)
-        self._take(*accepted)
+        while not self.try_connect():  # noqa: ASYNC110 - one look is at the port and at all connections
+            await asyncio.sleep(_LOOK_S)
 
     def try_connect(self) -> bool:
-        """Take PX4's connection if it has one waiting."""
-        try:
-            accepted = self._listener.accept()
-        except BlockingIOError:
-            return False
-        self.drop()
-        self._take(*accepted)
-        return True
+        """Take PX4's connection if it has one waiting, and close the others."""
+        self._accept()
+        for candidate in list(self._candidates):
+            is_open = candidate.read()
+            if candidate.reader.is_of_px4:
+                self._candidates.remove(candidate)
+                self._close_candidates(0)
+                self._take(candidate)
+                return True
+            if not is_open:
+                self._candidates.remove(candidate)
+                candidate.stream.close()
+            elif not candidate.is_reported and time.monotonic() - candidate.since_s > _STRANGE_S:
+                candidate.is_reported = True
+                self._notice(
+                    f"{candidate.place} is connected to PX4's port and has sent no heartbeat of a PX4; "
+                    "PX4 is still waited for"
+                )
+        return False
 
-    def _take(self, connection: socket.socket, peer: Address) -> None:
-        self._stream = Stream.of(connection, peer)
-        self._reader = ControlsReader()
+    def _accept(self) -> None:
+        with suppress(OSError):  # there are no more, or one has gone again
+            while True:
+                self._candidates.append(_Candidate(*self._listener.accept()))
+                self._close_candidates(_MAX_CANDIDATES)
+
+    def _close_candidates(self, left: int) -> None:
+        """Close the oldest connections that are not PX4's until so many are left."""
+        while len(self._candidates) > left:
+            self._candidates.pop(0).stream.close()
+
+    def _take(self, candidate: _Candidate) -> None:
+        self.drop()
+        self._stream, self._reader = candidate.stream, candidate.reader
         self._poll = select.poll()
         self._poll.register(self._stream, select.POLLIN)
         self._in_a_row = self.steps = self.unexpected = 0
@@ -94,6 +141,7 @@ class Px4Link:
     def close(self) -> None:
         """Close connection and port."""
         self.drop()
+        self._close_candidates(0)
         self._listener.close()
 
     def send(self, packets: bytes) -> None:

@@ -19,6 +19,8 @@ _REVERSED = bytes(int(f"{value:08b}"[::-1], 2) for value in range(256))
 SIMULATOR_SYSTEM_ID = 1
 SIMULATOR_COMPONENT_ID = 200  # the component PX4's own simulators use
 LOCKSTEP_FLAG = 1  # of HIL_ACTUATOR_CONTROLS
+_AUTOPILOT = slice(5, 6)  # in the payload of HEARTBEAT
+_PX4 = bytes([mavlink.MAV_AUTOPILOT_PX4])
 ARMED_FLAG = int(mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
 
 
@@ -88,6 +90,7 @@ class ControlsReader:
     """Reads HIL_ACTUATOR_CONTROLS from PX4's stream; other messages are left out. Never raises.
 
     Attributes:
+        is_of_px4: a heartbeat that says so has come; PX4 sends one as soon as it is connected.
         skipped_bytes: that were no part of a valid packet.
     """
 
@@ -95,6 +98,7 @@ class ControlsReader:
         kind = mavlink.mavlink_map[mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS]
         self._unpacker = kind.unpacker
         self._buffer = b""
+        self.is_of_px4 = False
         self.skipped_bytes = 0
 
     def feed(self, data: bytes) -> Iterator[ActuatorControls]:
@@ -125,6 +129,8 @@ class ControlsReader:
                 continue
             if message_id == mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
                 yield self._read(buffer[start + HEADER_BYTES_V2 : end])
+            elif message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+                self.is_of_px4 |= buffer[start + HEADER_BYTES_V2 : end][_AUTOPILOT] == _PX4
             position = packet_end
         self._buffer = buffer[position:]
 

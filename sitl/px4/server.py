@@ -168,12 +168,9 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         self._simulation.move(None)
 
     async def _wait_idle(self, idle: IdleCheck) -> None:
-        """Let PX4's threads that its lockstep does not wait for finish, so that each step is the same.
-
-        Others run meanwhile only while PX4 starts: later it takes less time than to change to them and back.
-        """
+        """Let PX4's threads that its lockstep does not wait for finish, so that each step is the same."""
         if not idle.starting:
-            idle.wait(_IDLE_S)
+            await idle.wait(_IDLE_S)
         elif self._simulation.time_us > 0:
             await asyncio.to_thread(idle.wait_started, _IDLE_START_S)
         else:  # until its first sensors, PX4 waits by polling

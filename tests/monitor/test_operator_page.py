@@ -13,6 +13,7 @@ from playwright.async_api import expect
 from errors import SettingError
 from framerunner.preflight.card import FlightCard, Section
 from framerunner.preflight.operator_link import OperatorLink
+from monitor.operator_channel import REFUSED
 from monitor.run import serve
 from monitor.settings import MonitorError, MonitorSettings
 from offboard.safety.operator import Operator
@@ -152,10 +153,21 @@ async def test_checks_go_landing_and_motors_on_a_phone(tmp_path, open_window):
         await press(window, window.land, 0.0)
         await until(lambda: operator.stops == 1)
         operator.phase = "landing"
-        await expect(window.land).to_be_disabled()
+        await expect(window.land).to_have_text(re.compile("^Land again"))
+        landings = operator.landings
+        await press(window, window.land, 0.0)
+        await until(lambda: operator.landings > landings)
         await expect(window.motors).to_be_enabled()
         await press(window, window.motors, 0.0)
         await until(lambda: operator.kills)
+        operator.phase = "stopping motors"
+        await expect(window.motors).to_have_text(re.compile("^Stop motors again"))
+        motor_stops = operator.motor_stops
+        await press(window, window.motors, 0.0)
+        await until(lambda: operator.motor_stops > motor_stops)
+        operator.phase = "motors stopped"
+        await expect(window.motors).to_be_disabled()
+        await expect(window.land).to_be_disabled()
         assert window.complaints == []
 
 
@@ -244,7 +256,7 @@ async def test_a_stop_is_sent_until_the_flight_has_it(tmp_path, open_window):
             await expect(window.land).to_be_enabled()
             del link._take
             await until(lambda: operator.stops == 1)  # it has connected again
-            await expect(window.land).to_have_text(re.compile("^Landing"))
+            await expect(window.land).to_have_text(re.compile("^Land again"))
         operator = Operator()
         async with link_to(tmp_path, operator):
             await expect(window.head).to_have_text("Checks")
@@ -263,6 +275,16 @@ async def test_what_ended_a_flight_stays_on_the_page(tmp_path, open_window):
                 await expect(window.state).to_contain_text("failed: battery")
                 raise SettingError("not armed: a check has failed (battery)")
         await expect(window.state).to_contain_text("not armed: a check has failed (battery)")
+
+
+async def test_that_a_second_flight_was_refused_is_told_on_the_page(tmp_path, open_window):
+    async with monitor(tmp_path) as (url, _), link_to(tmp_path, Operator()):
+        window = await open_window(url)
+        await expect(window.head).to_have_text("Checks")
+        with pytest.raises(SettingError):
+            await link_to(tmp_path, Operator()).__aenter__()
+        await expect(window.page.locator(".o-answer")).to_have_text(REFUSED)
+        await expect(window.head).to_have_text("Checks")
 
 
 async def test_a_viewer_operates_nothing_and_one_who_logged_in_does(tmp_path, open_window):
@@ -332,6 +354,14 @@ async def test_the_socket_of_a_monitor_that_runs_is_left_alone_and_one_that_was_
         killed.listen()
     async with monitor(tmp_path), link_to(tmp_path, Operator()):
         assert path.stat().st_mode & 0o077 == 0
+
+
+async def test_a_socket_that_cannot_be_opened_is_told_before_any_url(tmp_path):
+    database, path = f"sqlite:///{tmp_path / 'monitor.db'}", tmp_path / "missing" / "operator.sock"
+    settings, lines = MonitorSettings(port=0, database=database, operator_socket=path), []
+    with pytest.raises(MonitorError, match=r"--operator-socket .*: cannot be opened \(No such file"):
+        await serve(EQUIPMENT, settings, lines.append)
+    assert lines == []
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"what": "arm"}', '{"what": "go", "beat": 1e99}', "x" * 600])

@@ -63,6 +63,26 @@ def test_motors_on_again_begin_a_new_try(simulation, fly):
     assert not snapshot.over
 
 
+def test_a_drone_that_turns_too_fast_has_crashed_until_the_next_try(simulation):
+    run(simulation, 2.0)
+    assert simulation.autopilot.arm() is CommandResult.ACCEPTED
+    assert simulation.autopilot.takeoff() is CommandResult.ACCEPTED
+    run(simulation, 3.0)
+    simulation.world.dynamics.push((0.0, 0.0, 0.0), (0.0, 0.0, 500.0))
+    run(simulation, 0.01)
+    simulation.world.dynamics.push((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    run(simulation, 2.0)
+    report = simulation.referee.report()
+    assert report.verdict == "crashed"
+    assert "the drone turned faster than 100 rad/s" in report.reason
+    simulation.autopilot.disarm(force=True)
+    run(simulation, 3.0)
+    simulation.autopilot.arm(force=True)
+    run(simulation, 0.1)
+    assert simulation.truth.crash == ""
+    assert not simulation.referee.over
+
+
 def test_it_takes_off_and_the_truth_agrees_with_the_estimate(simulation):
     run(simulation, 2.0)
     assert simulation.autopilot.arm() is CommandResult.ACCEPTED

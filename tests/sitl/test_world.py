@@ -1,6 +1,6 @@
 """The world: standing, bouncing, determinism."""
 
-from math import hypot, pi
+from math import hypot, isfinite, pi
 
 import pytest
 
@@ -8,7 +8,7 @@ from firmware_py.airframe import load_airframe
 from firmware_py.commands import VelocityCommand
 from firmware_py.control.stabiliser import Stabiliser
 from scenarios.models import Base, Decoy, Frame, Pole, Scenario, Start, Wall
-from sitl.world import CONTROL_PERIOD_US, World
+from sitl.world import CONTROL_PERIOD_US, MAX_RATE_RAD_S, PHYSICS_RATE_HZ, World
 from tests.flight import state_of
 
 AIRFRAME = load_airframe("abejorro")
@@ -145,3 +145,40 @@ def test_a_drone_past_the_edge_falls_off():
     for _ in range(750):
         w.step((0.0, 0.0, 0.0, 0.0))
     assert w.truth(w.sensors(), motors_on=False).position_arena_m[2] < 0.3
+
+
+def in_the_air(airframe):
+    w = World(Scenario(name="test"), airframe)
+    for _ in range(250):
+        w.step((0.7 * airframe.motor.max_speed_rad_s,) * 4)
+    return w
+
+
+@pytest.mark.parametrize("name", ["abejorro", "x500", "racer-3in"])
+@pytest.mark.parametrize("kick_rad_s", [20.0, 150.0, 400.0])
+def test_a_drone_that_is_made_to_turn_however_fast_still_moves_by_numbers(name, kick_rad_s):
+    airframe = load_airframe(name)
+    w = in_the_air(airframe)
+    w.dynamics.push((0.0, 0.0, 0.0), tuple(i * kick_rad_s * PHYSICS_RATE_HZ for i in airframe.inertia_kg_m2))
+    w.dynamics.run()
+    w.dynamics.push((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    for _ in range(1000):
+        w.step((0.0,) * 4)
+    sensors = w.sensors()
+    assert isfinite(sum(w.position_arena_m))
+    assert max(map(abs, sensors.angular_rate_frd_rad_s)) < MAX_RATE_RAD_S
+
+
+def test_a_drone_that_turns_too_fast_has_crashed_and_its_motors_stop_until_they_are_armed_again():
+    airframe = load_airframe("racer-3in")
+    w, full = in_the_air(airframe), airframe.motor.max_speed_rad_s
+    assert w.truth(w.sensors(), motors_on=True).crash == ""
+    for _ in range(1000):
+        w.step((full, 0.0, full, 0.0))
+    assert w.truth(w.sensors(), motors_on=True).crash == "turned faster than 100 rad/s"
+    assert isfinite(sum(w.position_arena_m))
+    assert max(w.dynamics.motor_speeds_rad_s()) < 1.0
+    w.repair()
+    for _ in range(25):
+        w.step((full,) * 4)
+    assert min(w.dynamics.motor_speeds_rad_s()) > 0.5 * full

@@ -250,7 +250,7 @@ def _near_bars(samples: Samples, stretches: list[Stretch]) -> npt.NDArray[np.boo
 
 
 def _crossings(samples: Samples, stretches: list[Stretch], times: Array) -> tuple[Crossing, ...]:
-    """When the path crosses and leaves its gates."""
+    """When the path crosses its gates."""
     crossings: list[Crossing] = []
     for number, stretch in enumerate(stretches):
         if not stretch.crosses or not isinstance(stretch.goal, Gate):
@@ -264,7 +264,5 @@ def _crossings(samples: Samples, stretches: list[Stretch], times: Array) -> tupl
             if behind == 0
             else float(np.interp(0.0, past[behind - 1 : behind + 1], times[rows[behind - 1 : behind + 1]]))
         )
-        left = int(np.argmax(past >= LEFT_M))
-        left_s = float(times[rows[left]]) if past[left] >= LEFT_M else float(times[-1])
-        crossings.append(Crossing(stretch.goal, stretch.yaw_rad, time_s, left_s))
+        crossings.append(Crossing(stretch.goal, stretch.yaw_rad, time_s))
     return tuple(crossings)

@@ -74,7 +74,7 @@ def modes(flight):
 
 def test_the_operators_stop_lands(tmp_path):
     operator = Operator(needs_go=False)
-    flight = fly(tmp_path, operator=operator, events=[(12.0, lambda _: operator.press_stop())])
+    flight = fly(tmp_path, operator=operator, events=[(12.0, lambda _: operator.demand_landing())])
     assert flight.outcome.reason == "stopped by the operator"
     assert came_down(flight)
     flown_s = flight.outcome.flight_time_s
@@ -83,7 +83,7 @@ def test_the_operators_stop_lands(tmp_path):
 
 def test_the_second_stop_stops_the_motors_during_the_landing(tmp_path):
     operator = Operator(needs_go=False)
-    events = [(12.0, lambda _: operator.press_stop()), (13.0, lambda _: operator.press_stop())]
+    events = [(12.0, lambda _: operator.demand_landing()), (13.0, lambda _: operator.demand_motors_off())]
     flight = fly(tmp_path, operator=operator, events=events)
     assert flight.outcome.reason == "stopped by the operator; the operator stopped the motors"
     assert not flight.armed
@@ -93,7 +93,7 @@ def test_the_second_stop_stops_the_motors_during_the_landing(tmp_path):
 
 def test_both_stops_at_once_stop_the_motors(tmp_path):
     operator = Operator(needs_go=False)
-    events = [(12.0, lambda _: (operator.press_stop(), operator.press_stop()))]
+    events = [(12.0, lambda _: (operator.demand_landing(), operator.demand_motors_off()))]
     flight = fly(tmp_path, operator=operator, events=events)
     off_s = next(each.time_us for each in flight.truths if each.time_us > 11e6 and not each.motors_on) / 1e6
     assert off_s == pytest.approx(12.0, abs=0.1)
@@ -102,7 +102,7 @@ def test_both_stops_at_once_stop_the_motors(tmp_path):
 def test_a_stop_arrives_over_a_lossy_link(tmp_path):
     operator = Operator(needs_go=False)
     lossy = Impairment(loss=0.2, jitter_s=0.2)
-    events = [(12.0, lambda _: operator.press_stop())]
+    events = [(12.0, lambda _: operator.demand_landing())]
     flight = fly(tmp_path, operator=operator, impairment=lossy, events=events)
     assert flight.outcome.reason.startswith("stopped by the operator")
     assert came_down(flight)
@@ -119,7 +119,7 @@ def test_a_landing_whose_answer_is_lost_is_not_ended_by_hold(tmp_path):
 
         vehicle.command = command
 
-    events = [(11.9, lose_answers), (12.0, lambda _: operator.press_stop())]
+    events = [(11.9, lose_answers), (12.0, lambda _: operator.demand_landing())]
     flight = fly(tmp_path, operator=operator, events=events)
     assert flight.outcome.reason == "stopped by the operator"
     assert came_down(flight)
@@ -142,7 +142,7 @@ def test_a_landing_that_is_lost_is_requested_again(tmp_path, abort):
 
     def end(vehicle):
         if abort == "stop":
-            operator.press_stop()
+            operator.demand_landing()
         else:
             vehicle.video = Direction(SILENT, Random(0))
 
@@ -180,7 +180,7 @@ def test_nothing_is_armed_before_the_go(tmp_path):
 
 def test_a_stop_before_the_go_arms_nothing(tmp_path):
     operator = Operator()
-    events = [(9.0, lambda _: operator.press_stop()), (10.0, lambda _: operator.give_go())]
+    events = [(9.0, lambda _: operator.demand_landing()), (10.0, lambda _: operator.give_go())]
     flight = fly(tmp_path, operator=operator, events=events)
     assert (flight.outcome.ended, flight.outcome.reason) == ("aborted", "stopped by the operator")
     assert not any(truth.motors_on for truth in flight.truths)
@@ -319,7 +319,7 @@ def test_a_drone_that_holds_lands_after_its_time(tmp_path):
 
 def test_a_stop_lands_a_drone_that_holds(tmp_path):
     operator = Operator(needs_go=False)
-    flight = hold(tmp_path, operator, [(21.0, lambda _: operator.press_stop())], hold_s=30.0)
+    flight = hold(tmp_path, operator, [(21.0, lambda _: operator.demand_landing())], hold_s=30.0)
     assert came_down(flight)
     assert 1.0 < seconds_in(flight, "HOLD") < 15.0
 

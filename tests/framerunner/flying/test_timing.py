@@ -9,10 +9,10 @@ import pytest
 from framerunner.flying.timing import flight_timing
 
 
-def timing(ticks=(2000, 0), oldest_s=0.11, missed=None, factor=1.0, fused=True):
+def timing(ticks=(2000, 0), oldest_s=0.11, missed=None, factor=1.0, fused=True, repeats=True):
     drone, perception = SimpleNamespace(ticks_in_flight=ticks), SimpleNamespace(oldest_s=oldest_s)
     clock = None if missed is None else SimpleNamespace(images_missed=missed[0], setpoints_missed=missed[1])
-    return flight_timing(drone, perception, clock, factor, 1.0, fused=fused)
+    return flight_timing(drone, perception, clock, factor, 1.0, fused=fused, repeats=repeats)
 
 
 @pytest.mark.parametrize(
@@ -34,6 +34,11 @@ def timing(ticks=(2000, 0), oldest_s=0.11, missed=None, factor=1.0, fused=True):
             {"missed": (0, 0), "factor": 0.9},
             "vehicle time ran at 0.90 of the requested speed; it waited for the app, so the flight is the "
             "same as on a free machine",
+        ),
+        (
+            {"missed": (0, 0), "factor": 0.9, "repeats": False},
+            "vehicle time ran at 0.90 of the requested speed; it waited for the app, but the flight may "
+            "differ from one on a free machine",
         ),
         ({"factor": 0.9}, "vehicle time ran at 0.90 of the requested speed; nothing came late to the app"),
     ],

@@ -1,5 +1,7 @@
 """Characters of a terminal and their times, and what the operator demands by them."""
 
+from math import ceil
+
 import pytest
 
 from framerunner.preflight.keys import KeyReader
@@ -31,9 +33,35 @@ def test_a_held_key_gives_the_go(key):
 
 
 @pytest.mark.parametrize(
+    "repetition",
+    [
+        {"delay_s": 0.25, "rate_hz": 10.9},
+        {"delay_s": 0.66, "rate_hz": 25.0},
+        {"delay_s": 0.375, "rate_hz": 11.1},
+    ],
+    ids=["Linux console", "X11", "macOS"],
+)
+def test_a_held_key_gives_the_go_with_the_repetition_that_is_usual_there(repetition):
+    assert type_keys(Operator(), *held("g", 1.0, 2.7, **repetition)).has_go
+
+
+def test_characters_that_a_slow_network_delivers_together_give_the_go():
+    late = [(key, ceil(at_s / 0.25) * 0.25) for key, at_s in held("g", 1.0, 2.5)]
+    assert type_keys(Operator(), *late).has_go
+
+
+@pytest.mark.parametrize(
     "characters",
-    [held("g", 1.0, 1.8), [("g", 1.0)], [("g", 1.0), ("g", 3.0), ("g", 5.0)], held("h", 1.0, 3.0)],
-    ids=["let go", "once", "now and then", "another key"],
+    [
+        held("g", 1.0, 1.8),
+        [("g", 1.0)],
+        [("g", 1.0), ("g", 3.0), ("g", 5.0)],
+        [("g", 1.0), ("g", 1.7), ("g", 2.4)],
+        held("g", 1.0, 6.0, delay_s=0.14, rate_hz=7.0),
+        [("g", 1.0)] * 20,
+        held("h", 1.0, 3.0),
+    ],
+    ids=["let go", "once", "now and then", "three times", "fast taps", "pasted", "another key"],
 )
 def test_less_gives_no_go(characters):
     assert not type_keys(Operator(), *characters).has_go
@@ -55,6 +83,11 @@ def test_a_stop_that_is_held_or_pressed_again_is_one_stop(to_s):
 def test_k_after_a_stop_stops_the_motors(key):
     assert type_keys(Operator(needs_go=False), (" ", 1.0), (key, 1.1)).kills
     assert type_keys(Operator(needs_go=False), *held(" ", 1.0, 3.0), *held(key, 3.1, 5.0)).stops == 2
+
+
+def test_what_is_pressed_again_is_demanded_again():
+    operator = type_keys(Operator(needs_go=False), (" ", 1.0), (" ", 4.0), ("k", 5.0), ("k", 6.0), ("k", 9.0))
+    assert (operator.landings, operator.motor_stops) == (2, 3)
 
 
 def test_k_alone_means_nothing():

@@ -17,6 +17,7 @@ from offboard.keep_in_box import KeepInBox
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import CONTEST, FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
 from offboard.navigation.path import Path
+from offboard.navigation.planner.timing import LEFT_M
 from offboard.navigation.planning import plan
 from offboard.response import ResponseEstimate
 from scenarios.models import COLOURS, Arena, Scenario
@@ -168,8 +169,7 @@ def fly(
         drone.command(sent)
         farthest_m = max(farthest_m, follower.error_m)
         if now_s - planned_s >= replan_s and follower.progress_s < path.duration_s - 1.0:
-            left = path.gates_left(follower.progress_s + follower.lead_s)
-            goals = [goal for goal in goals if goal not in left]
+            goals = goals_left(goals, path, follower.progress_s + follower.lead_s)
             planned_s = now_s
             style = CONTEST.adapted(answers) if answers.late else CONTEST
             again = layout.plan(follower.reference(), goals, path, style)
@@ -178,6 +178,19 @@ def fly(
     asyncio.run(drone.motors_off())
     drone.settle()
     return vehicle.simulation.referee.report(), farthest_m, keeper.limited_us / 1e6
+
+
+def goals_left(goals: list[Goal], path: Path, time_s: float) -> list[Goal]:
+    """The goals without the gates that the drone has crossed and left behind on a path at a time."""
+    behind = []
+    for crossing in path.crossings:
+        normal, centre_m = (cos(crossing.heading_rad), sin(crossing.heading_rad)), crossing.gate.centre_m
+        for at_s in np.arange(crossing.time_s, time_s, STEP_S):
+            offset = np.subtract(path.position_at_m(float(at_s))[:2], centre_m[:2])
+            if offset @ normal > LEFT_M:
+                behind.append(crossing.gate)
+                break
+    return [goal for goal in goals if goal not in behind]
 
 
 def base_distances(path: Sampled, scenario: Scenario) -> np.ndarray:

@@ -16,6 +16,7 @@ from tests.offboard.navigation.flown_layouts import (
     Sampled,
     base_distances,
     crossed,
+    goals_left,
     least_margin,
     touching,
 )
@@ -69,7 +70,7 @@ def test_planning_again_from_the_path_changes_little(seed: int):
     layout, path = planned(seed)
     first_s, flown_s, goals = path.duration_s, 0.0, layout.goals
     while path.duration_s > 1.0:
-        goals = [goal for goal in goals if goal not in path.gates_left(0.4)]
+        goals = goals_left(goals, path, 0.4)
         again = layout.plan(path.at(0.4), goals, path)
         assert isinstance(again, Path), (flown_s, again)
         path, flown_s = again, flown_s + 0.4

@@ -12,6 +12,7 @@ from math import nan
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import common as mavlink
 
 from errors import SettingError
 from scenarios.loader import load_scenario
@@ -24,7 +25,7 @@ from sitl.px4.server import Px4Server
 from sitl.px4.simulation import MotionError, Px4Simulation
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
-from tests.sitl.px4.fake_px4 import FakePx4
+from tests.sitl.px4.fake_px4 import FakePx4, connect
 from tests.waiting import stopped, until
 from wire.transports.urls import LinkError
 
@@ -73,6 +74,43 @@ async def test_every_sensor_is_answered_once_and_the_answers_fly_the_drone():
     assert {"ODOMETRY", "HIL_STATE_QUATERNION"} <= set(fake.others)
     assert any("waiting for PX4 on TCP" in line for line in lines)
     await stopped(task)
+
+
+async def test_others_that_connect_first_do_not_take_the_place_of_px4():
+    lines, fakes = [], []
+    server, port, made = serving(lines)
+    task = asyncio.create_task(server.run())
+    await until(lambda: server.link is not None)
+    silent, ground_station = connect(port), connect(port)
+    mav = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+    ground_station.sendall(mav.heartbeat_encode(6, 8, 0, 0, 4).pack(mav))
+    await asyncio.sleep(0.05)
+    run_fake(port, fakes)
+    await until(lambda: server.link.in_lockstep)
+    late = connect(port)
+    await until(lambda: len(fakes[-1].times_us) > 500)
+    fakes[-1].connection.shutdown(2)
+    await until(lambda: len(made) == 2)
+    await asyncio.sleep(0.1)
+    assert [line for line in lines if line.startswith("PX4 is connected")] == ["PX4 is connected"]
+    run_fake(port, fakes)
+    await until(lambda: made[-1].time_us > 100_000)
+    await stopped(task)
+    for other in (silent, ground_station, late):
+        other.close()
+
+
+async def test_a_connection_that_is_not_of_px4_is_told_once(monkeypatch):
+    monkeypatch.setattr("sitl.px4.link._STRANGE_S", 0.0)
+    place, lines = ("127.0.0.1", FIRST_PORT + free_instance()), []
+    link = Px4Link(place, lines.append)
+    with connect(place[1]) as other:
+        host, port = other.getsockname()
+        await until(lambda: not link.try_connect() and lines)
+        link.try_connect()
+    assert len(lines) == 1
+    assert lines[0].startswith(f"{host}:{port} is connected to PX4's port and has sent no heartbeat of a PX4")
+    link.close()
 
 
 async def test_a_px4_that_is_killed_ends_the_try_and_a_new_one_gets_a_new_drone():

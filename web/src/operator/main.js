@@ -118,10 +118,13 @@ class OperatorPage {
     return this.#socket?.send({ what, beat: this.#beat?.beat ?? -1, flight }) ?? false;
   }
 
-  /** Land. The stop is sent at each beat until the flight says that it is stopped, to the same flight only. */
+  /**
+   * Land. The stop is sent at each beat until the flight says that it is stopped, to the same flight only; it is
+   * sent once more when it is pressed again.
+   */
   #stop() {
-    if (!this.#mayGoOn || this.#beat?.stops) return;
-    this.#pendingStop = this.#flight.flight;
+    if (!this.#mayGoOn) return;
+    if (!this.#beat?.stops) this.#pendingStop = this.#flight.flight;
     this.#send("stop");
     this.#show();
   }
@@ -172,9 +175,11 @@ class OperatorPage {
     setText(this.#parts.title, this.#flight?.title ?? "");
     const stops = this.#beat?.stops ?? 0;
     go.disabled = !(this.#isAlive && this.#beat.asks);
-    land.disabled = !this.#mayGoOn || stops > 0;
-    setText(land.firstElementChild, this.#pendingStop ? "Land: being sent" : stops ? "Landing" : "Land");
-    motors.disabled = !(this.#isAlive && stops === 1 && performance.now() - this.#stoppedAt > MOTORS_AFTER_MS);
+    const areOff = ["motors stopped", "ended"].includes(this.#beat?.phase);
+    land.disabled = !this.#mayGoOn || areOff;
+    setText(land.firstElementChild, this.#pendingStop ? "Land: being sent" : stops ? "Land again" : "Land");
+    motors.disabled = areOff || !(this.#isAlive && stops > 0 && performance.now() - this.#stoppedAt > MOTORS_AFTER_MS);
+    setText(motors.firstElementChild, stops > 1 && !areOff ? "Stop motors again" : "Stop motors");
     this.#showFigures();
   }
 

@@ -7,6 +7,7 @@ const PHASES = {
   flying: ["In flight", "Land ends the flight where the drone is"],
   landing: ["Landing", "Stop motors stops them at once: the drone falls"],
   holding: ["Holding", "it hovers, then lands; Land lands it now"],
+  "stopping motors": ["Stopping motors", "Stop motors again requests it again"],
   "motors stopped": ["Motors stopped", ""],
   ended: ["Ended", ""],
 };
