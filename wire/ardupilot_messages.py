@@ -10,6 +10,8 @@ from importlib import import_module
 from wire.dialect import mavlink
 
 EKF_STATUS_REPORT_ID = 193
+POSE_ARRIVAL_EARLY_MS = 12
+"""ArduPilot counts a pose as so much older than it is on arrival (measured)."""
 
 
 def add_ardupilot_messages() -> None:

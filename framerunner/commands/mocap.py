@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from errors import SettingError
 from framerunner.commands import check_range
 
 if TYPE_CHECKING:
-    from framerunner.mocap.session import SendSettings
+    from framerunner.mocap.facts import Origin, SendSettings
 
 
 @Parameter(name="*")
@@ -26,6 +27,13 @@ class Sending:
     velocity_sigma: Annotated[
         float, Parameter(help="standard deviation of velocities, m/s, if the source has them")
     ] = 0.05
+    origin: Annotated[
+        str | None,
+        Parameter(
+            help="LATITUDE,LONGITUDE,ALTITUDE of the room, degrees and metres: set in a drone that has none",
+            allow_leading_hyphen=True,
+        ),
+    ] = None
 
 
 def mocap(
@@ -52,16 +60,16 @@ def mocap(
     sending: Sending | None = None,
     seconds: Annotated[float | None, Parameter(help="stop after this time; without it at Ctrl-C")] = None,
 ) -> int:
-    """Send a motion capture's poses to a drone as MAVLink ODOMETRY, and check that it uses them.
+    """Send a motion capture's poses to a drone with PX4 or ArduPilot, and check that it uses them.
 
     While it runs, one line says each second how many poses are sent, whether the drone's estimator uses them,
     how far they are from the drone's own estimate, and, once the drone has been turned, whether the axes are
     right and how old the poses are. At the end a report says what is missing and what to do. Nothing is set
-    in the drone except the rates of this link's messages. When the source stops, nothing is sent: an old pose
-    is never repeated.
+    in the drone except the rates of this link's messages and, with `--origin`, where on Earth the room is.
+    When the source stops, nothing is sent: an old pose is never repeated.
 
-    `sitl` is the true pose that a simulated drone sends on the same link (HIL_STATE_QUATERNION): `framerunner
-    sim --sensors external`, or PX4's SIH on its display link.
+    `sitl` is the true pose that a simulated drone sends on the same link: `framerunner sim --sensors
+    external`, PX4's SIH on its display link, or ArduPilot's SITL.
 
     Exit code 0: the drone uses the poses and nothing is wrong, 1: something is missing, 2: bad input.
 
@@ -74,6 +82,8 @@ def mocap(
         framerunner mocap poses.csv --drone udpin://0.0.0.0:14550
 
         framerunner mocap sitl --drone udpin://127.0.0.1:19410
+
+        framerunner mocap poses.csv --drone udpin://0.0.0.0:14550 --origin 40.4168,-3.7038,650
     """
     check_range("--forward", forward, -360.0, 360.0)
     check_range("--seconds", seconds, 1.0, 1e6)
@@ -87,7 +97,7 @@ def _settings(sending: Sending, forward: float) -> SendSettings:
     check_range("--attitude-sigma", sending.attitude_sigma, 0.0, 3.0)
     check_range("--velocity-sigma", sending.velocity_sigma, 0.0, 10.0)
 
-    from framerunner.mocap.session import SendSettings
+    from framerunner.mocap.facts import SendSettings
 
     return SendSettings(
         rate_hz=sending.rate,
@@ -96,7 +106,27 @@ def _settings(sending: Sending, forward: float) -> SendSettings:
         position_sigma_m=sending.position_sigma,
         attitude_sigma_rad=sending.attitude_sigma,
         velocity_sigma_m_s=sending.velocity_sigma,
+        origin=None if sending.origin is None else _origin(sending.origin),
     )
+
+
+def _origin(text: str) -> Origin:
+    from framerunner.mocap.facts import Origin
+
+    try:
+        latitude, longitude, altitude = (float(part) for part in text.split(","))
+    except ValueError:
+        raise SettingError(
+            f"--origin {text}: must be LATITUDE,LONGITUDE,ALTITUDE, such as 40.4168,-3.7038,650"
+        ) from None
+    check_range("latitude of --origin", latitude, -90.0, 90.0)
+    check_range("longitude of --origin", longitude, -180.0, 180.0)
+    check_range("altitude of --origin", altitude, -1000.0, 10_000.0)
+    if latitude == longitude == 0.0:
+        raise SettingError(
+            f"--origin {text}: latitude and longitude 0 mean that none is known; give the room's"
+        )
+    return Origin(latitude, longitude, altitude)
 
 
 def _send(

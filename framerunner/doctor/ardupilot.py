@@ -89,9 +89,7 @@ def position(record: Record) -> Findings:
     advice = f"give it its position by motion capture or visual odometry: {_GUIDE}"
     if report is not None and (report.flags & _CONSTANT_POSITION or not report.flags & _HAS_POSITION):
         if source == _EXTERNAL_NAVIGATION:
-            advice = (
-                f"EK3_SRC1_POSXY asks for external navigation: send ODOMETRY and set its origin: {_GUIDE}"
-            )
+            advice = f"send poses and set its origin, as `framerunner mocap --origin` does: {_GUIDE}"
         yield missing("position", f"the estimator has none; its source is {words}", advice)
     elif source == _EXTERNAL_NAVIGATION:
         yield good("position", f"by {words}")

@@ -11,8 +11,9 @@ from rich.text import Text
 
 from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.page import findings_table
-from framerunner.mocap.judgement import Facts, judge, line
-from framerunner.mocap.session import MocapSession, SendSettings
+from framerunner.mocap.facts import Facts, SendSettings
+from framerunner.mocap.judgement import is_fused, judge, line
+from framerunner.mocap.session import MocapSession
 from framerunner.mocap.sources import PoseSource
 from wire.transports.vehicle_link import VehicleLink
 
@@ -41,7 +42,10 @@ def run_session(
     def clock() -> float:
         return time.monotonic() - began_s
 
-    session = MocapSession(link, source, settings, lambda words: console.print(words, highlight=False))
+    # Time stamps go on when this program is started again: a vehicle would take a jump for late poses.
+    session = MocapSession(
+        link, source, settings, lambda words: console.print(words, highlight=False), zero_s=began_s
+    )
     live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
     facts: Facts | None = None
     try:
@@ -73,6 +77,7 @@ def _run(
         if now_s >= line_s:
             line_s = now_s + _LINE_S
             facts = _facts(session, now_s)
+            session.note_use(is_fused(facts), facts.comparison, _LINE_S)
             show(line(facts) if session.vehicle.found else "waiting for a vehicle")
 
 
@@ -104,6 +109,10 @@ def _facts(session: MocapSession, now_s: float) -> Facts:
         vehicle.converts_stamps,
         source.faults,
         source.fault,
+        session.settings,
+        session.has_velocity,
+        vehicle.transit_s,
+        session.unused,
     )
 
 
@@ -116,5 +125,9 @@ def _report(console: Console, session: MocapSession, url: str, facts: Facts) -> 
         )
         return
     findings: list[Finding] = judge(facts)
-    console.print(f"Vehicle {session.vehicle.record.system_id} on {url}, poses from {session.source.label}")
+    vehicle = session.vehicle.record
+    words = (
+        f"Vehicle {vehicle.system_id} ({vehicle.autopilot_name}) on {url}, poses from {session.source.label}"
+    )
+    console.print(words)
     console.print(findings_table(findings))

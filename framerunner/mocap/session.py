@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from math import nan
+from dataclasses import replace
 from typing import Protocol
 
-from framerunner.mocap.motion import MotionCheck, PoseComparison, SentPose, body_velocity
-from framerunner.mocap.poses import Pose, with_forward
+from framerunner.mocap.facts import SendSettings, Unused
+from framerunner.mocap.motion import MotionCheck, PoseComparison, SentPose
+from framerunner.mocap.poses import with_forward
 from framerunner.mocap.sources import PoseSource, TimedPose
 from framerunner.mocap.vehicle import Vehicle
 from wire.dialect import Message, mavlink
@@ -18,8 +18,6 @@ SYSTEM_ID = 248  # the doctor has 247
 COMPONENT_ID = mavlink.MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY
 SILENT_S = 0.2  # without a new pose for so long, the source has stopped
 _EARLY = 0.2  # share of a period by which a pose may come early
-_DIAGONAL = (0, 6, 11, 15, 18, 20)
-_QUALITY = 100
 _RATE_SPAN_S = 2.0
 
 
@@ -33,35 +31,15 @@ class Link(Protocol):
         """Send a message."""
 
 
-@dataclass(frozen=True, slots=True)
-class SendSettings:
-    """How poses are sent.
-
-    Attributes:
-        rate_hz: at most so many a second; a source that has fewer is not repeated.
-        forward_deg: from the body's first axis to the vehicle's forward axis, counter-clockwise.
-        delay_s: constant delay of the motion capture, by which poses are older than they seem here.
-        position_sigma_m: standard deviation of each axis.
-        attitude_sigma_rad: standard deviation about each axis.
-        velocity_sigma_m_s: standard deviation of each axis.
-    """
-
-    rate_hz: float = 50.0
-    forward_deg: float = 0.0
-    delay_s: float = 0.0
-    position_sigma_m: float = 0.005
-    attitude_sigma_rad: float = 0.01
-    velocity_sigma_m_s: float = 0.05
-
-
 class MocapSession:
-    """Passes a source's poses to the vehicle on a link, as ODOMETRY of the type VISION.
+    """Passes a source's poses to the vehicle on a link, in the form that its autopilot takes.
 
     Args:
         link: to the vehicle.
         source: of the poses.
         settings: how they are sent.
         say: called with lines for people.
+        zero_s: reading of the clock of the time stamps at this program's time 0.
 
     Attributes:
         vehicle: as its messages show it.
@@ -69,23 +47,35 @@ class MocapSession:
         longest_gap_s: between two poses.
         silent: the source has stopped; nothing is sent.
         dropouts: how often it stopped.
+        has_velocity: the source gives velocities.
+        unused: when the vehicle did not use the poses that came.
     """
 
     def __init__(
-        self, link: Link, source: PoseSource, settings: SendSettings, say: Callable[[str], None]
+        self,
+        link: Link,
+        source: PoseSource,
+        settings: SendSettings,
+        say: Callable[[str], None],
+        zero_s: float = 0.0,
     ) -> None:
         self._link, self._source, self._settings, self._say = link, source, settings, say
-        self.vehicle = Vehicle(settings.rate_hz if source.needs_truth else 0.0)
+        self.vehicle = Vehicle(settings.rate_hz if source.needs_truth else 0.0, settings.origin, zero_s)
         self.sent = self.dropouts = 0
         self.longest_gap_s = 0.0
-        self.silent = False
+        self.unused = Unused()
+        self._used_in_boot: int | None = None  # number of the vehicle's restarts when it used poses
+        self.silent = self.has_velocity = False
         self._motion = MotionCheck()
         self._in_motion = PoseComparison()
         self._recent: deque[float] = deque()  # when poses were sent
         self._newest_s = -1e9  # when the last pose that was sent was taken
         self._heard_s = 0.0  # when a pose has come
-        self._covariance = _covariance(settings.position_sigma_m**2, settings.attitude_sigma_rad**2)
-        self._velocity_covariance = _covariance(settings.velocity_sigma_m_s**2, nan)
+
+    @property
+    def settings(self) -> SendSettings:
+        """How poses are sent."""
+        return self._settings
 
     @property
     def source(self) -> PoseSource:
@@ -138,32 +128,27 @@ class MocapSession:
             return
         self._newest_s = taken_s
         pose = with_forward(timed.pose, settings.forward_deg)
-        self._link.send(self._odometry(pose, taken_s))
+        self.has_velocity = pose.velocity_ned_m_s is not None
+        stamp_us = self.vehicle.stamp_us(taken_s)
+        self._link.send(self.vehicle.dialect.pose_message(pose, stamp_us, settings))
         self.sent += 1
         self._recent.append(now_s)
         if offset_s is not None:
             time_us = round((taken_s + offset_s) * 1e6)
             self._motion.note(SentPose(time_us, pose.position_ned_m, pose.attitude))
 
-    def _odometry(self, pose: Pose, taken_s: float) -> Message:
-        velocity = pose.velocity_ned_m_s
-        body = (nan, nan, nan) if velocity is None else body_velocity(pose.attitude, velocity)
-        return mavlink.MAVLink_odometry_message(
-            max(1, round(taken_s * 1e6)),
-            mavlink.MAV_FRAME_LOCAL_NED,
-            mavlink.MAV_FRAME_BODY_FRD,
-            *pose.position_ned_m,
-            list(pose.attitude),
-            *body,
-            nan,
-            nan,
-            nan,
-            self._covariance,
-            self._velocity_covariance,
-            0,
-            mavlink.MAV_ESTIMATOR_TYPE_VISION,  # PX4's estimator ignores the type MOCAP
-            _QUALITY,
-        )
+    def note_use(self, fused: bool | None, comparison: PoseComparison, span_s: float) -> None:
+        """Note whether the vehicle uses the poses and how it moves, once for each `span_s`."""
+        boot = self.vehicle.record.telemetry.restarts
+        if fused:
+            self._used_in_boot = boot
+        elif fused is False and self._used_in_boot == boot and not self.silent:
+            before = self.unused
+            self.unused = Unused(
+                before.seconds + span_s,
+                max(before.farthest_m, comparison.distance_m),  # NaN is never larger
+                comparison.track or before.track,
+            )
 
     def rate_hz(self, now_s: float) -> float:
         """Poses sent a second, over the last two."""
@@ -187,11 +172,3 @@ class MocapSession:
             axes=seen.axes,
             track=found.track or seen.track,
         )
-
-
-def _covariance(first: float, second: float) -> list[float]:
-    """A covariance matrix with the same variance three times, and another one three times."""
-    entries = [nan] * 21
-    for index, variance in zip(_DIAGONAL, (first,) * 3 + (second,) * 3, strict=True):
-        entries[index] = variance
-    return entries

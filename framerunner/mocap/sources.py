@@ -16,6 +16,7 @@ from framerunner.extras import install_advice, is_installed
 from framerunner.mocap.capture import KINDS
 from framerunner.mocap.poses import Axes, Pose, PoseError, parse_line, read_poses
 from geometry.rotations import multiply, normalized
+from geometry.vectors import Quaternion, Vec3
 from wire.dialect import Message, mavlink
 from wire.transports.sockets import UdpSocket, bind_udp
 from wire.transports.urls import UrlRules, parse_url
@@ -44,7 +45,7 @@ class PoseSource(Protocol):
         ended: it will deliver nothing more.
         fault: what was wrong with data that it received last; empty: nothing was.
         faults: how often that happened.
-        needs_truth: it is made from the vehicle's HIL_STATE_QUATERNION.
+        needs_truth: it is made from a simulated vehicle's true pose.
     """
 
     label: str
@@ -223,10 +224,10 @@ class ServerSource(UdpSource):
 
 
 class SitlSource:
-    """The true state that a simulated vehicle sends on its link as HIL_STATE_QUATERNION.
+    """The true state that a simulated vehicle sends: HIL_STATE_QUATERNION, or ArduPilot's SIM_STATE.
 
     Its origin is where the vehicle is first heard. White noise is added, as a motion capture has it: the
-    message has latitudes in steps of 1 cm, and an estimator takes a pose that never changes for a fault.
+    messages have latitudes in steps of 1 cm, and an estimator takes a pose that never changes for a fault.
 
     Args:
         position_noise_m: standard deviation of each axis.
@@ -238,30 +239,27 @@ class SitlSource:
         self._random = Random(1)
         self.label = "the simulator's truth"
         self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, True
-        self._origin: tuple[int, int, int] | None = None
+        self._origin: tuple[int, int, float] | None = None
         self._taken: list[TimedPose] = []
 
     def take(self, message: Message, now_s: float) -> None:
-        """Take HIL_STATE_QUATERNION."""
-        if message.get_msgId() != mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION:
+        """Take a true state."""
+        truth = _truth(message)
+        if truth is None:
             return
-        if self._origin is None:
-            self._origin = (message.lat, message.lon, message.alt)
-        latitude, longitude, altitude = self._origin
+        latitude, longitude, altitude_m = truth.place
+        origin = self._origin = self._origin or truth.place
         position = (
-            (message.lat - latitude) * _METRES,
-            (message.lon - longitude) * _METRES * cos(radians(latitude * 1e-7)),
-            (altitude - message.alt) / 1000.0,
+            (latitude - origin[0]) * _METRES,
+            (longitude - origin[1]) * _METRES * cos(radians(origin[0] * 1e-7)),
+            origin[2] - altitude_m,
         )
         sigma_m, sigma_rad = self._noise
         north_m, east_m, down_m = (value + self._random.gauss(0.0, sigma_m) for value in position)
         half = [self._random.gauss(0.0, sigma_rad / 2.0) for _ in range(3)]
-        velocity = (message.vx / 100.0, message.vy / 100.0, message.vz / 100.0)
-        w, x, y, z = message.attitude_quaternion
-        attitude = normalized(multiply((w, x, y, z), (1.0, half[0], half[1], half[2])))
-        pose = Pose(message.time_usec / 1e6, (north_m, east_m, down_m), attitude, velocity)
-        # PX4 leaves the time out.
-        self._taken.append(TimedPose(pose, now_s, message.time_usec or None))
+        attitude = normalized(multiply(truth.attitude, (1.0, half[0], half[1], half[2])))
+        pose = Pose(truth.time_us / 1e6, (north_m, east_m, down_m), attitude, truth.velocity_ned_m_s)
+        self._taken.append(TimedPose(pose, now_s, truth.time_us or None))
 
     def poll(self, now_s: float) -> list[TimedPose]:
         """Those that have come."""
@@ -270,6 +268,31 @@ class SitlSource:
 
     def close(self) -> None:
         """Nothing is open."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Truth:
+    """A true state: latitude and longitude in 1e-7 degrees with the altitude in metres; 0 us: no time."""
+
+    time_us: int
+    place: tuple[int, int, float]
+    attitude: Quaternion
+    velocity_ned_m_s: Vec3
+
+
+def _truth(message: Message) -> _Truth | None:
+    """The state in a message; None if it has none."""
+    number = message.get_msgId()
+    if number == mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION:
+        w, x, y, z = message.attitude_quaternion
+        velocity = (message.vx / 100.0, message.vy / 100.0, message.vz / 100.0)
+        place = (message.lat, message.lon, message.alt / 1000.0)
+        return _Truth(message.time_usec, place, (w, x, y, z), velocity)  # PX4 leaves the time out
+    if number == mavlink.MAVLINK_MSG_ID_SIM_STATE:
+        attitude = (message.q1, message.q2, message.q3, message.q4)
+        velocity = (message.vn, message.ve, message.vd)
+        return _Truth(0, (message.lat_int, message.lon_int, message.alt), attitude, velocity)
+    return None
 
 
 def open_source(text: str, axes: Axes, name: str | None) -> PoseSource:

@@ -4,34 +4,30 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from statistics import median
 
 from framerunner.doctor.listen import Record
+from framerunner.mocap.dialects import PoseDialect, dialect_of
+from framerunner.mocap.facts import Origin
+from wire.ardupilot_messages import EKF_STATUS_REPORT_ID, add_ardupilot_messages
 from wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
     Message,
     companion_heartbeat,
+    degrees_e7,
     mavlink,
+    millimetres,
+    request_message,
     request_rate,
 )
 
-PARAMETERS = (
-    *("EKF2_EV_CTRL", "EKF2_EV_DELAY", "EKF2_EV_NOISE_MD", "EKF2_EVP_NOISE", "EKF2_EVA_NOISE"),
-    *("EKF2_GPS_CTRL", "EKF2_HGT_REF", "EKF2_MAG_TYPE"),
-)
 _HEARTBEAT_S = 1.0
 _REQUEST_S = 1.0
 _PARAMETER_S = 0.05
+_ORIGIN_S = 1.0
 _TIMESYNC_S = 0.2
 _CONVERGED = 500  # answers after which PX4 converts time stamps
 _KEPT = 30  # round trips
-_WANTED_HZ = {
-    "ATTITUDE": 50.0,
-    "LOCAL_POSITION_NED": 30.0,
-    "ESTIMATOR_STATUS": 2.0,
-    "SYS_STATUS": 2.0,
-    # PX4's filter estimates the drift per answer, so this rate must stay the same.
-    "TIMESYNC": 20.0,
-}
 _LOW = 0.6  # share of the wanted rate
 
 
@@ -41,25 +37,31 @@ class Vehicle:
     Times in seconds are those of this program's clock, whose zero is its start.
 
     Args:
-        needs_truth_hz: HIL_STATE_QUATERNION is requested, so many a second; 0: it is not.
+        needs_truth_hz: a simulator's true pose is requested, so many a second; 0: it is not.
+        origin: set while the vehicle is disarmed, if it has none; None: nothing is set.
+        zero_s: reading of the clock of the time stamps at this program's time 0.
 
     Attributes:
         record: all that it has sent.
         answers: to its TIMESYNC requests, sent.
         rates_rad_s: the latest body rates with vehicle time in microseconds: (time, forward, right, down).
         worst_ratio: the largest innovation ratio of position or height.
+        dialect: of its autopilot, by its heartbeats.
     """
 
-    def __init__(self, needs_truth_hz: float = 0.0) -> None:
+    def __init__(
+        self, needs_truth_hz: float = 0.0, origin: Origin | None = None, zero_s: float = 0.0
+    ) -> None:
         self.record = Record()
         self.answers = 0
         self.rates_rad_s: deque[tuple[int, float, float, float]] = deque(maxlen=2000)
         self.worst_ratio = 0.0
-        self._wanted = dict(_WANTED_HZ)
-        if needs_truth_hz:
-            self._wanted["HIL_STATE_QUATERNION"] = needs_truth_hz
+        self.dialect: PoseDialect = dialect_of(self.record)
+        self._truth_hz, self._origin, self._zero_s = needs_truth_hz, origin, zero_s
+        self._restarts = 0
+        self._asked_origin = False  # a second ago, without an answer
         self._offsets: deque[tuple[float, float]] = deque(maxlen=_KEPT)  # round trip, offset
-        self._due_s = {"heartbeat": 0.0, "rates": 0.5, "timesync": 0.0, "parameter": 0.0}
+        self._due_s = {"heartbeat": 0.0, "rates": 0.5, "timesync": 0.0, "parameter": 0.0, "origin": 0.0}
         self._counted: dict[str, int] = {}
         self._counted_s = 0.0
 
@@ -70,8 +72,26 @@ class Vehicle:
 
     @property
     def offset_s(self) -> float | None:
-        """Vehicle time less this program's; None: not known yet."""
-        return min(self._offsets)[1] if self._offsets else None
+        """Vehicle time less this program's; None: not known yet.
+
+        The median of the quicker half: the very quickest answers are those of a simulator that is catching
+        up, whose clock is late meanwhile.
+        """
+        return median(offset for _, offset in self._quicker_half()) if self._offsets else None
+
+    @property
+    def transit_s(self) -> float:
+        """Half of a quick way there and back; 0: not known yet."""
+        if not self._offsets:
+            return 0.0
+        return median(round_trip_s for round_trip_s, _ in self._quicker_half()) / 2.0
+
+    def _quicker_half(self) -> list[tuple[float, float]]:
+        return sorted(self._offsets)[: (len(self._offsets) + 1) // 2]
+
+    def stamp_us(self, now_s: float) -> int:
+        """A time of this program as time stamps and TIMESYNC carry it: above zero."""
+        return max(1, round((now_s + self._zero_s) * 1e6))
 
     @property
     def converts_stamps(self) -> bool:
@@ -85,38 +105,55 @@ class Vehicle:
             return None
         if message.get_srcComponent() != AUTOPILOT_COMPONENT_ID:
             return None
+        self._follow_restarts()
         kind = message.get_type()
         if kind == "TIMESYNC":
             return self._synchronise(message, now_s)
+        if kind == "HEARTBEAT":
+            self.dialect = dialect_of(self.record)
+            if self.record.is_ardupilot:
+                add_ardupilot_messages()
         if kind == "ATTITUDE":
             rates = (message.rollspeed, message.pitchspeed, message.yawspeed)
             self.rates_rad_s.append((message.time_boot_ms * 1000, *rates))
-        elif kind == "ESTIMATOR_STATUS":
-            self.worst_ratio = max(self.worst_ratio, message.pos_horiz_ratio, message.pos_vert_ratio)
+        elif kind == self.dialect.estimator:
+            self.worst_ratio = max(self.worst_ratio, self.dialect.innovation_ratio(message))
         return None
+
+    def _follow_restarts(self) -> None:
+        """Forget what a vehicle loses when it is restarted."""
+        restarts = self.record.telemetry.restarts
+        if restarts != self._restarts:
+            self._restarts = restarts
+            self.record.latest.pop("GPS_GLOBAL_ORIGIN", None)
+            self._asked_origin = False
+            self._offsets.clear()
 
     def _synchronise(self, message: Message, now_s: float) -> Message | None:
         if message.tc1 == 0:
             self.answers += 1
-            return mavlink.MAVLink_timesync_message(nanoseconds(now_s), message.ts1)
-        round_trip_s = now_s - message.ts1 / 1e9
+            return mavlink.MAVLink_timesync_message(self.stamp_us(now_s) * 1000, message.ts1)
+        round_trip_s = now_s + self._zero_s - message.ts1 / 1e9
         if 0.0 <= round_trip_s < 1.0:
             self._offsets.append((round_trip_s, message.tc1 / 1e9 - (now_s - round_trip_s / 2.0)))
         return None
 
     def requests(self, now_s: float) -> Iterator[Message]:
-        """What is due to be sent, except poses. Nothing in the vehicle is changed but rates of this link."""
+        """What is due to be sent, except poses. Only rates of this link and a missing origin are set."""
         if self._is_due("heartbeat", now_s, _HEARTBEAT_S):
             yield companion_heartbeat()  # over udpout the vehicle cannot send before it has this address
         system_id = self.record.system_id
         if system_id is None:
             return
         if self._is_due("timesync", now_s, _TIMESYNC_S):
-            yield mavlink.MAVLink_timesync_message(0, nanoseconds(now_s))
+            yield mavlink.MAVLink_timesync_message(0, self.stamp_us(now_s) * 1000)
         if self._is_due("parameter", now_s, _PARAMETER_S):
             yield from self._parameter_request(system_id, now_s)
         if self._is_due("rates", now_s, _REQUEST_S):
             yield from self._rate_requests(system_id, now_s)
+        wants_origin = self.dialect.needs_origin or self._origin is not None
+        if wants_origin and self._is_due("origin", now_s, _ORIGIN_S):
+            yield from self._origin_requests(system_id)
 
     def _is_due(self, what: str, now_s: float, period_s: float) -> bool:
         if now_s < self._due_s[what]:
@@ -125,23 +162,44 @@ class Vehicle:
         return True
 
     def _parameter_request(self, system_id: int, now_s: float) -> Iterator[Message]:
-        missing = [name for name in PARAMETERS if name not in self.record.parameters]
+        names = self.dialect.parameters
+        missing = [name for name in names if name not in self.record.parameters]
         if not missing:
             self._due_s["parameter"] = now_s + 5.0  # they may be changed meanwhile
-            missing = [*PARAMETERS]
+            missing = [*names]
         name = missing[int(now_s / _PARAMETER_S) % len(missing)]
         yield mavlink.MAVLink_param_request_read_message(system_id, AUTOPILOT_COMPONENT_ID, name.encode(), -1)
 
     def _rate_requests(self, system_id: int, now_s: float) -> Iterator[Message]:
         """Request what comes too slowly; never less than the link has already."""
         counts, span_s = self.record.counts, now_s - self._counted_s
-        for name, wanted_hz in self._wanted.items():
+        wanted = dict(self.dialect.rates_hz)
+        if self._truth_hz:
+            wanted[self.dialect.truth] = self._truth_hz
+        for name, wanted_hz in wanted.items():
             received_hz = (counts.get(name, 0) - self._counted.get(name, 0)) / span_s
             if received_hz < _LOW * wanted_hz:
-                yield request_rate(system_id, getattr(mavlink, f"MAVLINK_MSG_ID_{name}"), wanted_hz)
+                yield request_rate(system_id, _number(name), wanted_hz)
         self._counted, self._counted_s = dict(counts), now_s
 
+    def _origin_requests(self, system_id: int) -> Iterator[Message]:
+        """Ask for the origin until it is known; set it if there is none and one was given."""
+        if "GPS_GLOBAL_ORIGIN" in self.record.latest:
+            self._asked_origin = False
+            return
+        if self._asked_origin and self._origin is not None and not self.record.armed:
+            yield mavlink.MAVLink_set_gps_global_origin_message(
+                system_id,
+                degrees_e7(self._origin.latitude_deg),
+                degrees_e7(self._origin.longitude_deg),
+                millimetres(self._origin.altitude_m),
+            )
+        self._asked_origin = True
+        yield request_message(system_id, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 
-def nanoseconds(now_s: float) -> int:
-    """This program's time as TIMESYNC carries it: above zero."""
-    return max(1, round(now_s * 1e9))
+
+def _number(name: str) -> int:
+    """The number of a message."""
+    if name == "EKF_STATUS_REPORT":
+        return EKF_STATUS_REPORT_ID
+    return int(getattr(mavlink, f"MAVLINK_MSG_ID_{name}"))

@@ -11,11 +11,13 @@ from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
 from framerunner.doctor.findings import Level
 from framerunner.doctor.listen import Record
-from framerunner.mocap.judgement import Facts, is_fused, judge, line
+from framerunner.mocap.facts import Facts, Origin, SendSettings, Unused
+from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison
 from framerunner.mocap.poses import Pose
-from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession, SendSettings
+from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession
 from framerunner.mocap.sources import SitlSource, TimedPose
+from framerunner.mocap.vehicle import Vehicle
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 from wire.dialect import mavlink
@@ -101,6 +103,7 @@ class Trial:
             session.dropouts,
             session.vehicle.worst_ratio,
             session.vehicle.converts_stamps,
+            settings=session.settings,
         )
 
     def missing(self):
@@ -198,12 +201,12 @@ def test_a_faster_source_is_thinned_out():
     assert trial.facts().rate_hz == pytest.approx(25.0, abs=1.0)
 
 
-def recorded(flags, *, parameters=None, autopilot=mavlink.MAV_AUTOPILOT_PX4):
+def recorded(flags, *, parameters=None):
     """A record of a PX4 vehicle, which sends no health of vision."""
     record, packer = Record(), mavlink.MAVLink(None, 1, 1)
     reader = PacketReader()
     for message in (
-        mavlink.MAVLink_heartbeat_message(2, autopilot, 29, 0x03040000, 3, 3),
+        mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3),
         mavlink.MAVLink_sys_status_message(0x2F, 0x2F, 0x2F, *[0] * 12, 0),
         mavlink.MAVLink_estimator_status_message(1, flags, *[0.0] * 8),
     ):
@@ -238,12 +241,12 @@ def test_whether_px4_uses_the_poses(flags, control, distance_m, expected):
     ("changes", "subject", "advice"),
     [
         ({"parameters": {"EKF2_EV_CTRL": 0}}, "fused", "EKF2_EV_CTRL is 0: set it to 15"),
-        ({"flags": 0, "autopilot": 3}, "fused", "VISO_TYPE"),
         ({"comparison": replace(RIGHT, tilt_deg=90.0)}, "tilt", "--frame"),
         ({"comparison": replace(RIGHT, heading_deg=90.0)}, "heading", "--forward"),
         ({"comparison": replace(RIGHT, distance_m=0.3)}, "position", "step 6"),
         ({"comparison": replace(RIGHT, correlation=0.2)}, "axes", "rigid"),
         ({"sent": 0}, "poses", "tracked"),
+        ({"unused": Unused(12.0, 50.0)}, "used", "by hand"),
         (
             {"worst_ratio": 2.0, "comparison": replace(RIGHT, distance_m=0.4)},
             "innovation",
@@ -253,8 +256,7 @@ def test_whether_px4_uses_the_poses(flags, control, distance_m, expected):
 )
 def test_what_is_missing_and_what_to_do(changes, subject, advice):
     parameters = changes.pop("parameters", {"EKF2_EV_CTRL": 15})
-    kind = changes.pop("autopilot", mavlink.MAV_AUTOPILOT_PX4)
-    record = recorded(changes.pop("flags", RELATIVE), parameters=parameters, autopilot=kind)
+    record = recorded(changes.pop("flags", RELATIVE), parameters=parameters)
     given = {"comparison": RIGHT, "sent": 100, "rate_hz": 50.0} | changes
     found = {each.subject: each for each in judge(Facts(record, **given)) if each.level is Level.MISSING}
     assert advice in found[subject].advice
@@ -264,3 +266,19 @@ def test_a_right_setup_has_no_missing_finding():
     record = recorded(RELATIVE, parameters={"EKF2_EV_CTRL": 15, "EKF2_HGT_REF": 3})
     facts = Facts(record, RIGHT, 100, 50.0, 0.03, converts_stamps=True)
     assert {finding.level for finding in judge(facts)} == {Level.GOOD}
+
+
+@pytest.mark.parametrize("origin", [None, Origin(47.4, 8.5, 400.0)])
+def test_an_origin_is_set_in_a_px4_only_if_one_is_given(origin):
+    vehicle, reader = Vehicle(origin=origin), PacketReader()
+    heartbeat = mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3)
+    for message in reader.feed(heartbeat.pack(mavlink.MAVLink(None, 1, 1))):
+        vehicle.take(message, 0.0)
+    kinds = {message.get_type() for tick in range(30) for message in vehicle.requests(tick / 10)}
+    assert ("SET_GPS_GLOBAL_ORIGIN" in kinds) == (origin is not None)
+
+
+def test_no_origin_is_set_in_a_drone_that_has_one():
+    trial = Trial(origin=Origin(47.4, 8.5, 400.0)).run(6.0)
+    assert trial.sent_of("SET_GPS_GLOBAL_ORIGIN") == []
+    assert "origin" in {finding.subject for finding in judge(trial.facts())}
