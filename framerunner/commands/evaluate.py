@@ -97,8 +97,6 @@ def evaluate(
 
         framerunner evaluate --level calm --count 10 --px4 ../PX4-Autopilot
 
-        framerunner evaluate --level calm --count 10 --ardupilot ../ardupilot
-
         framerunner evaluate --level calm --backend dask --address tcp://10.0.0.1:8786
     """
     given = dict(locals())
@@ -107,8 +105,7 @@ def evaluate(
 
     from framerunner.evaluation import evaluate as evaluation
 
-    drawn = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
-    plan = _flown_by(drawn, response, use)
+    plan = _flown_by(_plan(scenarios, level, seed, count, load_mission_with(mission, pilot)), response, use)
     settings = evaluation.EvaluationSettings(
         plan=plan,
         pool=_pool(backend, jobs, address, use),
