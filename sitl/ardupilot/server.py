@@ -305,6 +305,9 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
                 raise AutopilotEndedError(f"{reason} (its output: {process.log})")
             self._connected.clear()
             self._sender.forget()
+            if self._holding is not None:  # a frame that need not be answered any more
+                self._holding.cancel()
+                self._holding = None
             self._is_falling = True
             await self._end_try(reason)
             self._is_falling = False
