@@ -21,8 +21,6 @@ _DISK_REFUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO
 
 def build_app() -> App:
     """Return the program with all its commands."""
-    from importlib import metadata
-
     from cyclopts import App, Parameter
 
     from framerunner.commands import (
@@ -49,7 +47,7 @@ def build_app() -> App:
     app = App(
         name="framerunner",
         help="A simulated MAVLink drone, and an app that flies the frame challenge with it.",
-        version=metadata.version("framerunner"),
+        version=_version,
         help_format="markdown",
         default_parameter=Parameter(negative=()),
         suppress_keyboard_interrupt=False,
@@ -74,6 +72,12 @@ def build_app() -> App:
     app.command(scenario.app)
     app.command(vision.app)
     return app
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    return metadata.version("framerunner")
 
 
 def main() -> None:

@@ -205,7 +205,7 @@ class MavsdkDrone:
             async with asyncio.timeout(limit_s):
                 while not self._in_offboard and not self._feed.armed:
                     with contextlib.suppress(MavsdkError):  # refused without a position
-                        await self._requests.wait(self._stream.request_offboard())
+                        await self._ticks.until_done(self._requests.wait(self._stream.request_offboard()))
                     await self._becomes(lambda: self._in_offboard, HOLD_SHOWN_S)
         with contextlib.suppress(TimeoutError):  # with an exchange its checks have had their time
             first_s = 0.0 if self._stream.exchange else min(FIRST_MODE_S, limit_s / 2)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.telemetry.streams import ONBOARD
+from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from sitl.faults.link import LinkFault, Way
 from sitl.links import (
     Joined,

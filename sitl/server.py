@@ -6,13 +6,14 @@ import asyncio
 import functools
 import time
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
-from sitl.drone import ServedDrone
-from sitl.fleet import Fleet
 from sitl.server_settings import ServerSettings
-from sitl.simulation import Simulation
 from sitl.time_grants import FREE_US, TimeGrants
 from sitl.world import CONTROL_PERIOD_US
+
+if TYPE_CHECKING:
+    from sitl.simulation import Simulation
 
 BURST_TICKS = 5  # at most 0.02 s of simulated time before links and video are served
 _MAX_CAUGHT_UP_S = 0.05  # shorter delays are caught up; longer ones slow simulated time down
@@ -72,7 +73,10 @@ class SimulatorServer:
         notice: Callable[[str], None] = lambda line: None,
         grants: TimeGrants | None = None,
     ) -> None:
-        simulations = [simulation] if isinstance(simulation, Simulation) else list(simulation)
+        from sitl.drone import ServedDrone  # our autopilot, which takes long to import; others do not need it
+        from sitl.fleet import Fleet
+
+        simulations = list(simulation) if isinstance(simulation, Sequence) else [simulation]
         self._settings = settings
         self._notice = notice
         self._grants = grants

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 
-from firmware_py.mavlink.telemetry.streams import GROUND, NORMAL, ONBOARD
+from firmware_py.mavlink.telemetry.profiles import GROUND, NORMAL, ONBOARD
 from sitl.links import UdpAddresses
 from wire.link import LinkProfile
 from wire.signing import SigningKey

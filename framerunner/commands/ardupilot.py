@@ -66,28 +66,29 @@ def ardupilot_server(
         return ArduPilotSimulation(chosen, seed=seed)
 
     simulation = new_simulation()  # so that what is wrong with it is said first
-    start = _start(simulation, settings, ardupilot)
+    start = _start(simulation, settings, ardupilot, relayed=grants is not None)
     return ArduPilotServer(new_simulation, settings, start, notice=say, grants=grants)
 
 
 def _start(
-    simulation: ArduPilotSimulation, settings: ServerSettings, ardupilot: Path | None
+    simulation: ArduPilotSimulation, settings: ServerSettings, ardupilot: Path | None, *, relayed: bool
 ) -> AutopilotStart:
     from sitl.ardupilot.build import ArduPilotProcess, find_build, options
     from sitl.ardupilot.parameters import all_parameters
     from sitl.autopilots.process import AutopilotStart
     from sitl.sensors.suite import load_suite
 
-    scenario, home, takes_poses = simulation.scenario, simulation.place, simulation.sends_poses
+    scenario, home = simulation.scenario, simulation.place
+    how = {"takes_poses": simulation.sends_poses, "relayed": relayed}
     values = all_parameters(simulation.world.airframe, load_suite(scenario.sensors))
     file = f"{simulation.world.airframe.name}.parm"
     command = (
         f"framerunner ardupilot params {scenario.airframe} --sensors {scenario.sensors} > {file}; "
-        f"arducopter {shlex.join(options(settings, home, file, takes_poses=takes_poses))}"
+        f"arducopter {shlex.join(options(settings, home, file, **how))}"
     )
     if ardupilot is None:
         return AutopilotStart(None, command)
     folder = None if settings.storage is None else settings.storage / f"ardupilot-{settings.instance}"
     program = find_build(ardupilot)
-    process = ArduPilotProcess(program, settings, home, values, folder, takes_poses=takes_poses)
+    process = ArduPilotProcess(program, settings, home, values, folder, **how)
     return AutopilotStart(process, command)

@@ -10,24 +10,25 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load_mission_with
-from framerunner.commands.px4 import plan_for_px4
+from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load_mission_with, say
 
 if TYPE_CHECKING:
     from framerunner.evaluation.backends import Backend, Pool
+    from framerunner.evaluation.genuine_flight import GenuineUse
     from framerunner.evaluation.plan import Plan
-    from framerunner.evaluation.px4_flight import Px4Use
+    from framerunner.flying.simulator_process import GenuineAutopilot
     from offboard.mission import Mission
 
 _COUNT, _SEED = 100, 1
-_PX4_SPEED, _MAX_PX4_SPEED = 4.0, 100.0
+_GENUINE_SPEED, _MAX_GENUINE_SPEED = 4.0, 100.0
 _Level = Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")]
 _CountOption = Annotated[WholeNumber | None, Parameter(help=f"how many scenarios of the level; {_COUNT}")]
 _SeedOption = Annotated[
     WholeNumber | None, Parameter(help=f"of the first scenario; each next one has one more; {_SEED}")
 ]
 _Jobs = Annotated[
-    WholeNumber | None, Parameter(help="flights at once; as many as there are cores, with --px4 1")
+    WholeNumber | None,
+    Parameter(help="flights at once; one a core, with a genuine autopilot 1"),
 ]
 _Out = Annotated[
     Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
@@ -42,9 +43,15 @@ _Px4 = Annotated[
     Path | None,
     Parameter(help="folder of a PX4 built for SITL: it flies instead of our autopilot, as in `fly --px4`"),
 ]
+_ArduPilot = Annotated[
+    Path | None,
+    Parameter(help="folder of an ArduPilot built for SITL: likewise an ArduCopter, as in `fly --ardupilot`"),
+]
 _Speed = Annotated[
     float | None,
-    Parameter(help=f"with --px4: simulated seconds a second, if the machine can; {_PX4_SPEED:g}"),
+    Parameter(
+        help=f"with --px4 or --ardupilot: simulated seconds a second, if the machine can; {_GENUINE_SPEED:g}"
+    ),
 ]
 _Again = Annotated[bool, Parameter(help="fly again what is in the folder already")]
 _Backend = Annotated[
@@ -61,6 +68,7 @@ def evaluate(
     pilot: Annotated[Path | None, Parameter(help="Python file with a subclass of Pilot")] = None,
     response: _Response = None,
     px4: _Px4 = None,
+    ardupilot: _ArduPilot = None,
     speed: _Speed = None,
     jobs: _Jobs = None,
     out: _Out = None,
@@ -72,7 +80,7 @@ def evaluate(
     """Fly a mission on many scenarios in lockstep; report how often it lands, how well, and why it fails.
 
     Every flight is saved as soon as it is over. Ctrl-C loses none of them: the same command continues where
-    it stopped, and ends with the same results. With --px4 a genuine PX4 flies.
+    it stopped, and ends with the same results. With --px4 or --ardupilot a genuine autopilot flies.
     Exit code 0: all were flown, 1: a fault of the program ended some of them, 2: bad input.
 
     **Examples**
@@ -93,12 +101,11 @@ def evaluate(
     """
     given = dict(locals())
     _check(scenarios, level, count, seed)
-    use = _px4_use(px4, speed, jobs, response=response, backend=backend)
+    use = _genuine_use(_autopilot(px4, ardupilot), speed, jobs, response=response, backend=backend)
 
     from framerunner.evaluation import evaluate as evaluation
 
-    drawn = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
-    plan = _flown_by(drawn, response, use)
+    plan = _flown_by(_plan(scenarios, level, seed, count, load_mission_with(mission, pilot)), response, use)
     settings = evaluation.EvaluationSettings(
         plan=plan,
         pool=_pool(backend, jobs, address, use),
@@ -108,22 +115,59 @@ def evaluate(
         mission=mission,
         pilot=None if pilot is None else str(pilot),
         command=_command(scenarios, given),
-        px4=use,
+        genuine=use,
     )
     return evaluation.evaluate(settings)
 
 
-def _flown_by(plan: Plan, response: str | None, use: Px4Use | None) -> Plan:
-    """The plan with a vehicle that answers late, or that PX4 flies."""
+def _flown_by(plan: Plan, response: str | None, use: GenuineUse | None) -> Plan:
+    """The plan with a vehicle that answers late, or that a genuine autopilot flies."""
     if response is not None:
         from framerunner.commands.named_numbers import response_of
 
         return plan.answering_late(response_of(response))
-    return plan if use is None else plan_for_px4(plan, use.folder)
+    return plan if use is None else _plan_for_genuine(plan, use.autopilot)
 
 
-def _pool(backend: Backend, jobs: int | None, address: str | None, use: Px4Use | None) -> Pool:
-    """Where flights are flown: on all cores, but with PX4 one after another."""
+def _plan_for_genuine(plan: Plan, autopilot: GenuineAutopilot) -> Plan:
+    """A plan for an autopilot, without scenarios with a fault of the link; says what is changed.
+
+    Raises:
+        SettingError: nothing is left, or there is no such autopilot.
+    """
+    from scenarios.faults.declaration import FaultPart
+    from sitl.autopilots.process import version_of
+    from sitl.autopilots.sensors import SUITE_INSTEAD_OF_IDEAL, with_estimable_sensors
+
+    title, option = autopilot.title, f"--{autopilot.name} {autopilot.folder}"
+    flown, ideal = [], 0
+    for scenario in plan.scenarios:
+        if all(fault.part is not FaultPart.LINK for fault in scenario.faults):
+            flown.append(with_estimable_sensors(scenario))
+            ideal += flown[-1] is not scenario
+    left_out = len(plan) - len(flown)
+    if not flown:
+        raise SettingError(f"{option}: all flights have a fault of the link, which is {title}'s own")
+    if left_out:
+        whole = f"{left_out} of {len(plan)} flights have a fault of it, left out"
+        say(f"{title} has its own link to the app: {whole}")
+    if ideal:
+        say(f"{title} takes no true state: drones with ideal sensors have {SUITE_INSTEAD_OF_IDEAL}")
+    return plan.flown_by(version_of(title, _program(autopilot)), flown)
+
+
+def _program(autopilot: GenuineAutopilot) -> Path:
+    """Raises `SettingError` if there is none."""
+    from sitl.ardupilot.build import find_build as find_ardupilot
+    from sitl.px4.build import find_build as find_px4
+
+    if autopilot.name == "ardupilot":
+        return find_ardupilot(autopilot.folder)
+    return find_px4(autopilot.folder) / "bin" / "px4"
+
+
+def _pool(backend: Backend, jobs: int | None, address: str | None, use: GenuineUse | None) -> Pool:
+    """Where flights are flown: on all cores, but with a genuine autopilot one after another."""
     from joblib import cpu_count
 
     from framerunner.evaluation.backends import Pool
@@ -132,25 +176,45 @@ def _pool(backend: Backend, jobs: int | None, address: str | None, use: Px4Use |
     return Pool(backend, at_once if jobs is None else jobs, address)
 
 
-def _px4_use(
-    px4: Path | None, speed: float | None, jobs: int | None, *, response: str | None, backend: str
-) -> Px4Use | None:
-    """By which PX4 is flown; refuses options that do not go with it."""
-    if px4 is None:
-        if speed is not None:
-            raise SettingError(f"--speed {speed:g}: is for flights with --px4; leave it out")
-        return None
-    if response is not None:
-        raise SettingError(f"--response {response}: changes our autopilot's flights; leave it out with --px4")
-    if backend != "loky":
-        raise SettingError(f"--backend {backend}: PX4 is started on this machine; leave it out with --px4")
-    from framerunner.evaluation.px4_flight import INSTANCES, Px4Use
-    from sitl.px4.build import find_build
+def _autopilot(px4: Path | None, ardupilot: Path | None) -> GenuineAutopilot | None:
+    """The genuine autopilot that was chosen; None: our own."""
+    from framerunner.flying.simulator_process import GenuineAutopilot
 
-    check_range("--speed", speed, 0.01, _MAX_PX4_SPEED)
+    if px4 is not None and ardupilot is not None:
+        raise SettingError(f"--ardupilot {ardupilot}: PX4 flies, by --px4 {px4}; leave one of them out")
+    if px4 is not None:
+        return GenuineAutopilot("px4", px4.resolve())
+    return None if ardupilot is None else GenuineAutopilot("ardupilot", ardupilot.resolve())
+
+
+def _genuine_use(
+    autopilot: GenuineAutopilot | None,
+    speed: float | None,
+    jobs: int | None,
+    *,
+    response: str | None,
+    backend: str,
+) -> GenuineUse | None:
+    """By which a genuine autopilot is flown; refuses options that do not go with it."""
+    if autopilot is None:
+        if speed is not None:
+            raise SettingError(f"--speed {speed:g}: is for flights with --px4 or --ardupilot; leave it out")
+        return None
+    option, title = f"--{autopilot.name}", autopilot.title
+    if response is not None:
+        raise SettingError(
+            f"--response {response}: changes our autopilot's flights; leave it out with {option}"
+        )
+    if backend != "loky":
+        raise SettingError(
+            f"--backend {backend}: {title} is started on this machine; leave it out with {option}"
+        )
+    from framerunner.evaluation.genuine_flight import INSTANCES, GenuineUse
+
+    check_range("--speed", speed, 0.01, _MAX_GENUINE_SPEED)
     check_range("--jobs", jobs, 1, INSTANCES)
-    find_build(px4)
-    return Px4Use(px4.resolve(), _PX4_SPEED if speed is None else speed)
+    _program(autopilot)
+    return GenuineUse(autopilot, _GENUINE_SPEED if speed is None else speed)
 
 
 def _plan(

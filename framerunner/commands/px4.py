@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from errors import SettingError
 from framerunner.commands import for_genuine, say, with_faults, with_sensors
 
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
-    from framerunner.evaluation.plan import Plan
     from sitl.autopilots.process import AutopilotStart
     from sitl.px4.server import Px4Server
     from sitl.px4.simulation import Px4Simulation
@@ -58,33 +56,6 @@ def params(
     )
     print("\n".join(lines))
     return 0
-
-
-def plan_for_px4(plan: Plan, folder: Path) -> Plan:
-    """An evaluation's plan for PX4, without scenarios with a fault of the link; says what is changed.
-
-    Raises:
-        SettingError: nothing is left, or there is no PX4.
-    """
-    from scenarios.faults.declaration import FaultPart
-    from sitl.autopilots.sensors import SUITE_INSTEAD_OF_IDEAL, with_estimable_sensors
-    from sitl.px4.build import version_of
-
-    flown, ideal = [], 0
-    for scenario in plan.scenarios:
-        if all(fault.part is not FaultPart.LINK for fault in scenario.faults):
-            flown.append(with_estimable_sensors(scenario))
-            ideal += flown[-1] is not scenario
-    left_out = len(plan) - len(flown)
-    if not flown:
-        raise SettingError(f"--px4 {folder}: all flights have a fault of the link, which is PX4's own")
-    if left_out:
-        say(
-            f"PX4 has its own link to the app: {left_out} of {len(plan)} flights have a fault of it, left out"
-        )
-    if ideal:
-        say(f"PX4 takes no true state: drones with ideal sensors have {SUITE_INSTEAD_OF_IDEAL}")
-    return plan.flown_by(version_of(folder), flown)
 
 
 def px4_server(

@@ -12,8 +12,8 @@ from rich.console import Console
 from errors import SettingError
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
+from framerunner.evaluation.genuine_flight import GenuineUse
 from framerunner.evaluation.plan import Plan
-from framerunner.evaluation.px4_flight import Px4Use
 from framerunner.evaluation.rows import Row, csv_text
 from framerunner.evaluation.runner import Terms, fly_all
 from framerunner.evaluation.statistics import summarise
@@ -38,7 +38,7 @@ class EvaluationSettings:
         mission: name or file, as given on the command line.
         pilot: a contestant's file, as given; None without one.
         command: continues this evaluation.
-        px4: the genuine PX4 that flies; None: our own autopilot.
+        genuine: the genuine autopilot that flies; None: our own.
     """
 
     plan: Plan
@@ -49,7 +49,7 @@ class EvaluationSettings:
     mission: str
     pilot: str | None
     command: str
-    px4: Px4Use | None = None
+    genuine: GenuineUse | None = None
 
 
 def evaluate(settings: EvaluationSettings) -> int:
@@ -91,9 +91,10 @@ def _fly_missing(settings: EvaluationSettings, folder: EvaluationFolder) -> None
         return
     scenarios = {scenario.name: scenario for scenario in plan.scenarios}
     not_kept: tuple[Row, SettingError] | None = None
+    tasks, terms = plan.tasks(frozenset(folder.done)), Terms(genuine=settings.genuine)
     with (
         EvaluationProgress(len(plan), list(folder.rows().values())) as progress,
-        closing(fly_all(plan.tasks(frozenset(folder.done)), settings.pool, Terms(px4=settings.px4))) as rows,
+        closing(fly_all(tasks, settings.pool, terms)) as rows,
     ):
         for row in rows:
             if row.version != folder.identity.version:
@@ -137,9 +138,9 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
             status.update(f"drawing the report, plot {done + 1} of {total}")
 
         plan = settings.plan
-        px4 = None if settings.px4 is None else settings.px4.folder
+        genuine = None if settings.genuine is None else settings.genuine.autopilot
         named = (plan.title, settings.mission, settings.pilot, settings.command)
-        page = Page(*named, summary, comparison, px4)
+        page = Page(*named, summary, comparison, genuine)
         write_report(folder, page, advance)
     print(f"left in {folder.path}/: report.html, results.csv", flush=True)
     return code

@@ -26,6 +26,7 @@ from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import Summary, crossing_offsets_m, mean_seconds_in_state
 from framerunner.evaluation.store import REPORT, EvaluationFolder
 from framerunner.evaluation.terminal import comparison_lines, spread_cells
+from framerunner.flying.simulator_process import GenuineAutopilot
 from framerunner.runs.plots import draw_track
 from scenarios.loader import load_scenario
 from scenarios.models import COLOURS, ScenarioError
@@ -70,7 +71,7 @@ class Page:
         command: makes the same evaluation.
         summary: of the flights.
         comparison: with an earlier evaluation; None without.
-        px4: folder of the PX4 that flew; None: our own autopilot did.
+        genuine: the genuine autopilot that flew; None: our own did.
     """
 
     title: str
@@ -79,7 +80,7 @@ class Page:
     command: str
     summary: Summary
     comparison: Comparison | None
-    px4: Path | None = None
+    genuine: GenuineAutopilot | None = None
 
 
 def write_report(
@@ -122,14 +123,21 @@ def write_report(
 
 
 def replay_command(
-    path: Path, mission: str, pilot: str | None, seed: int, response: str = "", *, px4: Path | None = None
+    path: Path,
+    mission: str,
+    pilot: str | None,
+    seed: int,
+    response: str = "",
+    *,
+    genuine: GenuineAutopilot | None = None,
 ) -> str:
     """The command that flies the scenario of a file again, in lockstep the same to the last bit."""
     words = ["framerunner", "fly", str(path), "--mission", mission]
     words += ["--pilot", pilot] if pilot else []
     words += ["--seed", str(seed)] if seed else []
     words += ["--response", response] if response else []
-    return shlex.join([*words, *(["--lockstep"] if px4 is None else ["--px4", str(px4)])])
+    words += ["--lockstep"] if genuine is None else [f"--{genuine.name}", str(genuine.folder)]
+    return shlex.join(words)
 
 
 def picked_for_plots(summary: Summary, count: int) -> set[str]:
@@ -159,7 +167,7 @@ def _failures(
                 done += 1
             file = folder.scenario_file(row.scenario)
             flown = (page.mission, page.pilot, row.seed or 0, row.response)
-            command = replay_command(file, *flown, px4=page.px4)
+            command = replay_command(file, *flown, genuine=page.genuine)
             failures.append(Failure(row, command, plot, _traceback(folder, row)))
         groups.append((cause.verdict, cause.ended_in, failures))
     return groups

@@ -20,7 +20,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from framerunner.evaluation.backends import Pool, Workers, is_lost_worker, open_pool
-from framerunner.evaluation.px4_flight import Px4Use, fly_with_px4
+from framerunner.evaluation.genuine_flight import GenuineUse, fly_with_genuine
 from framerunner.evaluation.rows import Row
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
@@ -53,13 +53,13 @@ class Terms:
         processor_s: processor time; a flight that uses more ends, mostly in its mission, with the reason.
             None: no limit. It holds in a process's main thread only.
         whole: keep of every flight the track and the counts of transitions, not only tracks of failed ones.
-        px4: the genuine PX4 that flies, over MAVLink; None: our own autopilot, in lockstep. With it counts of
+        genuine: the genuine autopilot that flies, over MAVLink; None: our own, in lockstep. With it counts of
             transitions are not kept.
     """
 
     processor_s: float | None = None
     whole: bool = False
-    px4: Px4Use | None = None
+    genuine: GenuineUse | None = None
 
 
 NO_LIMITS = Terms()
@@ -280,8 +280,8 @@ def fly_task(plan: FlightPlan, terms: Terms = NO_LIMITS) -> Row:
     chart = ChartRecord() if terms.whole else None
     try:
         with _ONE_AT_A_TIME, processor_limit(terms.processor_s):
-            if terms.px4 is not None:
-                flown = fly_with_px4(plan, terms.px4)
+            if terms.genuine is not None:
+                flown = fly_with_genuine(plan, terms.genuine)
             else:
                 flown = fly_lockstep(plan, observers=() if chart is None else (chart.see,))
         if flown.outcome.interrupted:

@@ -33,10 +33,6 @@ _ANSWER_US = CONTROL_PERIOD_US + TELEMETRY_DELAY_US - 1
 _GENUINE_ANSWER_US = {"px4": 20_000, "ardupilot": 28_000}
 """Likewise; PX4 sends an attitude each 10 ms, ArduPilot each 20 ms, when it comes to it."""
 
-_GENUINE_START_US = {"px4": 0, "ardupilot": 10_000_000}
-"""A flight begins at a multiple of this: the autopilot has then been running for the same time each time."""
-_STEP_US = 500_000
-
 
 @dataclass(frozen=True, slots=True)
 class GenuineAutopilot:
@@ -53,7 +49,7 @@ class GenuineAutopilot:
     @property
     def repeats(self) -> bool:
         """Whether it flies the same flight again with the same seed; else it is only alike."""
-        return self.name == "px4" and may_use_real_time()
+        return self.name != "px4" or may_use_real_time()
 
 
 class SitlProcess(ChildProcess):
@@ -92,10 +88,7 @@ class SitlProcess(ChildProcess):
         ]
         super().__init__("the simulator", arguments, inherited=there)
         answer_us = _ANSWER_US if autopilot is None else _GENUINE_ANSWER_US[autopilot.name]
-        start_us = 0 if autopilot is None else _GENUINE_START_US[autopilot.name]
-        self.clock = SimulatorClock(
-            here, answer_us, answers_take_time=autopilot is not None, start_us=start_us
-        )
+        self.clock = SimulatorClock(here, answer_us, answers_take_time=autopilot is not None)
         self.system_id = instance + 1  # MAVLink id of its drone
         self.drone_url = f"udpin://127.0.0.1:{14540 + instance}"
         self.api = SimulatorApi(f"http://127.0.0.1:{VIDEO_PORT + instance}")
@@ -123,7 +116,6 @@ class SimulatorClock:
         channel: to the simulator.
         answer_us: simulated time from a tick until the telemetry of the tick has been sent.
         answers_take_time: the autopilot answers requests only while simulated time goes on.
-        start_us: time stops at a multiple of this; 0: at once.
     """
 
     def __init__(
@@ -132,9 +124,7 @@ class SimulatorClock:
         answer_us: int = _ANSWER_US,
         *,
         answers_take_time: bool = False,
-        start_us: int = 0,
     ) -> None:
-        self._start_us = start_us
         self.answers_take_time = answers_take_time
         self._answer_us = answer_us
         self.images_missed = 0  # ticks whose image did not arrive in time
@@ -161,12 +151,7 @@ class SimulatorClock:
 
     async def stop(self) -> int:
         """Stop vehicle time; returns that of the last control tick, microseconds."""
-        time_us = (await self._granted(Grant(0))).time_us
-        period_us = self._start_us or 1
-        start_us = -(-time_us // period_us) * period_us
-        while time_us < start_us:
-            time_us = (await self._granted(Grant(min(time_us + _STEP_US, start_us)))).time_us
-        return time_us
+        return (await self._granted(Grant(0))).time_us
 
     async def advance(self, tick_us: int, command: VelocityCommand | None) -> None:
         """Grant time up to a tick and the control period after it; then wait for the image.

@@ -35,7 +35,7 @@ TAKEOFF_HEIGHT_M = 1.0  # requested; velocities take over as soon as the drone i
 TAKEOFF_SHARE = 0.7  # likewise, of the room below the ceiling at most
 TAKEOFF_CLIMB_M_S = 0.05  # a command on the ground to climb faster than this is a take-off
 TAKEOFF_AGAIN_US = 5_000_000  # vehicle time; arming takes 2 s and the motors' start half a second
-_STREAMS_HZ = {
+STREAMS_HZ = {
     mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 10.0,
@@ -43,6 +43,43 @@ _STREAMS_HZ = {
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
 }
 ARDUPILOT_MODES = ModeNames(offboard="GUIDED", hold="BRAKE", land="LAND", pilot=ardupilot_modes.PILOT_MODES)
+
+
+class Setpoints:
+    """Velocities to one ArduCopter; on the ground, one that climbs is a request to take off.
+
+    Args:
+        messages: to it.
+        feed: its telemetry, which shows whether it is on the ground.
+        room_above_m: from the start to the ceiling, which its take-off must not reach.
+    """
+
+    def __init__(self, messages: DirectMessages, feed: TelemetryFeed, room_above_m: float) -> None:
+        self._messages, self._feed = messages, feed
+        self._takeoff_height_m = min(TAKEOFF_HEIGHT_M, TAKEOFF_SHARE * room_above_m)
+        self._takeoff_us: int | None = None  # vehicle time at which take-off was last requested
+        feed.needs_landed_state = True  # else each climb in the air would be taken for a take-off
+
+    def send(self, command: VelocityCommand) -> None:
+        """Send a velocity, or request take-off."""
+        if self._stands_ready and command.up_m_s > TAKEOFF_CLIMB_M_S:
+            self._take_off()
+        else:
+            self._takeoff_us = None
+            self._messages.send_velocity(command)
+
+    @property
+    def _stands_ready(self) -> bool:
+        """Armed in GUIDED on the ground."""
+        feed = self._feed
+        return feed.landed and feed.mode == ARDUPILOT_MODES.offboard and feed.arming.is_armed(feed.time_us)
+
+    def _take_off(self) -> None:
+        """Request take-off, and again when the drone is still on the ground after some seconds."""
+        now_us = self._feed.time_us
+        if self._takeoff_us is None or now_us - self._takeoff_us > TAKEOFF_AGAIN_US:
+            self._takeoff_us = now_us
+            self._messages.send_command(mavlink.MAV_CMD_NAV_TAKEOFF, *(0.0,) * 6, self._takeoff_height_m)
 
 
 class ArduPilotDialect:
@@ -71,20 +108,17 @@ class ArduPilotDialect:
         system_id: int,
         room_above_m: float = inf,
     ) -> None:
-        self._takeoff_height_m = min(TAKEOFF_HEIGHT_M, TAKEOFF_SHARE * room_above_m)
         self.ended = False
         self._action = action
         self._messages = DirectMessages(direct, system_id)
-        self._feed = feed
-        feed.needs_landed_state = True  # else each climb in the air would be taken for a take-off
+        self._setpoints = Setpoints(self._messages, feed, room_above_m)
         self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
         self._sent_since_repeat = False
-        self._takeoff_us: int | None = None  # vehicle time at which take-off was last requested
         self._lock = threading.Lock()  # the watchdog's thread sends, too
 
     async def request_streams(self) -> None:
         """Request what a flight needs; what is refused is missing later, in words."""
-        for message_id, rate_hz in _STREAMS_HZ.items():
+        for message_id, rate_hz in STREAMS_HZ.items():
             with contextlib.suppress(MavsdkError):
                 await self._command_long(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz)
 
@@ -94,13 +128,8 @@ class ArduPilotDialect:
             if self.ended:
                 return
             self._command, self._sent_since_repeat = command, True
-            climbs = command.up_m_s > TAKEOFF_CLIMB_M_S
             with contextlib.suppress(MavsdkError):  # the link is closed; telemetry shows that
-                if self._stands_ready and climbs:
-                    self._take_off()
-                else:
-                    self._takeoff_us = None
-                    self._messages.send_velocity(command)
+                self._setpoints.send(command)
 
     def repeat(self) -> None:
         """Send the last velocity again if nothing was sent since the last call."""
@@ -145,19 +174,6 @@ class ArduPilotDialect:
         """End the setpoints permanently."""
         with self._lock:
             self.ended, self._command = True, None
-
-    @property
-    def _stands_ready(self) -> bool:
-        """Armed in GUIDED on the ground."""
-        feed = self._feed
-        return feed.landed and feed.mode == ARDUPILOT_MODES.offboard and feed.arming.is_armed(feed.time_us)
-
-    def _take_off(self) -> None:
-        """Request take-off, and again when the drone is still on the ground after some seconds."""
-        now_us = self._feed.time_us
-        if self._takeoff_us is None or now_us - self._takeoff_us > TAKEOFF_AGAIN_US:
-            self._takeoff_us = now_us
-            self._messages.send_command(mavlink.MAV_CMD_NAV_TAKEOFF, *(0.0,) * 6, self._takeoff_height_m)
 
     async def _set_mode(self, number: int) -> None:
         await self._command_long(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(number))

@@ -12,6 +12,7 @@ from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from offboard.drone import DroneError
 from offboard.link.ardupilot import ArduPilotDialect
 from offboard.link.dialect import Dialect, Px4Dialect
+from offboard.link.stepped_ardupilot import SteppedArduPilotDialect
 from offboard.link.stepped_px4 import SteppedPx4Dialect
 from offboard.link.telemetry import TelemetryFeed
 
@@ -31,17 +32,20 @@ async def open_dialect(
         direct: its asyncio plugin `mavlink_direct`.
         feed: the vehicle's telemetry.
         room_above_m: from the start to the ceiling under which the vehicle must stay.
-        stepped: it is a PX4 whose time waits for this app.
+        stepped: its time waits for this app.
 
     Raises:
         DroneError: it is ArduPilot, but no multicopter: the numbers of its modes mean others.
     """
-    action = ActionAsync(system)
     if await system.autopilot_type() == Autopilot.ARDUPILOT:
         kind = await system.vehicle_type()
         if kind in (Vehicle.FIXED_WING, Vehicle.ROVER, Vehicle.SUBMARINE):
             raise DroneError(f"the vehicle is a {kind.name.lower().replace('_', ' ')}; use a multicopter")
-        return ArduPilotDialect(action, direct, feed, await system.get_system_id(), room_above_m)
+        system_id = await system.get_system_id()
+        if stepped:
+            return SteppedArduPilotDialect(direct, feed, system_id, room_above_m)
+        return ArduPilotDialect(ActionAsync(system), direct, feed, system_id, room_above_m)
+    action = ActionAsync(system)  # requests EXTENDED_SYS_STATE once a second, for the first dialect, too
     if stepped:
         return SteppedPx4Dialect(direct, await system.get_system_id())
     return Px4Dialect(OffboardAsync(system), action)

@@ -10,6 +10,7 @@ from firmware_py.types import GeodeticPoint
 from sitl.ardupilot.json_interface import PORTS_AN_INSTANCE
 from sitl.ardupilot.parameters import file_of
 from sitl.ardupilot.poses import POSE_PORT
+from sitl.ardupilot.relay import RELAY_PORT
 from sitl.autopilots.parameters import Value
 from sitl.autopilots.process import AutopilotProcess
 from sitl.links import UdpAddresses
@@ -36,7 +37,9 @@ def find_build(folder: Path) -> Path:
     )
 
 
-def options(settings: ServerSettings, home: GeodeticPoint, defaults: str, *, takes_poses: bool) -> list[str]:
+def options(
+    settings: ServerSettings, home: GeodeticPoint, defaults: str, *, takes_poses: bool, relayed: bool = False
+) -> list[str]:
     """The options by which ArduCopter flies here, with MAVLink on this simulator's usual ports.
 
     Args:
@@ -44,15 +47,17 @@ def options(settings: ServerSettings, home: GeodeticPoint, defaults: str, *, tak
         home: the scenario's origin.
         defaults: file of parameters.
         takes_poses: the simulator sends those of motion capture.
+        relayed: MAVLink with the app goes through the simulator; see `sitl.ardupilot.relay`.
     """
-    instance = settings.instance
-    poses = f"udpclient:{settings.bind}:{POSE_PORT + PORTS_AN_INSTANCE * instance}"
+    instance, here = settings.instance, f"udpclient:{settings.bind}"
+    shift = PORTS_AN_INSTANCE * instance
+    app = f"{here}:{RELAY_PORT + shift}" if relayed else _udp(settings.onboard)
     return [
         *("--model", f"JSON:{settings.bind}", "-I", str(instance), "--sysid", str(instance + 1)),
         *("--home", f"{home.latitude_deg:.9f},{home.longitude_deg:.9f},{home.altitude_m:.3f},0"),
         *("--speedup", f"{settings.speed:g}", "--defaults", defaults),
-        *("--serial0", _udp(settings.onboard), "--serial1", _udp(settings.ground)),
-        *(("--serial2", poses) if takes_poses else ()),
+        *("--serial0", app, "--serial1", _udp(settings.ground)),
+        *(("--serial2", f"{here}:{POSE_PORT + shift}") if takes_poses else ()),
     ]
 
 
@@ -72,6 +77,7 @@ class ArduPilotProcess(AutopilotProcess):
         parameters: for its start; in a folder that is kept, those that were changed in flight win.
         folder: where it runs and keeps parameters and logs. None: a temporary one.
         takes_poses: the simulator sends those of motion capture.
+        relayed: MAVLink with the app goes through the simulator.
     """
 
     def __init__(
@@ -83,14 +89,16 @@ class ArduPilotProcess(AutopilotProcess):
         folder: Path | None,
         *,
         takes_poses: bool,
+        relayed: bool = False,
     ) -> None:
         super().__init__("ArduPilot", "--ardupilot", folder, {})
-        self._takes_poses = takes_poses
+        self._takes_poses, self._relayed = takes_poses, relayed
         self._program, self._settings, self._home = program, settings, home
         self._parameters = parameters
 
     def command(self) -> list[str]:
         """ArduCopter's own options."""
         (self.folder / PARAMETER_FILE).write_text(file_of(self._parameters), encoding="ascii")
-        chosen = options(self._settings, self._home, PARAMETER_FILE, takes_poses=self._takes_poses)
+        how = {"takes_poses": self._takes_poses, "relayed": self._relayed}
+        chosen = options(self._settings, self._home, PARAMETER_FILE, **how)
         return [str(self._program), *chosen]

@@ -53,7 +53,10 @@ def all_parameters(airframe: Airframe, suite: SuiteSpec) -> dict[str, Value]:
 
 
 def simulation_parameters() -> dict[str, Value]:
-    """What a simulated ArduCopter needs: no sticks, and a loop at half the rate of the simulation's steps."""
+    """What a simulated ArduCopter needs: no sticks, and a loop at half the rate of the simulation's steps.
+
+    Its log is open before arming: else arming waits until a thread has opened it, in wall time.
+    """
     return {
         "SCHED_LOOP_RATE": PHYSICS_RATE_HZ // 2,
         "SIM_RATE_HZ": PHYSICS_RATE_HZ,
@@ -62,6 +65,7 @@ def simulation_parameters() -> dict[str, Value]:
         "SIM_DRIFT_SPEED": 0,
         "BATT_MONITOR": 0,
         "FENCE_ENABLE": 0,
+        "LOG_DISARMED": 1,
         **{
             f"INS_ACC{number}{what}_{axis}": value
             for number in ("", "2")

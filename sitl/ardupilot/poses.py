@@ -7,16 +7,20 @@ until somebody sets it, so that is done here, too.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from firmware_py.measurements import ExternalPose
 from firmware_py.types import GeodeticPoint
 from geometry.rotations import euler_from_quaternion
-from wire.dialect import degrees_e7, mavlink, millimetres
-from wire.transports.vehicle_link import VehicleLink
+from sitl.autopilots.sole_sender import SoleSender
+from wire.dialect import Message, degrees_e7, mavlink, millimetres
+from wire.transports.sockets import Address, bind_udp
 
 POSE_PORT = 9006
 """UDP port of instance 0, between those of the JSON interface."""
 _COMPONENT_ID = int(mavlink.MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY)
 _ORIGIN_PERIOD_US = 1_000_000
+_PACKETS_AT_ONCE = 200
 
 
 class PoseLink:
@@ -27,13 +31,18 @@ class PoseLink:
         port: UDP port.
         system_id: of the vehicle.
         origin: where on Earth the poses' frame is.
+        notice: called with lines for people.
 
     Raises:
         LinkError: the port is in use.
     """
 
-    def __init__(self, bind: str, port: int, system_id: int, origin: GeodeticPoint) -> None:
-        self._link = VehicleLink(f"udpin://{bind}:{port}", system_id=system_id, component_id=_COMPONENT_ID)
+    def __init__(
+        self, bind: str, port: int, system_id: int, origin: GeodeticPoint, notice: Callable[[str], None]
+    ) -> None:
+        self._socket = bind_udp((bind, port), "choose another --instance")
+        self._sender = SoleSender("ArduPilot", port, notice)
+        self._codec = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=_COMPONENT_ID)
         self._origin = mavlink.MAVLink_set_gps_global_origin_message(
             system_id,
             degrees_e7(origin.latitude_deg),
@@ -46,12 +55,11 @@ class PoseLink:
         """Send a pose; once a second of its time the origin, which ArduPilot takes once."""
         if not 0 <= self._origin_due_us - pose.time_us <= _ORIGIN_PERIOD_US:
             self._origin_due_us = pose.time_us + _ORIGIN_PERIOD_US
-            while self._link.receive(0.0):  # ArduPilot's address
-                pass
-            self._link.send(self._origin)
+            self._find_ardupilot()
+            self._send(self._origin)
         attitude = (0.0, 0.0, 0.0) if pose.attitude is None else euler_from_quaternion(pose.attitude)
         variances = (*pose.position_variance_m2, *pose.attitude_variance_rad2)
-        self._link.send(
+        self._send(
             mavlink.MAVLink_vision_position_estimate_message(
                 *(pose.time_us, *pose.position_ned_m, *attitude),
                 _covariance(variances),
@@ -61,7 +69,22 @@ class PoseLink:
 
     def close(self) -> None:
         """Close the port."""
-        self._link.close()
+        self._socket.close()
+
+    def _find_ardupilot(self) -> None:
+        """Take its address from what has arrived."""
+        received: list[tuple[None, Address]] = []
+        for _ in range(_PACKETS_AT_ONCE):
+            if not self._socket.read() or self._socket.peer is None:
+                break
+            received.append((None, self._socket.peer))
+        self._sender.select(received)
+
+    def _send(self, message: Message) -> None:
+        """Send a message to ArduPilot; lost before anything was received."""
+        if self._sender.address is not None:
+            self._socket.write(message.pack(self._codec), self._sender.address)
+            self._codec.seq = (self._codec.seq + 1) % 256
 
 
 def _covariance(variances: tuple[float, ...]) -> tuple[float, ...]:

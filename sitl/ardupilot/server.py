@@ -8,15 +8,20 @@ from collections.abc import Callable
 
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
 from sitl.ardupilot.poses import POSE_PORT, PoseLink
+from sitl.ardupilot.relay import HEARTBEAT_S, RELAY_PORT, AppRelay
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.server import AutopilotServer
+from sitl.autopilots.sole_sender import SoleSender
+from sitl.server import Pacer
 from sitl.server_settings import ServerSettings
-from sitl.time_grants import TimeGrants
+from sitl.time_grants import FREE_US, TimeGrants
 from wire.transports.sockets import Address, UdpSocket, bind_udp
 
 _SILENCE_S = 2.0  # wall time without a frame that is reported
 _LOST_S = 0.5  # wall time after which an answer to a frame that is repeated was lost
+_GONE_S = 3.5  # wall time without a frame after which another is accepted; it repeats one each 1.1 s
+_PACKETS_AT_ONCE = 200
 
 
 class FrameExchange:
@@ -97,6 +102,10 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         self.exchange = FrameExchange(self._simulation)
         self._link: UdpSocket | None = None
         self._poses: PoseLink | None = None
+        self._relay: AppRelay | None = None  # with a program that grants time
+        self._pacer: Pacer | None = None  # until that has granted time
+        self._pace = 0.0  # simulated seconds a second of the pacer
+        self._sender = SoleSender("ArduPilot", self._port, notice, _GONE_S)
         self._waiting: tuple[ServoFrame, Address] | None = None  # the last frame and its sender
         self._frame_s = 0.0  # wall time of the last frame
         self._connected = asyncio.Event()
@@ -109,11 +118,19 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         self._link = bind_udp((bind, self._port), "choose another --instance")
         if self._simulation.sends_poses:
             port, place = POSE_PORT + PORTS_AN_INSTANCE * instance, self._simulation.place
-            self._poses = PoseLink(bind, port, instance + 1, place)
+            self._poses = PoseLink(bind, port, instance + 1, place, self._notice)
+        app = self._settings.onboard.remote
+        if self._grants is not None and app is not None:
+            port = RELAY_PORT + PORTS_AN_INSTANCE * instance
+            listening = bind_udp((bind, port), "choose another --instance")
+            sender = SoleSender("ArduPilot", port, self._notice)
+            self._relay = AppRelay(listening, app, sender, instance + 1)
 
     def _close(self) -> None:
         if self._poses is not None:
             self._poses.close()
+        if self._relay is not None:
+            self._relay.close()
         if self._link is not None:
             self._link.close()
 
@@ -124,6 +141,8 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         loop.add_reader(link, self._receive)
         tasks = [asyncio.ensure_future(self._failed), asyncio.create_task(self._watch())]
         tasks.append(asyncio.create_task(self._run_process()))
+        if self._relay is not None:
+            tasks.append(asyncio.create_task(self._serve_relay(self._relay)))
         try:
             await asyncio.gather(*tasks)
         finally:
@@ -134,43 +153,61 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
+    async def _serve_relay(self, relay: AppRelay) -> None:
+        """Pass on what arrives there, until cancelled."""
+        loop = asyncio.get_running_loop()
+        loop.add_reader(relay.ardupilot, relay.from_ardupilot)
+        loop.add_reader(relay.app, relay.from_app)
+        try:
+            while True:
+                if not self._is_starting:
+                    relay.send_heartbeat()
+                await asyncio.sleep(HEARTBEAT_S)
+        finally:
+            loop.remove_reader(relay.ardupilot)
+            loop.remove_reader(relay.app)
+
     @property
     def _port(self) -> int:
         return FIRST_PORT + PORTS_AN_INSTANCE * self._settings.instance
 
     def _receive(self) -> None:
-        """Answer the newest frame that has arrived, as soon as time is granted."""
-        link = self._link
+        """Answer ArduPilot's newest frame that has arrived, as soon as time is granted."""
+        link, before = self._link, self._sender.address
         assert link is not None, "it was opened"
-        newest: tuple[ServoFrame, Address] | None = None
-        while packet := link.read():
+        received: list[tuple[ServoFrame, Address]] = []
+        for _ in range(_PACKETS_AT_ONCE):
+            if not (packet := link.read()):
+                break
             frame = decode_frame(packet)
             if frame is not None and link.peer is not None:
-                newest = frame, link.peer
-        if newest is None or self._is_falling:
+                received.append((frame, link.peer))
+        if self._is_falling or not (frames := self._sender.select(received)):
             return
-        self._waiting, self._frame_s = newest, time.monotonic()
+        assert self._sender.address is not None, "it has sent frames"
+        self._waiting, self._frame_s = (frames[-1], self._sender.address), time.monotonic()
         if not self._connected.is_set():
             self._connected.set()
             self._notice("ArduPilot is connected")
-        if self._holding is not None:
-            return
         try:
-            self._take(newest[0])
+            self._take(frames[-1], is_other=before not in (None, self._sender.address))
         except Exception as error:  # it would be lost in the event loop
             self._fail(error)
 
-    def _take(self, frame: ServoFrame) -> None:
-        if self.exchange.is_restart(frame):
+    def _take(self, frame: ServoFrame, *, is_other: bool) -> None:
+        if is_other or self.exchange.is_restart(frame):
             self._restart()
+        if self._holding is not None:
+            return
         simulation = self._simulation
-        is_due = simulation.time_us > self._until_us and simulation.is_at_control_tick
-        if is_due and self.exchange.is_new(frame):
+        is_held = simulation.time_us > self._until_us or self._is_starting or not self._video_is_open.is_set()
+        if is_held and simulation.is_at_control_tick and self.exchange.is_new(frame):
             self._holding = asyncio.create_task(self._answer_when_granted())
         else:
-            self._answer()
+            self._answer(holds=self._until_us == FREE_US)
 
-    def _answer(self) -> None:
+    def _answer(self, *, holds: bool) -> None:
+        """Answer the last frame; what the app has sent goes on when time held, or is not granted."""
         assert self._waiting is not None
         assert self._link is not None
         frame, peer = self._waiting
@@ -180,16 +217,34 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
             return
         if is_new and simulation.pose is not None and self._poses is not None:
             self._poses.send(simulation.pose)  # before the answer that lets ArduPilot's time advance
+        if holds and self._relay is not None:
+            self._relay.flush()
         self._link.write(line, peer)
         if is_new and simulation.is_at_control_tick:
             self._video.step()  # while ArduPilot computes
 
+    @property
+    def _is_starting(self) -> bool:
+        """Whether a program will grant time, and has not yet."""
+        return self._grants is not None and not self._grants.used
+
+    async def _keep_pace(self) -> None:
+        """Wait until a step is due while the autopilot starts."""
+        time_us, now_s, pace = self._simulation.time_us, time.monotonic(), self._starting_speed()
+        if self._pacer is None or pace != self._pace:
+            self._pacer, self._pace = Pacer(pace, now_s, time_us), pace
+        self._pacer.give_up_lag(now_s, time_us)
+        await asyncio.sleep(self._pacer.wait_s(now_s, time_us))
+
     async def _answer_when_granted(self) -> None:
         try:
+            await self._video_is_open.wait()
+            if self._is_starting:
+                await self._keep_pace()
             while self._simulation.time_us > self._until_us:
                 await self._hold()
             self._holding = None
-            self._answer()
+            self._answer(holds=True)
         except Exception as error:  # nobody waits for this task
             self._fail(error)
 
@@ -199,7 +254,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
             self._failed.set_exception(error)
 
     def _restart(self) -> None:
-        reason = "ArduPilot counts its frames from zero again"
+        reason = "ArduPilot has started again"
         if self._grants is not None:
             at_s = self._simulation.time_us / 1e6
             raise AutopilotEndedError(f"{reason} at {at_s:.1f} s of simulated time")
@@ -249,12 +304,17 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
             if not self._connected.is_set():
                 raise AutopilotEndedError(f"{reason} (its output: {process.log})")
             self._connected.clear()
+            self._sender.forget()
+            if self._holding is not None:  # a frame that need not be answered any more
+                self._holding.cancel()
+                self._holding = None
             self._is_falling = True
             await self._end_try(reason)
             self._is_falling = False
 
     async def _open_grants(self) -> None:
-        """Once ArduPilot is connected, let the program that started this one grant time."""
+        """Once ArduPilot and video are connected, let the program that started this one grant time."""
         await self._connected.wait()
+        await self._video_is_open.wait()
         if self._grants is not None:
             await self._grants.open()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ctypes
+import hashlib
 import os
 import signal
 import sys
@@ -129,6 +130,12 @@ class AutopilotProcess(ABC):
             if lines:
                 return f": {(errors or lines)[-1]}"
         return ""
+
+
+def version_of(name: str, program: Path) -> str:
+    """An autopilot and the hash of its program, which differs between builds."""
+    with program.open("rb") as file:
+        return f"{name} {hashlib.file_digest(file, 'sha256').hexdigest()[:12]}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import asyncio
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.server import BURST_TICKS, Pacer
@@ -18,6 +18,8 @@ from sitl.world import CONTROL_PERIOD_US
 
 FALL_US = 3_000_000
 """For which a drone without its autopilot is simulated on."""
+_READY_US = 7_000_000  # by which the autopilot can be prepared for its flight
+_WAITING_SPEED = 0.2  # simulated seconds a second; a heartbeat still comes every 5 s
 
 V = TypeVar("V", bound=SimulatedVehicle)
 
@@ -37,9 +39,6 @@ class AutopilotServer(ABC, Generic[V]):
             the server.
     """
 
-    SETPOINT_S: ClassVar[float] = 0.002
-    """Wall time in which it takes a setpoint that was sent before time was granted."""
-
     def __init__(
         self,
         new_simulation: Callable[[], V],
@@ -52,6 +51,7 @@ class AutopilotServer(ABC, Generic[V]):
         self._settings, self._autopilot, self._notice, self._grants = settings, start, notice, grants
         self._simulation = self._new()
         self._video = DroneVideo(self._simulation, settings)
+        self._video_is_open = asyncio.Event()  # from then on time passes
 
     async def run(self) -> None:
         """Open the ports, then run until cancelled.
@@ -62,18 +62,27 @@ class AutopilotServer(ABC, Generic[V]):
             SettingError: the autopilot cannot be started.
             AutopilotEndedError: it ended soon after its start, or time is granted by another program.
         """
+        tasks: list[asyncio.Task[None]] = []
         try:
             self._open()
-            await self._video.open()
-            self._notice(self._greeting())
-            await self._serve()
+            tasks = [asyncio.create_task(work) for work in (self._open_video(), self._serve())]
+            await asyncio.gather(*tasks)
         finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
             self._close()
             if self._autopilot.process is not None:
                 await self._autopilot.process.stop()
             if self._grants is not None:
                 await self._grants.close()
             await self._video.close()
+
+    async def _open_video(self) -> None:
+        """Open the video, which takes long, while the autopilot starts and connects."""
+        await self._video.open()
+        self._notice(self._greeting())
+        self._video_is_open.set()
 
     @abstractmethod
     def _open(self) -> None:
@@ -143,5 +152,12 @@ class AutopilotServer(ABC, Generic[V]):
         assert grants is not None, "time is granted"
         held_us = self._simulation.time_us - CONTROL_PERIOD_US
         await grants.hold(held_us, self._video.image_us, lambda: grants.setpoint)
-        if grants.setpoint is not None:
-            await asyncio.sleep(self.SETPOINT_S)
+
+    def _starting_speed(self) -> float:
+        """Simulated seconds a second until a program grants time: at most real time.
+
+        When the autopilot can be armed, time passes slowly, because that program begins its flight at a
+        whole multiple of ten seconds.
+        """
+        speed = 1.0 if self._simulation.time_us < _READY_US else _WAITING_SPEED
+        return min(speed, self._settings.speed)

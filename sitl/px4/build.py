@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import sys
 from collections.abc import Mapping
@@ -48,16 +47,6 @@ def _processor(instance: int) -> int | None:
         return None
     allowed = sorted(os.sched_getaffinity(0))
     return allowed[-1 - instance % len(allowed)]
-
-
-def version_of(folder: Path) -> str:
-    """PX4 and the hash of its program, which differs between builds.
-
-    Raises:
-        SettingError: there is no PX4.
-    """
-    with (find_build(folder) / "bin" / "px4").open("rb") as program:
-        return f"PX4 {hashlib.file_digest(program, 'sha256').hexdigest()[:12]}"
 
 
 class Px4Process(AutopilotProcess):

@@ -23,8 +23,6 @@ _OWN_TIME = ("commander", "mavlink_if1")
 _IDLE_S = 0.1  # wall time for which a step waits until PX4's threads have done their work
 _FIRST_S = 0.3  # wall time in which its start-up script comes to waiting for them
 _IDLE_START_S = 2.0  # likewise, while it starts
-_READY_US = 7_000_000  # by which PX4 can be armed
-_WAITING_SPEED = 0.2  # simulated seconds a second; a heartbeat still comes every 5 s
 _ENDING_S = 1.0  # wall time in which a PX4 that has closed the connection ends
 
 
@@ -41,8 +39,6 @@ class Px4Server(AutopilotServer[Px4Simulation]):
     Attributes:
         link: to PX4; None before `run`.
     """
-
-    SETPOINT_S = 0.0  # the app waits until PX4 has taken it
 
     def __init__(
         self,
@@ -77,6 +73,7 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         while True:
             await self._start(link)
             self._notice("PX4 is connected")
+            await self._video_is_open.wait()
             with contextlib.suppress(Px4GoneError):
                 await self._run_paced(link)
             link.drop()
@@ -143,15 +140,10 @@ class Px4Server(AutopilotServer[Px4Simulation]):
             await asyncio.sleep(pacer.wait_s(now_s, simulation.time_us + CONTROL_PERIOD_US))
 
     def _wanted_speed(self, *, opened: bool) -> float:
-        """Simulated seconds a second: real time while PX4 starts, and until a program grants time.
-
-        When PX4 can be armed, time passes slowly until then, because that program begins its flight at a
-        whole multiple of ten seconds.
-        """
-        speed, grants = self._settings.speed, self._grants
-        if opened and (grants is None or grants.used):
-            return speed
-        return min(1.0 if self._simulation.time_us < _READY_US else _WAITING_SPEED, speed)
+        """Simulated seconds a second, also while PX4 starts."""
+        grants = self._grants
+        is_free = opened and (grants is None or grants.used)
+        return self._settings.speed if is_free else self._starting_speed()
 
     def _has_started(self, link: Px4Link) -> bool:
         return link.in_lockstep and not (self._idle is not None and self._idle.starting)

@@ -20,7 +20,7 @@ from math import inf, isfinite
 
 from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
-from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from framerunner.flying.plan import FlightPlan
 from monitor.ports import Equipment
 from scenarios.loader import list_scenarios, load_scenario

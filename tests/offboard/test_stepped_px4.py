@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from offboard.drone import DroneError, VelocityCommand
-from offboard.link import stepped_px4
+from offboard.link import stepped, stepped_px4
 from offboard.link.direct import CommandRefusedError
 from offboard.link.stepped_px4 import SteppedPx4Dialect
 from wire.dialect import mavlink
@@ -93,7 +93,7 @@ async def test_a_refusal_is_named(plugin, dialect):
 
 
 async def test_px4_that_stands_still_is_waited_for(plugin, dialect, monkeypatch):
-    monkeypatch.setattr(stepped_px4, "_ECHO_AGAIN_S", 0.02)
+    monkeypatch.setattr(stepped, "_ECHO_AGAIN_S", 0.02)
     plugin.deaf = True
     waiting = asyncio.create_task(dialect.before_tick())
     await asyncio.sleep(0.1)
@@ -103,8 +103,8 @@ async def test_px4_that_stands_still_is_waited_for(plugin, dialect, monkeypatch)
 
 
 async def test_px4_that_never_answers_is_an_error(plugin, dialect, monkeypatch):
-    monkeypatch.setattr(stepped_px4, "_ECHO_AGAIN_S", 0.02)
-    monkeypatch.setattr(stepped_px4, "ECHO_LIMIT_S", 0.05)
+    monkeypatch.setattr(stepped, "_ECHO_AGAIN_S", 0.02)
+    monkeypatch.setattr(stepped, "ECHO_LIMIT_S", 0.05)
     plugin.deaf = True
     with pytest.raises(DroneError, match="PX4 has not returned a PING"):
         await dialect.before_tick()

@@ -5,7 +5,7 @@ import pytest
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from firmware_py.types import GeodeticPoint
 from sitl.link_hub import LinkInput
 from wire.dialect import mavlink

@@ -9,7 +9,7 @@ from math import nan
 import pytest
 
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.telemetry.streams import ONBOARD
+from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 from tests.node_input import deliver

@@ -4,7 +4,7 @@ from math import inf
 
 import pytest
 
-from firmware_py.mavlink.telemetry.streams import GROUND, NORMAL, ONBOARD
+from firmware_py.mavlink.telemetry.profiles import GROUND, NORMAL, ONBOARD
 from sitl.server_settings import parse_link
 from wire.transports.urls import LinkError
 

@@ -8,7 +8,7 @@ from firmware_py.airframe import Airframe, load_airframe
 from firmware_py.estimation.report import EstimatorReport
 from firmware_py.geodesy import LocalProjection, is_on_earth
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
-from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus

@@ -6,7 +6,7 @@ import pytest
 
 from firmware_py.estimation.report import Sensor
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
-from firmware_py.mavlink.telemetry.streams import ONBOARD
+from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.mavlink.time_sync import TimeSync
 from firmware_py.status import CommandResult, FlightMode
 from geometry.rotations import quaternion_from_yaw

@@ -3,7 +3,7 @@
 import pytest
 
 from firmware_py.mavlink.service import merged
-from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from tests.node_input import deliver
 from wire.dialect import mavlink
 

@@ -5,7 +5,7 @@ from hashlib import sha256
 
 import pytest
 
-from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from tests.node_input import deliver
 from wire.dialect import mavlink
 from wire.signing import Signing, SigningKey

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from firmware_py.mavlink.telemetry.streams import NORMAL, ONBOARD
+from firmware_py.mavlink.telemetry.profiles import NORMAL, ONBOARD
 from wire.dialect import mavlink
 
 BYTES_S = 2880.0  # half of 57600 baud

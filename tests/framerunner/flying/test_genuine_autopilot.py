@@ -35,10 +35,11 @@ def test_that_px4_may_not_use_real_time_priorities_is_said_once(px4, allowed, ca
     assert capsys.readouterr().err.count("may not use real-time priorities") == (not allowed)
 
 
-def test_only_px4_repeats_its_flights(monkeypatch):
-    monkeypatch.setattr(simulator_process, "may_use_real_time", lambda: True)
-    assert GenuineAutopilot("px4", Path()).repeats
-    assert not GenuineAutopilot("ardupilot", Path()).repeats
+@pytest.mark.parametrize("allowed", [True, False])
+def test_px4_alone_needs_real_time_priorities_to_repeat_its_flights(allowed, monkeypatch):
+    monkeypatch.setattr(simulator_process, "may_use_real_time", lambda: allowed)
+    assert GenuineAutopilot("px4", Path()).repeats == allowed
+    assert GenuineAutopilot("ardupilot", Path()).repeats
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="sets limits of Linux")

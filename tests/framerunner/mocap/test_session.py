@@ -6,7 +6,7 @@ from math import nan
 import pytest
 
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
-from firmware_py.mavlink.telemetry.streams import ONBOARD
+from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
 from framerunner.doctor.findings import Level

@@ -5,7 +5,7 @@ from __future__ import annotations
 from random import Random
 
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from sitl.simulation import Simulation
 from tests.node_input import deliver
 from wire.dialect import mavlink

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.telemetry.streams import GROUND
+from firmware_py.mavlink.telemetry.profiles import GROUND
 from framerunner.flying.plan import FlightPlan
 from framerunner.virtual_camera.camera import HELD_AFTER_FLIGHT_US, Placement, VirtualCamera
 from geometry.axes import Pose

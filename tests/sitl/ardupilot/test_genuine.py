@@ -30,6 +30,12 @@ def flown(seed, folder):
     return json.loads(file.read_text(encoding="utf-8"))
 
 
+def test_the_same_seed_is_the_same_flight(tmp_path):
+    first, again = (flown(3, tmp_path / name) for name in ("first", "again"))
+    assert first["verdict"] == again["verdict"]
+    assert first["try_time_s"] == pytest.approx(again["try_time_s"], abs=0.2)
+
+
 def test_test_case_1_is_completed_in_eight_of_ten_flights(tmp_path):
     verdicts = []
     for seed in range(FLIGHTS):

@@ -6,7 +6,7 @@ import signal
 import socket
 import sys
 import time
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from pathlib import Path
 
 import pytest
@@ -98,6 +98,35 @@ async def test_an_ardupilot_that_starts_again_gets_a_new_drone():
         assert any("a new drone is on the start" in line for line in lines)
 
 
+async def test_an_ardupilot_that_starts_again_at_another_port_gets_a_new_drone_at_once():
+    async with serving() as (fake, _lines, made):
+        for _ in range(20):
+            await asyncio.to_thread(fake.step, STILL)
+        fake.close()
+        with closing(FakeArduPilot(fake.place[1])) as another:
+            another.number = 30  # its first frames were lost
+            assert (await asyncio.to_thread(another.step, STILL))["timestamp"] == 0.002
+        assert len(made) == 2
+
+
+async def test_a_strangers_frames_change_nothing_and_are_reported_once():
+    async with serving() as (fake, lines, made):
+        await asyncio.to_thread(fake.step, STILL)
+        with closing(FakeArduPilot(fake.place[1])) as stranger:
+            for _ in range(20):
+                for number in (0, fake.number, 5000):
+                    stranger.send(CLIMB, number)
+                await asyncio.to_thread(fake.step, STILL)
+            stranger.socket.settimeout(0.05)
+            with pytest.raises(TimeoutError):
+                stranger.receive()
+        assert [answer["timestamp"] for answer in fake.answers] == [
+            round(0.002 * number, 6) for number in range(1, 22)
+        ]
+        assert len(made) == 1
+        assert sum("is ignored: ArduPilot at" in line for line in lines) == 1
+
+
 async def test_other_packets_are_ignored():
     async with serving() as (fake, _lines, _made):
         fake.socket.sendto(b"no frame", fake.place)
@@ -145,7 +174,7 @@ async def test_frames_wait_until_time_is_granted():
     assert (await asyncio.to_thread(fake.step, STILL))["timestamp"] == 0.028
     fake.number = 0
     fake.send(STILL)
-    with pytest.raises(AutopilotEndedError, match="counts its frames from zero again"):
+    with pytest.raises(AutopilotEndedError, match="has started again"):
         await task
     fake.close()
     writer.close()

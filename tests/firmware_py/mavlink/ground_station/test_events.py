@@ -14,7 +14,7 @@ from firmware_py.mavlink.ground_station.event_definitions import (
 )
 from firmware_py.mavlink.ground_station.metadata import EVENTS_FILE, ExtraFiles
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from firmware_py.status import FlightMode
 from wire.dialect import mavlink
 from wire.framing import PacketReader

@@ -7,7 +7,7 @@ import pytest
 from firmware_py.estimation.report import EstimatorReport, Ratios, Sensor
 from firmware_py.mavlink.ground_station.events import assess
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
-from firmware_py.mavlink.telemetry.streams import ONBOARD
+from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.measurements import BarometerSample, FixType, GpsSample, Readings
 from firmware_py.status import VehicleStatus
 from scenarios.loader import load_scenario

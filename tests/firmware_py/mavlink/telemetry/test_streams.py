@@ -7,8 +7,8 @@ import pytest
 from firmware_py.atmosphere import pressure_hpa, temperature_k
 from firmware_py.estimation.wind import WindEstimate
 from firmware_py.mavlink.node import MavlinkNode
+from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from firmware_py.mavlink.telemetry.sensing import EARTH_FIELD_NED_GAUSS, earth_field_frd_gauss
-from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from firmware_py.setpoints import AttitudeSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode, LandedState, VehicleStatus
 from firmware_py.types import (

@@ -1,4 +1,4 @@
-"""`framerunner evaluate --px4`: no PX4 is needed, its flights are lockstep flights here."""
+"""`framerunner evaluate` with genuine autopilots: none is needed, their flights are lockstep flights here."""
 
 import asyncio
 import json
@@ -12,9 +12,9 @@ import pytest
 
 from errors import SettingError
 from framerunner.cli import run
-from framerunner.evaluation import px4_flight, runner
+from framerunner.evaluation import genuine_flight, runner
+from framerunner.evaluation.genuine_flight import claimed_instance, interrupted_once
 from framerunner.evaluation.plan import plan_files
-from framerunner.evaluation.px4_flight import claimed_instance, interrupted_once
 from framerunner.flying.lockstep import fly_lockstep
 from offboard.mission import load_mission
 from scenarios.faults.parse import parse_fault
@@ -41,15 +41,15 @@ def px4():
 
 @pytest.fixture
 def flown(monkeypatch):
-    """Plans that were flown by "PX4"."""
+    """Plans that were flown by a "genuine" autopilot."""
     plans = []
 
     def fly(plan, use):
         plans.append((plan, use))
         flight = fly_lockstep(plan)
-        return replace(flight, result=flight.result.model_copy(update={"autopilot": "PX4"}))
+        return replace(flight, result=flight.result.model_copy(update={"autopilot": use.autopilot.title}))
 
-    monkeypatch.setattr(runner, "fly_with_px4", fly)
+    monkeypatch.setattr(runner, "fly_with_genuine", fly)
     return plans
 
 
@@ -77,6 +77,20 @@ def test_flights_are_kept_counted_and_continued_as_in_lockstep(px4, flown, capsy
     assert run(["evaluate", "mine", "--px4", str(px4), *out]) == 2
     assert "has an evaluation of autopilot PX4 " in capsys.readouterr().err
     assert run(["evaluate", "mine", *out]) == 2
+
+
+def test_ardupilot_flies_as_px4_does(flown, capsys):
+    program = Path("ardupilot/build/sitl/bin/arducopter")
+    program.parent.mkdir(parents=True)
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    write_scenarios(Path("mine"), seeds=(1,))
+    assert run(["evaluate", "mine", "--ardupilot", "ardupilot", "--speed", "5"]) == 0
+    assert "mine, flown by ArduPilot: explorer" in capsys.readouterr().out
+    ((plan, use),) = flown
+    assert (plan.scenario.sensors, use.autopilot.name, use.speed) == ("mocap", "ardupilot", 5.0)
+    (folder,) = Path("runs").iterdir()
+    assert folder.name.startswith("evaluate-mine-ardupilot-explorer-")
 
 
 def test_our_own_autopilots_evaluations_are_recognised_as_before():
@@ -112,10 +126,12 @@ def test_flights_with_faults_of_the_link_are_left_out(px4, flown, capsys):
     ("options", "message"),
     [
         (["--px4", "/no/px4"], "--px4 /no/px4: has no bin/px4"),
-        (["--speed", "2"], "--speed 2: is for flights with --px4"),
+        (["--speed", "2"], "--speed 2: is for flights with --px4 or --ardupilot"),
         (["--px4", "px4", "--response", "lag=0.5"], "--response lag=0.5: changes our autopilot's flights"),
         (["--px4", "px4", "--backend", "ray"], "--backend ray: PX4 is started on this machine"),
         (["--px4", "px4", "--jobs", "11"], "--jobs"),
+        (["--px4", "px4", "--ardupilot", "here"], "--ardupilot here: PX4 flies, by --px4 px4"),
+        (["--ardupilot", "/no/ardupilot"], "--ardupilot /no/ardupilot: has no arducopter"),
     ],
 )
 def test_options_that_do_not_go_together(px4, options, message, capsys):
@@ -124,15 +140,16 @@ def test_options_that_do_not_go_together(px4, options, message, capsys):
 
 
 def test_each_flight_at_once_has_an_instance_of_its_own(monkeypatch, tmp_path):
-    monkeypatch.setattr(px4_flight, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr(px4_flight, "INSTANCES", 3)
-    monkeypatch.setattr(px4_flight, "_TCP_PORTS", (24560,))
-    monkeypatch.setattr(px4_flight, "_UDP_PORTS", (24580,))
+    monkeypatch.setattr(genuine_flight, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(genuine_flight, "INSTANCES", 3)
+    monkeypatch.setattr(genuine_flight, "_TCP_PORTS", (24560,))
+    monkeypatch.setattr(genuine_flight, "_UDP_PORTS", (24580,))
+    monkeypatch.setattr(genuine_flight, "_ARDUPILOT_UDP_PORTS", ())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 24581))
         with claimed_instance() as first, claimed_instance() as second:
             assert (first, second) == (0, 2)
-            with pytest.raises(SettingError, match="all 3 instances of PX4 are in use"), claimed_instance():
+            with pytest.raises(SettingError, match="all 3 instances are in use"), claimed_instance():
                 pass
         with claimed_instance() as again:
             assert again == 0
@@ -158,14 +175,15 @@ def test_a_flight_that_is_interrupted_twice_still_ends_in_order():
 
 
 def test_a_lock_in_the_shared_folder_neither_changes_nor_waits_for_other_files(monkeypatch, tmp_path):
-    monkeypatch.setattr(px4_flight, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr(px4_flight, "INSTANCES", 3)
-    monkeypatch.setattr(px4_flight, "_TCP_PORTS", (24560,))
-    monkeypatch.setattr(px4_flight, "_UDP_PORTS", (24580,))
+    monkeypatch.setattr(genuine_flight, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(genuine_flight, "INSTANCES", 3)
+    monkeypatch.setattr(genuine_flight, "_TCP_PORTS", (24560,))
+    monkeypatch.setattr(genuine_flight, "_UDP_PORTS", (24580,))
+    monkeypatch.setattr(genuine_flight, "_ARDUPILOT_UDP_PORTS", ())
     valuable = tmp_path / "valuable"
     valuable.write_text("kept")
-    (tmp_path / "framerunner-px4-0.lock").symlink_to(valuable)
-    left = tmp_path / "framerunner-px4-1.lock"  # by an earlier flight of another user
+    (tmp_path / "framerunner-0.lock").symlink_to(valuable)
+    left = tmp_path / "framerunner-1.lock"  # by an earlier flight of another user
     left.write_text("theirs")
     left.chmod(0o444)
     with claimed_instance() as instance:
@@ -173,4 +191,4 @@ def test_a_lock_in_the_shared_folder_neither_changes_nor_waits_for_other_files(m
     assert (valuable.read_text(), left.read_text()) == ("kept", "theirs")
     with claimed_instance(), claimed_instance() as instance:
         assert instance == 2
-    assert (tmp_path / "framerunner-px4-2.lock").stat().st_mode & 0o777 == 0o644
+    assert (tmp_path / "framerunner-2.lock").stat().st_mode & 0o777 == 0o644

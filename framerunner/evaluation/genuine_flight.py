@@ -1,4 +1,4 @@
-"""A flight with a genuine PX4, for many of them: no display, no files, an instance of its own."""
+"""A flight with a genuine autopilot, for many of them: no display, no files, an instance of its own."""
 
 from __future__ import annotations
 
@@ -23,8 +23,11 @@ from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
 from framerunner.flying.simulator_process import GenuineAutopilot
 from framerunner.runs.recorder import RunRecords
 from framerunner.runs.run_folder import RunFolder
+from sitl.ardupilot import json_interface as ardupilot
+from sitl.ardupilot.poses import POSE_PORT
+from sitl.ardupilot.relay import RELAY_PORT
 from sitl.autopilots.own_folder import OwnFolder
-from sitl.px4.link import FIRST_PORT
+from sitl.px4 import link as px4
 from sitl.px4.side_link import CAMERA_PORT
 from sitl.server_settings import VIDEO_PORT
 from wire.transports.sockets import bind_udp, listen_tcp
@@ -33,36 +36,38 @@ from wire.transports.urls import LinkError
 T = TypeVar("T")
 
 INSTANCES = 10
-_TCP_PORTS = (FIRST_PORT, VIDEO_PORT)
+_TCP_PORTS = (px4.FIRST_PORT, VIDEO_PORT)
 _UDP_PORTS = (14540, 14580, 18570, CAMERA_PORT)  # of the app, and PX4's own
+_ARDUPILOT_UDP_PORTS = (ardupilot.FIRST_PORT, POSE_PORT, RELAY_PORT)
 
 
 @dataclass(frozen=True, slots=True)
-class Px4Use:
-    """By which PX4 flights are flown.
+class GenuineUse:
+    """By which flights with a genuine autopilot are flown.
 
     Attributes:
-        folder: of PX4 or its build.
+        autopilot: that flies, and where it was built.
         speed: simulated seconds a second, if the machine can.
     """
 
-    folder: Path
+    autopilot: GenuineAutopilot
     speed: float
 
 
-def fly_with_px4(plan: FlightPlan, use: Px4Use) -> FinishedFlight:
-    """Fly a plan with a PX4 and a simulator that are started for it and end with it.
+def fly_with_genuine(plan: FlightPlan, use: GenuineUse) -> FinishedFlight:
+    """Fly a plan with an autopilot and a simulator that are started for it and end with it.
 
     Raises:
         DroneError: the drone does not get ready.
-        SettingError: simulator or PX4 cannot be started, or have ended.
+        SettingError: simulator or autopilot cannot be started, or have ended.
         ValueError: the plan has no mission.
     """
     with claimed_instance() as instance, _temporary_folder() as out:
         folder = RunFolder(out, plan.scenario.name)
         folder.write_plan(plan.scenario, plan.chart)
-        px4 = GenuineAutopilot("px4", use.folder)
-        settings = RealTimeSettings(speed=use.speed, instance=instance, autopilot=px4, unattended=True)
+        settings = RealTimeSettings(
+            speed=use.speed, instance=instance, autopilot=use.autopilot, unattended=True
+        )
         return asyncio.run(interrupted_once(fly_in_real_time(plan, settings, RunRecords(folder, None), None)))
 
 
@@ -102,7 +107,7 @@ def claimed_instance() -> Iterator[int]:
     """
     for instance in range(INSTANCES):
         try:
-            lock = _open_lock(Path(gettempdir()) / f"framerunner-px4-{instance}.lock")
+            lock = _open_lock(Path(gettempdir()) / f"framerunner-{instance}.lock")
         except OSError:  # its name is taken by something else
             continue
         with lock:
@@ -114,7 +119,7 @@ def claimed_instance() -> Iterator[int]:
                 yield instance
                 return
     raise SettingError(
-        f"the ports of all {INSTANCES} instances of PX4 are in use; end other simulators, or use fewer --jobs"
+        f"the ports of all {INSTANCES} instances are in use; end other simulators, or use fewer --jobs"
     )
 
 
@@ -135,8 +140,10 @@ def _is_free(instance: int) -> bool:
     try:
         for port in _TCP_PORTS:
             listen_tcp(("127.0.0.1", port + instance)).close()
-        for port in _UDP_PORTS:
-            bind_udp(("127.0.0.1", port + instance), "").close()
+        shift = ardupilot.PORTS_AN_INSTANCE * instance
+        shifted = [port + shift for port in _ARDUPILOT_UDP_PORTS]
+        for port in (*(port + instance for port in _UDP_PORTS), *shifted):
+            bind_udp(("127.0.0.1", port), "").close()
     except LinkError:
         return False
     return True

@@ -1,0 +1,202 @@
+"""What dialects have in common in a simulation whose time waits for this app.
+
+MAVSDK repeats setpoints, and sends requests, on threads of its own, so it depends on the machine at which
+simulated time the autopilot gets them. Here everything is sent once, while time stands, and time goes on when
+the autopilot has it. So a flight in the same simulation is the same again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Awaitable
+from typing import Any, ClassVar
+
+from offboard.drone import DroneError, VelocityCommand
+from offboard.link.commands import synchronous
+from offboard.link.dialect import TickExchange
+from offboard.link.direct import CommandRefusedError, DirectMessages
+from wire.dialect import mavlink
+
+ECHO_LIMIT_S = 20.0  # wall time for the answer to a PING, on the busiest machine
+_ECHO_AGAIN_S = 0.5  # wall time after which another one is sent
+_ANSWER_LIMIT_S = 10.0  # wall time for the answer to a command
+_TURNS = 10  # of the event loop, in which what was received before an echo reaches who waits for it
+_FORCED = 21196.0  # disarming in the air
+
+
+class _Echo:
+    """PINGs that the vehicle returns in turn with the other messages that it receives and sends."""
+
+    def __init__(self, messages: DirectMessages, direct: Any, name: str) -> None:  # noqa: ANN401
+        self._messages, self._name = messages, name
+        self._loop = asyncio.get_running_loop()
+        self._sequence = 0
+        self._echo: asyncio.Future[None] | None = None
+        synchronous(direct).subscribe_message("PING", self._on_ping)
+
+    async def wait(self) -> None:
+        """Send a PING, and wait until it comes back."""
+        end_s = time.monotonic() + ECHO_LIMIT_S
+        self._sequence += 1
+        self._echo = echo = self._loop.create_future()
+        while not echo.done():
+            if time.monotonic() > end_s:
+                raise DroneError(f"link lost: {self._name} has not returned a PING for {ECHO_LIMIT_S:g} s")
+            self._messages.send_ping(self._sequence)
+            await asyncio.wait((echo,), timeout=_ECHO_AGAIN_S)
+
+    def _on_ping(self, message: Any, _user: object) -> None:  # noqa: ANN401
+        """On MAVSDK's thread. PX4 sends PINGs of its own, too, to nobody."""
+        fields = json.loads(message.fields_json)
+        if fields["target_system"]:
+            self._loop.call_soon_threadsafe(self._returned, fields["seq"])
+
+    def _returned(self, sequence: int) -> None:
+        if self._echo is not None and sequence == self._sequence and not self._echo.done():
+            self._echo.set_result(None)
+
+
+class _Requests:
+    """MAV_CMDs, whose answers are awaited while time goes on."""
+
+    def __init__(self, messages: DirectMessages, direct: Any) -> None:  # noqa: ANN401
+        self._messages = messages
+        self._loop = asyncio.get_running_loop()
+        self._answers: dict[int, asyncio.Future[int]] = {}  # by the number of the command
+        synchronous(direct).subscribe_message("COMMAND_ACK", self._on_answer)
+
+    def send(self, number: int, *parameters: float) -> Awaitable[None]:
+        """Send a command at once; what is returned waits for the answer, and raises `CommandRefusedError`."""
+        answer: asyncio.Future[int] = self._loop.create_future()
+        self._answers[number] = answer
+        self._messages.send_command(number, *parameters)
+        return _accepted(answer)
+
+    def _on_answer(self, message: Any, _user: object) -> None:  # noqa: ANN401
+        fields = json.loads(message.fields_json)
+        self._loop.call_soon_threadsafe(self._answered, fields["command"], fields["result"])
+
+    def _answered(self, number: int, result: int) -> None:
+        answer = self._answers.get(number)
+        if answer is not None and not answer.done() and result != mavlink.MAV_RESULT_IN_PROGRESS:
+            answer.set_result(result)
+
+
+class SteppedDialect(ABC):
+    """A vehicle, by MAVSDK's plugin `mavlink_direct`; see the module and `Dialect`.
+
+    Requests are sent when a method is called; what it returns waits for the answer.
+
+    Args:
+        direct: MAVSDK's asyncio plugin.
+        system_id: the vehicle's.
+    """
+
+    NAME: ClassVar[str]  # of the autopilot, for people
+    OFFBOARD: ClassVar[tuple[float, ...]]  # parameters of MAV_CMD_DO_SET_MODE
+    HOLD: ClassVar[tuple[float, ...]]
+    LAND: ClassVar[tuple[float, ...]]
+
+    def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
+        self.ended = False
+        self._messages = DirectMessages(direct, system_id)
+        self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
+        self._sent_since_tick = False
+        self._echo = _Echo(self._messages, direct, self.NAME)
+        self._requests = _Requests(self._messages, direct)
+
+    @property
+    def exchange(self) -> TickExchange:
+        """Itself."""
+        return self
+
+    async def before_tick(self) -> None:
+        """Wait until the vehicle has all that was sent; a velocity is sent again if there was no new one."""
+        if self._command is not None and not self._sent_since_tick:
+            self.send(self._command)
+        self._sent_since_tick = False
+        await self._until_taken()
+
+    async def after_tick(self) -> None:
+        """Wait until all that the vehicle has sent has been taken here."""
+        await self._echo.wait()
+        for _ in range(_TURNS):
+            await asyncio.sleep(0)
+
+    @abstractmethod
+    def request_streams(self) -> Awaitable[None]:
+        """Request what the vehicle does not send by itself, or too rarely."""
+
+    def send(self, command: VelocityCommand) -> None:
+        """Send a velocity; ignored after `end`."""
+        if not self.ended:
+            self._command, self._sent_since_tick = command, True
+            self._transmit(command)
+
+    def repeat(self) -> None:  # noqa: B027 - it is complete
+        """Nothing: `before_tick` does."""
+
+    def request_offboard(self) -> Awaitable[None]:
+        """Request the mode that follows setpoints."""
+        return self._set_mode(self.OFFBOARD)
+
+    def request_hold(self) -> Awaitable[None]:
+        """End the setpoints until the next one, and request hold."""
+        self._command = None
+        return self._set_mode(self.HOLD)
+
+    def request_hold_blocking(self) -> None:
+        """The same from a thread, which waits for the answer."""
+        self._command = None
+        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.HOLD)
+
+    def request_land_blocking(self) -> None:
+        """End the setpoints permanently and request landing, from a thread, which waits for the answer."""
+        self.end()
+        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.LAND)
+
+    def arm(self) -> Awaitable[None]:
+        """Arm."""
+        return self._request(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+
+    def kill(self) -> Awaitable[None]:
+        """Disarm at once, in the air too."""
+        self._command = None
+        return self._request(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, _FORCED)
+
+    def land(self) -> Awaitable[None]:
+        """Request landing where the vehicle is."""
+        self._command = None
+        return self._set_mode(self.LAND)
+
+    def end(self) -> None:
+        """End the setpoints permanently; from any thread."""
+        self.ended, self._command = True, None
+
+    async def _until_taken(self) -> None:
+        """Wait until the vehicle has all that was sent."""
+        await self._echo.wait()
+
+    def _transmit(self, command: VelocityCommand) -> None:
+        """Send a velocity now."""
+        self._messages.send_velocity(command)
+
+    def _set_mode(self, parameters: tuple[float, ...]) -> Awaitable[None]:
+        return self._request(mavlink.MAV_CMD_DO_SET_MODE, *parameters)
+
+    def _request(self, number: int, *parameters: float) -> Awaitable[None]:
+        return self._requests.send(number, *parameters)
+
+
+async def _accepted(answer: asyncio.Future[int]) -> None:
+    """Wait for an answer. Raises `CommandRefusedError` if it is another one than "accepted"."""
+    try:
+        async with asyncio.timeout(_ANSWER_LIMIT_S):
+            result = await answer
+    except TimeoutError:
+        raise CommandRefusedError("TIMEOUT") from None
+    if result != mavlink.MAV_RESULT_ACCEPTED:
+        raise CommandRefusedError.of(result)

@@ -1,0 +1,126 @@
+"""MAVLink between ArduPilot and the app whose flight it is, so that all comes at the same time again.
+
+ArduPilot reads one datagram of its MAVLink port in each run of its loop, so one that comes by wall time, such
+as a heartbeat, delays the setpoint behind it. Here all that the app sends while simulated time stands is one
+datagram, and what it sends later waits until time stands again.
+
+ArduPilot returns no PINGs, and its loop stands with time. They are returned here: then all that the app has
+sent before is here, and the app has all that ArduPilot has sent before.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from sitl.autopilots.sole_sender import SoleSender
+from wire.dialect import Message, mavlink
+from wire.framing import HEADER_BYTES_V2, MARKER_V1, MARKER_V2, PacketReader
+from wire.transports.sockets import Address, UdpSocket, connect_udp
+
+HEARTBEAT_S = 1.0
+RELAY_PORT = 9007
+"""UDP port of instance 0, between those of the JSON interface."""
+_PACKETS_AT_ONCE = 200
+_ROOM_BYTES = 400  # of a datagram; ArduPilot's buffer is 512, and what exceeds it is lost
+_DATAGRAMS_AT_ONCE = 8  # ArduPilot's loop runs twelve times from one tick of the app to the next
+_COMPONENT_ID = int(mavlink.MAV_COMP_ID_UDP_BRIDGE)
+_PING = int(mavlink.MAVLINK_MSG_ID_PING)
+_FIRST = (
+    int(mavlink.MAVLINK_MSG_ID_COMMAND_LONG),
+    int(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED),
+)
+"""What flies the drone is before anything else."""
+
+
+class AppRelay:
+    """Passes datagrams on between ArduPilot and the app.
+
+    Args:
+        listening: where ArduPilot sends to.
+        app: where the app listens.
+        sender: selects ArduPilot's datagrams.
+        system_id: of the vehicle.
+    """
+
+    def __init__(self, listening: UdpSocket, app: Address, sender: SoleSender, system_id: int) -> None:
+        self.ardupilot, self.app = listening, connect_udp(app)
+        self._sender = sender
+        self._codec = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=_COMPONENT_ID)
+        self._reader = PacketReader()
+        self._first: deque[bytes] = deque()
+        self._others: deque[bytes] = deque()
+
+    def from_ardupilot(self) -> None:
+        """Pass on to the app what has arrived."""
+        received: list[tuple[bytes, Address]] = []
+        for _ in range(_PACKETS_AT_ONCE):
+            data = self.ardupilot.read()
+            if not data or self.ardupilot.peer is None:
+                break
+            received.append((data, self.ardupilot.peer))
+        for data in self._sender.select(received):
+            self.app.write(data)
+
+    def from_app(self) -> None:
+        """Keep what has arrived until `flush`; return PINGs."""
+        for _ in range(_PACKETS_AT_ONCE):
+            data = self.app.read()
+            if not data:
+                return
+            number = _message_id(data)
+            if number == _PING:
+                self._return(data)
+            else:
+                (self._first if number in _FIRST else self._others).append(data)
+
+    def send_heartbeat(self) -> None:
+        """Keep the app's MAVLink library from forgetting the relay; each `HEARTBEAT_S` of wall time.
+
+        It sends nothing to an address from which nothing has come for some seconds, as while time stands. Not
+        before it knows ArduPilot: it would send NaN in commands, as to PX4, and ArduPilot's simulation ends
+        with a floating point exception.
+        """
+        kind, none = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
+        self._tell(mavlink.MAVLink_heartbeat_message(kind, none, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
+
+    def flush(self) -> None:
+        """Send to ArduPilot what the app has sent, in few datagrams; it must have sent something before."""
+        address = self._sender.address
+        if address is None:
+            return
+        for _ in range(_DATAGRAMS_AT_ONCE):
+            if not (datagram := self._next_datagram()):
+                return
+            self.ardupilot.write(datagram, address)
+
+    def close(self) -> None:
+        """Close the sockets."""
+        self.ardupilot.close()
+        self.app.close()
+
+    def _next_datagram(self) -> bytes:
+        datagram = bytearray()
+        while queue := self._first or self._others:
+            if datagram and len(datagram) + len(queue[0]) > _ROOM_BYTES:
+                break
+            datagram += queue.popleft()
+        return bytes(datagram)
+
+    def _return(self, data: bytes) -> None:
+        self.from_ardupilot()  # what it has sent before
+        for message in self._reader.feed(data):
+            if message.get_type() == "PING" and message.target_system == 0:
+                sender = (message.get_srcSystem(), message.get_srcComponent())
+                self._tell(mavlink.MAVLink_ping_message(message.time_usec, message.seq, *sender))
+
+    def _tell(self, message: Message) -> None:
+        """Send a message of the relay to the app."""
+        self.app.write(message.pack(self._codec))
+        self._codec.seq = (self._codec.seq + 1) % 256
+
+
+def _message_id(packet: bytes) -> int | None:
+    """Of a packet's header; None: it is none."""
+    if len(packet) < HEADER_BYTES_V2 or packet[0] not in (MARKER_V1, MARKER_V2):
+        return None
+    return packet[5] if packet[0] == MARKER_V1 else int.from_bytes(packet[7:10], "little")

@@ -1,0 +1,87 @@
+"""Whose datagrams count on a UDP port that serves one program: the first sender's, until that has gone."""
+
+from __future__ import annotations
+
+import errno
+import socket
+import time
+from collections.abc import Callable, Sequence
+from math import inf
+from typing import TypeVar
+
+from wire.transports.sockets import Address
+
+T = TypeVar("T")
+
+
+class SoleSender:
+    """Selects what the connected program has sent; what others send is dropped, and reported once.
+
+    Another sender is connected when the port of the one before is closed, which is known at once on this
+    machine, or when that has been silent for too long.
+
+    Args:
+        name: of the program, for people.
+        port: that is served.
+        notice: called with a line for people about a sender that is not connected, once until another is.
+        silent_s: wall time of silence after which a sender has gone; infinite: its port must be closed.
+        clock: monotonic wall time, seconds.
+
+    Attributes:
+        address: of the connected sender; None: nobody is connected.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        port: int,
+        notice: Callable[[str], None],
+        silent_s: float = inf,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.address: Address | None = None
+        self._name, self._port, self._notice = name, port, notice
+        self._silent_s, self._clock = silent_s, clock
+        self._heard_s = 0.0
+        self._noticed = False
+
+    def select(self, received: Sequence[tuple[T, Address]]) -> list[T]:
+        """What the connected sender has sent, of all that has arrived since the last call, in order."""
+        if not received:
+            return []
+        if all(sender != self.address for _, sender in received) and self._has_gone():
+            self.address, self._noticed = received[0][1], False
+        selected = [item for item, sender in received if sender == self.address]
+        if selected:
+            self._heard_s = self._clock()
+        if len(selected) < len(received) and not self._noticed:
+            self._noticed = True
+            self._report(next(sender for _, sender in received if sender != self.address))
+        return selected
+
+    def forget(self) -> None:
+        """Nobody is connected from now on."""
+        self.address, self._noticed = None, False
+
+    def _report(self, other: Address) -> None:
+        connected = self.address
+        assert connected is not None, "there is another one"
+        self._notice(
+            f"what {other[0]}:{other[1]} sends to UDP {self._port} is ignored: {self._name} at "
+            f"{connected[0]}:{connected[1]} is connected; end one of the two, or choose another --instance"
+        )
+
+    def _has_gone(self) -> bool:
+        address = self.address
+        return address is None or self._clock() - self._heard_s > self._silent_s or _is_closed(address)
+
+
+def _is_closed(address: Address) -> bool:
+    """Whether no program of this machine has this UDP port; False for an address of another machine."""
+    family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
+    with socket.socket(family, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(address)
+        except OSError as error:
+            return error.errno not in (errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.EACCES)
+    return True
