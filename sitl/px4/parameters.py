@@ -29,7 +29,12 @@ _VELOCITY_CONTROL: dict[str, Value] = {
     "MPC_Z_VEL_I_ACC": 3.0,
     "MC_YAW_TQ_CUTOFF": 0.0,
 }
-"""For apps that command velocities; accelerations for velocities, so the same for all airframes."""
+"""For apps that command velocities; accelerations for velocities, so the same for all airframes.
+
+With a high P the response is nearly the same with and without drag, which may grow with the square of the
+speed. With a low I the rest takes several seconds, which the app tells from the lag; with a higher one the
+drone is pushed aside after a fast leg, and with a low P it swings.
+"""
 RC_PARAMETERS: dict[str, Value] = {
     "COM_RC_IN_MODE": 6,  # a ground station's sticks while it sends some, otherwise the transmitter
     "RC_CHAN_CNT": CHANNELS,

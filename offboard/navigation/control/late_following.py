@@ -21,6 +21,8 @@ MAX_BANDWIDTH_OF_ONE_PER_S = 2.4  # likewise of a vehicle with one short lag, at
 BANDWIDTH_OF_TWO_PER_S = 1.45  # likewise of a vehicle with two lags, at least
 MAX_BANDWIDTH_PER_S = 2.0
 BANDWIDTH_OF_SHARE_PER_S = 1.8  # in plan, of a vehicle whose slow part is known: less disturbs it
+CLIMB_GAIN_PER_S = 1.6  # safe with a dead time of half a second that is not predicted
+MAX_CLIMB_DAMPING = 0.8
 MAX_CORRECTION_M_S = 0.6
 RATE_CHANGE_PER_S = 1.2  # of the path's time: at the speed of crossings, that of a gentle stop
 RATE_S = 0.25  # time constant of that rate
@@ -102,8 +104,7 @@ class LateFollower:
         if response.share != 1.0:
             bandwidth_per_s = max(bandwidth_per_s, BANDWIDTH_OF_SHARE_PER_S)
         gains = _gains(response.level_lag_s, response.own_lag_s, bandwidth_per_s)
-        climb_bandwidth_per_s = _bandwidth(response.climb_dead_s, response.climb_lag_s)
-        climb_gains = _gains(response.climb_lag_s, bandwidth_per_s=climb_bandwidth_per_s)
+        climb_gains = _climb_gains(response.climb_lag_s)
         offset, correction = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
         for axis, wanted in enumerate((level, level, climb)):
             gain, damping, ease = gains if axis < 2 else climb_gains
@@ -203,6 +204,17 @@ def _bandwidth(dead_s: float, lag_s: float) -> float:
     What happens in its dead time is only predicted, so that counts twice.
     """
     return min(max(1.0 / (2.0 * dead_s + lag_s), BANDWIDTH_PER_S), MAX_BANDWIDTH_OF_ONE_PER_S)
+
+
+def _climb_gains(lag_s: float) -> tuple[float, float, float]:
+    """Those of `_gains` up and down, that close an offset at the same rate for nearly all lags.
+
+    A climb against drag looks like a longer lag, and a longer dead time, than the vehicle has.
+    """
+    if lag_s * CLIMB_GAIN_PER_S < 0.25:
+        return CLIMB_GAIN_PER_S, 0.0, 0.0
+    most_per_s = 0.5 * (1.0 + MAX_CLIMB_DAMPING) / lag_s
+    return _gains(lag_s, bandwidth_per_s=min(sqrt(CLIMB_GAIN_PER_S / lag_s), most_per_s))
 
 
 def rate_of(error_m: Vec3, velocity_m_s: Vec3) -> float:
