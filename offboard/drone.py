@@ -24,7 +24,7 @@ class ResponsePrior(Enum):
     UNKNOWN = "unknown"
     """It is another one: its motion must be predicted from its first commands on."""
     LATE = "late"
-    """Likewise, and it needs about a second for 1 m/s sideways, as PX4 does."""
+    """Likewise, and it needs about half a second for 1 m/s sideways, as PX4 with our parameters does."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,7 +35,7 @@ _KEPT = max(DEAD_STEPS) + _WINDOW + 1
 _MEMORY_S = 40.0
 _MAX_STEPS = 8  # after a longer gap everything but the estimate begins again
 _EXPECTED = ((3, 2), (1, 0), (1, 0))  # indices of dead time and lag, before there is evidence
-_EXPECTED_LATE = ((1, 5), (0, 1), (0, 0))  # likewise, of a vehicle with PX4: 1 m/s sideways takes it a second
+_EXPECTED_LATE = ((1, 2), (0, 1), (0, 0))  # likewise, of a PX4 with our parameters
 _MIN_ENERGY = (0.3, 0.2, 0.2)  # sums of squared changes (m/s, m/s, rad/s) that are evidence
 _BETTER = 0.7  # share of the present pair's error that another one must reach
 _LITTLE_ENERGY = 0.03  # is enough where a vehicle is known to be late, and a pair is
@@ -44,6 +44,7 @@ _CLEARLY_BETTER = 0.5  # likewise for axes that turn: those of vehicles that ans
 _LATE_S = (0.65, 0.36, 0.31)  # level, climb, yaw: beyond this in all a vehicle answers late
 _LATE_SHARE = 0.4  # of the error of the best pair that is not late: a late one must reach it
 _UNEXPLAINED = 0.06  # share of the changes that this best pair must leave unexplained
+_KNOWN_STEPS = 120  # after which a model of a late vehicle is kept near gates
 _SURE = 3  # choices in a row after which a vehicle is known to be late
 _DISTURBANCE_S = 0.4  # time constant of the estimate of what commands do not explain
 _LEADS = np.array((0.0, 0.0, 0.7))  # shares by which its change is expected to go on: heights wander slowly
@@ -134,6 +135,7 @@ class ResponseEstimate:
         self._errors = np.zeros(shape)
         self._energies = np.zeros(len(_GROUPS))
         self._late_choices = 0  # in a row
+        self._late_steps = 0  # in the air, since the vehicle counts as late
         self._others_before: tuple[object, ...] = (None, None, 1.0)  # what was chosen of the other models
         self._second = SecondLag(shape[:2], STEP_S, _WINDOW)
         self._slow = SlowShare(shape[:2], STEP_S, _WINDOW)
@@ -157,21 +159,23 @@ class ResponseEstimate:
     def _begin_with(self, prior: ResponsePrior) -> None:
         """Expect what is known of the vehicle before there is evidence."""
         self._prior = prior
+        self._stays_late = prior is not ResponsePrior.OWN
         if prior is ResponsePrior.LATE:
             self._chosen, self._turning = list(_EXPECTED_LATE), False
             self.response = self._as_response()
 
-    def update(self, state: DroneState, sent: VelocityCommand | None) -> None:
+    def update(self, state: DroneState, sent: VelocityCommand | None, *, near_gate: bool = False) -> None:
         """Add a tick.
 
         Args:
             state: of the drone now.
             sent: the command that it has had since the last tick; None if it had none, or it is not known.
+            near_gate: another model would disturb the flight now: one that is known for some time is kept.
         """
         if state.response_prior is not self._prior:
             self._begin_with(state.response_prior)
-        if self._prior is not ResponsePrior.OWN and not self.response.late:
-            self._stays_late, self.response = True, self._as_response()
+        if self._stays_late and not self.response.late:
+            self.response = self._as_response()
         now_s = state.time_us * 1e-6
         if sent is None or self._last_s is None or not 0.0 <= now_s - self._last_s <= _MAX_STEPS * STEP_S:
             self._restart()
@@ -187,6 +191,7 @@ class ResponseEstimate:
         moves = _measured(state, turn_rate)
         measured = np.array(moves)
         self._yaw = state.yaw
+        choose = not near_gate or self._late_steps < _KNOWN_STEPS
         compared = False
         for _ in range(steps):
             self._outputs = commanded + self._kept * (self._outputs - commanded)
@@ -197,19 +202,20 @@ class ResponseEstimate:
             if self.response.late:
                 self._second.update(self._first_lags(), measured[[_X, _Y]], self._yaw)
                 self._slow.update(commanded[[_X, _Y]], measured[[_X, _Y]])
+                self._late_steps += 0 if state.landed else 1
             self._airborne_steps = 0 if state.landed else self._airborne_steps + 1
             if self._airborne_steps > TAKE_OFF_STEPS:
                 self._uncompared += 1
                 # Windows that begin a step later hardly differ; only of a late vehicle all are needed.
                 if self.response.late or self._uncompared == _COMPARED_STEPS:
-                    self._compare(self._uncompared * STEP_S)
+                    self._compare(self._uncompared * STEP_S, choose=choose)
                     self._uncompared = 0
                     compared = True
-        if compared:
+        if compared and choose:
             self._choose()
         self._observe_disturbance((moves[_X], moves[_Y], moves[_UP]), steps)
 
-    def _compare(self, period_s: float) -> None:
+    def _compare(self, period_s: float, *, choose: bool) -> None:
         """Add the errors of all predictions of the change over the window; they count for a period."""
         if len(self._past) < _KEPT:
             return
@@ -223,9 +229,9 @@ class ResponseEstimate:
         self._energies += ((change * change) @ _MEMBERS) * period_s
         if self.response.late:
             one = float(squares[(*self._chosen[0], 1 if self._turning else 0)])
-            self._second.compare(change[[_X, _Y]], one)
+            self._second.compare(change[[_X, _Y]], one, choose=choose)
             changes = np.array([self._changes[-1 - dead][:, [_X, _Y]] for dead in DEAD_STEPS])
-            self._slow.compare(changes, change[[_X, _Y]], self._second.least_error)
+            self._slow.compare(changes, change[[_X, _Y]], self._second.least_error, choose=choose)
         else:
             self._second.restart()
             self._slow.restart()

@@ -85,13 +85,14 @@ class SlowShare:
         ).tolist()
         return x, y
 
-    def compare(self, changes: Array, change: Array, error_of_two_lags: float) -> None:
-        """Compare the changes over the window with the measured one; choose a pair and a share.
+    def compare(self, changes: Array, change: Array, error_of_two_lags: float, *, choose: bool) -> None:
+        """Compare the changes over the window with the measured one; maybe choose a pair and a share.
 
         Args:
             changes: of what the lags make of the commands, shape (dead times, lags, 2).
             change: of the measured velocity, shape (2,).
             error_of_two_lags: squared, of the best pair of two lags, with this class's memory.
+            choose: or keep what was chosen.
         """
         past = self._past
         if len(past) != past.maxlen:
@@ -103,7 +104,7 @@ class SlowShare:
         self._both = fade * self._both + made @ measured
         self._measured = fade * self._measured + float(measured @ measured)
         self._energy = fade * self._energy + float(change @ change) * self._step_s
-        if self._energy > _MIN_ENERGY:
+        if self._energy > _MIN_ENERGY and choose:
             self._choose(error_of_two_lags)
 
     def _choose(self, error_of_two_lags: float) -> None:

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
 from math import inf
 from typing import Any
 
-from mavsdk.asyncio import Autopilot, Vehicle
+from mavsdk.asyncio import Autopilot, MavsdkError, Vehicle
 from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.info import InfoAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 
-from offboard.drone import DroneError
+from offboard.drone import DroneError, ResponsePrior
 from offboard.link.ardupilot import ArduPilotDialect
 from offboard.link.dialect import Dialect, Px4Dialect
 from offboard.link.stepped_ardupilot import SteppedArduPilotDialect
 from offboard.link.stepped_px4 import SteppedPx4Dialect
 from offboard.link.telemetry import TelemetryFeed
+from wire.vehicle_identity import is_simulator
+
+_IDENTITY_TRIES = 15
+_IDENTITY_AGAIN_S = 0.2  # wall time; MAVSDK requests the identity itself when it finds a vehicle
 
 
 async def open_dialect(
@@ -46,6 +52,26 @@ async def open_dialect(
             return SteppedArduPilotDialect(direct, feed, system_id, room_above_m)
         return ArduPilotDialect(ActionAsync(system), direct, feed, system_id, room_above_m)
     action = ActionAsync(system)  # requests EXTENDED_SYS_STATE once a second, for the first dialect, too
+    system_id = await system.get_system_id()
     if stepped:
-        return SteppedPx4Dialect(direct, await system.get_system_id())
-    return Px4Dialect(OffboardAsync(system), action)
+        return SteppedPx4Dialect(direct, system_id)
+    own = await is_own_autopilot(InfoAsync(system), system_id)
+    prior = ResponsePrior.OWN if own else ResponsePrior.UNKNOWN
+    return Px4Dialect(OffboardAsync(system), action, prior)
+
+
+async def is_own_autopilot(info: Any, system_id: int) -> bool:  # noqa: ANN401
+    """Whether a vehicle says that it is framerunner's simulated drone, which presents itself as PX4.
+
+    Args:
+        info: MAVSDK's asyncio plugin.
+        system_id: the vehicle's.
+    """
+    for _ in range(_IDENTITY_TRIES):
+        try:
+            identification = await info.get_identification()
+        except MavsdkError:  # not received yet
+            await asyncio.sleep(_IDENTITY_AGAIN_S)
+        else:
+            return is_simulator(identification.legacy_uid, system_id)
+    return False

@@ -110,18 +110,29 @@ class Dialect(Protocol):
 
 
 class Px4Dialect(SetpointStream):
-    """PX4, by MAVSDK's plugins `offboard` and `action`."""
+    """PX4, by MAVSDK's plugins `offboard` and `action`.
+
+    Args:
+        offboard: the plugin.
+        action: likewise.
+        response_prior: framerunner's own autopilot presents itself as PX4, so it is not always PX4's.
+    """
 
     modes = PX4_MODES
     numbered_modes: Mapping[int, str] = MappingProxyType({})
-    response_prior = ResponsePrior.OWN  # framerunner's own autopilot presents itself as PX4
     checks_in_offboard = False
     ready_limit_s = 30.0
     exchange = None
 
-    def __init__(self, offboard: OffboardAsync, action: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
+    def __init__(
+        self,
+        offboard: OffboardAsync,
+        action: Any,  # noqa: ANN401 - MAVSDK is untyped
+        response_prior: ResponsePrior = ResponsePrior.OWN,
+    ) -> None:
         super().__init__(offboard)
         self._action = action
+        self.response_prior = response_prior
 
     async def request_streams(self) -> None:
         """Nothing: PX4 sends all streams by itself."""

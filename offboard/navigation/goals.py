@@ -18,6 +18,8 @@ VIEW_NEAR_M = 0.25  # half a frame's width, with a margin
 PRESENT_SHARE = 1.15
 """Of the crossing speed: a drone that is faster at the start of a path brakes to this before an opening."""
 LOOK_AGAIN_M = 1.0
+MIN_LATE = 0.6
+"""So gently, from 0 to 1, a vehicle that answers late is flown at least: its loops are not known exactly."""
 LOOK_BRAKING_M = 0.5
 
 
@@ -150,7 +152,7 @@ class FlightStyle:
 
     def adapted(self, response: Response) -> FlightStyle:
         """The style for a vehicle that answers late: gentler, the later it answers."""
-        late = min(max(response.level_s - 0.5, 0.0) / 0.5, 1.0)
+        late = min(max((response.level_s - 0.5) / 0.5, MIN_LATE), 1.0)
         return replace(
             self,
             lag_s=response.level_lags_s,

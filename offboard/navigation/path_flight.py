@@ -42,6 +42,7 @@ MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
 LOOKED_AT_RAD = 0.3
 LOOK_GAIN_PER_S = 2.0
 LOOK_RAD_S = 0.9
+KEEP_MODEL_S = (-0.5, 2.0)  # to a gate; in this time the model of a vehicle that answers late is kept
 
 
 class PathFlight:
@@ -75,7 +76,7 @@ class PathFlight:
 
     def learn(self, state: DroneState, sent: VelocityCommand | None) -> None:
         """How late the vehicle answers, from the command that it had since the last tick; call every tick."""
-        self._response.update(state, sent)
+        self._response.update(state, sent, near_gate=self._is_near_gate())
         response = self._response.response
         if not response.late:
             self._follower.observe(state, state.time_us * 1e-6, sent)
@@ -83,6 +84,13 @@ class PathFlight:
             self._follower.response = response
             self._style = self._usual_style.adapted(response) if response.late else self._usual_style
             self._planned_for = None
+
+    def _is_near_gate(self) -> bool:
+        """Whether the path crosses a gate so soon that another model of the vehicle would disturb that."""
+        if self.path is None:
+            return False
+        now_s, (first_s, last_s) = self._follower.progress_on(self.path), KEEP_MODEL_S
+        return any(first_s < crossing.time_s - now_s < last_s for crossing in self.path.crossings)
 
     def stop(self) -> None:
         """Leave the path."""

@@ -20,15 +20,21 @@ _YAW_BANDWIDTH_RAD_S = 12.0
 _YAW_INTEGRAL_SHARE = 0.5
 _VELOCITY_CONTROL: dict[str, Value] = {
     "MC_AIRMODE": 1,  # a drone with little hover thrust has little torque otherwise
-    "MC_ROLL_P": 8.0,
-    "MC_PITCH_P": 8.0,
-    "MPC_XY_VEL_P_ACC": 1.1,  # with PX4's default 1.8 the drone follows a velocity 0.7 s later
-    "MPC_XY_VEL_I_ACC": 1.3,
-    "MPC_XY_VEL_D_ACC": 0.2,
-    "MPC_Z_VEL_P_ACC": 8.0,
+    "MC_ROLL_P": 10.0,
+    "MC_PITCH_P": 10.0,
+    "MPC_XY_VEL_P_ACC": 5.0,
+    "MPC_XY_VEL_I_ACC": 1.0,
+    "MPC_XY_VEL_D_ACC": 0.5,
+    "MPC_Z_VEL_P_ACC": 12.0,
+    "MPC_Z_VEL_I_ACC": 3.0,
     "MC_YAW_TQ_CUTOFF": 0.0,
 }
-"""For apps that command velocities; accelerations for velocities, so the same for all airframes."""
+"""For apps that command velocities; accelerations for velocities, so the same for all airframes.
+
+With a high P the response is nearly the same with and without drag, which may grow with the square of the
+speed. With a low I the rest takes several seconds, which the app tells from the lag; with a higher one the
+drone is pushed aside after a fast leg, and with a low P it swings.
+"""
 RC_PARAMETERS: dict[str, Value] = {
     "COM_RC_IN_MODE": 6,  # a ground station's sticks while it sends some, otherwise the transmitter
     "RC_CHAN_CNT": CHANNELS,

@@ -131,18 +131,31 @@ def test_a_vehicle_that_answers_in_time_is_not_late():
     assert not estimate.response.late
 
 
-@pytest.mark.parametrize(("prior", "least_s"), [(ResponsePrior.LATE, 0.6), (ResponsePrior.UNKNOWN, 0.0)])
-def test_a_vehicle_that_is_known_to_be_another_is_late_from_the_first_tick_on(prior, least_s):
+@pytest.mark.parametrize(("prior", "level_s"), [(ResponsePrior.LATE, 0.45), (ResponsePrior.UNKNOWN, 0.65)])
+def test_a_vehicle_that_is_known_to_be_another_is_late_from_the_first_tick_on(prior, level_s):
     estimate = ResponseEstimate()
     estimate.update(Vehicle(0.05, 0.15, prior=prior).state, None)
     assert estimate.response.late
-    assert estimate.response.level_s > least_s
+    assert estimate.response.level_s == pytest.approx(level_s)
 
 
 def test_one_that_was_taken_for_late_and_is_not_is_known_after_some_seconds():
     response = learn(Vehicle(0.05, 0.15, prior=ResponsePrior.LATE)).response
     assert response.late  # its loops are not known, so its motion is still predicted
     assert response.level_dead_s + response.level_lag_s == pytest.approx(0.2)
+
+
+def test_near_a_gate_a_model_that_has_been_known_for_some_time_is_kept():
+    vehicle, estimate, sent = Vehicle(0.15, 0.3, prior=ResponsePrior.LATE), ResponseEstimate(), None
+    for tick in range(round(30.0 / STEP_S)):
+        time_s = tick * STEP_S
+        if time_s == 8.0:
+            vehicle.lag_s, known = 0.8, estimate.response
+        estimate.update(vehicle.state, sent, near_gate=8.0 <= time_s < 20.0)
+        assert not 8.0 <= time_s < 20.0 or estimate.response == known
+        sent = command_at(time_s)
+        vehicle.fly(sent)
+    assert estimate.response.level_s > known.level_s
 
 
 def test_slow_flight_shows_the_lag_of_a_vehicle_that_is_known_to_be_late():

@@ -16,12 +16,17 @@ from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path
 from offboard.response import Prediction, Response
 
-BANDWIDTH_PER_S = 1.2  # of the control
+BANDWIDTH_PER_S = 1.2  # of the control, at least
+MAX_BANDWIDTH_OF_ONE_PER_S = 2.4  # likewise of a vehicle with one short lag, at most
 BANDWIDTH_OF_TWO_PER_S = 1.45  # likewise of a vehicle with two lags, at least
 MAX_BANDWIDTH_PER_S = 2.0
 BANDWIDTH_OF_SHARE_PER_S = 1.8  # in plan, of a vehicle whose slow part is known: less disturbs it
+CLIMB_GAIN_PER_S = 1.6  # safe with a dead time of half a second that is not predicted
+MAX_CLIMB_DAMPING = 0.8
 MAX_CORRECTION_M_S = 0.6
 RATE_CHANGE_PER_S = 1.2  # of the path's time: at the speed of crossings, that of a gentle stop
+RATE_S = 0.25  # time constant of that rate
+RATE_CHANGE_PER_S2 = 6.0  # how fast its change may change: each jump of it is one of the command, by the lag
 WAIT_FROM_M = 0.1  # farther from the path, its time goes slower
 WAIT_ASIDE_M = 0.05  # or aside from it
 WAIT_M = 0.25  # beyond that, it stands still
@@ -61,9 +66,15 @@ class LateFollower:
 
     def advance(self, step_s: float, path: Path) -> None:
         """Go on along the path, by a tick."""
-        rate, most = self._pace[0], RATE_CHANGE_PER_S * step_s
-        change = min(max(self._wanted_rate - rate, -most), most)
-        self._pace = (rate + change, change / step_s if step_s > 0.0 else 0.0)
+        rate, before = self._pace
+        per_s = 0.0
+        if step_s > 0.0:
+            jump = RATE_CHANGE_PER_S2 * step_s
+            wanted = (self._wanted_rate - rate) / RATE_S
+            wanted = min(max(wanted, -RATE_CHANGE_PER_S), RATE_CHANGE_PER_S)
+            per_s = max(min(max(wanted, before - jump), before + jump), -rate / step_s)
+        change = per_s * step_s
+        self._pace = (rate + change, per_s)
         advance_s = min((rate + 0.5 * change) * step_s, path.duration_s - self.ahead_s)
         self.ahead_s += advance_s
         self._ticks.append((step_s, advance_s, self._pace))
@@ -89,11 +100,14 @@ class LateFollower:
         climb = self._reference(path, dead_s - response.climb_dead_s)
         turn = self._reference(path, dead_s - response.yaw_dead_s)
         now = (state.x, state.y, state.z)
-        bandwidth_per_s = BANDWIDTH_PER_S if response.share == 1.0 else BANDWIDTH_OF_SHARE_PER_S
+        bandwidth_per_s = _bandwidth(dead_s, response.level_lag_s)
+        if response.share != 1.0:
+            bandwidth_per_s = max(bandwidth_per_s, BANDWIDTH_OF_SHARE_PER_S)
         gains = _gains(response.level_lag_s, response.own_lag_s, bandwidth_per_s)
+        climb_gains = _climb_gains(response.climb_lag_s)
         offset, correction = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
         for axis, wanted in enumerate((level, level, climb)):
-            gain, damping, ease = gains if axis < 2 else _gains(response.climb_lag_s)
+            gain, damping, ease = gains if axis < 2 else climb_gains
             offset[axis] = wanted.position_m[axis] - now[axis] - prediction.moved_m[axis]
             correction[axis] = gain * offset[axis]
             correction[axis] += damping * (wanted.velocity_m_s[axis] - prediction.velocity_m_s[axis])
@@ -182,6 +196,25 @@ def _gains(
     if lag_s < slowest_s:
         return min(0.25 / lag_s, bandwidth_per_s), 0.0, 0.0
     return lag_s * bandwidth_per_s**2, 2.0 * lag_s * bandwidth_per_s - 1.0, 0.0
+
+
+def _bandwidth(dead_s: float, lag_s: float) -> float:
+    """That of the control of a vehicle with one lag: higher, the sooner it answers.
+
+    What happens in its dead time is only predicted, so that counts twice.
+    """
+    return min(max(1.0 / (2.0 * dead_s + lag_s), BANDWIDTH_PER_S), MAX_BANDWIDTH_OF_ONE_PER_S)
+
+
+def _climb_gains(lag_s: float) -> tuple[float, float, float]:
+    """Those of `_gains` up and down, that close an offset at the same rate for nearly all lags.
+
+    A climb against drag looks like a longer lag, and a longer dead time, than the vehicle has.
+    """
+    if lag_s * CLIMB_GAIN_PER_S < 0.25:
+        return CLIMB_GAIN_PER_S, 0.0, 0.0
+    most_per_s = 0.5 * (1.0 + MAX_CLIMB_DAMPING) / lag_s
+    return _gains(lag_s, bandwidth_per_s=min(sqrt(CLIMB_GAIN_PER_S / lag_s), most_per_s))
 
 
 def rate_of(error_m: Vec3, velocity_m_s: Vec3) -> float:

@@ -12,6 +12,7 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
 from offboard.drone import DroneState
 from offboard.mission import load_mission
+from offboard.navigation.control.late_following import RATE_CHANGE_PER_S2, LateFollower
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, style_of
 from offboard.navigation.path import Path
@@ -48,7 +49,7 @@ def test_vehicle_that_was_pushed_aside_before_a_gate_waits_and_goes_on_when_it_i
     follower, at_m, waited, pace = PathFollower(answers), start.position_m, 0, 1.0
     for tick in range(500):
         gate_s = path.crossings[0].time_s - follower.progress_s - follower.lead_s
-        pushed_m = 0.2 if 1.5 < gate_s < 2.0 and tick < 200 else 0.0
+        pushed_m = 0.2 if 1.2 < gate_s < 2.0 and tick < 200 else 0.0
         state = DroneState(tick * 50_000, at_m[0], at_m[1] + pushed_m, at_m[2], 0.0, (0.0, 0.0, 0.0), False)
         motion = path.at(follower.progress_s + follower.lead_s)
         turned_rad = motion.yaw_rad - state.yaw
@@ -64,6 +65,32 @@ def test_vehicle_that_was_pushed_aside_before_a_gate_waits_and_goes_on_when_it_i
             break
     assert waited > 20
     assert follower.finished
+
+
+def test_the_pace_of_a_late_vehicle_changes_smoothly():
+    """A jump of its change would be one of the command: by the speed and the vehicle's lag."""
+    answers = Learnt(level_dead_s=0.15, level_tilt_s=0.0, level_lag_s=0.8, turning=False, late=True)
+    path = plan(
+        Motion((-3.0, 0.0, 1.0)),
+        [Point((3.0, 0.0, 1.0))],
+        obstacles=Obstacles(),
+        arena=Arena(),
+        style=CONTEST.adapted(answers),
+    )
+    assert isinstance(path, Path)
+    follower, before = LateFollower(2.0, 0.0), 0.0
+    for tick in range(60):
+        motion = path.at(follower.ahead_s)
+        behind_m = 0.4 if tick % 20 < 10 else 0.0
+        x, y, z = motion.position_m
+        state = DroneState(tick * 50_000, x - behind_m, y, z, 0.0, motion.velocity_m_s, landed=False)
+        coming = Prediction((0.0, 0.0, 0.0), motion.velocity_m_s, (0.0, 0.0, 0.0), 0.0, 0.0)
+        follower.advance(0.05, path)
+        follower.command(path, state, coming, answers)
+        rate, change = follower.before(0.0)[1]
+        assert abs(change - before) <= RATE_CHANGE_PER_S2 * 0.05 + 1e-9
+        assert 0.0 <= rate <= 1.0 + 1e-9
+        before = change
 
 
 @pytest.mark.parametrize(("from_m", "least_m_s2", "most_m_s2"), [(1.4, 0.9, 1.6), (0.25, 0.2, 0.45)])
