@@ -152,18 +152,17 @@ class TelemetryFeed:
         self._taken = self.sample
         return True
 
-    def take_newest(self) -> Sample:
-        """The sample of the newest tick; `next_tick` waits for one after it."""
-        self._taken = self.sample
-        return self._taken
+    def take_samples(self) -> tuple[Sample, list[Sample]]:
+        """The newest tick's sample, after which `next_tick` waits for another, and those before it.
 
-    def take_samples(self) -> list[Sample]:
-        """Those of all ticks since the last call, oldest first; of many only the last `SAMPLES_KEPT`."""
+        Those since the last call, oldest first; of many only the last `SAMPLES_KEPT`.
+        """
+        newest = self._taken = self.sample
         samples = []
         with contextlib.suppress(IndexError):
             while True:
                 samples.append(self._samples.popleft())
-        return samples
+        return newest, [sample for sample in samples if sample.time_us < newest.time_us]
 
     async def tick(self, number: int, timeout_s: float) -> bool:
         """Wait for the tick of this number, or a later one; False after `timeout_s` of wall time."""

@@ -112,12 +112,12 @@ async def test_a_tick_that_comes_while_the_one_before_is_taken_is_given_once(fee
     attitude(feed, 1_050_000)
     asyncio.get_running_loop().call_soon(attitude, feed, 1_100_000)  # the task is woken, but has not run yet
     assert await waiting
-    assert feed.take_newest().time_us == 1_100_000
+    assert feed.take_samples()[0].time_us == 1_100_000
     assert not await feed.next_tick(0.01)
     attitude(feed, 1_150_000)
     assert await feed.next_tick(1.0)
     attitude(feed, 1_200_000)
-    assert feed.take_newest().time_us == 1_200_000
+    assert feed.take_samples()[0].time_us == 1_200_000
     assert not await feed.next_tick(0.01)
 
 
