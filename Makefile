@@ -19,7 +19,10 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
+# Only `test` has several targets made at once, those that do not disturb each other.
+ifndef AT_ONCE
 .NOTPARALLEL:
+endif
 
 .PHONY: help
 help: ## say what can be made
@@ -33,7 +36,24 @@ fly: $(VENV)/installed ## set up and fly test case 1; the result is left in runs
 setup: $(VENV)/installed-dev $(MAVPROXY_VENV)/installed ## set up for development, without running anything
 
 .PHONY: test
-test: setup lint web-check test-fast test-realtime ## set up, then run all checks and all tests
+test: test-set-up test-checks test-together test-front test-realtime-alone ## set up, then run all checks and all tests
+
+# What is made at once shows its output when it is complete.
+AT_ONCE_FLAGS = --output-sync=target -j2 AT_ONCE=yes
+
+.PHONY: test-set-up test-checks test-together test-collect
+test-set-up:
+	$(MAKE) $(AT_ONCE_FLAGS) setup web-check
+
+test-checks:
+	$(MAKE) $(AT_ONCE_FLAGS) lint test-collect
+
+test-together: # flights in real time use a third of two processors; one more process of tests gets what they leave
+	$(MAKE) $(AT_ONCE_FLAGS) test-realtime-shared test-core
+
+# Each worker of pytest reads all tests; once they have been read, what they are compiled to is stored.
+test-collect: $(VENV)/installed-dev
+	@out=$$($(BIN)/pytest --collect-only --quiet 2>&1) || { echo "$$out"; exit 1; }
 
 .PHONY: lint lint-code lint-format lint-types lint-rooms lint-web
 lint: lint-code lint-format lint-types lint-rooms lint-web ## ruff, mypy, the rules between the rooms; eslint and tsc
@@ -72,17 +92,27 @@ test-ardupilot: $(VENV)/installed-dev ## fly the challenge on a genuine ArduCopt
 
 .PHONY: test-fast
 test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
-	$(BIN)/pytest -n 3 --dist worksteal -m "not realtime"
+	$(FAST)
 
-.PHONY: test-realtime test-realtime-links test-realtime-pairs test-realtime-alone
-test-realtime: test-realtime-links test-realtime-pairs test-realtime-alone ## the tests that fly in real time
+# `test` runs them in two parts; those of the second use browsers and several processes.
+FAST = $(BIN)/pytest -n 3 --dist worksteal -m "not realtime"
+CORE = $(addprefix tests/,geometry wire scenarios firmware_py vision sitl offboard)
+
+.PHONY: test-core test-front
+test-core: $(VENV)/installed-dev
+	nice -n 15 $(BIN)/pytest -m "not realtime" $(CORE)
+
+test-front: $(VENV)/installed-dev
+	$(FAST) $(addprefix --ignore=,$(CORE))
+
+.PHONY: test-realtime test-realtime-shared test-realtime-alone
+test-realtime: test-realtime-shared test-realtime-alone ## the tests that fly in real time
 test-realtime-%: export FRAMERUNNER_MAVPROXY := $(abspath $(MAVPROXY_VENV)/bin/mavproxy.py)
 
-test-realtime-links: setup # these only wait
-	$(BIN)/pytest -n 6 -m "realtime and not alone" tests/offboard
-
-test-realtime-pairs: setup
-	$(BIN)/pytest -n 2 --dist loadfile -m "realtime and not alone" tests/realtime
+# Its workers have other ports than the three of test-fast.
+test-realtime-shared: export FRAMERUNNER_TEST_FIRST_WORKER := 3
+test-realtime-shared: setup
+	$(BIN)/pytest -n 3 --dist loadgroup -m "realtime and not alone" tests/offboard tests/realtime
 
 test-realtime-alone: setup
 	$(BIN)/pytest -m alone tests/realtime

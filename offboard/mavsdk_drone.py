@@ -412,8 +412,7 @@ class MavsdkDrone:
     def _newest_state(self) -> DroneState:
         """The state at the last tick; it holds those of the ticks that were skipped before it."""
         assert self._alignment is not None, "ready() comes first"
-        sample = self._feed.sample
-        missed = [before for before in self._feed.take_samples() if before.time_us < sample.time_us]
+        sample, missed = self._feed.take_samples()
         fixed = (self._feed, self._alignment, self._stream)
         return reported_state(sample, *fixed, tuple(reported_state(before, *fixed) for before in missed))
 

@@ -6,9 +6,15 @@ import os
 import socket
 from itertools import cycle
 
+
+def worker_number() -> int:
+    """The number of this process among all workers; a second run of pytest at the same time counts on."""
+    first = int(os.environ.get("FRAMERUNNER_TEST_FIRST_WORKER", "0"))
+    return first + int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+
+
 _SIZE = 500
-_WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-_FIRST = 21000 + _SIZE * (_WORKER % 9)  # parallel workers have ranges of their own
+_FIRST = 21000 + _SIZE * (worker_number() % 9)  # parallel workers have ranges of their own
 _candidates = cycle(range(_FIRST, _FIRST + _SIZE))
 
 

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+
+from tests.free_ports import worker_number
 
 ROOT = Path(__file__).parents[1]
 UDP_PORTS = (14540, 14550, 14580, 18570, 14030, 14280)
 HTTP_PORT = 8100
+RESERVED_S = 20.0
+_RESERVATIONS = Path(tempfile.gettempdir(), f"framerunner-tests-{os.getuid()}")
 
 
 def bound(port: int, kind: socket.SocketKind = socket.SOCK_DGRAM) -> socket.socket:
@@ -45,13 +51,34 @@ def ports_are_free(instance: int) -> bool:
 
 
 def free_instance(count: int = 1) -> int:
-    """The first of some instances whose ports nobody has; two parallel workers begin at 1 and at 5."""
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-    for offset in range(9):
-        instance = (4 * worker + offset) % 9 + 1
-        if instance + count <= 10 and all(ports_are_free(instance + number) for number in range(count)):
-            return instance
+    """The first of some instances whose ports nobody has; parallel workers begin at different ones.
+
+    For some seconds, until their ports are open, no other process of tests gets them.
+    """
+    _RESERVATIONS.mkdir(exist_ok=True)
+    end_s = time.monotonic() + 60.0
+    while time.monotonic() < end_s:
+        with (_RESERVATIONS / "lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            for offset in range(9):
+                first = (4 * worker_number() + offset) % 9 + 1
+                instances = range(first, first + count)
+                if instances[-1] <= 9 and all(map(_is_available, instances)):
+                    for instance in instances:
+                        (_RESERVATIONS / str(instance)).write_text(str(os.getpid()), encoding="ascii")
+                    return first
+        time.sleep(0.5)
     raise RuntimeError("no instance of 1 to 9 has all its ports free")
+
+
+def _is_available(instance: int) -> bool:
+    """Whether an instance's ports are free and no other process has reserved them lately."""
+    note = _RESERVATIONS / str(instance)
+    with suppress(FileNotFoundError):
+        age_s = time.time() - note.stat().st_mtime
+        if age_s < RESERVED_S and note.read_text(encoding="ascii") != str(os.getpid()):
+            return False
+    return ports_are_free(instance)
 
 
 def wait_until(condition: Callable[[], object], limit_s: float) -> bool:

@@ -105,6 +105,7 @@ class TelemetryFeed:
         self._attitude_order = MessageOrder()
         self._position_order = MessageOrder()
         self._samples: deque[Sample] = deque(maxlen=SAMPLES_KEPT)
+        self._taken = self.sample  # what the waiting tasks have had; the next tick is another one
         self._loop: asyncio.AbstractEventLoop | None = None
         self._new_tick = asyncio.Event()
 
@@ -143,19 +144,25 @@ class TelemetryFeed:
             # Not wait_for: before Python 3.12 it loses a cancellation that arrives together with the tick,
             # and then a loop under a time limit never ends.
             async with asyncio.timeout(timeout_s):
-                await self._new_tick.wait()
+                while self.sample is self._taken:  # woken for a tick that was taken with the one before
+                    self._new_tick.clear()
+                    await self._new_tick.wait()
         except TimeoutError:
             return False
-        self._new_tick.clear()
+        self._taken = self.sample
         return True
 
-    def take_samples(self) -> list[Sample]:
-        """Those of all ticks since the last call, oldest first; of many only the last `SAMPLES_KEPT`."""
+    def take_samples(self) -> tuple[Sample, list[Sample]]:
+        """The newest tick's sample, after which `next_tick` waits for another, and those before it.
+
+        Those since the last call, oldest first; of many only the last `SAMPLES_KEPT`.
+        """
+        newest = self._taken = self.sample
         samples = []
         with contextlib.suppress(IndexError):
             while True:
                 samples.append(self._samples.popleft())
-        return samples
+        return newest, [sample for sample in samples if sample.time_us < newest.time_us]
 
     async def tick(self, number: int, timeout_s: float) -> bool:
         """Wait for the tick of this number, or a later one; False after `timeout_s` of wall time."""
@@ -164,6 +171,7 @@ class TelemetryFeed:
                 while self.tick_number < number:
                     self._new_tick.clear()
                     await self._new_tick.wait()
+        self._taken = self.sample
         return self.tick_number >= number
 
     def time_at_us(self, wall_s: float) -> int | None:
@@ -226,7 +234,6 @@ class TelemetryFeed:
         self.attitudes += 1
         tick = time_us // TICK_US
         if tick != self.tick_number:
-            self.tick_number = tick
             self.sample = Sample(
                 time_us,
                 self.yaw_ned_rad,
@@ -238,6 +245,7 @@ class TelemetryFeed:
                 self._gimbal.newest,
             )
             self._samples.append(self.sample)
+            self.tick_number = tick  # after its sample, for tasks that look at the number
             self._wake()
 
     def _on_position(self, message: Any, _user: object) -> None:  # noqa: ANN401

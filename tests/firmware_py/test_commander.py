@@ -129,16 +129,15 @@ def situations():
 SITUATIONS = situations()
 
 
-@pytest.mark.parametrize("event", COMMANDS)
 @pytest.mark.parametrize("state", State)
-def test_every_command_has_an_answer_in_every_state_and_situation(state, event):
-    for now in SITUATIONS:
+def test_every_command_has_an_answer_in_every_state_and_situation(state):
+    for event, now in product(COMMANDS, SITUATIONS):
         row = first_match(RULES[state, event], now)
-        assert row is not None
+        assert row is not None, event
         if row.result is not OK:
-            assert row.text, "a refusal says why"
-            assert row.target is None, "a refusal changes nothing"
-            assert row.intends is None, "a refusal changes nothing"
+            assert row.text, f"a refusal of {event} says why"
+            assert row.target is None, f"a refusal of {event} changes nothing"
+            assert row.intends is None, f"a refusal of {event} changes nothing"
 
 
 def test_every_row_of_the_table_is_reached():
@@ -209,34 +208,34 @@ def test_commands_in_flight(state, event, cell):
     assert row.target is (None if cell in "-!" else State(cell))
 
 
-@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("state", State)
-def test_every_mode_can_be_requested_in_every_state(state, mode):
-    row = first_match(RULES[state, MODE_EVENT[mode]], FLYING)
-    assert row is not None
-    if state is State.TERMINATED:
-        assert row.result is NO
-        return
-    assert (row.result, row.intends) == (OK, mode)
-    own = State(mode.name.lower())
-    stays = state is State.DISARMED or (state is own and own in GOES_ON)
-    assert row.target is (None if stays else own)
+def test_every_mode_can_be_requested_in_every_state(state):
+    for mode in MODES:
+        row = first_match(RULES[state, MODE_EVENT[mode]], FLYING)
+        assert row is not None, mode
+        if state is State.TERMINATED:
+            assert row.result is NO, mode
+            continue
+        assert (row.result, row.intends) == (OK, mode)
+        own = State(mode.name.lower())
+        stays = state is State.DISARMED or (state is own and own in GOES_ON)
+        assert row.target is (None if stays else own), mode
 
 
 @pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
-@pytest.mark.parametrize("mode", MODES)
-def test_a_mode_that_cannot_be_flown_is_refused_in_flight(state, mode):
+def test_a_mode_that_cannot_be_flown_is_refused_in_flight(state):
     blind = replace(FLYING, position_us=LONG_AGO, manual_us=NEVER_US, has_mission=False, setpoint_us=NEVER_US)
-    row = first_match(RULES[state, MODE_EVENT[mode]], blind)
-    assert row is not None
-    if mode is FlightMode.LAND:
-        assert row.target in {State.FAILSAFE_DESCEND, State.LAND, None}
-        assert row.result is OK
-    elif state is State.OFFBOARD and mode is FlightMode.OFFBOARD:
-        assert (row.result, row.target) == (OK, None)
-    else:
-        assert row.result is NO
-        assert row.text
+    for mode in MODES:
+        row = first_match(RULES[state, MODE_EVENT[mode]], blind)
+        assert row is not None, mode
+        if mode is FlightMode.LAND:
+            assert row.target in {State.FAILSAFE_DESCEND, State.LAND, None}
+            assert row.result is OK
+        elif state is State.OFFBOARD and mode is FlightMode.OFFBOARD:
+            assert (row.result, row.target) == (OK, None)
+        else:
+            assert row.result is NO, mode
+            assert row.text, mode
 
 
 @pytest.mark.parametrize("state", State)
@@ -286,16 +285,15 @@ def test_every_cause_has_every_reaction(cause, reaction):
     )
 
 
-@pytest.mark.parametrize("event", [CAUSE_EVENT[cause] for cause in Cause])
 @pytest.mark.parametrize("state", State)
-def test_a_failsafe_never_leads_back_to_a_milder_one(state, event):
-    for now in SITUATIONS:
+def test_a_failsafe_never_leads_back_to_a_milder_one(state):
+    for event, now in product([CAUSE_EVENT[cause] for cause in Cause], SITUATIONS):
         row = first_match(RULES[state, event], now)
-        assert row is not None
+        assert row is not None, event
         if row.target in SEVERITY and state in SEVERITY:
-            assert SEVERITY.index(row.target) >= SEVERITY.index(state)
+            assert SEVERITY.index(row.target) >= SEVERITY.index(state), event
         if state in {State.DISARMED, State.TERMINATED}:
-            assert row.target is None
+            assert row.target is None, event
 
 
 @pytest.mark.parametrize(

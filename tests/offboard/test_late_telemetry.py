@@ -69,12 +69,13 @@ async def test_the_samples_of_all_ticks_are_kept_until_they_are_taken():
     for ms in range(10_000, 10_220, 20):
         plugin.position(ms - 5, ms / 1000)
         plugin.attitude(ms)
-    taken = feed.take_samples()
+    newest, before = feed.take_samples()
+    taken = [*before, newest]
     assert [sample.time_us // 1000 for sample in taken] == [10_000, 10_060, 10_100, 10_160, 10_200]
     assert [sample.position_ned_m[0] for sample in taken] == [10.0, 10.06, 10.1, 10.16, 10.2]
-    assert feed.take_samples() == []
+    assert feed.take_samples() == (newest, [])
     for ms in range(11_000, 20_000, 50):
         plugin.attitude(ms)
-    taken = feed.take_samples()
-    assert (len(taken), taken[-1].time_us) == (SAMPLES_KEPT, 19_950_000)
+    newest, before = feed.take_samples()
+    assert (len(before) + 1, before[-1].time_us, newest.time_us) == (SAMPLES_KEPT, 19_900_000, 19_950_000)
     await asyncio.sleep(0)

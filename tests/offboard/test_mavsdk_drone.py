@@ -77,8 +77,9 @@ async def test_ticks_keep_to_vehicle_time_at_any_speed(speed):
             states = await take(drone.ticks(), 21)
     finally:
         vehicle.stop()
-    assert all(state.time_us % 50_000 == 0 for state in states)  # attitude comes every 10 ms here
-    assert all(later.time_us > earlier.time_us for earlier, later in pairwise(states))
+    # Attitude comes every 10 ms here; of a packet that a busy machine loses, the next one makes the tick.
+    assert sum(state.time_us % 50_000 == 0 for state in states) >= 16
+    assert all(later.time_us // 50_000 > earlier.time_us // 50_000 for earlier, later in pairwise(states))
 
 
 async def test_landing_waits_until_disarmed(vehicle):

@@ -106,14 +106,30 @@ async def test_time_that_does_not_wait_passes_ticks_over_and_counts_them_in_flig
     assert not await source.next(0.01, COMMAND)
 
 
+async def test_a_tick_that_comes_while_the_one_before_is_taken_is_given_once(feed):
+    waiting = asyncio.create_task(feed.next_tick(1.0))
+    await asyncio.sleep(0)
+    attitude(feed, 1_050_000)
+    asyncio.get_running_loop().call_soon(attitude, feed, 1_100_000)  # the task is woken, but has not run yet
+    assert await waiting
+    assert feed.take_samples()[0].time_us == 1_100_000
+    assert not await feed.next_tick(0.01)
+    attitude(feed, 1_150_000)
+    assert await feed.next_tick(1.0)
+    attitude(feed, 1_200_000)
+    assert feed.take_samples()[0].time_us == 1_200_000
+    assert not await feed.next_tick(0.01)
+
+
 async def test_a_cancellation_together_with_a_tick_is_not_lost():
     """Otherwise a wait under a time limit never ends when its end and a tick coincide."""
-    for turns in range(4):
+    for turns in range(5):
         feed = TelemetryFeed()
+        feed._loop = asyncio.get_running_loop()
         waiting = asyncio.create_task(feed.next_tick(5.0))
         await asyncio.sleep(0)
         await asyncio.sleep(0)
-        feed._new_tick.set()
+        attitude(feed, 50_000)
         for _ in range(turns):
             await asyncio.sleep(0)
         cancelled = waiting.cancel()

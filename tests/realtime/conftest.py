@@ -6,12 +6,20 @@ import asyncio
 import signal
 import time
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import pytest
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from pymavlink import mavutil
 
 from tests.processes import free_instance, simulator
+
+
+def pytest_collection_modifyitems(items):
+    """The tests of a file share a simulator, so one worker runs them, after each other."""
+    for item in items:
+        if item.path.parent == Path(__file__).parent:
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 
 @asynccontextmanager

@@ -164,12 +164,12 @@ def test_times_by_colour():
     assert RefereeReport.from_outside({**LOCKSTEP, "crossing_times_s": [1.0]}).times_s == {}
 
 
-@pytest.mark.parametrize("sign", "=+-@＝＋－＠﹦﹢﹣﹫")
 @pytest.mark.parametrize(
     "before", ["", " ", "\t", "\r", "\n", "\u00a0", "\u3000", "\u200b", "\ufeff", "\u2066"]
 )
-def test_what_a_spreadsheet_takes_for_a_formula_is_marked(before, sign):
-    assert spreadsheet_cell(f"{before}{sign}cmd|'/c calc'!A1") == f"'{before}{sign}cmd|'/c calc'!A1"
+def test_what_a_spreadsheet_takes_for_a_formula_is_marked(before):
+    for sign in "=+-@＝＋－＠﹦﹢﹣﹫":
+        assert spreadsheet_cell(f"{before}{sign}cmd|'/c calc'!A1") == f"'{before}{sign}cmd|'/c calc'!A1"
 
 
 @pytest.mark.parametrize(

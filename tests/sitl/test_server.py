@@ -151,12 +151,16 @@ async def test_time_runs_at_the_wanted_speed(speed):
     simulation = Simulation(load_scenario("empty"))
     async with serving(simulation, speed=speed) as (lines, _):
         await asyncio.sleep(0.3)
-        began_s, began_us = time.monotonic(), simulation.time_us
-        await asyncio.sleep(2.0)
-        factor = (simulation.time_us - began_us) / 1e6 / (time.monotonic() - began_s)
-    assert factor < speed * 1.15
+        factors = []
+        while (
+            len(factors) < 10 and max(factors, default=0.0) < speed * 0.7
+        ):  # a busy machine has quiet seconds
+            began_s, began_us = time.monotonic(), simulation.time_us
+            await asyncio.sleep(1.0)
+            factors.append((simulation.time_us - began_us) / 1e6 / (time.monotonic() - began_s))
+    assert max(factors) < speed * 1.15
     if len(lines) == 1:  # else the machine was too busy, and the server said so
-        assert factor > speed * 0.7
+        assert max(factors) > speed * 0.7
 
 
 @pytest.mark.parametrize("base", [14580, 18570])

@@ -13,8 +13,8 @@ from tests.offboard.authoring.oracle import check_lines
 from tests.offboard.authoring.random_missions import random_edit, random_mission
 
 GENERATED = 50
-EDITS = 500
-MISSIONS = 10  # on which the edits are made
+EDITS = 200
+MISSIONS = 4  # on which the edits are made
 
 
 def test_opening_and_saving_generated_missions_changes_no_byte(tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from random import Random
-from time import perf_counter
+from time import process_time
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -174,10 +174,10 @@ BOMBS = [
 
 @pytest.mark.parametrize("text", BOMBS, ids=range(len(BOMBS)))
 def test_hostile_xml_is_refused_soon(text):
-    started = perf_counter()
+    started_s = process_time()
     with pytest.raises(XmlError):
         import_scxml(text.encode())
-    assert perf_counter() - started < 3
+    assert process_time() - started_s < 3
 
 
 def test_the_commands(tmp_path, capsys, monkeypatch):
