@@ -95,8 +95,8 @@ class SideLink:
             self._output.close()
 
     def _lacks_origin(self, simulation: Px4Simulation) -> bool:
-        """Whether PX4 cannot know where on Earth it is, and has not said that it was told."""
-        return not simulation.has_gps and not simulation.armed and self._placed is not simulation
+        """Whether PX4 must be told where on Earth it is, and has not said that it was told."""
+        return simulation.needs_place_on_earth and not simulation.armed and self._placed is not simulation
 
     def _send_origin(self, simulation: Px4Simulation) -> None:
         origin = simulation.scenario.origin

@@ -73,9 +73,12 @@ class Px4Simulation(SimulatedVehicle):
         return ZERO3 if self._suite.external_pose is not None else None
 
     @property
-    def has_gps(self) -> bool:
-        """Whether the drone has GPS."""
-        return self._suite.gps is not None
+    def needs_place_on_earth(self) -> bool:
+        """Whether PX4 must be told where on Earth it is.
+
+        With GPS it knows. With a compass it would expect another magnetic field, and refuse to arm.
+        """
+        return self._suite.gps is None and self._suite.magnetometer is None
 
     def sense(self) -> bytes:
         """The messages of this tick; begins it."""

@@ -21,10 +21,10 @@ LAND = 0x06040000
 class Flight:
     """A drone in the air by a fake PX4: armed from the start, its motors at half speed."""
 
-    def __init__(self, tmp_path, *faults):
+    def __init__(self, tmp_path, *faults, sensors="mocap"):
         instance = free_instance()
         scenario = load_scenario("test-case-1").model_copy(
-            update={"sensors": "mocap", "faults": tuple(map(parse_fault, faults))}
+            update={"sensors": sensors, "faults": tuple(map(parse_fault, faults))}
         )
         self.simulation = Px4Simulation(scenario)
         self.output = tmp_path / "px4.log"
@@ -110,6 +110,16 @@ def test_what_px4_prints_and_its_mode_become_the_failsafes_of_the_flight(tmp_pat
     assert failsafe.text == "Emergency battery level; Failsafe activated: LAND"
     assert 1.4e6 < failsafe.time_us < 1.6e6
     assert facts.autopilot == "PX4"
+    flight.close()
+
+
+@pytest.mark.parametrize(("sensors", "is_told"), [("mocap", True), ("flow", False), ("outdoor", False)])
+def test_a_px4_with_a_compass_is_not_told_its_place(tmp_path, sensors, is_told):
+    """PX4 would then expect another magnetic field, and refuse to arm: heading estimate not stable."""
+    flight = Flight(tmp_path, sensors=sensors)
+    flight.link.step(flight.simulation)
+    flight.battery()
+    assert ("SET_GPS_GLOBAL_ORIGIN" in flight.others) == is_told
     flight.close()
 
 
