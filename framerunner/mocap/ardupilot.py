@@ -25,7 +25,7 @@ from framerunner.mocap.facts import (
 )
 from framerunner.mocap.messages import odometry, vision_position
 from framerunner.mocap.poses import Pose
-from wire.ardupilot_messages import POSE_ARRIVAL_EARLY_MS
+from wire.ardupilot_messages import EKF_STATUS_REPORT_ID, POSE_ARRIVAL_EARLY_MS
 from wire.dialect import Message, mavlink
 
 _EXTERNAL_NAVIGATION = 6
@@ -86,10 +86,15 @@ class ArduPilotPoses:
         *("EK3_SRC1_YAW", "VISO_TYPE", "VISO_DELAY_MS", "VISO_POS_M_NSE", "VISO_YAW_M_NSE"),
         *("VISO_QUAL_MIN", "VISO_SCALE", "INS_GYRO_FILTER"),
     )
-    rates_hz: Mapping[str, float] = MappingProxyType(
-        {"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 30.0, "EKF_STATUS_REPORT": 2.0, "SYS_STATUS": 2.0}
+    streams_hz: Mapping[str, tuple[int, float]] = MappingProxyType(
+        {
+            "ATTITUDE": (mavlink.MAVLINK_MSG_ID_ATTITUDE, 50.0),
+            "LOCAL_POSITION_NED": (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 30.0),
+            "EKF_STATUS_REPORT": (EKF_STATUS_REPORT_ID, 2.0),
+            "SYS_STATUS": (mavlink.MAVLINK_MSG_ID_SYS_STATUS, 2.0),
+        }
     )
-    truth = "SIM_STATE"
+    truth = ("SIM_STATE", mavlink.MAVLINK_MSG_ID_SIM_STATE)
     estimator = "EKF_STATUS_REPORT"
     needs_origin = True
 

@@ -93,18 +93,7 @@ class Trial:
         return self
 
     def facts(self):
-        session = self.session
-        return Facts(
-            session.vehicle.record,
-            session.compare(),
-            session.sent,
-            session.rate_hz(self.now_s),
-            session.longest_gap_s,
-            session.dropouts,
-            session.vehicle.worst_ratio,
-            session.vehicle.converts_stamps,
-            settings=session.settings,
-        )
+        return self.session.facts(self.now_s)
 
     def missing(self):
         return [finding.subject for finding in judge(self.facts()) if finding.level is Level.MISSING]
