@@ -117,9 +117,7 @@ class _Capture:
         device = _device_number(url)
         with _limited(2 * limit_ms / 1000), _logged() as log:
             self._capture = _opened(url, limit_ms) if device is None else cv2.VideoCapture(device)
-            # The name of a device that is unplugged leads to no number.
-            is_device = device is not None or url.startswith("/dev/")
-            self.problem = Problem.NO_DEVICE if is_device else problem_in(log())
+            self.problem = problem_in(log()) if device is None else Problem.NO_DEVICE
         self._is_file = self._capture.get(cv2.CAP_PROP_FRAME_COUNT) > 0
         self._has_end = not url.lower().startswith(_WITHOUT_END)
         self._clock = StreamClock() if device is None else None

@@ -543,5 +543,4 @@ async def test_why_an_rtsp_camera_does_not_open(answer: str, words: str) -> None
 async def test_nothing_listens_or_the_address_is_another_machines() -> None:
     assert "connection refused" in await failure(CaptureSource(f"tcp://127.0.0.1:{free_port()}"))
     assert "no address of this machine" in await failure(CaptureSource("udp://192.0.2.1:5600"))
-    for device in (999, "/dev/v4l/by-id/unplugged"):
-        assert "ls /dev/video*" in await failure(CaptureSource(device))
+    assert "ls /dev/video*" in await failure(CaptureSource(999))
