@@ -24,9 +24,6 @@ MAX_FILE_BYTES = 64 * 1024 * 1024
 _TIME = re.compile(r"(\d{1,18})us$")
 _NO_VIDEO = "; is H.264 sent to this port of this machine, with a key frame each second?"
 _HINTS = {"rtsp": "; does it send a key frame each second?", "udp": _NO_VIDEO, "rtp": _NO_VIDEO}
-_NO_DEVICE = (
-    "cannot be opened; is it in `ls /dev/video*`, may you use it (group video), and does no other program?"
-)
 _PROBLEMS = {
     Problem.UNKNOWN: "cannot be opened; is it there, and is it video?",
     Problem.NO_LOGIN: "user name or password is missing or wrong; write them as rtsp://USER:PASSWORD@HOST/PATH",
@@ -36,6 +33,8 @@ _PROBLEMS = {
     Problem.UNREACHABLE: "the host cannot be reached; check the address and the network",
     Problem.NOT_OUR_ADDRESS: "is no address of this machine; write 0.0.0.0 to receive at all of them",
     Problem.PORT_IN_USE: "another program receives at this port, or at the next one, which rtp:// needs too",
+    Problem.NO_DEVICE: "cannot be opened; is it in `ls /dev/video*`, may you use it (group video), and does "
+    "no other program?",
 }
 _VIDEO_FILE = re.compile(r"\.(mp4|mkv|avi|mov|webm|ts|m3u8|mpd|sdp)$", re.IGNORECASE)
 
@@ -125,12 +124,8 @@ class CaptureSource:
             raise CameraError(f"{self._name}: {problem}") from None
         if answer.reply is not Reply.OPENED:
             self._worker.end()
-            raise CameraError(f"{self._name}: {self._why(answer.problem)}")
+            raise CameraError(f"{self._name}: {_PROBLEMS[answer.problem]}")
         return self
-
-    def _why(self, problem: Problem) -> str:
-        is_device = str(self._url).isdecimal() or str(self._url).startswith("/dev/")
-        return _NO_DEVICE if is_device else _PROBLEMS[problem]
 
     async def __aexit__(self, *exc_info: object) -> None:
         """Close it."""

@@ -80,7 +80,7 @@ class Reply(IntEnum):
 
 
 class Problem(IntEnum):
-    """Why a camera could not be opened, as far as FFmpeg's log tells."""
+    """Why a camera could not be opened, as far as its kind and FFmpeg's log tell."""
 
     UNKNOWN = 0
     NO_LOGIN = 1
@@ -90,6 +90,7 @@ class Problem(IntEnum):
     UNREACHABLE = 5
     NOT_OUR_ADDRESS = 6
     PORT_IN_USE = 7
+    NO_DEVICE = 8
 
 
 _LOGGED = (
@@ -116,7 +117,7 @@ class _Capture:
         device = _device_number(url)
         with _limited(2 * limit_ms / 1000), _logged() as log:
             self._capture = _opened(url, limit_ms) if device is None else cv2.VideoCapture(device)
-            self.problem = Problem.UNKNOWN if self._capture.isOpened() else problem_in(log())
+            self.problem = problem_in(log()) if device is None else Problem.NO_DEVICE
         self._is_file = self._capture.get(cv2.CAP_PROP_FRAME_COUNT) > 0
         self._has_end = not url.lower().startswith(_WITHOUT_END)
         self._clock = StreamClock() if device is None else None

@@ -63,10 +63,10 @@ def _examine(drone: str, seconds: float, camera: str | None, calibration: Calibr
     from rich.progress import BarColumn, Progress, TextColumn
 
     from framerunner.doctor.camera import LOOK_S, examine_camera
+    from framerunner.doctor.camera_times import measure_camera
     from framerunner.doctor.checks import can_fly, examine
     from framerunner.doctor.listen import COMPONENT_ID, FIND_S, SYSTEM_ID, Record, find, listen
     from framerunner.doctor.page import findings_table, print_page
-    from framerunner.preflight.camera import measure_camera
     from wire.transports.vehicle_link import VehicleLink
 
     record = Record()

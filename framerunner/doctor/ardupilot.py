@@ -10,18 +10,18 @@ from framerunner.doctor.findings import Findings, Level
 from framerunner.doctor.listen import Record
 from framerunner.doctor.subjects import Subject, finding, good, missing, note
 from wire import ardupilot_modes
+from wire.ardupilot_messages import EKF_ATTITUDE, EKF_POS_VERT_ABS, EXTERNAL_NAVIGATION, has_position
 from wire.dialect import mavlink
 
 _GUIDE = "docs/ardupilot.md, section 5"
-_GPS, _EXTERNAL_NAVIGATION = 3, 6
+_GPS = 3
 _POSITION_SOURCES = {0: "nothing", 2: "beacons", _GPS: "GPS", 4: "beacons", 5: "optical flow"}
-_POSITION_SOURCES |= {_EXTERNAL_NAVIGATION: "external navigation"}
+_POSITION_SOURCES |= {EXTERNAL_NAVIGATION: "external navigation"}
 _HEIGHT_SOURCES = {0: "nothing", 1: "barometer", 2: "range finder", _GPS: "GPS", 4: "beacons"}
-_HEIGHT_SOURCES |= {_EXTERNAL_NAVIGATION: "external navigation"}
+_HEIGHT_SOURCES |= {EXTERNAL_NAVIGATION: "external navigation"}
 _ACCURATE_MM = 100.0
 _BAD_VARIANCE = 0.8  # of EKF_STATUS_REPORT: ArduPilot's FS_EKF_THRESH
 _HIGH_VARIANCE = 0.5
-_HAS_ATTITUDE, _HAS_POSITION, _HAS_HEIGHT, _CONSTANT_POSITION = 1, 8 | 16, 32, 128  # EKF_STATUS_FLAGS
 _CHALLENGE_HEIGHT_M, _CHALLENGE_REACH_M = 3.0, 8.0
 
 
@@ -62,7 +62,7 @@ def estimator(record: Record) -> Findings:
     if report is None:
         yield note("estimator", "it does not report its state (EKF_STATUS_REPORT)")
         return
-    if not report.flags & _HAS_ATTITUDE:
+    if not report.flags & EKF_ATTITUDE:
         yield missing("estimator", "it does not know its attitude", "keep the drone still for some seconds")
         return
     variances = {
@@ -87,11 +87,11 @@ def position(record: Record) -> Findings:
     source = int(parameters.get("EK3_SRC1_POSXY", _GPS))
     words = _POSITION_SOURCES.get(source, f"source {source}")
     advice = f"give it its position by motion capture or visual odometry: {_GUIDE}"
-    if report is not None and (report.flags & _CONSTANT_POSITION or not report.flags & _HAS_POSITION):
-        if source == _EXTERNAL_NAVIGATION:
+    if report is not None and not has_position(report):
+        if source == EXTERNAL_NAVIGATION:
             advice = f"send poses and set its origin, as `framerunner mocap --origin` does: {_GUIDE}"
         yield missing("position", f"the estimator has none; its source is {words}", advice)
-    elif source == _EXTERNAL_NAVIGATION:
+    elif source == EXTERNAL_NAVIGATION:
         yield good("position", f"by {words}")
     else:
         gps = record.latest.get("GPS_RAW_INT")
@@ -109,9 +109,9 @@ def _height(record: Record, advice: str) -> Findings:
     report = record.latest.get("EKF_STATUS_REPORT")
     source = int(record.parameters.get("EK3_SRC1_POSZ", 1))
     words = _HEIGHT_SOURCES.get(source, f"source {source}")
-    if report is not None and not report.flags & _HAS_HEIGHT:
+    if report is not None and not report.flags & EKF_POS_VERT_ABS:
         yield missing("height", f"the estimator has none; its source is {words}", advice)
-    elif source == _EXTERNAL_NAVIGATION:
+    elif source == EXTERNAL_NAVIGATION:
         yield good("height", f"by {words}")
     else:
         text = f"by {words}, which drifts in flight; a frame's opening is 0.18 m high"

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
+from framerunner.doctor.camera_times import CameraTimes, calibration_facts
 from framerunner.doctor.findings import Finding, Level
 from framerunner.flying.plan import CAMERA_DELAY_S
-from framerunner.preflight.camera import CameraTimes, calibration_facts
 from offboard.safety.check import Check, Outcome
 from offboard.safety.vehicle_checks import calibration_checks, camera_checks
 from vision.calibration.model import Calibration
@@ -26,22 +24,10 @@ def examine_camera(
         calibration: None: none was given.
         clock_ms: vehicle time in milliseconds at a monotonic wall time, seconds; None: not known.
     """
-    measured_s = None if calibration is None else calibration.delay_s
-    assumed_s = CAMERA_DELAY_S if measured_s is None else measured_s
     checks: list[Check] = []
     if times is not None:
-        checks += camera_checks(times.facts(clock_ms, assumed_s))
-        if not times.problem and not any(stamp is not None for stamp in times.stamps_us):
-            checks[-1] = _delay_check(checks[-1], measured_s)
+        measured_s = None if calibration is None else calibration.delay_s
+        assumed = (CAMERA_DELAY_S, "") if measured_s is None else (measured_s, "the calibration")
+        checks += camera_checks(times.facts(clock_ms, *assumed))
     checks += calibration_checks(calibration_facts(calibration, (0, 0) if times is None else times.size_px))
     return [Finding(_LEVELS[each.outcome], each.name, each.value, each.advice) for each in checks]
-
-
-def _delay_check(check: Check, measured_s: float | None) -> Check:
-    """The check of the delay of images without time stamps, with where it is from."""
-    if measured_s is None:
-        value = f"never measured; {CAMERA_DELAY_S:g} s are assumed, as its images have no time stamps"
-        advice = "run framerunner camera latency, and give fly --camera-delay"
-        return replace(check, outcome=Outcome.NOTE, value=value, advice=advice)
-    value = f"{measured_s:.3f} s by the calibration; its images have no time stamps"
-    return replace(check, value=value)

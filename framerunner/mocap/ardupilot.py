@@ -25,11 +25,14 @@ from framerunner.mocap.facts import (
 )
 from framerunner.mocap.messages import odometry, vision_position
 from framerunner.mocap.poses import Pose
-from wire.ardupilot_messages import POSE_ARRIVAL_EARLY_MS
+from wire.ardupilot_messages import (
+    EKF_STATUS_REPORT_ID,
+    EXTERNAL_NAVIGATION,
+    POSE_ARRIVAL_EARLY_MS,
+    has_position,
+)
 from wire.dialect import Message, mavlink
 
-_EXTERNAL_NAVIGATION = 6
-_POSITION, _CONSTANT_POSITION = 8 | 16, 128  # EKF_STATUS_FLAGS
 _FAR_DELAY_S = 0.05  # 5 cm at 1 m/s
 _MAX_DELAY_MS = 250.0
 _MAX_POSITION_NOISE_M, _MAX_YAW_NOISE_RAD = 0.05, 0.1
@@ -55,20 +58,20 @@ _RULES = (
     ),
     _Rule("VISO_SCALE", (1,), Level.MISSING, "it multiplies positions by this", "set it to 1"),
     _Rule(
-        *("EK3_SRC1_POSXY", (_EXTERNAL_NAVIGATION,), Level.MISSING, "its position is not that of the poses"),
+        *("EK3_SRC1_POSXY", (EXTERNAL_NAVIGATION,), Level.MISSING, "its position is not that of the poses"),
         "set it to 6",
     ),
     _Rule(
-        *("EK3_SRC1_POSZ", (_EXTERNAL_NAVIGATION,), Level.NOTE, "its height is not that of the poses"),
+        *("EK3_SRC1_POSZ", (EXTERNAL_NAVIGATION,), Level.NOTE, "its height is not that of the poses"),
         "set it to 6",
     ),
     _Rule(
-        *("EK3_SRC1_YAW", (_EXTERNAL_NAVIGATION,), Level.NOTE, "its heading is not that of the poses"),
+        *("EK3_SRC1_YAW", (EXTERNAL_NAVIGATION,), Level.NOTE, "its heading is not that of the poses"),
         "set it to 6",
     ),
     *(
         _Rule(
-            *(name, (0, _EXTERNAL_NAVIGATION), Level.MISSING, "its velocity is from another sensor"),
+            *(name, (0, EXTERNAL_NAVIGATION), Level.MISSING, "its velocity is from another sensor"),
             "set it to 0, or to 6 if the source has velocities",
         )
         for name in _VELOCITIES
@@ -82,14 +85,18 @@ class ArduPilotPoses:
     name = "ArduPilot"
     guide = "docs/ardupilot.md, section 5"
     parameters: tuple[str, ...] = (
-        *("AHRS_EKF_TYPE", "EK3_SRC1_POSXY", "EK3_SRC1_POSZ", "EK3_SRC1_VELXY", "EK3_SRC1_VELZ"),
-        *("EK3_SRC1_YAW", "VISO_TYPE", "VISO_DELAY_MS", "VISO_POS_M_NSE", "VISO_YAW_M_NSE"),
-        *("VISO_QUAL_MIN", "VISO_SCALE", "INS_GYRO_FILTER"),
+        *(rule.name for rule in _RULES),
+        *("VISO_DELAY_MS", "VISO_POS_M_NSE", "VISO_YAW_M_NSE", "VISO_QUAL_MIN", "INS_GYRO_FILTER"),
     )
-    rates_hz: Mapping[str, float] = MappingProxyType(
-        {"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 30.0, "EKF_STATUS_REPORT": 2.0, "SYS_STATUS": 2.0}
+    streams_hz: Mapping[str, tuple[int, float]] = MappingProxyType(
+        {
+            "ATTITUDE": (mavlink.MAVLINK_MSG_ID_ATTITUDE, 50.0),
+            "LOCAL_POSITION_NED": (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 30.0),
+            "EKF_STATUS_REPORT": (EKF_STATUS_REPORT_ID, 2.0),
+            "SYS_STATUS": (mavlink.MAVLINK_MSG_ID_SYS_STATUS, 2.0),
+        }
     )
-    truth = "SIM_STATE"
+    truth = ("SIM_STATE", mavlink.MAVLINK_MSG_ID_SIM_STATE)
     estimator = "EKF_STATUS_REPORT"
     needs_origin = True
 
@@ -110,10 +117,9 @@ class ArduPilotPoses:
         if report is None:
             return None
         arrive = system is None or bool(system.onboard_control_sensors_health & VISION)
-        source = parameters.get("EK3_SRC1_POSXY", _EXTERNAL_NAVIGATION)
-        positioned = bool(report.flags & _POSITION) and not report.flags & _CONSTANT_POSITION
+        source = parameters.get("EK3_SRC1_POSXY", EXTERNAL_NAVIGATION)
         near = facts.comparison.distance_m < FAR_M
-        return arrive and source == _EXTERNAL_NAVIGATION and positioned and near
+        return arrive and source == EXTERNAL_NAVIGATION and has_position(report) and near
 
     def why_not_fused(self, facts: Facts) -> str:
         """By its parameters, whether poses arrive, and its estimator's state."""
@@ -124,7 +130,7 @@ class ArduPilotPoses:
         system, report = facts.record.latest.get("SYS_STATUS"), facts.record.latest[self.estimator]
         if system is not None and not system.onboard_control_sensors_health & VISION:
             return "no poses arrive now: see the poses above, and whether the link is fast enough"
-        if report.flags & _CONSTANT_POSITION or not report.flags & _POSITION:
+        if not has_position(report):
             return "keep it still for half a minute after its start; then see the axes below"
         return "see the innovation ratio and the axes below"
 
@@ -153,7 +159,7 @@ class ArduPilotPoses:
 
     def heading_advice(self, facts: Facts) -> tuple[str, str]:
         """By EK3_SRC1_YAW."""
-        if facts.record.parameters.get("EK3_SRC1_YAW", _EXTERNAL_NAVIGATION) != _EXTERNAL_NAVIGATION:
+        if facts.record.parameters.get("EK3_SRC1_YAW", EXTERNAL_NAVIGATION) != EXTERNAL_NAVIGATION:
             return "it is not that of the poses", "set EK3_SRC1_YAW to 6"
         return "", "choose --frame or --forward, then restart the vehicle"
 
@@ -189,7 +195,7 @@ def _wrong_parameters(facts: Facts) -> Findings:
             yield Finding(rule.level, rule.name, f"{value:g}: {rule.text}", rule.advice)
     if facts.sent and not facts.has_velocity:
         for name in _VELOCITIES:
-            if parameters.get(name) == _EXTERNAL_NAVIGATION:
+            if parameters.get(name) == EXTERNAL_NAVIGATION:
                 yield missing(
                     name, "6: it waits for velocities, which the source does not send", "set it to 0"
                 )

@@ -24,8 +24,8 @@ class PoseDialect(Protocol):
         name: of the autopilot.
         guide: where its parameters are documented.
         parameters: those that are read.
-        rates_hz: messages that are requested.
-        truth: the message with a simulator's true pose.
+        streams_hz: number and rate of each message that is requested, by name.
+        truth: name and number of the message with a simulator's true pose.
         estimator: the message with the estimator's state.
         needs_origin: without GPS it cannot be armed before its place on Earth is set.
     """
@@ -33,8 +33,8 @@ class PoseDialect(Protocol):
     name: str
     guide: str
     parameters: tuple[str, ...]
-    rates_hz: Mapping[str, float]
-    truth: str
+    streams_hz: Mapping[str, tuple[int, float]]
+    truth: tuple[str, int]
     estimator: str
     needs_origin: bool
 

@@ -53,7 +53,7 @@ def run_session(
             live.start()
         facts = _run(session, clock, seconds, _shower(console, live))
     except KeyboardInterrupt:
-        facts = _facts(session, clock())
+        facts = session.facts(clock())
         raise
     finally:
         if live is not None:
@@ -67,16 +67,16 @@ def _run(
     session: MocapSession, clock: Callable[[], float], seconds: float | None, show: Callable[[str], None]
 ) -> Facts:
     line_s = _LINE_S
-    facts = _facts(session, 0.0)
+    facts = session.facts(0.0)
     while True:
         now_s = clock()
         if (seconds is not None and now_s >= seconds) or session.source.ended:
             # At the end of a source its rate falls: the last facts of the flow count.
-            return facts if session.source.ended else _facts(session, now_s)
+            return facts if session.source.ended else session.facts(now_s)
         session.step(now_s, _WAIT_S, clock)
         if now_s >= line_s:
             line_s = now_s + _LINE_S
-            facts = _facts(session, now_s)
+            facts = session.facts(now_s)
             session.note_use(is_fused(facts), facts.comparison, _LINE_S)
             show(line(facts) if session.vehicle.found else "waiting for a vehicle")
 
@@ -94,26 +94,6 @@ def _shower(console: Console, live: Live | None) -> Callable[[str], None]:
             console.print(words, highlight=False, soft_wrap=True)
 
     return show
-
-
-def _facts(session: MocapSession, now_s: float) -> Facts:
-    vehicle, source = session.vehicle, session.source
-    return Facts(
-        vehicle.record,
-        session.compare(),
-        session.sent,
-        session.rate_hz(now_s),
-        session.longest_gap_s,
-        session.dropouts,
-        vehicle.worst_ratio,
-        vehicle.converts_stamps,
-        source.faults,
-        source.fault,
-        session.settings,
-        session.has_velocity,
-        vehicle.transit_s,
-        session.unused,
-    )
 
 
 def _report(console: Console, session: MocapSession, url: str, facts: Facts) -> None:

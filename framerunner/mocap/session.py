@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from framerunner.mocap.facts import SendSettings, Unused
+from framerunner.mocap.facts import Facts, SendSettings, Unused
 from framerunner.mocap.motion import MotionCheck, PoseComparison, SentPose
 from framerunner.mocap.poses import with_forward
 from framerunner.mocap.sources import PoseSource, TimedPose
@@ -71,11 +71,6 @@ class MocapSession:
         self._recent: deque[float] = deque()  # when poses were sent
         self._newest_s = -1e9  # when the last pose that was sent was taken
         self._heard_s = 0.0  # when a pose has come
-
-    @property
-    def settings(self) -> SendSettings:
-        """How poses are sent."""
-        return self._settings
 
     @property
     def source(self) -> PoseSource:
@@ -150,14 +145,34 @@ class MocapSession:
                 comparison.track or before.track,
             )
 
-    def rate_hz(self, now_s: float) -> float:
+    def facts(self, now_s: float) -> Facts:
+        """What is known now of poses and vehicle."""
+        vehicle, source = self.vehicle, self._source
+        return Facts(
+            record=vehicle.record,
+            comparison=self._compare(),
+            sent=self.sent,
+            rate_hz=self._rate_hz(now_s),
+            longest_gap_s=self.longest_gap_s,
+            dropouts=self.dropouts,
+            worst_ratio=vehicle.worst_ratio,
+            converts_stamps=vehicle.converts_stamps,
+            faults=source.faults,
+            fault=source.fault,
+            settings=self._settings,
+            has_velocity=self.has_velocity,
+            transit_s=vehicle.transit_s,
+            unused=self.unused,
+        )
+
+    def _rate_hz(self, now_s: float) -> float:
         """Poses sent a second, over the last two."""
         recent = self._recent
         while recent and recent[0] < now_s - _RATE_SPAN_S:
             recent.popleft()
         return len(recent) / _RATE_SPAN_S
 
-    def compare(self) -> PoseComparison:
+    def _compare(self) -> PoseComparison:
         """The poses against what the vehicle reports now; of axes and delay, what was last seen in motion."""
         rates: Sequence[tuple[int, float, float, float]] = list(self.vehicle.rates_rad_s)
         found = self._motion.compare(self.vehicle.record.telemetry, rates)

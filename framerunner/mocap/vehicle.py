@@ -9,7 +9,7 @@ from statistics import median
 from framerunner.doctor.listen import Record
 from framerunner.mocap.dialects import PoseDialect, dialect_of
 from framerunner.mocap.facts import Origin
-from wire.ardupilot_messages import EKF_STATUS_REPORT_ID, add_ardupilot_messages
+from wire.ardupilot_messages import add_ardupilot_messages
 from wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
     Message,
@@ -46,7 +46,6 @@ class Vehicle:
         answers: to its TIMESYNC requests, sent.
         rates_rad_s: the latest body rates with vehicle time in microseconds: (time, forward, right, down).
         worst_ratio: the largest innovation ratio of position or height.
-        dialect: of its autopilot, by its heartbeats.
     """
 
     def __init__(
@@ -56,7 +55,6 @@ class Vehicle:
         self.answers = 0
         self.rates_rad_s: deque[tuple[int, float, float, float]] = deque(maxlen=2000)
         self.worst_ratio = 0.0
-        self.dialect: PoseDialect = dialect_of(self.record)
         self._truth_hz, self._origin, self._zero_s = needs_truth_hz, origin, zero_s
         self._restarts = 0
         self._asked_origin = False  # a second ago, without an answer
@@ -69,6 +67,11 @@ class Vehicle:
     def found(self) -> bool:
         """Whether a vehicle has been heard."""
         return self.record.system_id is not None
+
+    @property
+    def dialect(self) -> PoseDialect:
+        """How its autopilot gets poses, by its heartbeats."""
+        return dialect_of(self.record)
 
     @property
     def offset_s(self) -> float | None:
@@ -109,10 +112,8 @@ class Vehicle:
         kind = message.get_type()
         if kind == "TIMESYNC":
             return self._synchronise(message, now_s)
-        if kind == "HEARTBEAT":
-            self.dialect = dialect_of(self.record)
-            if self.record.is_ardupilot:
-                add_ardupilot_messages()
+        if kind == "HEARTBEAT" and self.record.is_ardupilot:
+            add_ardupilot_messages()
         if kind == "ATTITUDE":
             rates = (message.rollspeed, message.pitchspeed, message.yawspeed)
             self.rates_rad_s.append((message.time_boot_ms * 1000, *rates))
@@ -173,13 +174,14 @@ class Vehicle:
     def _rate_requests(self, system_id: int, now_s: float) -> Iterator[Message]:
         """Request what comes too slowly; never less than the link has already."""
         counts, span_s = self.record.counts, now_s - self._counted_s
-        wanted = dict(self.dialect.rates_hz)
+        wanted = dict(self.dialect.streams_hz)
         if self._truth_hz:
-            wanted[self.dialect.truth] = self._truth_hz
-        for name, wanted_hz in wanted.items():
+            name, number = self.dialect.truth
+            wanted[name] = (number, self._truth_hz)
+        for name, (number, wanted_hz) in wanted.items():
             received_hz = (counts.get(name, 0) - self._counted.get(name, 0)) / span_s
             if received_hz < _LOW * wanted_hz:
-                yield request_rate(system_id, _number(name), wanted_hz)
+                yield request_rate(system_id, number, wanted_hz)
         self._counted, self._counted_s = dict(counts), now_s
 
     def _origin_requests(self, system_id: int) -> Iterator[Message]:
@@ -196,10 +198,3 @@ class Vehicle:
             )
         self._asked_origin = True
         yield request_message(system_id, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
-
-
-def _number(name: str) -> int:
-    """The number of a message."""
-    if name == "EKF_STATUS_REPORT":
-        return EKF_STATUS_REPORT_ID
-    return int(getattr(mavlink, f"MAVLINK_MSG_ID_{name}"))

@@ -6,10 +6,8 @@ from math import isnan
 
 from framerunner.doctor.listen import Record
 from offboard.safety.vehicle_checks import EstimatorFacts
+from wire.ardupilot_messages import EKF_ATTITUDE, EKF_POS_HORIZ_ABS, EKF_POS_VERT_ABS, has_position
 from wire.dialect import mavlink
-
-# EKF_STATUS_FLAGS of ArduPilot's EKF_STATUS_REPORT.
-_ATTITUDE, _POSITION_RELATIVE, _POSITION_ABSOLUTE, _HEIGHT = 1, 8, 16, 32
 
 
 def estimator_facts(record: Record, autopilot: str) -> EstimatorFacts:
@@ -21,7 +19,7 @@ def has_global_position(record: Record, autopilot: str) -> bool:
     """Whether the vehicle knows where on Earth it is, so that its fence has an effect."""
     name, flag = "ESTIMATOR_STATUS", int(mavlink.ESTIMATOR_POS_HORIZ_ABS)
     if autopilot == "ardupilot":
-        name, flag = "EKF_STATUS_REPORT", _POSITION_ABSOLUTE
+        name, flag = "EKF_STATUS_REPORT", EKF_POS_HORIZ_ABS
     status = record.latest.get(name)
     return status is not None and bool(status.flags & flag) and "GPS_GLOBAL_ORIGIN" in record.latest
 
@@ -55,9 +53,9 @@ def _ardupilots(record: Record) -> EstimatorFacts:
     )
     return EstimatorFacts(
         reported=True,
-        has_attitude=bool(flags & _ATTITUDE),
-        has_position=bool(flags & (_POSITION_RELATIVE | _POSITION_ABSOLUTE)),
-        has_height=bool(flags & _HEIGHT),
+        has_attitude=bool(flags & EKF_ATTITUDE),
+        has_position=has_position(report),
+        has_height=bool(flags & EKF_POS_VERT_ABS),
         largest_ratio=_largest(ratios),
         message=message,
     )

@@ -14,11 +14,11 @@ from pathlib import Path
 from errors import UserError
 from firmware_py.geodesy import LocalProjection
 from firmware_py.types import GeodeticPoint
+from framerunner.doctor.camera_times import CameraTimes, calibration_facts, measure_camera
 from framerunner.doctor.checks import examine
 from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import Record
 from framerunner.flying.plan import CAMERA_DELAY_S, FlightPlan
-from framerunner.preflight.camera import CameraTimes, calibration_facts, measure_camera
 from framerunner.preflight.check_names import CHECK_NAMES, RENAMED, REPLACED
 from framerunner.preflight.estimator import estimator_facts, has_global_position
 from framerunner.preflight.fence_upload import (

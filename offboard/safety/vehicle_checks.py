@@ -71,8 +71,10 @@ class CameraFacts:
     Attributes:
         rate_hz: of the images.
         longest_gap_s: between two images.
-        age_s: of an image on arrival; NaN if it has no time stamp.
-        assumed_age_s: what the user says of an image without a time stamp.
+        age_s: of an image on arrival; NaN: not known.
+        has_stamps: images have the vehicle time at which they were taken.
+        assumed_age_s: of an image without a time stamp.
+        assumed_by: what says so; empty: it was never measured.
         size_px: width and height.
         problem: why there is no image; empty if there are some.
     """
@@ -80,7 +82,9 @@ class CameraFacts:
     rate_hz: float = 0.0
     longest_gap_s: float = 0.0
     age_s: float = float("nan")
+    has_stamps: bool = False
     assumed_age_s: float = 0.0
+    assumed_by: str = "--camera-delay"
     size_px: tuple[int, int] = (0, 0)
     problem: str = ""
 
@@ -166,17 +170,27 @@ def camera_checks(facts: CameraFacts) -> list[Check]:
     )
     limit = f"{MIN_CAMERA_RATE_HZ:g} a second, gaps up to {MAX_CAMERA_GAP_S:g} s"
     rate = passed("camera", good, value, limit, "use a better link, or fewer pixels")
-    limit = f"{MAX_CAMERA_AGE_S:g} s"
-    if isnan(facts.age_s):
-        good = 0.0 <= facts.assumed_age_s <= MAX_CAMERA_AGE_S
-        value = f"{facts.assumed_age_s:g} s by --camera-delay; its images have no time stamps"
-        return [rate, passed("camera delay", good, value, limit, "use a camera with less delay")]
-    if facts.age_s < -CLOCK_TOLERANCE_S:
-        value = f"{facts.age_s:.2f} s: from the future"
-        advice = "its clock is not the vehicle's; check what stamps the images"
-        return [rate, Check("camera delay", Outcome.FAIL, value, limit, advice)]
-    good = facts.age_s <= MAX_CAMERA_AGE_S
-    return [rate, passed("camera delay", good, f"{facts.age_s:.2f} s", limit, "use a camera with less delay")]
+    return [rate, _camera_delay_check(facts)]
+
+
+def _camera_delay_check(facts: CameraFacts) -> Check:
+    name, limit, advice = "camera delay", f"{MAX_CAMERA_AGE_S:g} s", "use a camera with less delay"
+    if isfinite(facts.age_s):
+        if facts.age_s < -CLOCK_TOLERANCE_S:
+            value = f"{facts.age_s:.2f} s: from the future"
+            told = "its clock is not the vehicle's; check what stamps the images"
+            return Check(name, Outcome.FAIL, value, limit, told)
+        return passed(name, facts.age_s <= MAX_CAMERA_AGE_S, f"{facts.age_s:.2f} s", limit, advice)
+    if facts.has_stamps:
+        value = "not known: its images have vehicle times, and no clock of the vehicle is received"
+        return Check(name, Outcome.NOTE, value, limit, "let the link carry ATTITUDE")
+    if not facts.assumed_by:
+        value = f"never measured; {facts.assumed_age_s:g} s are assumed, as its images have no time stamps"
+        told = "run framerunner camera latency, and give fly --camera-delay"
+        return Check(name, Outcome.NOTE, value, limit, told)
+    good = 0.0 <= facts.assumed_age_s <= MAX_CAMERA_AGE_S
+    value = f"{facts.assumed_age_s:.3f} s by {facts.assumed_by}; its images have no time stamps"
+    return passed(name, good, value, limit, advice)
 
 
 def calibration_checks(facts: CalibrationFacts) -> list[Check]:

@@ -10,7 +10,7 @@ from sitl.ardupilot.simulation import PULSE_MAX_US, PULSE_MIN_US
 from sitl.autopilots.parameters import Value, text_of
 from sitl.sensors.specs import SuiteSpec
 from sitl.world import PHYSICS_RATE_HZ
-from wire.ardupilot_messages import POSE_ARRIVAL_EARLY_MS
+from wire.ardupilot_messages import EXTERNAL_NAVIGATION, POSE_ARRIVAL_EARLY_MS
 
 _HOVER_SHARE = 0.25  # of full thrust, at least; ArduCopter's estimate of it has a lower limit of 0.125
 _RATE_BANDWIDTH_RAD_S = 20.0  # of roll and pitch, with motors that are fast enough
@@ -28,7 +28,6 @@ _SHARES_OF_BANDWIDTH = {  # each loop slower than the one inside it
 }
 _YAW_BANDWIDTH_RAD_S = 4.0
 _YAW_INTEGRAL_SHARE = 0.1  # of P, by ArduCopter's defaults 0.18 and 0.018
-_EXTERNAL_NAVIGATION = 6
 _POSE_NOISE_M, _POSE_NOISE_RAD = 0.02, 0.05
 _FACTOR = 0.5  # of each motor in roll, pitch and yaw, as ArduCopter normalises them
 _PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1))  # of rotors in X, as PX4 orders them: forward, right
@@ -96,11 +95,11 @@ def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
         "VISO_DELAY_MS": max(0, round(pose.delay_s * 1000) - POSE_ARRIVAL_EARLY_MS),
         "VISO_POS_M_NSE": _POSE_NOISE_M,
         "VISO_YAW_M_NSE": _POSE_NOISE_RAD,
-        "EK3_SRC1_POSXY": _EXTERNAL_NAVIGATION,
+        "EK3_SRC1_POSXY": EXTERNAL_NAVIGATION,
         "EK3_SRC1_VELXY": 0,  # motion capture measures no velocity
-        "EK3_SRC1_POSZ": _EXTERNAL_NAVIGATION,
+        "EK3_SRC1_POSZ": EXTERNAL_NAVIGATION,
         "EK3_SRC1_VELZ": 0,
-        "EK3_SRC1_YAW": _EXTERNAL_NAVIGATION,
+        "EK3_SRC1_YAW": EXTERNAL_NAVIGATION,
         "GPS1_TYPE": 0,
         "COMPASS_ENABLE": 0,
         "MAV3_OPTIONS": 2,  # poses are not forwarded to the other links

@@ -3,8 +3,8 @@
 from datetime import date, timedelta
 
 from framerunner.doctor.camera import examine_camera
+from framerunner.doctor.camera_times import CameraTimes
 from framerunner.doctor.findings import Level
-from framerunner.preflight.camera import CameraTimes
 from vision.calibration.model import Calibration, Mounting
 
 TIMES = CameraTimes(tuple(0.1 * number for number in range(30)), (None,) * 30, (320, 240))
@@ -43,3 +43,16 @@ def test_what_was_never_measured_is_noted():
 def test_a_camera_that_gives_nothing_or_another_size_is_missing():
     assert levels(CameraTimes(problem="gone"), None, None)["camera"] is Level.MISSING
     assert levels(TIMES, calibration(width_px=640), None)["camera calibration"] is Level.MISSING
+
+
+def test_a_camera_that_gives_one_image_is_missing():
+    assert levels(CameraTimes((1.0,), (None,), (320, 240)), None, None)["camera"] is Level.MISSING
+
+
+def test_images_with_vehicle_times_have_an_age_by_the_vehicles_clock_alone():
+    received_s = TIMES.received_s
+    stamped = CameraTimes(received_s, tuple(round(1e6 * at_s) + 50_000 for at_s in received_s), (320, 240))
+    for clock_ms, level, words in ((None, Level.NOTE, "not known"), ((250, 0.1), Level.GOOD, "0.10 s")):
+        findings = {each.subject: each for each in examine_camera(stamped, None, clock_ms)}
+        assert findings["camera delay"].level is level
+        assert findings["camera delay"].text.startswith(words)

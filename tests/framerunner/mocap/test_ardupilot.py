@@ -1,11 +1,12 @@
 """Poses to an ArduCopter: a protocol fake, over a link without sockets, in simulated time."""
 
+from functools import partial
 from math import cos, nan, pi, sin
 
 import pytest
 
 from framerunner.doctor.findings import Level
-from framerunner.mocap.facts import Facts, Origin, SendSettings, Unused
+from framerunner.mocap.facts import Origin, SendSettings, Unused
 from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison
 from framerunner.mocap.poses import Pose
@@ -47,10 +48,10 @@ class HandHeldSource:
 class Trial:
     """A fake ArduCopter and a session that is its link's other end."""
 
-    def __init__(self, parameters=(), source=None, zero_s=0.0, **settings):
+    def __init__(self, parameters=(), source=HandHeldSource, zero_s=0.0, **settings):
         self.vehicle = FakeArduCopter(**dict(parameters))
         self.now_s = AHEAD_S
-        self.source = source or HandHeldSource(self.vehicle)
+        self.source = source(self.vehicle)
         self.sent, self.said = [], []
         self._packer = mavlink.MAVLink(None, SYSTEM_ID, COMPONENT_ID)
         self._reader, self._theirs = PacketReader(), PacketReader()
@@ -73,26 +74,10 @@ class Trial:
         return self
 
     def facts(self):
-        session = self.session
-        return Facts(
-            session.vehicle.record,
-            session.compare(),
-            session.sent,
-            session.rate_hz(self.now_s),
-            worst_ratio=session.vehicle.worst_ratio,
-            settings=session.settings,
-            has_velocity=session.has_velocity,
-            transit_s=session.vehicle.transit_s,
-        )
+        return self.session.facts(self.now_s)
 
     def found(self, level=Level.MISSING):
         return {each.subject: each for each in judge(self.facts()) if each.level is level}
-
-
-def with_source(parameters=(), settings=(), **source):
-    trial = Trial(parameters, **dict(settings))
-    trial.source = trial.session._source = HandHeldSource(trial.vehicle, **source)
-    return trial
 
 
 def test_poses_without_velocity_are_sent_as_arducopter_takes_them_and_nothing_is_set():
@@ -116,7 +101,7 @@ def test_poses_without_velocity_are_sent_as_arducopter_takes_them_and_nothing_is
 
 
 def test_poses_with_velocity_are_sent_as_odometry_in_frd():
-    trial = with_source(velocity=(0.0, 0.0, 0.0)).run(8.0)
+    trial = Trial(source=partial(HandHeldSource, velocity=(0.0, 0.0, 0.0))).run(8.0)
     assert is_fused(trial.facts())
     assert {message.get_type() for message in trial.vehicle.poses} == {"ODOMETRY"}
 
@@ -143,7 +128,7 @@ def test_no_origin_is_set_where_one_is_known_or_motors_run(state):
 
 
 def test_a_turned_vehicle_shows_axes_and_delay():
-    trial = with_source({"VISO_DELAY_MS": 20}, {"origin": HALL}, delay_s=0.03)
+    trial = Trial({"VISO_DELAY_MS": 20}, partial(HandHeldSource, delay_s=0.03), origin=HALL)
     trial.vehicle.turning = True
     trial.run(25.0)
     assert trial.facts().comparison.delay_s == pytest.approx(0.03, abs=0.01)
@@ -152,14 +137,14 @@ def test_a_turned_vehicle_shows_axes_and_delay():
 
 
 def test_a_delay_that_is_wrong_by_a_tenth_of_a_second_is_missing():
-    trial = with_source({"VISO_DELAY_MS": 10}, {"origin": HALL}, delay_s=0.11)
+    trial = Trial({"VISO_DELAY_MS": 10}, partial(HandHeldSource, delay_s=0.11), origin=HALL)
     trial.vehicle.turning = True
     trial.run(25.0)
     assert "VISO_DELAY_MS is 10: set it to" in trial.found()["delay"].advice
 
 
 def test_a_delay_given_to_this_program_does_not_hide_a_wrong_parameter():
-    trial = with_source({"VISO_DELAY_MS": 10}, {"origin": HALL, "delay_s": 0.1}, delay_s=0.11)
+    trial = Trial({"VISO_DELAY_MS": 10}, partial(HandHeldSource, delay_s=0.11), origin=HALL, delay_s=0.1)
     trial.vehicle.turning = True
     trial.run(25.0)
     assert "delay" in trial.found()
@@ -167,7 +152,7 @@ def test_a_delay_given_to_this_program_does_not_hide_a_wrong_parameter():
 
 
 def test_a_body_that_is_turned_by_90_degrees_is_told_by_the_gyroscope():
-    trial = with_source((), {"origin": HALL}, turned_deg=90.0)
+    trial = Trial(source=partial(HandHeldSource, turned_deg=90.0), origin=HALL)
     trial.vehicle.turning = True
     trial.run(25.0)
     assert "axes WRONG" in line(trial.facts())
@@ -238,7 +223,7 @@ def test_a_firmware_without_visual_odometry_is_told():
 
 
 def test_arducopters_own_truth_is_requested_and_sent_back():
-    trial = Trial(source=SitlSource(), origin=HALL).run(8.0)
+    trial = Trial(source=lambda _: SitlSource(), origin=HALL).run(8.0)
     assert is_fused(trial.facts())
     requested = [m.param1 for m in trial.sent if m.get_type() == "COMMAND_LONG"]
     assert mavlink.MAVLINK_MSG_ID_SIM_STATE in requested

@@ -1,6 +1,7 @@
 """Poses to a simulated drone over a link without sockets, in simulated time, and the judgement of it."""
 
 from dataclasses import replace
+from functools import partial
 from math import nan
 
 import pytest
@@ -57,7 +58,7 @@ class TrackingSource:
 class Trial:
     """A simulated drone with the suite `external`, its node, and a session that is its link's other end."""
 
-    def __init__(self, source=None, **settings):
+    def __init__(self, source=TrackingSource, **settings):
         scenario = load_scenario("open-field").model_copy(update={"sensors": "external"})
         self.simulation = Simulation(scenario, seed=2)
         self.autopilot = self.simulation.autopilot
@@ -65,9 +66,7 @@ class Trial:
         self._packer = mavlink.MAVLink(None, SYSTEM_ID, COMPONENT_ID)
         self._reader = PacketReader()
         self.sent, self.said = [], []
-        self.source = (
-            (source or TrackingSource)(self.simulation) if source is not SitlSource else SitlSource()
-        )
+        self.source = source(self.simulation)
         self.session = MocapSession(self, self.source, SendSettings(**settings), self.said.append)
 
     def receive(self, timeout_s):
@@ -93,18 +92,7 @@ class Trial:
         return self
 
     def facts(self):
-        session = self.session
-        return Facts(
-            session.vehicle.record,
-            session.compare(),
-            session.sent,
-            session.rate_hz(self.now_s),
-            session.longest_gap_s,
-            session.dropouts,
-            session.vehicle.worst_ratio,
-            session.vehicle.converts_stamps,
-            settings=session.settings,
-        )
+        return self.session.facts(self.now_s)
 
     def missing(self):
         return [finding.subject for finding in judge(self.facts()) if finding.level is Level.MISSING]
@@ -155,7 +143,7 @@ def test_what_is_sent():
 
 
 def test_a_flight_by_poses_that_are_late_shows_axes_and_delay():
-    trial = Trial(lambda simulation: TrackingSource(simulation, delay_s=0.03)).run(4.0)
+    trial = Trial(partial(TrackingSource, delay_s=0.03)).run(4.0)
     trial.autopilot.takeoff()
     trial.autopilot.arm()
     trial.run(10.0)
@@ -189,7 +177,7 @@ def test_a_source_that_stops_is_told_once_and_nothing_is_sent():
 
 
 def test_a_simulators_truth_is_requested_and_sent_back():
-    trial = Trial(SitlSource).run(6.0)
+    trial = Trial(lambda _: SitlSource()).run(6.0)
     assert len(trial.sent_of("ODOMETRY")) > 150
     assert is_fused(trial.facts())
     requested = [m.param1 for m in trial.sent_of("COMMAND_LONG")]

@@ -20,7 +20,7 @@ from offboard.safety.vehicle_checks import (
 
 ESTIMATOR = EstimatorFacts(True, True, True, True, 0.1)
 LINK = LinkFacts(0.0, (0.02,) * 20, 20)
-CAMERA = CameraFacts(30.0, 0.05, 0.1, 0.1, (320, 240))
+CAMERA = CameraFacts(30.0, 0.05, 0.1, assumed_age_s=0.1, size_px=(320, 240))
 
 
 def failed(*checks):

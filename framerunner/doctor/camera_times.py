@@ -33,12 +33,15 @@ class CameraTimes:
     size_px: tuple[int, int] = (0, 0)
     problem: str = ""
 
-    def facts(self, clock_ms: tuple[int, float] | None, assumed_age_s: float) -> CameraFacts:
+    def facts(
+        self, clock_ms: tuple[int, float] | None, assumed_age_s: float, assumed_by: str = "--camera-delay"
+    ) -> CameraFacts:
         """What the checks need.
 
         Args:
             clock_ms: vehicle time in milliseconds at a monotonic wall time, seconds; None: not known.
             assumed_age_s: of an image without a time stamp.
+            assumed_by: what says so; empty: it was never measured.
         """
         if self.problem:
             return CameraFacts(problem=self.problem)
@@ -52,7 +55,15 @@ class CameraTimes:
             if stamp is not None and clock_ms is not None
         ]
         age_s = median(ages) if ages else float("nan")
-        return CameraFacts(len(gaps) / span_s, max(gaps), age_s, assumed_age_s, self.size_px)
+        return CameraFacts(
+            len(gaps) / span_s,
+            max(gaps),
+            age_s,
+            any(stamp is not None for stamp in self.stamps_us),
+            assumed_age_s,
+            assumed_by,
+            self.size_px,
+        )
 
 
 async def measure_camera(url: str, seconds: float, size_px: tuple[int, int] | None = None) -> CameraTimes:
