@@ -7,6 +7,7 @@ import pytest_asyncio
 from playwright.async_api import expect
 
 from framerunner.course.lessons import find_lesson
+from tests.chromium import until
 from tests.framerunner.editing.editor_program import editor
 from tests.framerunner.editing.editor_user import EditorUser, box_of
 
@@ -36,10 +37,17 @@ async def user(browser, program):
     await context.close()
 
 
-async def drag_slider(slider, part):
-    """Move the slider of a replay to a part of its range."""
+async def drag_slider(replay, part):
+    """Move the slider of a replay to a part of its range, and wait until the page shows that time."""
+    slider = replay.locator(".r-slider")
     box = await box_of(slider)
     await slider.click(position={"x": 8 + part * (box["width"] - 16), "y": box["height"] / 2})
+    shown = """([slider, part]) => {
+        const [begin, end] = [Number(slider.min), Number(slider.max)];
+        const time = slider.closest(".r-bar").querySelector(".r-time");
+        return Math.abs(Number(time.dataset.value) - begin - part * (end - begin)) < 0.5;
+    }"""
+    await until(slider.page, shown, arg=[await slider.element_handle(), part])
 
 
 async def track_points(panel):
@@ -61,14 +69,13 @@ async def test_a_flight_is_replayed_on_the_chart_and_the_map(user):
     await expect(fly.locator(".e-run-line")).to_contain_text("landed", timeout=30_000)
     replay = await user.show_tab("replay")
     await replay.get_by_label("Flight", exact=True).select_option(index=1)
-    slider = replay.locator(".r-slider")
-    await drag_slider(slider, 0.4)
+    await drag_slider(replay, 0.4)
     await expect(user.page.locator(".e-active")).to_have_attribute("data-state", CLIMB)
     await expect(user.page.locator(".e-label")).to_have_text(GUARD)
     await expect(replay.locator(".e-run-line")).to_contain_text(f"s: {CLIMB}")
     climbed = await track_points(replay)
     assert climbed > 10
-    await drag_slider(slider, 1.0)
+    await drag_slider(replay, 1.0)
     await expect(user.page.locator(".e-active")).to_have_attribute("data-state", LANDING)
     await expect(user.page.locator(".e-label")).to_have_text(f"{GUARD} (1×)")
     await expect(replay.locator(".t-frame")).to_have_count(6)  # from above and their heights
