@@ -13,9 +13,9 @@ from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.server import AutopilotServer
 from sitl.autopilots.sole_sender import SoleSender
-from sitl.server import Pacer
+from sitl.pacing.pacer import Pacer
+from sitl.pacing.time_grants import FREE_US, TimeGrants
 from sitl.server_settings import ServerSettings
-from sitl.time_grants import FREE_US, TimeGrants
 from wire.transports.sockets import Address, UdpSocket, bind_udp
 
 _SILENCE_S = 2.0  # wall time without a frame that is reported

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
-from sitl.server import BURST_TICKS, Pacer
+from sitl.pacing.pacer import BURST_TICKS, Pacer
+from sitl.pacing.time_grants import FREE_US, TimeGrants
 from sitl.server_settings import ServerSettings
 from sitl.streaming.drone_video import DroneVideo
-from sitl.time_grants import FREE_US, TimeGrants
 from sitl.vehicle import SimulatedVehicle
 from sitl.world import CONTROL_PERIOD_US
 

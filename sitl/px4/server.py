@@ -10,12 +10,12 @@ from collections.abc import Callable
 from sitl.autopilots.idle import IdleCheck
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.server import AutopilotServer
+from sitl.pacing.pacer import BURST_TICKS, LagNotices, Pacer
+from sitl.pacing.time_grants import TimeGrants
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
 from sitl.px4.side_link import PERIOD_US, SideLink
 from sitl.px4.simulation import Px4Simulation
-from sitl.server import BURST_TICKS, LagNotices, Pacer
 from sitl.server_settings import ServerSettings
-from sitl.time_grants import TimeGrants
 from sitl.world import CONTROL_PERIOD_US
 
 _OWN_TIME = ("commander", "mavlink_if1")

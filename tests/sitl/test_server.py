@@ -11,7 +11,8 @@ import pytest
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 from sitl.fleet import side_by_side
-from sitl.server import LagNotices, SimulatorServer
+from sitl.pacing.pacer import LagNotices
+from sitl.server import SimulatorServer
 from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
 from sitl.video import VideoError
@@ -129,7 +130,7 @@ async def test_telemetry_goes_out_on_both_links_before_anybody_spoke():
 
 
 async def test_a_machine_that_is_too_slow_slows_time_and_skips_nothing(monkeypatch):
-    monkeypatch.setattr("sitl.server._NOTICE_PERIOD_S", 1.0)
+    monkeypatch.setattr("sitl.pacing.pacer._NOTICE_PERIOD_S", 1.0)
     simulation = SlowSimulation(load_scenario("empty"))
     async with serving(simulation) as (lines, _):
         began_s, began_us = time.monotonic(), simulation.time_us
