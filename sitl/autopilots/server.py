@@ -153,6 +153,11 @@ class AutopilotServer(ABC, Generic[V]):
         held_us = self._simulation.time_us - CONTROL_PERIOD_US
         await grants.hold(held_us, self._video.image_us, lambda: grants.setpoint)
 
+    @property
+    def _is_starting(self) -> bool:
+        """Whether a program will grant time, and has not yet."""
+        return self._grants is not None and not self._grants.used
+
     def _starting_speed(self) -> float:
         """Simulated seconds a second until a program grants time: at most real time.
 

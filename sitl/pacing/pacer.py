@@ -20,26 +20,29 @@ class Pacer:
         speed: simulated seconds a wall second.
         now_s: monotonic wall time, seconds.
         time_us: simulated time now, microseconds.
+
+    Attributes:
+        speed: as given.
     """
 
     def __init__(self, speed: float, now_s: float, time_us: int = 0) -> None:
         if not 0.01 <= speed <= 1000:
             raise ValueError(f"speed {speed:g}: must be from 0.01 to 1000")
-        self._speed = speed
+        self.speed = speed
         self._wall_s = now_s
         self._time_us = time_us
 
     def target_us(self, now_s: float) -> int:
         """The simulated time that should have been reached at a wall time."""
-        return self._time_us + round((now_s - self._wall_s) * self._speed * 1e6)
+        return self._time_us + round((now_s - self._wall_s) * self.speed * 1e6)
 
     def wait_s(self, now_s: float, time_us: int) -> float:
         """Wall seconds until a simulated time is due; zero if it is."""
-        return max(0.0, (time_us - self.target_us(now_s)) / 1e6 / self._speed)
+        return max(0.0, (time_us - self.target_us(now_s)) / 1e6 / self.speed)
 
     def give_up_lag(self, now_s: float, time_us: int) -> float:
         """Move the line if simulated time is too far behind to catch up; return the wall seconds given up."""
-        lag_s = (self.target_us(now_s) - time_us) / 1e6 / self._speed
+        lag_s = (self.target_us(now_s) - time_us) / 1e6 / self.speed
         if lag_s <= _MAX_CAUGHT_UP_S:
             return 0.0
         self._wall_s += lag_s

@@ -141,9 +141,7 @@ class Px4Server(AutopilotServer[Px4Simulation]):
 
     def _wanted_speed(self, *, opened: bool) -> float:
         """Simulated seconds a second, also while PX4 starts."""
-        grants = self._grants
-        is_free = opened and (grants is None or grants.used)
-        return self._settings.speed if is_free else self._starting_speed()
+        return self._settings.speed if opened and not self._is_starting else self._starting_speed()
 
     def _has_started(self, link: Px4Link) -> bool:
         return link.in_lockstep and not (self._idle is not None and self._idle.starting)
