@@ -153,9 +153,7 @@ async def test_time_runs_at_the_wanted_speed(speed):
     async with serving(simulation, speed=speed) as (lines, _):
         await asyncio.sleep(0.3)
         factors = []
-        while (
-            len(factors) < 10 and max(factors, default=0.0) < speed * 0.7
-        ):  # a busy machine has quiet seconds
+        while len(factors) < 10 and max(factors, default=0.0) < speed * 0.7:  # a busy machine has quiet ones
             began_s, began_us = time.monotonic(), simulation.time_us
             await asyncio.sleep(1.0)
             factors.append((simulation.time_us - began_us) / 1e6 / (time.monotonic() - began_s))
