@@ -26,7 +26,7 @@ from framerunner.runs.run_folder import RunFolder
 from sitl.ardupilot import json_interface as ardupilot
 from sitl.ardupilot.poses import POSE_PORT
 from sitl.ardupilot.relay import RELAY_PORT
-from sitl.autopilots.own_folder import OwnFolder
+from sitl.autopilots.temporary_folder import TemporaryFolder
 from sitl.px4 import link as px4
 from sitl.px4.side_link import CAMERA_PORT
 from sitl.server_settings import VIDEO_PORT
@@ -62,7 +62,7 @@ def fly_with_genuine(plan: FlightPlan, use: GenuineUse) -> FinishedFlight:
         SettingError: simulator or autopilot cannot be started, or have ended.
         ValueError: the plan has no mission.
     """
-    with claimed_instance() as instance, closing(OwnFolder("framerunner-flight-")) as out:
+    with claimed_instance() as instance, closing(TemporaryFolder("framerunner-flight-")) as out:
         folder = RunFolder(out.path, plan.scenario.name)
         folder.write_plan(plan.scenario, plan.chart)
         settings = RealTimeSettings(
