@@ -30,6 +30,7 @@ from rich.table import Table
 
 from scenarios.loader import load_scenario
 from sitl import server
+from sitl.pacing.pacer import Pacer
 from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
 from wire.dialect import mavlink
@@ -75,7 +76,7 @@ def flood_bytes() -> dict[str, bytes]:
     return {name: data * max(1, size // max(1, len(data))) for name, data in kinds.items()}
 
 
-class TimedPacer(server.Pacer):
+class TimedPacer(Pacer):
     """Records how late each burst of ticks began and how long links were served before it, seconds.
 
     The first depends on the load of the machine, the second, processor time, does not.
@@ -226,7 +227,7 @@ def read_options() -> argparse.Namespace:
 def main() -> int:
     """Flood each link with each kind of bytes and show the results."""
     options = read_options()
-    server.Pacer = TimedPacer  # type: ignore[misc]
+    server.Pacer = TimedPacer  # type: ignore[misc, attr-defined]
     Traffic.receive = count_packet  # type: ignore[method-assign]
     table = Table(title=f"one link flooded with up to {options.rate:g} MB/s for {options.seconds:g} s")
     for column in COLUMNS:

@@ -44,7 +44,7 @@ _CLEARLY_BETTER = 0.5  # likewise for axes that turn: those of vehicles that ans
 _LATE_S = (0.65, 0.36, 0.31)  # level, climb, yaw: beyond this in all a vehicle answers late
 _LATE_SHARE = 0.4  # of the error of the best pair that is not late: a late one must reach it
 _UNEXPLAINED = 0.06  # share of the changes that this best pair must leave unexplained
-_KNOWN_STEPS = 120  # after which a model of a late vehicle is kept near gates
+_KNOWN_STEPS = 120  # in the air, until a late vehicle's model is known well enough to be kept near gates
 _SURE = 3  # choices in a row after which a vehicle is known to be late
 _DISTURBANCE_S = 0.4  # time constant of the estimate of what commands do not explain
 _LEADS = np.array((0.0, 0.0, 0.7))  # shares by which its change is expected to go on: heights wander slowly
@@ -136,7 +136,6 @@ class ResponseEstimate:
         self._energies = np.zeros(len(_GROUPS))
         self._late_choices = 0  # in a row
         self._late_steps = 0  # in the air, since the vehicle counts as late
-        self._others_before: tuple[object, ...] = (None, None, 1.0)  # what was chosen of the other models
         self._second = SecondLag(shape[:2], STEP_S, _WINDOW)
         self._slow = SlowShare(shape[:2], STEP_S, _WINDOW)
         self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])[:, None]
@@ -191,7 +190,7 @@ class ResponseEstimate:
         moves = _measured(state, turn_rate)
         measured = np.array(moves)
         self._yaw = state.yaw
-        choose = not near_gate or self._late_steps < _KNOWN_STEPS
+        is_known = self._late_steps >= _KNOWN_STEPS
         compared = False
         for _ in range(steps):
             self._outputs = commanded + self._kept * (self._outputs - commanded)
@@ -208,14 +207,14 @@ class ResponseEstimate:
                 self._uncompared += 1
                 # Windows that begin a step later hardly differ; only of a late vehicle all are needed.
                 if self.response.late or self._uncompared == _COMPARED_STEPS:
-                    self._compare(self._uncompared * STEP_S, choose=choose)
+                    self._compare(self._uncompared * STEP_S)
                     self._uncompared = 0
                     compared = True
-        if compared and choose:
+        if compared and not (near_gate and is_known):
             self._choose()
         self._observe_disturbance((moves[_X], moves[_Y], moves[_UP]), steps)
 
-    def _compare(self, period_s: float, *, choose: bool) -> None:
+    def _compare(self, period_s: float) -> None:
         """Add the errors of all predictions of the change over the window; they count for a period."""
         if len(self._past) < _KEPT:
             return
@@ -229,9 +228,9 @@ class ResponseEstimate:
         self._energies += ((change * change) @ _MEMBERS) * period_s
         if self.response.late:
             one = float(squares[(*self._chosen[0], 1 if self._turning else 0)])
-            self._second.compare(change[[_X, _Y]], one, choose=choose)
+            self._second.compare(change[[_X, _Y]], one)
             changes = np.array([self._changes[-1 - dead][:, [_X, _Y]] for dead in DEAD_STEPS])
-            self._slow.compare(changes, change[[_X, _Y]], self._second.least_error, choose=choose)
+            self._slow.compare(changes, change[[_X, _Y]])
         else:
             self._second.restart()
             self._slow.restart()
@@ -243,7 +242,10 @@ class ResponseEstimate:
 
     def _choose(self) -> None:
         """Take pairs, and axes, that explain what was measured clearly better than the present ones."""
-        before = (self._turning, self._others_before, *self._chosen)
+        before = self._choices()
+        if self.response.late:
+            self._second.choose()
+            self._slow.choose(self._second.least_error)
         errors = self._errors.reshape(-1, len(_GROUPS))
         pairs: list[int] = errors.argmin(axis=0).tolist()
         least = [float(errors[pair, group]) for group, pair in enumerate(pairs)]
@@ -260,13 +262,16 @@ class ResponseEstimate:
                 continue
             if least[group] < _BETTER * present:
                 self._chosen[channel] = best[group]
-        self._others_before = (self._second.chosen, self._slow.chosen, self._slow.share)
         seems_late = self._seems_late(errors)
         self._late_choices = self._late_choices + 1 if seems_late else 0
         is_late = seems_late and (self.response.late or self._late_choices >= _SURE)
         is_late = is_late or self._stays_late
-        if is_late != self.response.late or (self._turning, self._others_before, *self._chosen) != before:
+        if is_late != self.response.late or self._choices() != before:
             self.response = self._as_response() if is_late else Response()
+
+    def _choices(self) -> tuple[object, ...]:
+        """All that the response is made from."""
+        return (self._turning, *self._chosen, self._second.chosen, self._slow.chosen, self._slow.share)
 
     def _seems_late(self, errors: Array) -> bool:
         """Whether a pair chosen is that of a late vehicle, and no pair that is not late fits nearly as well.

@@ -103,13 +103,12 @@ class SecondLag:
         ax, ay = c * ahead - s * aside - turn * y_m_s, s * ahead + c * aside + turn * x_m_s
         return (x_m, y_m), (x_m_s, y_m_s), (ax, ay)
 
-    def compare(self, change: Array, error_of_one_lag: float, *, choose: bool) -> None:
-        """Compare the change over the window with the measured one; maybe choose a pair.
+    def compare(self, change: Array, error_of_one_lag: float) -> None:
+        """Compare the change over the window with the measured one.
 
         Args:
             change: of the measured velocity, arena axes.
             error_of_one_lag: squared, of the pair of one lag that is best.
-            choose: or keep the pair that there is.
         """
         past = self._past
         if len(past) != past.maxlen:
@@ -119,8 +118,9 @@ class SecondLag:
         self._errors = fade * self._errors + squares
         self._error_of_one_lag = fade * self._error_of_one_lag + error_of_one_lag
         self._energy = fade * self._energy + float(change @ change) * self._step_s
-        if not choose:
-            return
+
+    def choose(self) -> None:
+        """Take a pair, or none, that explains what was measured clearly better than the present one."""
         dead, lag = divmod(int(self._errors.argmin()), self._errors.shape[1])
         least = float(self._errors[dead, lag])
         present = self._error_of_one_lag if self.chosen is None else float(self._errors[self.chosen])

@@ -85,14 +85,12 @@ class SlowShare:
         ).tolist()
         return x, y
 
-    def compare(self, changes: Array, change: Array, error_of_two_lags: float, *, choose: bool) -> None:
-        """Compare the changes over the window with the measured one; maybe choose a pair and a share.
+    def compare(self, changes: Array, change: Array) -> None:
+        """Compare the changes over the window with the measured one.
 
         Args:
             changes: of what the lags make of the commands, shape (dead times, lags, 2).
             change: of the measured velocity, shape (2,).
-            error_of_two_lags: squared, of the best pair of two lags, with this class's memory.
-            choose: or keep what was chosen.
         """
         past = self._past
         if len(past) != past.maxlen:
@@ -104,10 +102,15 @@ class SlowShare:
         self._both = fade * self._both + made @ measured
         self._measured = fade * self._measured + float(measured @ measured)
         self._energy = fade * self._energy + float(change @ change) * self._step_s
-        if self._energy > _MIN_ENERGY and choose:
-            self._choose(error_of_two_lags)
 
-    def _choose(self, error_of_two_lags: float) -> None:
+    def choose(self, error_of_two_lags: float) -> None:
+        """Take a pair and a share, or none, that explain what was measured clearly better.
+
+        Args:
+            error_of_two_lags: squared, of the best pair of two lags, with this class's memory.
+        """
+        if self._energy <= _MIN_ENERGY:
+            return
         made, both = self._made, self._both
         shares = np.clip(both / np.maximum(made, 1e-9), _MIN_SHARE, 1.0)
         errors = self._measured + shares * (shares * made - 2.0 * both)

@@ -9,6 +9,7 @@ from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from geometry.solids import Solid
 from sitl.drone_files import flight_recorder
 from sitl.link_hub import LinkHub
+from sitl.pacing.time_grants import TimeGrants, Velocity
 from sitl.parameter_file import ParameterKeeper, open_parameters
 from sitl.payload.album import CameraAlbum
 from sitl.server_settings import ServerSettings
@@ -16,7 +17,6 @@ from sitl.simulation import Simulation
 from sitl.storage import open_storage
 from sitl.streaming.drone_video import DroneVideo
 from sitl.streaming.streams import video_streams
-from sitl.time_grants import TimeGrants, Velocity
 from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink
 

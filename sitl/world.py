@@ -130,8 +130,8 @@ class World:
     def end_step(self) -> None:
         """End a control period; a drone that turns faster than can be simulated has crashed."""
         dynamics = self.dynamics
-        rate_rad_s = dynamics.angular_rate_frd_rad_s()
-        if max(rate_rad_s) > MAX_RATE_RAD_S or min(rate_rad_s) < -MAX_RATE_RAD_S:
+        p, q, r = dynamics.angular_rate_frd_rad_s()
+        if abs(p) > MAX_RATE_RAD_S or abs(q) > MAX_RATE_RAD_S or abs(r) > MAX_RATE_RAD_S:
             self.crash = f"turned faster than {MAX_RATE_RAD_S:g} rad/s"
         if self._is_near:
             dynamics.set_ground_height(self._ground_m)

@@ -270,6 +270,13 @@ class Packet:
         return bytes(packet)
 
 
+def packed(message: Message, sender: mavlink.MAVLink) -> bytes:
+    """A message as the next packet of a sender, which counts its packets."""
+    data: bytes = message.pack(sender)
+    sender.seq = (sender.seq + 1) % 256
+    return data
+
+
 def source_of(packet: bytes | bytearray) -> tuple[int, int]:
     """System id and component id of a whole packet's sender; the message may be unknown."""
     return (packet[3], packet[4]) if packet[0] == MARKER_V1 else (packet[5], packet[6])

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from sitl.ardupilot.server import ArduPilotServer
     from sitl.ardupilot.simulation import ArduPilotSimulation
     from sitl.autopilots.process import AutopilotStart
+    from sitl.pacing.time_grants import TimeGrants
     from sitl.server_settings import ServerSettings
-    from sitl.time_grants import TimeGrants
 
 app = App(name="ardupilot", help="What a genuine ArduCopter needs to fly in the simulated world.")
 

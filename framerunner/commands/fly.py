@@ -175,8 +175,7 @@ def _run(settings: FlightSettings, *, lifeline: bool) -> int:
     from framerunner.child_process import until_standard_input_ends
     from framerunner.flying.run import fly_once
 
-    autopilot = None if settings.real_time is None else settings.real_time.autopilot
-    if autopilot is not None and autopilot.name == "px4" and not autopilot.repeats:
+    if settings.real_time is not None and not settings.real_time.repeats:
         say(
             "PX4 may not use real-time priorities here, so its flights with the same seed are alike, not the "
             "same (on Linux they are, as root or with `ulimit -r 99`)"

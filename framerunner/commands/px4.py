@@ -12,10 +12,10 @@ from framerunner.commands import for_genuine, say, with_faults, with_sensors
 if TYPE_CHECKING:
     from framerunner.commands.sim import Onboard
     from sitl.autopilots.process import AutopilotStart
+    from sitl.pacing.time_grants import TimeGrants
     from sitl.px4.server import Px4Server
     from sitl.px4.simulation import Px4Simulation
     from sitl.server_settings import ServerSettings
-    from sitl.time_grants import TimeGrants
 
 app = App(name="px4", help="What a genuine PX4 needs to fly in the simulated world.")
 

@@ -19,9 +19,9 @@ from sitl.autopilots import TITLES
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
+    from sitl.pacing.time_grants import TimeGrants
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
-    from sitl.time_grants import TimeGrants
     from wire.signing import SigningKey
 
 _MAX_COUNT = 20
@@ -256,7 +256,7 @@ def _grants(descriptor: int | None) -> TimeGrants | None:
         return None
     import socket
 
-    from sitl.time_grants import TimeGrants
+    from sitl.pacing.time_grants import TimeGrants
 
     return TimeGrants(socket.socket(fileno=descriptor))
 

@@ -8,7 +8,7 @@ import os
 import signal
 import threading
 from collections.abc import Coroutine, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -26,7 +26,7 @@ from framerunner.runs.run_folder import RunFolder
 from sitl.ardupilot import json_interface as ardupilot
 from sitl.ardupilot.poses import POSE_PORT
 from sitl.ardupilot.relay import RELAY_PORT
-from sitl.autopilots.own_folder import OwnFolder
+from sitl.autopilots.temporary_folder import TemporaryFolder
 from sitl.px4 import link as px4
 from sitl.px4.side_link import CAMERA_PORT
 from sitl.server_settings import VIDEO_PORT
@@ -62,22 +62,13 @@ def fly_with_genuine(plan: FlightPlan, use: GenuineUse) -> FinishedFlight:
         SettingError: simulator or autopilot cannot be started, or have ended.
         ValueError: the plan has no mission.
     """
-    with claimed_instance() as instance, _temporary_folder() as out:
-        folder = RunFolder(out, plan.scenario.name)
+    with claimed_instance() as instance, closing(TemporaryFolder("framerunner-flight-")) as out:
+        folder = RunFolder(out.path, plan.scenario.name)
         folder.write_plan(plan.scenario, plan.chart)
         settings = RealTimeSettings(
             speed=use.speed, instance=instance, autopilot=use.autopilot, unattended=True
         )
         return asyncio.run(interrupted_once(fly_in_real_time(plan, settings, RunRecords(folder, None), None)))
-
-
-@contextmanager
-def _temporary_folder() -> Iterator[Path]:
-    own = OwnFolder("framerunner-flight-")
-    try:
-        yield own.path
-    finally:
-        own.close()
 
 
 async def interrupted_once(work: Coroutine[object, object, T]) -> T:

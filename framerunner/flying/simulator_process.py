@@ -1,4 +1,4 @@
-"""The simulator as a child process whose time waits for this program at each tick; see `sitl.time_grants`.
+"""The simulator as a child process whose time waits for this program at each tick; see `pacing.time_grants`.
 
 What the app receives at a tick is then a function of vehicle time alone, as in lockstep: the image that was
 sent last and the telemetry of that tick. The setpoint that answers it arrives one control period later.
@@ -19,8 +19,8 @@ from offboard.drone import DroneError, VelocityCommand
 from offboard.perception import CameraPerception
 from sitl.autopilots import TITLES
 from sitl.autopilots.process import may_use_real_time
+from sitl.pacing.time_grants import FREE_US, Grant, Held, Velocity
 from sitl.server_settings import VIDEO_PORT
-from sitl.time_grants import FREE_US, Grant, Held, Velocity
 from sitl.world import CONTROL_PERIOD_US
 from wire.simulator_api import SimulatorApi
 

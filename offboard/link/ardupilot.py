@@ -31,6 +31,7 @@ from offboard.link.telemetry import TelemetryFeed
 from wire import ardupilot_modes
 from wire.dialect import mavlink
 
+READY_LIMIT_S = 90.0  # wall time; its estimator uses GPS some 40 s after its start
 TAKEOFF_HEIGHT_M = 1.0  # requested; velocities take over as soon as the drone is off the ground
 TAKEOFF_SHARE = 0.7  # likewise, of the room below the ceiling at most
 TAKEOFF_CLIMB_M_S = 0.05  # a command on the ground to climb faster than this is a take-off
@@ -98,7 +99,7 @@ class ArduPilotDialect:
     response_prior = ResponsePrior.UNKNOWN
     checks_in_offboard = True
     exchange = None
-    ready_limit_s = 90.0  # its estimator uses GPS some 40 s after its start
+    ready_limit_s = READY_LIMIT_S
 
     def __init__(
         self,

@@ -19,6 +19,7 @@ from math import inf
 from typing import Any
 
 from wire.dialect import AUTOPILOT_COMPONENT_ID, companion_heartbeat, mavlink
+from wire.framing import packed
 from wire.mission_tunnel import (
     COMPONENT_ID,
     DETECTIONS_TYPE,
@@ -228,8 +229,7 @@ class Companion:
         sender, port = self._sender, self._port
         if sender is None or port is None or self._peer is None:
             return
-        data = message.pack(sender)
-        sender.seq = (sender.seq + 1) % 256
+        data = packed(message, sender)
         with contextlib.suppress(OSError):
             port.sendto(data, self._peer)
             self.sent += 1

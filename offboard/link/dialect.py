@@ -27,6 +27,7 @@ class ModeNames:
     pilot: frozenset[str]  # flown by a pilot's sticks
 
 
+PX4_READY_LIMIT_S = 30.0  # wall time
 PX4_MODES = ModeNames(
     offboard="OFFBOARD",
     hold="HOLD",
@@ -121,7 +122,7 @@ class Px4Dialect(SetpointStream):
     modes = PX4_MODES
     numbered_modes: Mapping[int, str] = MappingProxyType({})
     checks_in_offboard = False
-    ready_limit_s = 30.0
+    ready_limit_s = PX4_READY_LIMIT_S
     exchange = None
 
     def __init__(

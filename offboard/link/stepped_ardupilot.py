@@ -14,7 +14,7 @@ from typing import Any
 from mavsdk.asyncio import MavsdkError
 
 from offboard.drone import ResponsePrior, VelocityCommand
-from offboard.link.ardupilot import ARDUPILOT_MODES, STREAMS_HZ, Setpoints
+from offboard.link.ardupilot import ARDUPILOT_MODES, READY_LIMIT_S, STREAMS_HZ, Setpoints
 from offboard.link.stepped import SteppedDialect
 from offboard.link.telemetry import TelemetryFeed
 from wire import ardupilot_modes
@@ -40,7 +40,7 @@ class SteppedArduPilotDialect(SteppedDialect):
     numbered_modes = ardupilot_modes.NAMES
     response_prior = ResponsePrior.UNKNOWN
     checks_in_offboard = True
-    ready_limit_s = 90.0
+    ready_limit_s = READY_LIMIT_S
 
     def __init__(
         self,

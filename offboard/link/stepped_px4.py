@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from offboard.drone import ResponsePrior
-from offboard.link.dialect import PX4_MODES
+from offboard.link.dialect import PX4_MODES, PX4_READY_LIMIT_S
 from offboard.link.stepped import SteppedDialect
 from wire import px4_modes
 from wire.dialect import mavlink
@@ -35,7 +35,7 @@ class SteppedPx4Dialect(SteppedDialect):
     numbered_modes: Mapping[int, str] = MappingProxyType({})
     response_prior = ResponsePrior.LATE
     checks_in_offboard = False
-    ready_limit_s = 30.0
+    ready_limit_s = PX4_READY_LIMIT_S
 
     def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
         super().__init__(direct, system_id)

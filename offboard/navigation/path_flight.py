@@ -42,7 +42,7 @@ MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
 LOOKED_AT_RAD = 0.3
 LOOK_GAIN_PER_S = 2.0
 LOOK_RAD_S = 0.9
-KEEP_MODEL_S = (-0.5, 2.0)  # to a gate; in this time the model of a vehicle that answers late is kept
+KEEP_MODEL_S = (-0.5, 2.0)  # to a gate, less than 0 behind it: then the model of a late vehicle is kept
 
 
 class PathFlight:
@@ -76,7 +76,8 @@ class PathFlight:
 
     def learn(self, state: DroneState, sent: VelocityCommand | None) -> None:
         """How late the vehicle answers, from the command that it had since the last tick; call every tick."""
-        self._response.update(state, sent, near_gate=self._is_near_gate())
+        near_gate = self._response.response.late and self._is_near_gate()  # it matters of a late one only
+        self._response.update(state, sent, near_gate=near_gate)
         response = self._response.response
         if not response.late:
             self._follower.observe(state, state.time_us * 1e-6, sent)

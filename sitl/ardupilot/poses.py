@@ -14,13 +14,13 @@ from firmware_py.types import GeodeticPoint
 from geometry.rotations import euler_from_quaternion
 from sitl.autopilots.sole_sender import SoleSender
 from wire.dialect import Message, degrees_e7, mavlink, millimetres
-from wire.transports.sockets import Address, bind_udp
+from wire.framing import packed
+from wire.transports.sockets import bind_udp
 
 POSE_PORT = 9006
 """UDP port of instance 0, between those of the JSON interface."""
 _COMPONENT_ID = int(mavlink.MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY)
 _ORIGIN_PERIOD_US = 1_000_000
-_PACKETS_AT_ONCE = 200
 
 
 class PoseLink:
@@ -73,18 +73,12 @@ class PoseLink:
 
     def _find_ardupilot(self) -> None:
         """Take its address from what has arrived."""
-        received: list[tuple[None, Address]] = []
-        for _ in range(_PACKETS_AT_ONCE):
-            if not self._socket.read() or self._socket.peer is None:
-                break
-            received.append((None, self._socket.peer))
-        self._sender.select(received)
+        self._sender.select(self._socket.read_all())
 
     def _send(self, message: Message) -> None:
         """Send a message to ArduPilot; lost before anything was received."""
         if self._sender.address is not None:
-            self._socket.write(message.pack(self._codec), self._sender.address)
-            self._codec.seq = (self._codec.seq + 1) % 256
+            self._socket.write(packed(message, self._codec), self._sender.address)
 
 
 def _covariance(variances: tuple[float, ...]) -> tuple[float, ...]:

@@ -1,11 +1,11 @@
-"""MAVLink between ArduPilot and the app whose flight it is, so that all comes at the same time again.
+"""MAVLink between ArduPilot and the app that flies it, so that the same seed is the same flight again.
 
 ArduPilot reads one datagram of its MAVLink port in each run of its loop, so one that comes by wall time, such
-as a heartbeat, delays the setpoint behind it. Here all that the app sends while simulated time stands is one
-datagram, and what it sends later waits until time stands again.
+as a heartbeat, delays the setpoint behind it. So what the app sends waits here until simulated time has stood
+still and goes on, and is then one datagram, or few if it is much.
 
-ArduPilot returns no PINGs, and its loop stands with time. They are returned here: then all that the app has
-sent before is here, and the app has all that ArduPilot has sent before.
+ArduPilot's loop stands still with simulated time, and it returns no PINGs. The relay returns them: by then it
+has all that the app has sent before, and the app has all that ArduPilot has sent before.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from collections import deque
 
 from sitl.autopilots.sole_sender import SoleSender
 from wire.dialect import Message, mavlink
-from wire.framing import HEADER_BYTES_V2, MARKER_V1, MARKER_V2, PacketReader
+from wire.framing import HEADER_BYTES_V2, MARKERS, PacketReader, message_id_of, packed
 from wire.transports.sockets import Address, UdpSocket, connect_udp
 
 HEARTBEAT_S = 1.0
 RELAY_PORT = 9007
 """UDP port of instance 0, between those of the JSON interface."""
-_PACKETS_AT_ONCE = 200
 _ROOM_BYTES = 400  # of a datagram; ArduPilot's buffer is 512, and what exceeds it is lost
 _DATAGRAMS_AT_ONCE = 8  # ArduPilot's loop runs twelve times from one tick of the app to the next
 _COMPONENT_ID = int(mavlink.MAV_COMP_ID_UDP_BRIDGE)
@@ -29,7 +28,7 @@ _FIRST = (
     int(mavlink.MAVLINK_MSG_ID_COMMAND_LONG),
     int(mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED),
 )
-"""What flies the drone is before anything else."""
+"""Sent before anything else, because they fly the drone."""
 
 
 class AppRelay:
@@ -52,21 +51,12 @@ class AppRelay:
 
     def from_ardupilot(self) -> None:
         """Pass on to the app what has arrived."""
-        received: list[tuple[bytes, Address]] = []
-        for _ in range(_PACKETS_AT_ONCE):
-            data = self.ardupilot.read()
-            if not data or self.ardupilot.peer is None:
-                break
-            received.append((data, self.ardupilot.peer))
-        for data in self._sender.select(received):
+        for data in self._sender.select(self.ardupilot.read_all()):
             self.app.write(data)
 
     def from_app(self) -> None:
         """Keep what has arrived until `flush`; return PINGs."""
-        for _ in range(_PACKETS_AT_ONCE):
-            data = self.app.read()
-            if not data:
-                return
+        for data, _ in self.app.read_all():
             number = _message_id(data)
             if number == _PING:
                 self._return(data)
@@ -74,11 +64,12 @@ class AppRelay:
                 (self._first if number in _FIRST else self._others).append(data)
 
     def send_heartbeat(self) -> None:
-        """Keep the app's MAVLink library from forgetting the relay; each `HEARTBEAT_S` of wall time.
+        """Send the app a heartbeat of the relay's, which is due each `HEARTBEAT_S` of wall time.
 
-        It sends nothing to an address from which nothing has come for some seconds, as while time stands. Not
-        before it knows ArduPilot: it would send NaN in commands, as to PX4, and ArduPilot's simulation ends
-        with a floating point exception.
+        The app's MAVLink library sends nothing to an address from which nothing has come for some seconds, as
+        while simulated time stands still. Call it only when the library knows ArduPilot: until then it sends
+        commands as PX4 takes them, with NaN, at which ArduPilot's simulation ends with a floating point
+        exception.
         """
         kind, none = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
         self._tell(mavlink.MAVLink_heartbeat_message(kind, none, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
@@ -115,12 +106,10 @@ class AppRelay:
 
     def _tell(self, message: Message) -> None:
         """Send a message of the relay to the app."""
-        self.app.write(message.pack(self._codec))
-        self._codec.seq = (self._codec.seq + 1) % 256
+        self.app.write(packed(message, self._codec))
 
 
 def _message_id(packet: bytes) -> int | None:
     """Of a packet's header; None: it is none."""
-    if len(packet) < HEADER_BYTES_V2 or packet[0] not in (MARKER_V1, MARKER_V2):
-        return None
-    return packet[5] if packet[0] == MARKER_V1 else int.from_bytes(packet[7:10], "little")
+    is_header = len(packet) >= HEADER_BYTES_V2 and packet[0] in MARKERS
+    return message_id_of(packet) if is_header else None

@@ -13,15 +13,14 @@ from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.server import AutopilotServer
 from sitl.autopilots.sole_sender import SoleSender
-from sitl.server import Pacer
+from sitl.pacing.pacer import Pacer
+from sitl.pacing.time_grants import FREE_US, TimeGrants
 from sitl.server_settings import ServerSettings
-from sitl.time_grants import FREE_US, TimeGrants
 from wire.transports.sockets import Address, UdpSocket, bind_udp
 
 _SILENCE_S = 2.0  # wall time without a frame that is reported
 _LOST_S = 0.5  # wall time after which an answer to a frame that is repeated was lost
 _GONE_S = 3.5  # wall time without a frame after which another is accepted; it repeats one each 1.1 s
-_PACKETS_AT_ONCE = 200
 
 
 class FrameExchange:
@@ -104,7 +103,6 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         self._poses: PoseLink | None = None
         self._relay: AppRelay | None = None  # with a program that grants time
         self._pacer: Pacer | None = None  # until that has granted time
-        self._pace = 0.0  # simulated seconds a second of the pacer
         self._sender = SoleSender("ArduPilot", self._port, notice, _GONE_S)
         self._waiting: tuple[ServoFrame, Address] | None = None  # the last frame and its sender
         self._frame_s = 0.0  # wall time of the last frame
@@ -175,14 +173,11 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         """Answer ArduPilot's newest frame that has arrived, as soon as time is granted."""
         link, before = self._link, self._sender.address
         assert link is not None, "it was opened"
-        received: list[tuple[ServoFrame, Address]] = []
-        for _ in range(_PACKETS_AT_ONCE):
-            if not (packet := link.read()):
-                break
-            frame = decode_frame(packet)
-            if frame is not None and link.peer is not None:
-                received.append((frame, link.peer))
-        if self._is_falling or not (frames := self._sender.select(received)):
+        received = [(decode_frame(packet), peer) for packet, peer in link.read_all()]
+        if self._is_falling:
+            return
+        frames = self._sender.select([(frame, peer) for frame, peer in received if frame is not None])
+        if not frames:
             return
         assert self._sender.address is not None, "it has sent frames"
         self._waiting, self._frame_s = (frames[-1], self._sender.address), time.monotonic()
@@ -207,7 +202,11 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
             self._answer(holds=self._until_us == FREE_US)
 
     def _answer(self, *, holds: bool) -> None:
-        """Answer the last frame; what the app has sent goes on when time held, or is not granted."""
+        """Answer the last frame.
+
+        Args:
+            holds: simulated time was held, or is free: what the app has sent goes to ArduPilot first.
+        """
         assert self._waiting is not None
         assert self._link is not None
         frame, peer = self._waiting
@@ -223,16 +222,11 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         if is_new and simulation.is_at_control_tick:
             self._video.step()  # while ArduPilot computes
 
-    @property
-    def _is_starting(self) -> bool:
-        """Whether a program will grant time, and has not yet."""
-        return self._grants is not None and not self._grants.used
-
     async def _keep_pace(self) -> None:
         """Wait until a step is due while the autopilot starts."""
         time_us, now_s, pace = self._simulation.time_us, time.monotonic(), self._starting_speed()
-        if self._pacer is None or pace != self._pace:
-            self._pacer, self._pace = Pacer(pace, now_s, time_us), pace
+        if self._pacer is None or self._pacer.speed != pace:
+            self._pacer = Pacer(pace, now_s, time_us)
         self._pacer.give_up_lag(now_s, time_us)
         await asyncio.sleep(self._pacer.wait_s(now_s, time_us))
 

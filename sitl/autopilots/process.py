@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from errors import SettingError, UserError
-from sitl.autopilots.own_folder import OwnFolder
+from sitl.autopilots.temporary_folder import TemporaryFolder
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 _LAST_BYTES = 2000
@@ -47,7 +47,7 @@ class AutopilotProcess(ABC):
     ) -> None:
         self._name, self._option = name, option
         if folder is None:
-            self._temporary = OwnFolder(f"framerunner-files-{name.lower()}-")
+            self._temporary = TemporaryFolder(f"framerunner-files-{name.lower()}-")
             folder = self._temporary.path
         self.folder = folder.absolute()
         self._environment = dict(environment)

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
-from sitl.server import BURST_TICKS, Pacer
+from sitl.pacing.pacer import BURST_TICKS, Pacer
+from sitl.pacing.time_grants import FREE_US, TimeGrants
 from sitl.server_settings import ServerSettings
 from sitl.streaming.drone_video import DroneVideo
-from sitl.time_grants import FREE_US, TimeGrants
 from sitl.vehicle import SimulatedVehicle
 from sitl.world import CONTROL_PERIOD_US
 
@@ -152,6 +152,11 @@ class AutopilotServer(ABC, Generic[V]):
         assert grants is not None, "time is granted"
         held_us = self._simulation.time_us - CONTROL_PERIOD_US
         await grants.hold(held_us, self._video.image_us, lambda: grants.setpoint)
+
+    @property
+    def _is_starting(self) -> bool:
+        """Whether a program will grant time, and has not yet."""
+        return self._grants is not None and not self._grants.used
 
     def _starting_speed(self) -> float:
         """Simulated seconds a second until a program grants time: at most real time.

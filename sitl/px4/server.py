@@ -10,12 +10,12 @@ from collections.abc import Callable
 from sitl.autopilots.idle import IdleCheck
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.server import AutopilotServer
+from sitl.pacing.pacer import BURST_TICKS, LagNotices, Pacer
+from sitl.pacing.time_grants import TimeGrants
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
 from sitl.px4.side_link import PERIOD_US, SideLink
 from sitl.px4.simulation import Px4Simulation
-from sitl.server import BURST_TICKS, LagNotices, Pacer
 from sitl.server_settings import ServerSettings
-from sitl.time_grants import TimeGrants
 from sitl.world import CONTROL_PERIOD_US
 
 _OWN_TIME = ("commander", "mavlink_if1")
@@ -141,9 +141,7 @@ class Px4Server(AutopilotServer[Px4Simulation]):
 
     def _wanted_speed(self, *, opened: bool) -> float:
         """Simulated seconds a second, also while PX4 starts."""
-        grants = self._grants
-        is_free = opened and (grants is None or grants.used)
-        return self._settings.speed if is_free else self._starting_speed()
+        return self._settings.speed if opened and not self._is_starting else self._starting_speed()
 
     def _has_started(self, link: Px4Link) -> bool:
         return link.in_lockstep and not (self._idle is not None and self._idle.starting)

@@ -64,9 +64,14 @@ class HoveringDrone:
             await asyncio.sleep(0.01)
 
 
+def bringing_down(drone, rules):
+    """The task that brings a drone down, and what is set when it has seen a state."""
+    seen = asyncio.Event()
+    return asyncio.create_task(FlightAbort(drone, rules, lambda state: seen.set()).bring_down()), seen
+
+
 async def stopped_twice(drone, operator, again=0):
-    abort = FlightAbort(drone, SafetyRules("land", operator), lambda state: None)
-    work = asyncio.create_task(abort.bring_down())
+    work, _ = bringing_down(drone, SafetyRules("land", operator))
     await drone.landing.wait()
     drone.landing.clear()
     operator.demand_landing()
@@ -101,9 +106,7 @@ async def test_a_stop_of_the_motors_that_has_failed_is_requested_again_when_it_i
 
 async def test_motors_that_do_not_stop_are_told_when_the_drone_has_landed():
     drone, operator = HoveringDrone(lost=3), Operator(needs_go=False)
-    seen = asyncio.Event()
-    abort = FlightAbort(drone, SafetyRules("land", operator), lambda state: seen.set())
-    work = asyncio.create_task(abort.bring_down())
+    work, seen = bringing_down(drone, SafetyRules("land", operator))
     async with asyncio.timeout(2.0):
         await seen.wait()
         operator.demand_landing()
@@ -115,9 +118,7 @@ async def test_motors_that_do_not_stop_are_told_when_the_drone_has_landed():
 
 async def test_a_landing_is_requested_again_when_it_is_demanded_again():
     drone, operator = HoveringDrone(), Operator(needs_go=False)
-    seen = asyncio.Event()
-    abort = FlightAbort(drone, SafetyRules("hold", operator), lambda state: seen.set())
-    work = asyncio.create_task(abort.bring_down())
+    work, seen = bringing_down(drone, SafetyRules("hold", operator))
     async with asyncio.timeout(2.0):
         for _ in range(3):
             await seen.wait()
@@ -131,9 +132,7 @@ async def test_a_landing_is_requested_again_when_it_is_demanded_again():
 
 async def test_a_landing_that_is_under_way_is_not_interrupted_by_the_same_demand():
     drone, operator = SlowDrone(), Operator(needs_go=False)
-    work = asyncio.create_task(
-        FlightAbort(drone, SafetyRules("hold", operator), lambda state: None).bring_down()
-    )
+    work, _ = bringing_down(drone, SafetyRules("hold", operator))
     operator.demand_landing()
     await drone.landing.wait()
     for _ in range(3):
@@ -148,9 +147,7 @@ async def test_a_landing_that_is_under_way_is_not_interrupted_by_the_same_demand
 
 async def test_stops_act_after_a_link_that_was_lost_has_come_back():
     drone, operator = HoveringDrone(), Operator(needs_go=False)
-    seen = asyncio.Event()
-    abort = FlightAbort(drone, SafetyRules("hold", operator), lambda state: seen.set())
-    work = asyncio.create_task(abort.bring_down())
+    work, seen = bringing_down(drone, SafetyRules("hold", operator))
     async with asyncio.timeout(2.0):
         for demand in (operator.demand_landing, operator.demand_motors_off):
             await seen.wait()

@@ -11,7 +11,8 @@ import pytest
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 from sitl.fleet import side_by_side
-from sitl.server import LagNotices, SimulatorServer
+from sitl.pacing.pacer import LagNotices
+from sitl.server import SimulatorServer
 from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
 from sitl.video import VideoError
@@ -129,7 +130,7 @@ async def test_telemetry_goes_out_on_both_links_before_anybody_spoke():
 
 
 async def test_a_machine_that_is_too_slow_slows_time_and_skips_nothing(monkeypatch):
-    monkeypatch.setattr("sitl.server._NOTICE_PERIOD_S", 1.0)
+    monkeypatch.setattr("sitl.pacing.pacer._NOTICE_PERIOD_S", 1.0)
     simulation = SlowSimulation(load_scenario("empty"))
     async with serving(simulation) as (lines, _):
         began_s, began_us = time.monotonic(), simulation.time_us
@@ -152,9 +153,7 @@ async def test_time_runs_at_the_wanted_speed(speed):
     async with serving(simulation, speed=speed) as (lines, _):
         await asyncio.sleep(0.3)
         factors = []
-        while (
-            len(factors) < 10 and max(factors, default=0.0) < speed * 0.7
-        ):  # a busy machine has quiet seconds
+        while len(factors) < 10 and max(factors, default=0.0) < speed * 0.7:  # a busy machine has quiet ones
             began_s, began_us = time.monotonic(), simulation.time_us
             await asyncio.sleep(1.0)
             factors.append((simulation.time_us - began_us) / 1e6 / (time.monotonic() - began_s))

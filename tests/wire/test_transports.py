@@ -3,11 +3,14 @@
 import pytest
 
 from wire.transports.sockets import (
+    MAX_DATAGRAMS_AT_ONCE,
     MAX_UNSENT_BYTES,
     OneClient,
     Stream,
+    bind_udp,
     check_free,
     connect_tcp,
+    connect_udp,
     listen_tcp,
 )
 from wire.transports.urls import LinkError, LinkUrl, UrlRules, host_and_port, is_loopback, parse_url
@@ -124,3 +127,19 @@ def test_one_client_after_the_other():
     assert (server.read(), server.read(), server.read()) == (b"", b"", b"b")
     second.close()
     server.close()
+
+
+def test_of_a_flood_of_datagrams_so_many_are_read_at_once():
+    listening = bind_udp(("127.0.0.1", 0), "")
+    place = listening._socket.getsockname()
+    first, other = connect_udp(place), connect_udp(place)
+    assert listening.read_all() == []
+    first.write(b"a")
+    for number in range(MAX_DATAGRAMS_AT_ONCE):
+        other.write(bytes([number]))
+    read = listening.read_all()
+    assert read[:2] == [(b"a", first._socket.getsockname()), (b"\0", other._socket.getsockname())]
+    assert len(read) == MAX_DATAGRAMS_AT_ONCE
+    assert [data for data, _ in listening.read_all()] == [bytes([MAX_DATAGRAMS_AT_ONCE - 1])]
+    for each in (listening, first, other):
+        each.close()

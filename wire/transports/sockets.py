@@ -23,6 +23,7 @@ from wire.transports.urls import LinkError, LinkUrl
 Address = tuple[str, int]
 
 MAX_UNSENT_BYTES = 1 << 18  # of a stream; a slower reader loses packets
+MAX_DATAGRAMS_AT_ONCE = 200  # so that a flood does not keep the reader from all else
 _CONNECT_S = 5.0
 _READ_BYTES = 1 << 16
 
@@ -46,6 +47,13 @@ class UdpSocket:
         except (BlockingIOError, ConnectionRefusedError):  # refused: nothing listens there yet
             return b""
         return data
+
+    def read_all(self) -> list[tuple[bytes, Address]]:
+        """The datagrams that wait, with their senders, the oldest first; `MAX_DATAGRAMS_AT_ONCE` at most."""
+        found: list[tuple[bytes, Address]] = []
+        while len(found) < MAX_DATAGRAMS_AT_ONCE and (data := self.read()) and self.peer is not None:
+            found.append((data, self.peer))
+        return found
 
     def write(self, data: bytes, to: Address | None = None) -> None:
         """Send a datagram to the peer that it is connected to, or to another address."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import select
 
 from wire.dialect import Message, mavlink
-from wire.framing import PacketReader
+from wire.framing import PacketReader, packed
 from wire.transports.sockets import Address, UdpSocket, open_drone
 from wire.transports.urls import LinkError, parse_url
 
@@ -61,8 +61,7 @@ class VehicleLink:
 
     def send(self, message: Message) -> None:
         """Send a message to its target system, or to all; lost before anything was received."""
-        data = message.pack(self._codec)
-        self._codec.seq = (self._codec.seq + 1) % 256
+        data = packed(message, self._codec)
         if not isinstance(self._udp_port, UdpSocket):
             self._transport.write(data)
             return
@@ -75,8 +74,7 @@ class VehicleLink:
         if not isinstance(self._udp_port, UdpSocket):
             self.send(message)
             return
-        data = message.pack(self._codec)
-        self._codec.seq = (self._codec.seq + 1) % 256
+        data = packed(message, self._codec)
         for address in set().union(*self._sources.values()):
             self._udp_port.write(data, address)
 

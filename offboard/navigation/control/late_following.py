@@ -209,9 +209,10 @@ def _bandwidth(dead_s: float, lag_s: float) -> float:
 def _climb_gains(lag_s: float) -> tuple[float, float, float]:
     """Those of `_gains` up and down, that close an offset at the same rate for nearly all lags.
 
-    A climb against drag looks like a longer lag, and a longer dead time, than the vehicle has.
+    A climb against drag looks like a longer lag, and a longer dead time, than the vehicle has. So the
+    bandwidth b is that of the gain, lag b^2, unless the damping, 2 lag b - 1, would be too high.
     """
-    if lag_s * CLIMB_GAIN_PER_S < 0.25:
+    if lag_s * CLIMB_GAIN_PER_S < 0.25:  # this damping would be negative
         return CLIMB_GAIN_PER_S, 0.0, 0.0
     most_per_s = 0.5 * (1.0 + MAX_CLIMB_DAMPING) / lag_s
     return _gains(lag_s, bandwidth_per_s=min(sqrt(CLIMB_GAIN_PER_S / lag_s), most_per_s))

@@ -28,6 +28,17 @@ def _own_folder(tmp_path, monkeypatch):
 
 
 @pytest.fixture
+def three_instances(monkeypatch, tmp_path):
+    """Their ports are not those of other tests, nor their locks; returns the folder of the locks."""
+    monkeypatch.setattr(genuine_flight, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(genuine_flight, "INSTANCES", 3)
+    monkeypatch.setattr(genuine_flight, "_TCP_PORTS", (24560,))
+    monkeypatch.setattr(genuine_flight, "_UDP_PORTS", (24580,))
+    monkeypatch.setattr(genuine_flight, "_ARDUPILOT_UDP_PORTS", ())
+    return tmp_path
+
+
+@pytest.fixture
 def px4():
     """A folder that looks like a build of PX4, whose program ends at once."""
     folder = Path("px4")
@@ -139,12 +150,8 @@ def test_options_that_do_not_go_together(px4, options, message, capsys):
     assert message in capsys.readouterr().err
 
 
-def test_each_flight_at_once_has_an_instance_of_its_own(monkeypatch, tmp_path):
-    monkeypatch.setattr(genuine_flight, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr(genuine_flight, "INSTANCES", 3)
-    monkeypatch.setattr(genuine_flight, "_TCP_PORTS", (24560,))
-    monkeypatch.setattr(genuine_flight, "_UDP_PORTS", (24580,))
-    monkeypatch.setattr(genuine_flight, "_ARDUPILOT_UDP_PORTS", ())
+@pytest.mark.usefixtures("three_instances")
+def test_each_flight_at_once_has_an_instance_of_its_own():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 24581))
         with claimed_instance() as first, claimed_instance() as second:
@@ -174,16 +181,11 @@ def test_a_flight_that_is_interrupted_twice_still_ends_in_order():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_a_lock_in_the_shared_folder_neither_changes_nor_waits_for_other_files(monkeypatch, tmp_path):
-    monkeypatch.setattr(genuine_flight, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr(genuine_flight, "INSTANCES", 3)
-    monkeypatch.setattr(genuine_flight, "_TCP_PORTS", (24560,))
-    monkeypatch.setattr(genuine_flight, "_UDP_PORTS", (24580,))
-    monkeypatch.setattr(genuine_flight, "_ARDUPILOT_UDP_PORTS", ())
-    valuable = tmp_path / "valuable"
+def test_a_lock_in_the_shared_folder_neither_changes_nor_waits_for_other_files(three_instances):
+    valuable = three_instances / "valuable"
     valuable.write_text("kept")
-    (tmp_path / "framerunner-0.lock").symlink_to(valuable)
-    left = tmp_path / "framerunner-1.lock"  # by an earlier flight of another user
+    (three_instances / "framerunner-0.lock").symlink_to(valuable)
+    left = three_instances / "framerunner-1.lock"  # by an earlier flight of another user
     left.write_text("theirs")
     left.chmod(0o444)
     with claimed_instance() as instance:
@@ -191,4 +193,4 @@ def test_a_lock_in_the_shared_folder_neither_changes_nor_waits_for_other_files(m
     assert (valuable.read_text(), left.read_text()) == ("kept", "theirs")
     with claimed_instance(), claimed_instance() as instance:
         assert instance == 2
-    assert (tmp_path / "framerunner-2.lock").stat().st_mode & 0o777 == 0o644
+    assert (three_instances / "framerunner-2.lock").stat().st_mode & 0o777 == 0o644

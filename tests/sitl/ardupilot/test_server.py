@@ -19,8 +19,8 @@ from sitl.ardupilot.poses import POSE_PORT
 from sitl.ardupilot.server import ArduPilotServer
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
+from sitl.pacing.time_grants import Grant, Held, TimeGrants
 from sitl.server_settings import ServerSettings
-from sitl.time_grants import Grant, Held, TimeGrants
 from tests.processes import free_instance
 from tests.sitl.ardupilot.fake_ardupilot import FakeArduPilot
 from tests.waiting import stopped, until

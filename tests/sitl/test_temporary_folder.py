@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from sitl.autopilots.own_folder import OwnFolder
+from sitl.autopilots.temporary_folder import TemporaryFolder
 
 PREFIX = "framerunner-test-"
 MAKE = f"""
 import time
-from sitl.autopilots.own_folder import OwnFolder
-folder = OwnFolder({PREFIX!r})
+from sitl.autopilots.temporary_folder import TemporaryFolder
+folder = TemporaryFolder({PREFIX!r})
 print(folder.path, flush=True)
 (folder.path / "file").touch()
 time.sleep(60)
@@ -35,7 +35,7 @@ def names(place):
 
 
 def test_it_is_removed_when_it_is_closed_or_not_used_any_more(place):
-    first, second = OwnFolder(PREFIX), OwnFolder(PREFIX)
+    first, second = TemporaryFolder(PREFIX), TemporaryFolder(PREFIX)
     (first.path / "file").touch()
     assert len(names(place)) == 2
     first.close()
@@ -49,15 +49,15 @@ def test_that_of_a_program_that_was_killed_is_removed_by_the_next_and_that_of_a_
     with subprocess.Popen([sys.executable, "-c", MAKE], stdout=subprocess.PIPE, env=environment) as other:
         try:
             folder = Path(other.stdout.readline().decode().strip())
-            OwnFolder(PREFIX).close()
+            TemporaryFolder(PREFIX).close()
             assert folder.is_dir()
         finally:
             other.send_signal(signal.SIGKILL)
             other.wait()
     assert folder.is_dir()
-    OwnFolder("framerunner-other-").close()
+    TemporaryFolder("framerunner-other-").close()
     assert folder.is_dir()
-    OwnFolder(PREFIX).close()
+    TemporaryFolder(PREFIX).close()
     assert names(place) == []
 
 
@@ -70,7 +70,7 @@ def test_links_and_what_they_point_to_are_left_alone(place):
     (left / "link").symlink_to(kept)
     (place / f"{PREFIX}link").symlink_to(kept)
     (place / f"{PREFIX}file").touch()
-    OwnFolder(PREFIX).close()
+    TemporaryFolder(PREFIX).close()
     assert names(place) == [f"{PREFIX}file", f"{PREFIX}link", "kept"]
     assert (kept / "file").exists()
 
@@ -78,5 +78,5 @@ def test_links_and_what_they_point_to_are_left_alone(place):
 def test_a_folder_of_another_user_is_left_alone(place, monkeypatch):
     (place / f"{PREFIX}theirs").mkdir()
     monkeypatch.setattr(os, "getuid", lambda: 12345)
-    OwnFolder(PREFIX).close()
+    TemporaryFolder(PREFIX).close()
     assert names(place) == [f"{PREFIX}theirs"]

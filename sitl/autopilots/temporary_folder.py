@@ -13,7 +13,7 @@ from tempfile import gettempdir, mkdtemp
 _NEW = "framerunner-new-"  # until it is locked
 
 
-class OwnFolder:
+class TemporaryFolder:
     """A temporary folder of this program's, removed by `close`, at the latest when the program ends.
 
     It is locked while the program lives, and the system unlocks it when the program is killed. So folders

@@ -7,10 +7,10 @@ from contextlib import asynccontextmanager, suppress
 from pymavlink.dialects.v20 import common as mavlink
 
 from scenarios.loader import load_scenario
+from sitl.pacing.time_grants import FREE_US, Grant, Held, TimeGrants
 from sitl.server import SimulatorServer
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
-from sitl.time_grants import FREE_US, Grant, Held, TimeGrants
 from tests.processes import free_instance, wait_until
 
 SPEED = 20.0
@@ -103,7 +103,7 @@ async def test_time_waits_for_the_setpoint_that_was_sent():
 
 
 async def test_a_setpoint_that_is_never_received_is_reported_and_ends_nothing(monkeypatch):
-    monkeypatch.setattr("sitl.time_grants._POLLS", 100)
+    monkeypatch.setattr("sitl.pacing.time_grants._POLLS", 100)
     async with serving() as caller:
         caller.grant(0)
         began = await caller.held()

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sitl.server import Pacer
+from sitl.pacing.pacer import Pacer
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 4.0])

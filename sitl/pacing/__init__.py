@@ -1,0 +1,1 @@
+"""How fast simulated time passes, and how far."""
