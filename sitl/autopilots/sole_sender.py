@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Generic, TypeVar
 
+from sitl.autopilots import WARNING
 from wire.transports.sockets import Address
 
 T = TypeVar("T")
@@ -93,7 +94,8 @@ class SoleSender(Generic[T]):
                 f"{self._name} at {connected[0]}:{connected[1]} is connected; end one of the two, or choose "
                 "another --instance"
             )
-        self._notice(f"what {other[0]}:{other[1]} sends to UDP {self._port} is ignored: {reason}")
+        sender = f"{other[0]}:{other[1]}"
+        self._notice(f"{WARNING}what {sender} sends to UDP {self._port} is ignored: {reason}")
 
     def _has_gone(self) -> bool:
         address = self.address

@@ -18,6 +18,6 @@ def test_noise_and_another_vehicle_do_not_take_the_place_of_the_vehicle():
         assert sender.select([(data, stranger)]) == []
     assert sender.select([(heartbeat(5), vehicle)]) == [heartbeat(5)]
     assert said == [
-        "what 127.0.0.1:50001 sends to UDP 9046 is ignored: it is no MAVLink of ArduPilot with --sysid 5; "
-        "end it, or choose another --instance"
+        "warning: what 127.0.0.1:50001 sends to UDP 9046 is ignored: it is no MAVLink of ArduPilot with "
+        "--sysid 5; end it, or choose another --instance"
     ]
