@@ -22,6 +22,7 @@ from scenarios.models import Scenario
 T = TypeVar("T")
 
 _GRACE_S = 3.0
+_LAST_LINE_S = 1.0
 _MONITOR_START_S = 20.0
 
 
@@ -85,15 +86,21 @@ class ChildProcess:
                 process.kill()
             await process.wait()
         if self._reader is not None:
+            await asyncio.wait({self._reader}, timeout=_LAST_LINE_S)
             self._reader.cancel()
             await asyncio.gather(self._reader, return_exceptions=True)
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether it has ended by itself with an error."""
+        return self._process is not None and (self._process.returncode or 0) > 0
 
     async def failed(self) -> str:
         """Wait until the process ends by itself, and return why: its last line. Waits forever otherwise."""
         assert self._process is not None
         code = await self._process.wait()
         if self._reader is not None:
-            await asyncio.wait({self._reader}, timeout=1.0)
+            await asyncio.wait({self._reader}, timeout=_LAST_LINE_S)
         return f"{self._name} ended with code {code}: {self._last_line.removeprefix('error: ')}"
 
     async def guard(self, work: asyncio.Task[T]) -> T:

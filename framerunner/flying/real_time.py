@@ -194,7 +194,9 @@ async def _vehicle(
     links = () if monitor_url is None or autopilot is not None else (monitor_url,)  # others have their own
     storage = None if autopilot is None else records.folder.path
     chosen = (scenario_file, settings.speed, settings.instance, links, plan.seed or 0)
-    sitl = await stack.enter_async_context(SitlProcess(*chosen, autopilot=autopilot, storage=storage))
+    on_warning = (lambda line: None) if settings.unattended else warn
+    started = SitlProcess(*chosen, autopilot=autopilot, storage=storage, on_warning=on_warning)
+    sitl = await stack.enter_async_context(started)
     camera = plan.scenario.camera
     size_px = (camera.width_px, camera.height_px)
     shared = None if autopilot is None else monitor_url

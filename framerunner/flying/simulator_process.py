@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self
 
-from errors import SettingError
+from errors import SettingError, UserError
 from framerunner.child_process import ChildProcess
 from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate, single
 from offboard.drone import DroneError, VelocityCommand
 from offboard.perception import CameraPerception
-from sitl.autopilots import TITLES
+from sitl.autopilots import TITLES, WARNING
 from sitl.autopilots.process import may_use_real_time
 from sitl.pacing.time_grants import FREE_US, Grant, Held, Velocity
 from sitl.server_settings import VIDEO_PORT
@@ -63,6 +64,7 @@ class SitlProcess(ChildProcess):
         seed: of everything random.
         autopilot: that flies instead of our own; None: our own does.
         storage: folder of the drone's files; None: in memory.
+        on_warning: called with each of its warnings, without "warning: ".
     """
 
     def __init__(
@@ -75,6 +77,7 @@ class SitlProcess(ChildProcess):
         *,
         autopilot: GenuineAutopilot | None = None,
         storage: Path | None = None,
+        on_warning: Callable[[str], None] = lambda line: None,
     ) -> None:
         here, there = socket.socketpair()
         arguments = [
@@ -86,7 +89,12 @@ class SitlProcess(ChildProcess):
             *(() if autopilot is None else (f"--{autopilot.name}", str(autopilot.folder))),
             *(() if storage is None else ("--storage", str(storage))),
         ]
-        super().__init__("the simulator", arguments, inherited=there)
+
+        def hear(line: str) -> None:
+            if line.startswith(WARNING):
+                on_warning(line.removeprefix(WARNING))
+
+        super().__init__("the simulator", arguments, hear, inherited=there)
         answer_us = _ANSWER_US if autopilot is None else _GENUINE_ANSWER_US[autopilot.name]
         self.clock = SimulatorClock(here, answer_us, answers_take_time=autopilot is not None)
         self.system_id = instance + 1  # MAVLink id of its drone
@@ -103,10 +111,12 @@ class SitlProcess(ChildProcess):
             raise
         return self
 
-    async def __aexit__(self, *_: object) -> None:
-        """Stop it."""
+    async def __aexit__(self, *problem: object) -> None:
+        """Stop it; when it had failed, that is the reason of a UserError: SettingError with its last line."""
         self.clock.close()
         await super().__aexit__()
+        if self.has_failed and any(isinstance(each, UserError) for each in problem):
+            raise SettingError(await self.failed()) from None
 
 
 class SimulatorClock:

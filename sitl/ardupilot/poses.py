@@ -12,7 +12,7 @@ from collections.abc import Callable
 from firmware_py.measurements import ExternalPose
 from firmware_py.types import GeodeticPoint
 from geometry.rotations import euler_from_quaternion
-from sitl.autopilots.sole_sender import SoleSender
+from sitl.ardupilot.mavlink_sender import mavlink_sender
 from wire.dialect import Message, degrees_e7, mavlink, millimetres
 from wire.framing import packed
 from wire.transports.sockets import bind_udp
@@ -41,7 +41,7 @@ class PoseLink:
         self, bind: str, port: int, system_id: int, origin: GeodeticPoint, notice: Callable[[str], None]
     ) -> None:
         self._socket = bind_udp((bind, port), "choose another --instance")
-        self._sender = SoleSender("ArduPilot", port, notice)
+        self._sender = mavlink_sender(port, system_id, notice)
         self._codec = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=_COMPONENT_ID)
         self._origin = mavlink.MAVLink_set_gps_global_origin_message(
             system_id,

@@ -41,7 +41,7 @@ class AppRelay:
         system_id: of the vehicle.
     """
 
-    def __init__(self, listening: UdpSocket, app: Address, sender: SoleSender, system_id: int) -> None:
+    def __init__(self, listening: UdpSocket, app: Address, sender: SoleSender[bytes], system_id: int) -> None:
         self.ardupilot, self.app = listening, connect_udp(app)
         self._sender = sender
         self._codec = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=_COMPONENT_ID)

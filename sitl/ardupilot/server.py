@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
+from sitl.ardupilot.mavlink_sender import mavlink_sender
 from sitl.ardupilot.poses import POSE_PORT, PoseLink
 from sitl.ardupilot.relay import HEARTBEAT_S, RELAY_PORT, AppRelay
 from sitl.ardupilot.simulation import ArduPilotSimulation
@@ -103,7 +104,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         self._poses: PoseLink | None = None
         self._relay: AppRelay | None = None  # with a program that grants time
         self._pacer: Pacer | None = None  # until that has granted time
-        self._sender = SoleSender("ArduPilot", self._port, notice, _GONE_S)
+        self._sender = SoleSender[ServoFrame]("ArduPilot", self._port, notice, _GONE_S)
         self._waiting: tuple[ServoFrame, Address] | None = None  # the last frame and its sender
         self._frame_s = 0.0  # wall time of the last frame
         self._connected = asyncio.Event()
@@ -121,7 +122,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         if self._grants is not None and app is not None:
             port = RELAY_PORT + PORTS_AN_INSTANCE * instance
             listening = bind_udp((bind, port), "choose another --instance")
-            sender = SoleSender("ArduPilot", port, self._notice)
+            sender = mavlink_sender(port, instance + 1, self._notice)
             self._relay = AppRelay(listening, app, sender, instance + 1)
 
     def _close(self) -> None:

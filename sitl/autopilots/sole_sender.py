@@ -6,15 +6,25 @@ import errno
 import socket
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import inf
-from typing import TypeVar
+from typing import Generic, TypeVar
 
+from sitl.autopilots import WARNING
 from wire.transports.sockets import Address
 
 T = TypeVar("T")
 
 
-class SoleSender:
+@dataclass(frozen=True, slots=True)
+class Sign(Generic[T]):
+    """By which the program is told from others that send to its port."""
+
+    is_in: Callable[[T], bool]  # whether what was received shows it; only asked about new senders
+    words: str  # what it is, for people, after "it is no"
+
+
+class SoleSender(Generic[T]):
     """Selects what the connected program has sent; what others send is dropped, and reported once.
 
     Another sender is connected when the port of the one before is closed, which is known at once on this
@@ -29,6 +39,7 @@ class SoleSender:
 
     Attributes:
         address: of the connected sender; None: nobody is connected.
+        sign: of the program, which may be set; None: the first sender is the program.
     """
 
     def __init__(
@@ -40,6 +51,7 @@ class SoleSender:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.address: Address | None = None
+        self.sign: Sign[T] | None = None
         self._name, self._port, self._notice = name, port, notice
         self._silent_s, self._clock = silent_s, clock
         self._heard_s = 0.0
@@ -50,12 +62,15 @@ class SoleSender:
         if not received:
             return []
         if all(sender != self.address for _, sender in received) and self._has_gone():
-            self.address, self._noticed = received[0][1], False
+            genuine = next((sender for item, sender in received if self._is_genuine(item)), None)
+            if genuine is None:
+                self._report(received[0][1])
+                return []
+            self.address, self._noticed = genuine, False
         selected = [item for item, sender in received if sender == self.address]
         if selected:
             self._heard_s = self._clock()
-        if len(selected) < len(received) and not self._noticed:
-            self._noticed = True
+        if len(selected) < len(received):
             self._report(next(sender for _, sender in received if sender != self.address))
         return selected
 
@@ -63,13 +78,24 @@ class SoleSender:
         """Nobody is connected from now on."""
         self.address, self._noticed = None, False
 
+    def _is_genuine(self, item: T) -> bool:
+        return self.sign is None or self.sign.is_in(item)
+
     def _report(self, other: Address) -> None:
+        if self._noticed:
+            return
+        self._noticed = True
         connected = self.address
-        assert connected is not None, "there is another one"
-        self._notice(
-            f"what {other[0]}:{other[1]} sends to UDP {self._port} is ignored: {self._name} at "
-            f"{connected[0]}:{connected[1]} is connected; end one of the two, or choose another --instance"
-        )
+        if connected is None:
+            assert self.sign is not None, "the first sender would be connected"
+            reason = f"it is no {self.sign.words}; end it, or choose another --instance"
+        else:
+            reason = (
+                f"{self._name} at {connected[0]}:{connected[1]} is connected; end one of the two, or choose "
+                "another --instance"
+            )
+        sender = f"{other[0]}:{other[1]}"
+        self._notice(f"{WARNING}what {sender} sends to UDP {self._port} is ignored: {reason}")
 
     def _has_gone(self) -> bool:
         address = self.address

@@ -5,7 +5,7 @@ from contextlib import closing
 
 import pytest
 
-from sitl.autopilots.sole_sender import SoleSender
+from sitl.autopilots.sole_sender import Sign, SoleSender
 
 
 def sender(address="127.0.0.1"):
@@ -61,3 +61,21 @@ def test_after_forgetting_the_next_sender_counts(two):
     sole.select([("a", first)])
     sole.forget()
     assert sole.select([("b", other)]) == ["b"]
+
+
+def test_a_sender_without_the_sign_of_the_program_does_not_take_its_place(two):
+    (_, stranger), (_, genuine) = two
+    said = []
+    sole = SoleSender("ArduPilot", 9002, said.append)
+    sole.sign = Sign(lambda item: item == "genuine", "frame of ArduPilot")
+    assert sole.select([("noise", stranger)]) == sole.select([("noise", stranger)]) == []
+    assert sole.address is None
+    assert len(said) == 1
+    assert (
+        f"what 127.0.0.1:{stranger[1]} sends to UDP 9002 is ignored: it is no frame of ArduPilot" in said[0]
+    )
+    assert sole.select([("noise", stranger), ("genuine", genuine), ("later", genuine)]) == [
+        "genuine",
+        "later",
+    ]
+    assert sole.address == genuine

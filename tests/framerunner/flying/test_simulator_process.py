@@ -4,14 +4,18 @@ import asyncio
 import os
 import signal
 import subprocess
+import sys
 
 import aiohttp
 import pytest
 
-from errors import SettingError
+from errors import SettingError, UserError
 from framerunner.flying.judges import ask_referee
-from framerunner.flying.simulator_process import SitlProcess
+from framerunner.flying.simulator_process import GenuineAutopilot, SitlProcess
+from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE
 from tests.processes import bound, free_instance, is_running, ports_are_free, program, simulator
+from tests.waiting import until
+from vision.types import CameraError
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
@@ -76,6 +80,39 @@ async def test_its_last_line_is_the_reason_when_it_cannot_start():
     with pytest.raises(SettingError, match=r"code 2: unknown scenario .no-such-place"):
         async with SitlProcess("no-such-place", instance=free_instance()):
             pytest.fail("it has not started")
+
+
+@pytest.mark.parametrize("ended", [True, False])
+async def test_an_error_that_follows_from_its_end_is_replaced_by_its_last_line(ended):
+    reason = "the simulator ended with code 130: interrupted" if ended else "cannot connect"
+    with pytest.raises(UserError, match=reason):  # noqa: PT012 - the error comes from leaving the block
+        async with SitlProcess("empty", instance=free_instance()) as sitl:
+            if ended:
+                os.kill(sitl._process.pid, signal.SIGTERM)
+                await sitl._process.wait()
+            raise CameraError("cannot connect")
+
+
+async def test_that_a_stranger_has_taken_the_place_of_ardupilot_is_heard(tmp_path):
+    heard, instance = [], free_instance()
+    program = tmp_path / "build" / "sitl" / "bin" / "arducopter"
+    program.parent.mkdir(parents=True)
+    port = FIRST_PORT + PORTS_AN_INSTANCE * instance
+    program.write_text(
+        f"#!{sys.executable}\n"
+        "import socket, struct, time\n"
+        "frame = struct.pack('<HHI16H', 18458, 400, 1, *[1000] * 16)\n"
+        "both = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)]\n"
+        "while True:\n"
+        f"    for each in both: each.sendto(frame, ('127.0.0.1', {port}))\n"
+        "    time.sleep(0.1)\n"
+    )
+    program.chmod(0o755)
+    options = {"autopilot": GenuineAutopilot("ardupilot", tmp_path), "storage": tmp_path / "files"}
+    async with SitlProcess("empty", 1.0, instance, **options, on_warning=heard.append):
+        await until(lambda: heard)
+    assert len(heard) == 1
+    assert f"sends to UDP {port} is ignored: ArduPilot at 127.0.0.1:" in heard[0]
 
 
 async def test_its_end_cancels_the_work_that_it_guards():

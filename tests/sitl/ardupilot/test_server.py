@@ -139,7 +139,9 @@ async def test_poses_of_motion_capture_and_the_origin_are_sent_by_mavlink():
             serial.settimeout(5.0)
             port = POSE_PORT + fake.place[1] - FIRST_PORT
             beat = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 3, 3)
-            serial.sendto(beat.pack(mavlink.MAVLink(None, srcSystem=1, srcComponent=1)), ("127.0.0.1", port))
+            system_id = 1 + (fake.place[1] - FIRST_PORT) // PORTS_AN_INSTANCE
+            link = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=1)
+            serial.sendto(beat.pack(link), ("127.0.0.1", port))
             for _ in range(60):
                 await asyncio.to_thread(fake.step, STILL)
             reader = PacketReader()

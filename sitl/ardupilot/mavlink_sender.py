@@ -1,0 +1,25 @@
+"""Which sender of MAVLink datagrams is the connected ArduPilot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sitl.autopilots.sole_sender import Sign, SoleSender
+from wire.framing import PacketReader
+
+
+def mavlink_sender(port: int, system_id: int, notice: Callable[[str], None]) -> SoleSender[bytes]:
+    """Selects ArduPilot's datagrams; others cannot take its place by being the first.
+
+    Args:
+        port: UDP port that they are sent to.
+        system_id: of its MAVLink.
+        notice: called with lines for people.
+    """
+
+    def is_of_vehicle(data: bytes) -> bool:
+        return any(message.get_srcSystem() == system_id for message in PacketReader().feed(data))
+
+    sender = SoleSender[bytes]("ArduPilot", port, notice)
+    sender.sign = Sign(is_of_vehicle, f"MAVLink of ArduPilot with --sysid {system_id}")
+    return sender
