@@ -109,8 +109,8 @@ class Px4Link:
             elif not candidate.is_reported and time.monotonic() - candidate.since_s > _STRANGE_S:
                 candidate.is_reported = True
                 self._notice(
-                    f"{WARNING}{candidate.place} is connected to PX4's port and has sent no heartbeat of a PX4; PX4 "
-                    "is still waited for"
+                    f"{WARNING}{candidate.place} is connected to PX4's port and has sent no heartbeat of a "
+                    "PX4; PX4 is still waited for"
                 )
         return False
 

@@ -109,7 +109,8 @@ async def test_a_connection_that_is_not_of_px4_is_told_once(monkeypatch):
         await until(lambda: not link.try_connect() and lines)
         link.try_connect()
     assert len(lines) == 1
-    assert lines[0].startswith(f"{host}:{port} is connected to PX4's port and has sent no heartbeat of a PX4")
+    said = f"warning: {host}:{port} is connected to PX4's port and has sent no heartbeat of a PX4"
+    assert lines[0].startswith(said)
     link.close()
 
 
