@@ -19,7 +19,7 @@ from errors import SettingError, write_advice
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
 from framerunner.runs.track import Track
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_estimate import FrameEstimate
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 

@@ -7,7 +7,7 @@ from math import isfinite
 from typing import Any
 
 from offboard.app import Moment
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.view import NavigationView
 
 PERIOD_US = 500_000  # of vehicle time between two documents

@@ -41,7 +41,7 @@ from geometry.vectors import Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.view import NavigationView
 from scenarios.result import FlightResult, ResultError
 from vision.jpeg import JPEG_START, MAX_PIXELS, ImageError, jpeg_structure

@@ -16,7 +16,7 @@ from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.view import NavigationView
 from scenarios.imaging.effects import Lens
 from scenarios.models import COLOURS, Arena, Scenario

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import cos, dist, hypot, inf, pi, remainder, sin
 
 from geometry.vectors import Vec3
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import Point
 from offboard.navigation.path import Crossing, Path
 

@@ -11,8 +11,8 @@ from geometry.vectors import Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.exploration import Explorer, Pace, Viewpoint
-from offboard.navigation.frame_estimate import FrameEstimate
-from offboard.navigation.frame_map import FrameMap
+from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_map import FrameMap
 from offboard.navigation.goals import FlightStyle, Gate, Obstacles
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
@@ -86,7 +86,7 @@ class WorldModel:
         self.viewed_space.update(self._camera.pose(*where))
         others = any(frame.colour not in COLOURS for frame in self._map.frames())
         self.viewed_space.needed = others or len(known) < len(COLOURS)
-        self._glimpses.update(*where, image, known)
+        self._glimpses.update(*where, image, known, self._map.is_lookalike)
 
     def _poses_of_rows(self, image: Detections, pose: DronePose) -> list[DronePose] | None:
         """With a rolling shutter, the drone's pose when each frame's middle row was read out."""

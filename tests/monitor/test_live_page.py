@@ -16,7 +16,7 @@ from monitor.vehicle.mission import MissionView
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.mission import load_mission, mermaid
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.view import NavigationView
 from scenarios.loader import load_scenario
 from tests.chromium import Complaints, until

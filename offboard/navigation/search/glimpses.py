@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from math import hypot
 from typing import Final
@@ -38,7 +38,12 @@ class Glimpses:
         self._lines: dict[str, tuple[int, LineOfSight]] = {}
 
     def update(
-        self, position_m: Vec3, attitude_arena: Quaternion, detections: Detections, known: Collection[str]
+        self,
+        position_m: Vec3,
+        attitude_arena: Quaternion,
+        detections: Detections,
+        known: Collection[str],
+        is_lookalike: Callable[[str, LineOfSight], bool],
     ) -> None:
         """Take in an image.
 
@@ -47,6 +52,7 @@ class Glimpses:
             attitude_arena: body FLU to arena.
             detections: what the image showed.
             known: colours of the frames on the map.
+            is_lookalike: whether what is seen in a direction looks like a frame of a colour, and is none.
         """
         self._images += 1
         boxes = {"red": detections.red, "green": detections.green, "blue": detections.blue}
@@ -54,7 +60,9 @@ class Glimpses:
             if colour in known:
                 self._lines.pop(colour, None)
             elif box.seen:
-                self._lines[colour] = (self._images, self._line(position_m, attitude_arena, box))
+                line = self._line(position_m, attitude_arena, box)
+                if not is_lookalike(colour, line):
+                    self._lines[colour] = (self._images, line)
 
     def lines(self) -> tuple[LineOfSight, ...]:
         """The lines of sight to frames that are not known, the oldest glimpses left out."""

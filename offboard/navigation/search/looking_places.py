@@ -8,7 +8,7 @@ from math import atan2, cos, pi, sin
 import numpy as np
 
 from geometry.vectors import Vec3
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import FlightStyle, Obstacles, Point
 from offboard.navigation.planner.clearance import Clearance
 from offboard.navigation.planner.legs import Array

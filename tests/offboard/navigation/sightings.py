@@ -10,7 +10,7 @@ import numpy.typing as npt
 from geometry.rotations import multiply, normalized, quaternion_from_euler
 from geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.frame_map import FrameMap
+from offboard.navigation.frames.frame_map import FrameMap
 from offboard.navigation.pose_history import DronePose
 from scenarios.models import Arena, Camera, Frame
 from vision.types import Detections, FrameCorner, FrameSighting

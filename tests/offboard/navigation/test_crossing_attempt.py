@@ -1,7 +1,7 @@
 """Why an attempt to cross a frame is given up."""
 
 from offboard.navigation.crossing_attempt import CrossingAttempt
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import Gate
 from offboard.navigation.path import Crossing
 

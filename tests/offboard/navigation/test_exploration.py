@@ -190,11 +190,14 @@ def test_a_frame_that_was_glimpsed_draws_a_line_of_sight_until_it_is_known():
     glimpses = Glimpses(CAMERA)
     box = Detection(n=20.0, s=9.0, e=-138.0, w=-159.0)  # as high as a frame 3.2 m away
     level = quaternion_from_yaw(0.0)
-    glimpses.update((0.0, 0.0, 1.0), level, Detections(red=box), known=())
+    seen = ((0.0, 0.0, 1.0), level, Detections(red=box), ())
+    glimpses.update(*seen, is_lookalike=lambda colour, line: colour == "red")
+    assert glimpses.lines() == ()
+    glimpses.update(*seen, is_lookalike=lambda colour, line: False)
     [line] = glimpses.lines()
     assert line.direction == pytest.approx((0.73, 0.68, 0.07), abs=0.01)
     assert 3.2 < line.farthest_m < 6.0
-    glimpses.update((0.0, 0.0, 1.0), level, Detections(), known=())
+    glimpses.update((0.0, 0.0, 1.0), level, Detections(), (), lambda colour, line: False)
     assert glimpses.lines() == (line,)
-    glimpses.update((0.0, 0.0, 1.0), level, Detections(), known=("red",))
+    glimpses.update((0.0, 0.0, 1.0), level, Detections(), ("red",), lambda colour, line: False)
     assert glimpses.lines() == ()

@@ -6,7 +6,7 @@ from math import cos, dist, hypot, pi, remainder, sin
 
 import pytest
 
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import CONTEST, Gate, Obstacles
 from offboard.navigation.search.looking_places import LookingPlaces
 from scenarios.models import Arena

@@ -11,7 +11,7 @@ import pytest
 
 from geometry.rotations import quaternion_from_euler, rotation, to_world
 from offboard.drone import DroneState
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import CONTEST
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
 from offboard.navigation.surroundings import Surroundings

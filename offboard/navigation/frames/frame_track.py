@@ -7,9 +7,9 @@ from math import cos, hypot, sin, sqrt
 
 import numpy as np
 
-from offboard.navigation.frame_estimate import FrameEstimate
-from offboard.navigation.frame_filter import FrameFilter, Update, half_turn
-from offboard.navigation.frame_measurement import Floats, Prior, Solution, View, predicted, solutions
+from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_filter import FrameFilter, Update, half_turn
+from offboard.navigation.frames.frame_measurement import Floats, Prior, Solution, View, predicted, solutions
 from scenarios.models import Arena
 
 # Squares of innovations that one view in a thousand exceeds by chance (chi-squared), by number of corners,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from offboard.navigation.frame_measurement import Floats, Solution, View, noise_of, predicted
+from offboard.navigation.frames.frame_measurement import Floats, Solution, View, noise_of, predicted
 
 if TYPE_CHECKING:
     from filterpy.kalman import ExtendedKalmanFilter

@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import cos, hypot, sin
 
+import numpy as np
+
 from offboard.navigation.camera_model import CameraModel, CameraPose
-from offboard.navigation.frame_estimate import FrameEstimate
-from offboard.navigation.frame_filter import load_filters
-from offboard.navigation.frame_measurement import (
+from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_filter import load_filters
+from offboard.navigation.frames.frame_measurement import (
     HALF_HEIGHT_M,
     HALF_WIDTH_M,
     Floats,
@@ -20,8 +22,10 @@ from offboard.navigation.frame_measurement import (
     solutions,
     view_of,
 )
-from offboard.navigation.frame_track import GATES, Fit, FrameTrack
+from offboard.navigation.frames.frame_track import GATES, Fit, FrameTrack
+from offboard.navigation.frames.lookalikes import Lookalikes
 from offboard.navigation.pose_history import DronePose
+from offboard.navigation.search.glimpses import LineOfSight
 from scenarios.models import Arena
 from vision.types import Detections, ObstacleEdge
 
@@ -35,6 +39,7 @@ BEHIND_M = 0.5  # an obstacle that seems so much farther away than a frame does 
 NEAR_PX = 8.0  # a sighting whose centre is this near to where a frame should be is of that frame,
 NEAR_SHARE = 0.75  # or this share of its width
 DUPLICATE_M = 0.25  # two frames cannot be nearer to each other,
+SEEMED_M = 0.6  # a frame that is so near to where one seemed to be was seen there
 DUPLICATE_CERTAIN_M = 0.6  # nor as near as this to a certain one: what seemed to be there was seen badly
 
 
@@ -51,6 +56,7 @@ class FrameMap:
         self._arena = arena
         self._prior = Prior.of(arena)
         self._tracks: list[FrameTrack] = []
+        self._lookalikes = Lookalikes()
         self._frames: tuple[FrameEstimate, ...] = ()
         self._best: dict[str, FrameEstimate] = {}  # by colour
         self._largest_m = hypot(arena.length_x_m, arena.width_y_m)
@@ -64,6 +70,10 @@ class FrameMap:
     def frames(self) -> tuple[FrameEstimate, ...]:
         """All frames seen, of every colour, in the order in which they were found."""
         return self._frames
+
+    def is_lookalike(self, colour: str, line: LineOfSight) -> bool:
+        """Whether what is seen in a direction looks like a frame of a colour, and is known to be none."""
+        return self._lookalikes.are_at(colour, line.origin_m, line.direction)
 
     def observe(
         self, detections: Detections, pose: DronePose, poses: Sequence[DronePose] | None = None
@@ -85,8 +95,10 @@ class FrameMap:
             poses = [pose] * len(detections.frames)
         sightings = zip(detections.frames, poses, strict=True)
         seen = [view_of(sighting, self._camera, at) for sighting, at in sightings]
-        for view in self._match([view for view in seen if view is not None], unseen):
-            self._explain(view, unseen)
+        views = [view for view in seen if view is not None]
+        for view in self._match(views, unseen):
+            if not self._lookalikes.shows(view):
+                self._explain(view, unseen)
         camera = self._camera.pose(pose.position_m, pose.attitude_arena)
         for track in unseen:
             if self._should_be_seen(track, camera, detections.obstacle_edges):
@@ -97,6 +109,22 @@ class FrameMap:
             if track.is_believed(pose.time_us) and track.keep_inside(self._arena)
         ]
         self._drop_duplicates()
+        self._estimate()
+        for view in views:
+            self._compare_sizes(view)
+
+    def _compare_sizes(self, view: View) -> None:
+        """Frames that turn out to be larger or smaller things elsewhere are taken from the map."""
+        best = self._best.get(view.colour)
+        lookalike = None if best is not None and best.certain else self._lookalikes.note(view)
+        if lookalike is None:
+            return
+        self._tracks = [
+            track
+            for track in self._tracks
+            if track.colour != view.colour
+            or np.linalg.norm(lookalike.seemed_m - track.state[:3], axis=1).min() > SEEMED_M
+        ]
         self._estimate()
 
     def _estimate(self) -> None:

@@ -5,8 +5,9 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 
-from offboard.navigation.frame_estimate import FrameEstimate
-from offboard.navigation.frame_filter import half_turn
+from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.frames.frame_filter import half_turn
+from offboard.navigation.search.glimpses import LineOfSight
 from scenarios.models import Frame
 from tests.offboard.navigation.sightings import Flight, frame_at
 
@@ -198,3 +199,46 @@ def test_frame_seen_once_is_forgotten_and_one_seen_often_is_kept() -> None:
     for _ in range(60):
         flight.look([], (-1.0, 0.0, 1.5), pi)
     assert [estimate.colour for estimate in flight.map.frames()] == ["green"]
+
+
+def picture(size: float, x: float, y: float, z: float, yaw: float) -> Frame:
+    """A picture of a frame, so many times as large."""
+    size_m = {"outer_width_m": 0.42 * size, "outer_height_m": 0.22 * size}
+    return Frame.model_validate({"colour": "red", "x_m": x, "y_m": y, "z_m": z, "yaw_rad": yaw, **size_m})
+
+
+@pytest.mark.parametrize("heading_deg", [0, 40, -70])
+@pytest.mark.parametrize("size", [0.6, 1.6, 2.5])
+def test_a_picture_of_another_size_is_no_frame(size: float, heading_deg: int) -> None:
+    on_wall = picture(size, 6.5, 0.5, 2.0, pi)
+    flight = Flight(seed=round(10 * size))
+    for step in range(40):
+        along_m = 0.1 * step
+        place = (1.0 + along_m * cos(radians(heading_deg)), along_m * sin(radians(heading_deg)), 1.5)
+        flight.look([on_wall], place, 0.0)
+    assert flight.map.frames() == ()
+    ahead = LineOfSight((0.0, 0.5, 2.0), (1.0, 0.0, 0.0))
+    aside = LineOfSight((0.0, 2.0, 2.0), (1.0, 0.0, 0.0))
+    assert [flight.map.is_lookalike("red", line) for line in (ahead, aside)] == [True, False]
+    assert not flight.map.is_lookalike("blue", ahead)
+
+
+def test_a_frame_before_a_picture_of_its_colour_stays_on_the_map() -> None:
+    on_wall, frame = picture(2.3, 6.5, -1.0, 2.2, pi), frame_at(3.5, 1.0, 1.2, 0.3)
+    flight = Flight()
+    for step in range(35):
+        flight.look([on_wall, frame], (0.02 * step, -2.0 + 0.1 * step, 1.5), 0.1)
+    (estimate,) = flight.map.frames()
+    position_m, _ = errors(estimate, frame)
+    assert position_m < 0.1
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_frame_is_not_taken_for_a_picture(seed: int) -> None:
+    frame = frame_at(2.5, 0.3 * seed - 1.5, 1.0 + 0.1 * seed, 0.5 * seed)
+    flight = Flight(seed)
+    for step in range(40):
+        bearing = 0.15 * seed * step / 10
+        flight.look([frame], (-2.0 + 0.08 * step * cos(bearing), 0.08 * step * sin(bearing), 1.5), 0.0)
+        assert flight.map.best("red") is not None or step < 10
+    assert not flight.map.is_lookalike("red", LineOfSight((-2.0, frame.y_m, frame.z_m), (1.0, 0.0, 0.0)))
