@@ -24,9 +24,10 @@ APART_M = 0.15  # a thing is looked at again from a place of the camera so far f
 APART_RAD = 0.25  # in another direction
 BASE_M = 0.5  # between two places whose parallax is used
 AGREEING = 6  # sightings that must agree
+LEFT = 4  # of them, without those of one place
 SIZES = (0.2, 8.0)  # that are considered, times that of a frame
 OTHER_SIZE = 1.25  # a thing that is so many times larger or smaller than a frame is none,
-SURE = 40.0  # if the sum of its squared deviations is by so much less than with the size of a frame
+SURE = 20.0  # if the sum of its squared deviations is by so much less than with the size of a frame
 AGREES = 3.0  # deviations
 
 # Standard deviations of a sighting; the position's is stated with each view.
@@ -224,15 +225,24 @@ def _thing_of(sightings: _Sightings) -> tuple[Floats, float, Mask] | None:
     agree = _agree(sightings, eyes_m[-1] + sizes[:, None] * seemed_m[-1], sizes)
     best = int(agree.sum(axis=1).argmax())
     chosen: Mask = agree[best]
-    if chosen.sum() < AGREEING:
-        return None
     some = sightings.some(chosen)
-    place_m, size, cost = _fit(some, float(sizes[best]), is_frame=False)
-    if 1.0 / OTHER_SIZE < size < OTHER_SIZE or cost > AGREES**2 * len(some.away_m):
+    # A few sightings of another thing can bend a size: it must follow without those of any one place, too.
+    apart_m = np.linalg.norm(some.eyes_m[:, None, :] - some.eyes_m, axis=2)
+    parts = (some, *(some.some(row) for row in apart_m > BASE_M))
+    if len(some.away_m) < AGREEING or not all(_is_no_frame(part, float(sizes[best])) for part in parts):
         return None
-    if _fit(some, 1.0, is_frame=True)[2] - cost < SURE:
-        return None
+    place_m, size, _ = _fit(some, float(sizes[best]), is_frame=False)
     return place_m, size, chosen
+
+
+def _is_no_frame(sightings: _Sightings, size: float) -> bool:
+    """Whether sightings are surely of one thing that has another size than a frame, about the one given."""
+    if len(sightings.away_m) < LEFT:
+        return False
+    _, size, cost = _fit(sightings, size, is_frame=False)
+    if 1.0 / OTHER_SIZE < size < OTHER_SIZE or cost > AGREES**2 * len(sightings.away_m):
+        return False
+    return _fit(sightings, 1.0, is_frame=True)[2] - cost > SURE
 
 
 def _fit(sightings: _Sightings, size: float, *, is_frame: bool) -> tuple[Floats, float, float]:

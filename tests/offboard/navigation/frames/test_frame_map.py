@@ -208,7 +208,7 @@ def picture(size: float, x: float, y: float, z: float, yaw: float) -> Frame:
 
 
 @pytest.mark.parametrize("heading_deg", [0, 40, -70])
-@pytest.mark.parametrize("size", [0.6, 1.6, 2.5])
+@pytest.mark.parametrize("size", [1.4, 1.8, 2.5])
 def test_a_picture_of_another_size_is_no_frame(size: float, heading_deg: int) -> None:
     on_wall = picture(size, 6.5, 0.5, 2.0, pi)
     flight = Flight(seed=round(10 * size))
