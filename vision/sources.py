@@ -1,6 +1,6 @@
 """Camera sources: `open_source` chooses the one for a URL, a path or a device.
 
-MJPEG over HTTP has a module of its own, `vision.http_source`.
+MJPEG over HTTP has a module of its own, `vision.streams.http_source`.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def open_source(
         except ValueError as error:
             raise CameraError(f"camera {shown_url(text)}: not a valid URL") from error
         if parts.scheme.lower() in ("http", "https") and not _VIDEO_FILE.search(parts.path):
-            from vision.http_source import HttpSource  # noqa: PLC0415 - its library is slow to import
+            from vision.streams.http_source import HttpSource  # noqa: PLC0415 - its library is slow to import
 
             return HttpSource(text, timeout_s, size_px)
         if parts.scheme.lower() == "rtp":

@@ -19,7 +19,7 @@ from aiohttp import web
 from scenarios.models import Camera
 from sitl.streaming.rtp import RtpSender
 from tests.free_ports import free_port
-from vision.http_source import HttpSource, Latest
+from vision.streams.http_source import HttpSource, Latest
 from vision.sources import CaptureSource, FolderSource, open_source
 from vision.types import CameraError, CameraFrame, Image, shown_url
 
