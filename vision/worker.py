@@ -275,6 +275,7 @@ def _serve(link: socket.socket, memory: mmap.mmap) -> None:
             image = _decoded(data)
         elif kind == Request.OPEN:
             limit_ms, _, url = data.decode().partition(" ")
+            capture = None  # the one before has ended; it is closed before the next one is opened
             capture = _Capture(url, int(limit_ms))
             reply = Reply.OPENED if capture.start() else Reply.NOT_OPENED
             width = capture.problem
