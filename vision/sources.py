@@ -1,6 +1,6 @@
 """Camera sources: `open_source` chooses the one for a URL, a path or a device.
 
-MJPEG over HTTP has a module of its own, `vision.http_source`.
+MJPEG over HTTP has a module of its own, `vision.streams.http_source`.
 """
 
 from __future__ import annotations
@@ -9,12 +9,14 @@ import asyncio
 import re
 import time
 from collections.abc import AsyncIterator
+from functools import partial
 from pathlib import Path
 from typing import Self
 from urllib.parse import urlsplit
 
 from vision.decoder import ImageDecoder
 from vision.jpeg import JPEG_START, ImageError
+from vision.streams.reconnecting import ReconnectingSource, ReopenableSource
 from vision.types import CameraError, CameraFrame, CameraSource, shown_url
 from vision.worker import Problem, Reply, Request
 from vision.worker_process import Answer, WorkerEndedError, WorkerProcess
@@ -36,11 +38,16 @@ _PROBLEMS = {
     Problem.NO_DEVICE: "cannot be opened; is it in `ls /dev/video*`, may you use it (group video), and does "
     "no other program?",
 }
+_CONNECTIONLESS = ("udp", "rtp")  # one receives whoever sends, also after a restart
 _VIDEO_FILE = re.compile(r"\.(mp4|mkv|avi|mov|webm|ts|m3u8|mpd|sdp)$", re.IGNORECASE)
 
 
 def open_source(
-    url_or_path: str | int | Path, *, timeout_s: float = 5.0, size_px: tuple[int, int] | None = None
+    url_or_path: str | int | Path,
+    *,
+    timeout_s: float = 5.0,
+    size_px: tuple[int, int] | None = None,
+    reconnects: bool = False,
 ) -> CameraSource:
     """Choose the source for a camera; it is opened by `async with`.
 
@@ -50,6 +57,7 @@ def open_source(
             else is left to OpenCV (rtsp://, udp://, tcp://, files).
         timeout_s: how long to wait for the camera, and for each of its images.
         size_px: width and height of an MJPEG camera's images, others are skipped; None for any.
+        reconnects: whether a stream to which one connects is opened again when it is lost.
 
     Raises:
         CameraError: it is none of these.
@@ -62,13 +70,14 @@ def open_source(
             parts = urlsplit(text)
         except ValueError as error:
             raise CameraError(f"camera {shown_url(text)}: not a valid URL") from error
-        if parts.scheme.lower() in ("http", "https") and not _VIDEO_FILE.search(parts.path):
-            from vision.http_source import HttpSource  # noqa: PLC0415 - its library is slow to import
-
-            return HttpSource(text, timeout_s, size_px)
-        if parts.scheme.lower() == "rtp":
+        scheme = parts.scheme.lower()
+        if scheme == "rtp":
             _check_rtp(text)
-        return CaptureSource(text, timeout_s)
+        is_mjpeg = scheme in ("http", "https") and not _VIDEO_FILE.search(parts.path)
+        new_source = partial(_new_stream, text, timeout_s, size_px, is_mjpeg=is_mjpeg)
+        if reconnects and scheme not in _CONNECTIONLESS:
+            return ReconnectingSource(new_source, _name_of(text), timeout_s)
+        return new_source()
     path = Path(text)
     try:
         found = bool(text) and path.exists()
@@ -79,6 +88,20 @@ def open_source(
     if not found:
         raise CameraError(f"camera '{shown_url(text)}': no such file, folder, device or URL")
     return CaptureSource(text, timeout_s)
+
+
+def _new_stream(
+    url: str, timeout_s: float, size_px: tuple[int, int] | None, *, is_mjpeg: bool
+) -> ReopenableSource:
+    if not is_mjpeg:
+        return CaptureSource(url, timeout_s)
+    from vision.streams.http_source import HttpSource  # noqa: PLC0415 - its library is slow to import
+
+    return HttpSource(url, timeout_s, size_px)
+
+
+def _name_of(url: str) -> str:
+    return f"camera {shown_url(url)}"
 
 
 def _check_rtp(url: str) -> None:
@@ -108,13 +131,26 @@ class CaptureSource:
     def __init__(self, url: str | int, timeout_s: float = 5.0) -> None:
         self.bad_frames = 0
         self._url = url
-        self._name = f"camera {shown_url(str(url))}"
+        self._name = _name_of(str(url))
         self._hint = _HINTS.get(str(url).partition("://")[0].lower(), "")
         self._timeout_s = timeout_s
         self._worker = WorkerProcess()
 
     async def __aenter__(self) -> Self:
         """Open the camera; raises `CameraError` if that fails, also after `timeout_s`."""
+        try:
+            await self.open()
+        except BaseException:
+            self._worker.end()
+            raise
+        return self
+
+    async def __aexit__(self, *exc_info: object) -> None:
+        """Close it."""
+        self._worker.end()
+
+    async def open(self) -> None:
+        """Open the camera, for the first time or after it ended or failed; raises `CameraError`."""
         settings = f"{round(self._timeout_s * 1000)} {self._url}".encode()
         try:
             async with asyncio.timeout(self._timeout_s):
@@ -123,13 +159,7 @@ class CaptureSource:
             problem = f"did not open within {self._timeout_s:g} s{self._hint}"
             raise CameraError(f"{self._name}: {problem}") from None
         if answer.reply is not Reply.OPENED:
-            self._worker.end()
             raise CameraError(f"{self._name}: {_PROBLEMS[answer.problem]}")
-        return self
-
-    async def __aexit__(self, *exc_info: object) -> None:
-        """Close it."""
-        self._worker.end()
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
         """Always the latest image; its vehicle time is unknown. Raises `CameraError`."""
@@ -176,7 +206,7 @@ class FolderSource:
     def __init__(self, folder: Path, rate_hz: float | None = None) -> None:
         self.bad_frames = 0
         self._folder = folder
-        self._name = f"camera {shown_url(str(folder))}"
+        self._name = _name_of(str(folder))
         self._period_s = 1.0 / rate_hz if rate_hz else 0.0
         self._paths: list[Path] = []
         self._decoder = ImageDecoder()

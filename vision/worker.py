@@ -27,7 +27,7 @@ from enum import IntEnum
 import cv2
 import numpy as np
 
-from vision.stream_clock import StreamClock
+from vision.streams.stream_clock import StreamClock
 from vision.types import Image
 from wire.h264_rtp import describe_h264_rtp
 
@@ -145,8 +145,8 @@ class _Capture:
             return (Reply.END_OF_FILE if self._is_file else Reply.END_OF_STREAM), None, 0.0
         return Reply.IMAGE, *taken
 
-    def _captured_s(self) -> float:
-        """Monotonic time of the image read last; of a file's it is the time at which it was read."""
+    def _captured_s(self) -> float | None:
+        """Monotonic time of the image read last; None while it is not known. A file's is when it was read."""
         now_s = time.monotonic()
         if self._is_file:
             return now_s
@@ -165,9 +165,10 @@ class _Capture:
                 done, image = self._capture.read()
             except cv2.error:
                 done, image = False, None
+            captured_s = self._captured_s() if done else None
             with self._changed:
-                if done and image is not None:
-                    self._latest = (np.asarray(image, np.uint8), self._captured_s())
+                if image is not None and captured_s is not None:
+                    self._latest = (np.asarray(image, np.uint8), captured_s)
                 self._ended = not done and self._has_end
                 self._changed.notify()
             if self._ended:
@@ -274,6 +275,7 @@ def _serve(link: socket.socket, memory: mmap.mmap) -> None:
             image = _decoded(data)
         elif kind == Request.OPEN:
             limit_ms, _, url = data.decode().partition(" ")
+            capture = None  # the one before has ended; it is closed before the next one is opened
             capture = _Capture(url, int(limit_ms))
             reply = Reply.OPENED if capture.start() else Reply.NOT_OPENED
             width = capture.problem

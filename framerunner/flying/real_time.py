@@ -258,8 +258,9 @@ async def _camera(
         records.see_frame(replace(frame, time_us=time_us))
         reporter.see_frame(frame)
 
-    limit_s = CAMERA_LIMIT_S if vehicle.sitl is None else PATIENT_CAMERA_LIMIT_S
-    opened = open_source(vehicle.camera_url, timeout_s=limit_s, size_px=vehicle.image_size_px)
+    own = vehicle.sitl is not None  # its stream ends only with the simulator
+    limit_s, size_px = PATIENT_CAMERA_LIMIT_S if own else CAMERA_LIMIT_S, vehicle.image_size_px
+    opened = open_source(vehicle.camera_url, timeout_s=limit_s, size_px=size_px, reconnects=not own)
     source = await stack.enter_async_context(opened)
     path = None if settings.unattended else records.folder.video
     camera = RecordingCamera(source, path, plan.scenario.camera.rate_hz, keep)

@@ -19,8 +19,9 @@ from aiohttp import web
 from scenarios.models import Camera
 from sitl.streaming.rtp import RtpSender
 from tests.free_ports import free_port
-from vision.http_source import HttpSource, Latest
 from vision.sources import CaptureSource, FolderSource, open_source
+from vision.streams.http_source import HttpSource, Latest
+from vision.streams.reconnecting import ReconnectingSource
 from vision.types import CameraError, CameraFrame, Image, shown_url
 
 MULTIPART = {"Content-Type": "multipart/x-mixed-replace; boundary=cut"}
@@ -409,12 +410,13 @@ def test_open_source_chooses(tmp_path: Path, clip: Path) -> None:
     assert isinstance(open_source("http://127.0.0.1:8100/video"), HttpSource)
     assert isinstance(open_source("http://127.0.0.1/film.mp4"), CaptureSource)
     assert isinstance(open_source("rtsp://127.0.0.1/live"), CaptureSource)
+    assert isinstance(open_source("rtsp://127.0.0.1/live", reconnects=True), ReconnectingSource)
     assert isinstance(open_source("udp://127.0.0.1:5600"), CaptureSource)
-    assert isinstance(open_source("rtp://0.0.0.0:5600"), CaptureSource)
+    assert isinstance(open_source("rtp://0.0.0.0:5600", reconnects=True), CaptureSource)
     for wrong in ("rtp://0.0.0.0", "rtp://0.0.0.0:x", "rtp://a:5600\nm=audio"):
         with pytest.raises(CameraError, match="write rtp://HOST:PORT"):
             open_source(wrong)
-    assert isinstance(open_source("0"), CaptureSource)
+    assert isinstance(open_source("0", reconnects=True), CaptureSource)
     assert isinstance(open_source(2), CaptureSource)
     assert isinstance(open_source(tmp_path), FolderSource)
     assert isinstance(open_source(clip), CaptureSource)

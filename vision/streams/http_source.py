@@ -75,25 +75,29 @@ class HttpSource:
 
     async def __aenter__(self) -> Self:
         """Connect; raises `CameraError` if there is no answer, or it is not MJPEG."""
-        limits = aiohttp.ClientTimeout(total=None, connect=self._timeout_s, sock_connect=self._timeout_s)
-        self._session = aiohttp.ClientSession(timeout=limits, auto_decompress=False)
         try:
-            response, reader = await self._connect(self._session)
+            await self.open()
         except BaseException:
-            await self._session.close()
+            await self.__aexit__()
             raise
-        self._task = asyncio.create_task(self._read(response, reader), name=self._name)
         return self
 
     async def __aexit__(self, *exc_info: object) -> None:
         """Disconnect."""
         self._decoder.close()
-        if self._task is not None:
-            self._task.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._task
+        await self._stop_reading()
         if self._session is not None:
             await self._session.close()
+
+    async def open(self) -> None:
+        """Connect, for the first time or after the stream ended or failed; raises `CameraError`."""
+        await self._stop_reading()
+        self._latest = Latest()
+        if self._session is None:
+            limits = aiohttp.ClientTimeout(total=None, connect=self._timeout_s, sock_connect=self._timeout_s)
+            self._session = aiohttp.ClientSession(timeout=limits, auto_decompress=False)
+        response, reader = await self._connect(self._session)
+        self._task = asyncio.create_task(self._read(response, reader), name=self._name)
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
         """Always the latest image; raises `CameraError` when the stream fails or no image arrives in time."""
@@ -119,15 +123,21 @@ class HttpSource:
             yield CameraFrame(image, part.time_us, received_s, part.data)
             deadline_s = loop.time() + self._timeout_s
 
+    async def _stop_reading(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._task
+
     async def _connect(self, session: aiohttp.ClientSession) -> tuple[aiohttp.ClientResponse, MjpegReader]:
         try:
             async with asyncio.timeout(self._timeout_s):
                 response = await session.get(self._url, max_redirects=3)
-            if response.status != 200:
-                problem = f"HTTP {response.status} {_first_line(response.reason)}"
-                login = "; write user and password as http://USER:PASSWORD@HOST/PATH"
-                raise CameraError(f"{self._name}: {problem}{login if response.status == 401 else ''}")
-            return response, MjpegReader(response.headers.get("Content-Type", ""))
+            try:
+                return response, self._reader_of(response)
+            except BaseException:
+                response.close()
+                raise
         except TimeoutError as error:
             raise CameraError(f"{self._name}: no answer within {self._timeout_s:g} s") from error
         except aiohttp.ClientConnectorError as error:
@@ -138,6 +148,13 @@ class HttpSource:
             raise CameraError(f"{self._name}: not a valid URL") from error
         except (aiohttp.ClientError, OSError, ValueError) as error:
             raise CameraError(f"{self._name}: {_first_line(error)}") from error
+
+    def _reader_of(self, response: aiohttp.ClientResponse) -> MjpegReader:
+        if response.status != 200:
+            problem = f"HTTP {response.status} {_first_line(response.reason)}"
+            login = "; write user and password as http://USER:PASSWORD@HOST/PATH"
+            raise CameraError(f"{self._name}: {problem}{login if response.status == 401 else ''}")
+        return MjpegReader(response.headers.get("Content-Type", ""))
 
     async def _read(self, response: aiohttp.ClientResponse, reader: MjpegReader) -> None:
         parts, since_s = 0, time.monotonic()
@@ -155,8 +172,12 @@ class HttpSource:
                         raise StreamError(f"more than {_MAX_PARTS_PER_S} images a second")
                     await asyncio.sleep(0)
             self._latest.end(CameraError(f"{self._name}: the stream ended"))
+        except aiohttp.ClientPayloadError:  # the server was killed, or closed the connection early
+            self._latest.end(CameraError(f"{self._name}: the stream ended"))
         except (StreamError, aiohttp.ClientError, OSError) as error:
             self._latest.end(CameraError(f"{self._name}: the stream failed: {_first_line(error)}"))
+        finally:
+            response.close()
 
 
 def _first_line(error: object) -> str:

@@ -1,0 +1,1 @@
+"""Network cameras: MJPEG over HTTP, the time of each image, streams that are opened again."""
