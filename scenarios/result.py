@@ -197,7 +197,7 @@ class FlightResult(RefereeReport, _Flown):
     `lift_m` where frames were lifted, in real time; recordings have no wall times.
     """
 
-    cause: Text = Field("", description="why the flight was not clean, in one line; empty if it was")
+    cause: Text = Field("", description="why the flight was not clean, or its mission broken off; else empty")
     mission_state: Text = Field("", description="the mission's last state, such as red.turning")
     ended: Ended = Field("", description="how the mission ended; `error` occurs in evaluations only")
     seconds_in_state: dict[Text, Seconds] = Field(

@@ -52,10 +52,8 @@ class CauseWatch:
             self._views.append((moment.state.time_us, replace(view, path_m=())))
 
     def words(self, flown: Flown) -> str:
-        """Why the flight was not clean, in one line; empty if it was."""
+        """Why the flight was not clean, or its mission was broken off, in one line; else empty."""
         report, track = flown.report, flown.track
-        if report.verdict is Verdict.CLEAN:
-            return ""
         parts = [self._contact(flown), _outside(flown)]
         if report.verdict is Verdict.WRONG_ORDER:
             parts.append(_wrong_order(flown))
@@ -63,6 +61,8 @@ class CauseWatch:
             parts.append(f"crashed {_at(track, report.try_time_s)}")
             if flown.end.reason.startswith(STOPPED):  # other reasons follow from the crash
                 parts.append(flown.end.reason)
+        elif report.completed and flown.end.ended == "aborted":  # it could land as it should, all the same
+            parts.append(f"the mission was broken off: {_end(flown)}")
         elif not report.completed:
             parts.append(_end(flown))
             parts.append(self._hindrance(flown))

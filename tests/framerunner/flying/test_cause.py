@@ -91,6 +91,7 @@ def touched(*names, **values):
             "the way (2 times in trouble)",
         ),
         ({"verdict": "aborted"}, "aborted", (), "the camera is lost"),
+        ({"verdict": "clean"}, "aborted", (), "the mission was broken off: the camera is lost"),
         (
             {"verdict": "crashed", "try_time_s": 20.0},
             "aborted",
