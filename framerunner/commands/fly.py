@@ -159,6 +159,7 @@ def fly(
     _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
     seed, procedure = _checked_seed(seed, monitor, lockstep, autopilot), hardware_of(hardware, drone)
 
+    from framerunner.camera_calibration.camera_delay import delay_of
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
 
@@ -166,8 +167,8 @@ def fly(
     chosen = _scenario(scenario, sensors, fault, hardware, autopilot, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
-    ends, delay_s = (drone, camera, api, speed, instance, autopilot), plan.camera_delay_s(camera_delay)
-    flown = None if lockstep else RealTimeSettings(*ends, delay_s, procedure)
+    ends, delay = (drone, camera, api, speed, instance, autopilot), delay_of(camera_delay, plan.calibration)
+    flown = None if lockstep else RealTimeSettings(*ends, delay, procedure)
     return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
 
 

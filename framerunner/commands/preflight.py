@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from contextlib import closing
 from datetime import datetime
 from pathlib import Path
@@ -82,6 +83,7 @@ def preflight(
         raise SettingError("--any-vehicle: is for --restore-parameters; leave it out")
 
     from framerunner.camera_calibration.calibration_file import load_calibration
+    from framerunner.camera_calibration.camera_delay import delay_of
     from framerunner.commands.hardware import HardwareOptions, caps_of
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.check_names import CHECK_NAMES
@@ -93,13 +95,13 @@ def preflight(
     caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission_with(mission, None)
     known = None if calibration is None else load_calibration(calibration)
     plan = FlightPlan(load_scenario(scenario), loaded, None, calibration=known, caps=caps)
-    delay_s = plan.camera_delay_s(camera_delay)
-    return _check(plan, PreflightSettings(drone, camera, delay_s, set_parameters, accept, out))
+    delay = delay_of(camera_delay, known)
+    return _check(plan, PreflightSettings(drone, camera, delay, set_parameters, accept, out))
 
 
 def _check(plan: FlightPlan, settings: PreflightSettings) -> int:
     from framerunner.preflight.card import make_card
-    from framerunner.preflight.card_files import write_card
+    from framerunner.preflight.card_files import HTML_NAME, write_card
     from framerunner.preflight.run import run_preflight, tell
     from offboard.safety.rules import SafetyRules
 
@@ -110,6 +112,7 @@ def _check(plan: FlightPlan, settings: PreflightSettings) -> int:
         plan, settings, report, safety=SafetyRules("land"), operator="", kind="checks only", now=now
     )
     write_card(card, settings.folder)
+    print(f"flight card: {settings.folder / HTML_NAME}\n{report.verdict}", file=sys.stderr, flush=True)
     return 0 if report.may_arm else 1
 
 
