@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from math import cos, sin
 from typing import TYPE_CHECKING, Protocol
 
@@ -185,6 +186,8 @@ async def choose_judge(
 ) -> tuple[Judge, FlightPlan]:
     """Choose the referee of the simulator that flies or, without one, telemetry.
 
+    A simulator that was not named and has another scenario is told on standard error: its frames are others.
+
     Args:
         plan: of the flight; a simulator with another scenario cannot judge it.
         api: where a simulator may be; None: nowhere.
@@ -210,5 +213,12 @@ async def choose_judge(
                 if answer is None
                 else f"flies the scenario {answer.scenario}; start it with --scenario {plan.scenario.name}"
             )
+        )
+    if api is not None and answer is not None:
+        print(
+            f"warning: {api.url} shows the scenario {answer.scenario}, and {plan.scenario.name} is flown; "
+            f"start it with --scenario {plan.scenario.name}",
+            file=sys.stderr,
+            flush=True,
         )
     return TelemetryJudge(plan.new_referee()), plan
