@@ -119,7 +119,9 @@ def fly(
     camera_delay: _CameraDelay = None,
     calibration: _Calibration = None,
     simulator: _Simulator = None,
-    speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
+    speed: Annotated[
+        float, Parameter(help="of the simulated drone: simulated seconds a second, 0.01 to 100")
+    ] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     genuine: GenuineOptions = _OWN,
     lockstep: _Lockstep = False,

@@ -26,7 +26,9 @@ _CameraDelay = Annotated[
 _Calibration = Annotated[
     Path | None, Parameter(help="the camera's calibration, a file of `framerunner camera calibrate`")
 ]
-_MaxHeight = Annotated[float | None, Parameter(help="cap on the height above the start, m")]
+_MaxHeight = Annotated[
+    float | None, Parameter(help="cap on the height above the start in m; the box's ceiling if not given")
+]
 _SetParameters = Annotated[
     bool, Parameter(negative="", help="set failsafe parameters that fail, and keep their old values")
 ]
