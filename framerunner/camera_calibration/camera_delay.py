@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from vision.calibration.model import Calibration
+if TYPE_CHECKING:  # the commands import this module
+    from vision.calibration.model import Calibration
 
 CAMERA_DELAY_S = 0.1
 """Usual delay of a camera, from exposure to arrival."""

@@ -233,9 +233,7 @@ def extrinsics(
             "default that of the file, else 0.08 m forward"
         ),
     ] = None,
-    seconds: Annotated[
-        WholeNumber, Parameter(help="for how many s a live drone is watched at most, 20 to 1800")
-    ] = 180,
+    seconds: Annotated[WholeNumber, Parameter(help="s for which a live drone is watched, 20 to 1800")] = 180,
 ) -> int:
     """Measure how the camera is mounted on the drone: roll, pitch, yaw, place, and the delay of its images.
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
+from framerunner.camera_calibration.camera_delay import delay_of
 from framerunner.commands import (
     DEFAULT_MISSION,
     Faults,
@@ -119,9 +120,7 @@ def fly(
     camera_delay: _CameraDelay = None,
     calibration: _Calibration = None,
     simulator: _Simulator = None,
-    speed: Annotated[
-        float, Parameter(help="of the simulated drone: simulated seconds a second, 0.01 to 100")
-    ] = 1.0,
+    speed: Annotated[float, Parameter(help="of the simulated drone: seconds a second, 0.01 to 100")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     genuine: GenuineOptions = _OWN,
     lockstep: _Lockstep = False,
@@ -161,7 +160,6 @@ def fly(
     _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
     seed, procedure = _checked_seed(seed, monitor, lockstep, autopilot), hardware_of(hardware, drone)
 
-    from framerunner.camera_calibration.camera_delay import delay_of
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
+from framerunner.camera_calibration.camera_delay import delay_of
 from framerunner.commands import DEFAULT_MISSION, check_range, load_mission_with
 
 if TYPE_CHECKING:
@@ -85,7 +86,6 @@ def preflight(
         raise SettingError("--any-vehicle: is for --restore-parameters; leave it out")
 
     from framerunner.camera_calibration.calibration_file import load_calibration
-    from framerunner.camera_calibration.camera_delay import delay_of
     from framerunner.commands.hardware import HardwareOptions, caps_of
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.check_names import CHECK_NAMES
