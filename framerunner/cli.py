@@ -49,7 +49,7 @@ def build_app() -> App:
         help="A simulated MAVLink drone, and an app that flies the frame challenge with it.",
         version=_version,
         help_format="markdown",
-        default_parameter=Parameter(negative=()),
+        default_parameter=Parameter(negative=(), show_default=_shown_default),
         suppress_keyboard_interrupt=False,
         result_action="return_value",
     )
@@ -72,6 +72,11 @@ def build_app() -> App:
     app.command(scenario.app)
     app.command(vision.app)
     return app
+
+
+def _shown_default(value: object) -> str | None:
+    """What help says of a default; nothing of a flag that is off and of options that need not be given."""
+    return None if value is None or value is False or value in ((), "") else str(value)
 
 
 def _version() -> str:

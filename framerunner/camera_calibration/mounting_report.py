@@ -9,7 +9,7 @@ from math import degrees, hypot
 from pathlib import Path
 
 from framerunner.camera_calibration.calibration_file import save_calibration
-from framerunner.flying.plan import CAMERA_DELAY_S
+from framerunner.camera_calibration.camera_delay import CAMERA_DELAY_S
 from geometry.rotations import MAX_MOUNTING_RAD
 from geometry.vectors import Vec3
 from vision.calibration.model import Calibration, CalibrationError, Mounting

@@ -103,7 +103,9 @@ def calibrate(
     /,
     *,
     out: Annotated[Path, Parameter(help="file to be written, YAML")] = Path("camera.yaml"),
-    views: Annotated[WholeNumber, Parameter(help="how many different views to take from a camera")] = 20,
+    views: Annotated[
+        WholeNumber, Parameter(help="how many different views to take from a camera, 8 to 60")
+    ] = 20,
     columns: _Columns = 8,
     rows: _Rows = 5,
     square: _Square = 30.0,
@@ -134,7 +136,7 @@ def latency(
     source: Annotated[str, Parameter(help="URL or device of the camera, as for `fly --camera`")],
     /,
     *,
-    seconds: Annotated[WholeNumber, Parameter(help="how long to film")] = 20,
+    seconds: Annotated[WholeNumber, Parameter(help="how long to film, 8 to 300 s")] = 20,
     led: Annotated[
         Path | None,
         Parameter(
@@ -231,7 +233,7 @@ def extrinsics(
             "default that of the file, else 0.08 m forward"
         ),
     ] = None,
-    seconds: Annotated[WholeNumber, Parameter(help="for how long a live drone is watched at most")] = 180,
+    seconds: Annotated[WholeNumber, Parameter(help="s for which a live drone is watched, 20 to 1800")] = 180,
 ) -> int:
     """Measure how the camera is mounted on the drone: roll, pitch, yaw, place, and the delay of its images.
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def doctor(
     *,
     drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
-    seconds: Annotated[float, Parameter(help="how long to listen")] = 6.0,
+    seconds: Annotated[float, Parameter(help="how long to listen, 2 to 600 s")] = 6.0,
     camera: Annotated[
         str | None, Parameter(help="URL or device of its camera, as for `fly --camera`: it is watched, too")
     ] = None,

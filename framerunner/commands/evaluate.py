@@ -22,13 +22,16 @@ if TYPE_CHECKING:
 _COUNT, _SEED = 100, 1
 _GENUINE_SPEED, _MAX_GENUINE_SPEED = 4.0, 100.0
 _Level = Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")]
-_CountOption = Annotated[WholeNumber | None, Parameter(help=f"how many scenarios of the level; {_COUNT}")]
+_CountOption = Annotated[
+    WholeNumber | None, Parameter(help=f"how many scenarios of the level; {_COUNT} if not given")
+]
 _SeedOption = Annotated[
-    WholeNumber | None, Parameter(help=f"of the first scenario; each next one has one more; {_SEED}")
+    WholeNumber | None,
+    Parameter(help=f"of the first scenario; each next one has one more; {_SEED} if not given"),
 ]
 _Jobs = Annotated[
     WholeNumber | None,
-    Parameter(help="flights at once; one a core, with a genuine autopilot 1"),
+    Parameter(help="flights at once; if not given one a core, with a genuine autopilot 1"),
 ]
 _Out = Annotated[
     Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
@@ -50,7 +53,8 @@ _ArduPilot = Annotated[
 _Speed = Annotated[
     float | None,
     Parameter(
-        help=f"with --px4 or --ardupilot: simulated seconds a second, if the machine can; {_GENUINE_SPEED:g}"
+        help="with --px4 or --ardupilot: simulated seconds a second, if the machine can, 0.01 to "
+        f"{_MAX_GENUINE_SPEED:g}; {_GENUINE_SPEED:g} if not given"
     ),
 ]
 _Again = Annotated[bool, Parameter(help="fly again what is in the folder already")]

@@ -27,7 +27,7 @@ def film(
         float | None, Parameter(help="seconds of the flight in a second of the film; 8 if not given")
     ] = None,
     seconds: Annotated[
-        float | None, Parameter(help="length of the film, from which the speed follows")
+        float | None, Parameter(help="length of the film in s, 3 to 600, from which the speed follows")
     ] = None,
     size: _Size = None,
     fps: _Fps = None,

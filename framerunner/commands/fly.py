@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
+from framerunner.camera_calibration.camera_delay import delay_of
 from framerunner.commands import (
     DEFAULT_MISSION,
     Faults,
@@ -119,7 +120,7 @@ def fly(
     camera_delay: _CameraDelay = None,
     calibration: _Calibration = None,
     simulator: _Simulator = None,
-    speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
+    speed: Annotated[float, Parameter(help="of the simulated drone: seconds a second, 0.01 to 100")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     genuine: GenuineOptions = _OWN,
     lockstep: _Lockstep = False,
@@ -166,8 +167,8 @@ def fly(
     chosen = _scenario(scenario, sensors, fault, hardware, autopilot, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
-    ends, delay_s = (drone, camera, api, speed, instance, autopilot), plan.camera_delay_s(camera_delay)
-    flown = None if lockstep else RealTimeSettings(*ends, delay_s, procedure)
+    ends, delay = (drone, camera, api, speed, instance, autopilot), delay_of(camera_delay, plan.calibration)
+    flown = None if lockstep else RealTimeSettings(*ends, delay, procedure)
     return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
 
 

@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 class Sending:
     """How poses are sent."""
 
-    rate: Annotated[float, Parameter(help="poses a second that are sent at most")] = 50.0
-    delay: Annotated[float, Parameter(help="milliseconds by which poses are older than they seem here")] = 0.0
+    rate: Annotated[float, Parameter(help="poses a second that are sent at most, 1 to 250")] = 50.0
+    delay: Annotated[
+        float, Parameter(help="milliseconds by which poses are older than they seem here, 0 to 500")
+    ] = 0.0
     position_sigma: Annotated[float, Parameter(help="standard deviation of positions, m")] = 0.005
     attitude_sigma: Annotated[float, Parameter(help="standard deviation of attitudes, rad")] = 0.01
     velocity_sigma: Annotated[
@@ -58,7 +60,9 @@ def mocap(
         str | None, Parameter(help="name of the tracked body; by default the first that comes")
     ] = None,
     sending: Sending | None = None,
-    seconds: Annotated[float | None, Parameter(help="stop after this time; without it at Ctrl-C")] = None,
+    seconds: Annotated[
+        float | None, Parameter(help="stop after this many seconds; if not given at Ctrl-C")
+    ] = None,
 ) -> int:
     """Send a motion capture's poses to a drone with PX4 or ArduPilot, and check that it uses them.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from contextlib import closing
 from datetime import datetime
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
+from framerunner.camera_calibration.camera_delay import delay_of
 from framerunner.commands import DEFAULT_MISSION, check_range, load_mission_with
 
 if TYPE_CHECKING:
@@ -25,7 +27,9 @@ _CameraDelay = Annotated[
 _Calibration = Annotated[
     Path | None, Parameter(help="the camera's calibration, a file of `framerunner camera calibrate`")
 ]
-_MaxHeight = Annotated[float | None, Parameter(help="cap on the height above the start, m")]
+_MaxHeight = Annotated[
+    float | None, Parameter(help="cap on the height above the start in m; the box's ceiling if not given")
+]
 _SetParameters = Annotated[
     bool, Parameter(negative="", help="set failsafe parameters that fail, and keep their old values")
 ]
@@ -93,13 +97,13 @@ def preflight(
     caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission_with(mission, None)
     known = None if calibration is None else load_calibration(calibration)
     plan = FlightPlan(load_scenario(scenario), loaded, None, calibration=known, caps=caps)
-    delay_s = plan.camera_delay_s(camera_delay)
-    return _check(plan, PreflightSettings(drone, camera, delay_s, set_parameters, accept, out))
+    delay = delay_of(camera_delay, known)
+    return _check(plan, PreflightSettings(drone, camera, delay, set_parameters, accept, out))
 
 
 def _check(plan: FlightPlan, settings: PreflightSettings) -> int:
     from framerunner.preflight.card import make_card
-    from framerunner.preflight.card_files import write_card
+    from framerunner.preflight.card_files import HTML_NAME, write_card
     from framerunner.preflight.run import run_preflight, tell
     from offboard.safety.rules import SafetyRules
 
@@ -110,6 +114,7 @@ def _check(plan: FlightPlan, settings: PreflightSettings) -> int:
         plan, settings, report, safety=SafetyRules("land"), operator="", kind="checks only", now=now
     )
     write_card(card, settings.folder)
+    print(f"flight card: {settings.folder / HTML_NAME}\n{report.verdict}", file=sys.stderr, flush=True)
     return 0 if report.may_arm else 1
 
 

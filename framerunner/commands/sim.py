@@ -80,7 +80,9 @@ class Connections:
     signing_key: Annotated[
         Path | None, Parameter(help="file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it")
     ] = None
-    video_port: Annotated[WholeNumber | None, Parameter(help="TCP port of the video; 8100 + instance")] = None
+    video_port: Annotated[
+        WholeNumber | None, Parameter(help="TCP port of the video; 8100 + instance if not given")
+    ] = None
     video_rtp: Annotated[
         str, Parameter(help="host or host:port that gets the video as H.264 in RTP, UDP 5600, or off")
     ] = "127.0.0.1"

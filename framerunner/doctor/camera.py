@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from framerunner.camera_calibration.camera_delay import delay_of
 from framerunner.doctor.camera_times import CameraTimes, calibration_facts
 from framerunner.doctor.findings import Finding, Level
-from framerunner.flying.plan import CAMERA_DELAY_S
 from offboard.safety.check import Check, Outcome
 from offboard.safety.vehicle_checks import calibration_checks, camera_checks
 from vision.calibration.model import Calibration
@@ -26,8 +26,6 @@ def examine_camera(
     """
     checks: list[Check] = []
     if times is not None:
-        measured_s = None if calibration is None else calibration.delay_s
-        assumed = (CAMERA_DELAY_S, "") if measured_s is None else (measured_s, "the calibration")
-        checks += camera_checks(times.facts(clock_ms, *assumed))
+        checks += camera_checks(times.facts(clock_ms, delay_of(None, calibration)))
     checks += calibration_checks(calibration_facts(calibration, (0, 0) if times is None else times.size_px))
     return [Finding(_LEVELS[each.outcome], each.name, each.value, each.advice) for each in checks]

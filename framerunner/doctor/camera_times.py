@@ -9,6 +9,7 @@ from datetime import date
 from itertools import pairwise
 from statistics import median
 
+from framerunner.camera_calibration.camera_delay import CameraDelay
 from offboard.safety.vehicle_checks import CalibrationFacts, CameraFacts
 from vision.calibration.model import Calibration
 from vision.sources import open_source
@@ -33,15 +34,12 @@ class CameraTimes:
     size_px: tuple[int, int] = (0, 0)
     problem: str = ""
 
-    def facts(
-        self, clock_ms: tuple[int, float] | None, assumed_age_s: float, assumed_by: str = "--camera-delay"
-    ) -> CameraFacts:
+    def facts(self, clock_ms: tuple[int, float] | None, delay: CameraDelay) -> CameraFacts:
         """What the checks need.
 
         Args:
             clock_ms: vehicle time in milliseconds at a monotonic wall time, seconds; None: not known.
-            assumed_age_s: of an image without a time stamp.
-            assumed_by: what says so; empty: it was never measured.
+            delay: of an image without a time stamp.
         """
         if self.problem:
             return CameraFacts(problem=self.problem)
@@ -60,8 +58,8 @@ class CameraTimes:
             max(gaps),
             age_s,
             any(stamp is not None for stamp in self.stamps_us),
-            assumed_age_s,
-            assumed_by,
+            delay.age_s,
+            delay.measured_by,
             self.size_px,
         )
 

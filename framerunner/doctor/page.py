@@ -82,7 +82,8 @@ def _facts(record: Record) -> Iterator[tuple[str, str]]:
         able = [text for bit, text in _CAPABILITIES.items() if version.capabilities & bit]
         yield "can do", ", ".join(able) or "not reported"
     if record.modes:
-        yield "modes", ", ".join(name or mode_words(mode) for mode, name in sorted(record.modes.items()))
+        names = [name or mode_words(mode) for mode, name in sorted(record.modes.items())]
+        yield "modes", ", ".join(name[:1].upper() + name[1:] for name in names)
     factor = record.real_time_factor
     if factor is not None:
         yield "clock", f"runs at {factor:.2f} of real time"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from math import cos, sin
 from typing import TYPE_CHECKING, Protocol
 
@@ -164,6 +165,10 @@ class TelemetryJudge:
         return FaultFacts()
 
 
+def _warn(words: str) -> None:
+    print(f"warning: {words}", file=sys.stderr, flush=True)
+
+
 async def ask_referee(
     api: SimulatorApi, session: aiohttp.ClientSession, parameters: dict[str, str] | None = None
 ) -> Standing | None:
@@ -185,6 +190,9 @@ async def choose_judge(
 ) -> tuple[Judge, FlightPlan]:
     """Choose the referee of the simulator that flies or, without one, telemetry.
 
+    What makes the flight fail is told on standard error: a simulator that was not named and has another
+    scenario, and one whose drone has flown before and may not stand as on its start.
+
     Args:
         plan: of the flight; a simulator with another scenario cannot judge it.
         api: where a simulator may be; None: nowhere.
@@ -201,6 +209,11 @@ async def choose_judge(
     if api is not None and answer is not None and answer.scenario == plan.scenario.name:
         plan = plan.lifted(answer.lift_m)
         earlier_us = answer.snapshot.began_us if answer.snapshot.over else None
+        if earlier_us is not None and answer.source == "truth":  # a virtual camera places the arena anew
+            _warn(
+                f"a try was flown at {api.url} before, and the drone is taken to stand on the start with the "
+                "start's heading; if it does not, start the simulator again"
+            )
         return TruthJudge(api, session, plan, answer.source, earlier_us), plan
     if api is not None and named:
         raise SettingError(
@@ -210,5 +223,10 @@ async def choose_judge(
                 if answer is None
                 else f"flies the scenario {answer.scenario}; start it with --scenario {plan.scenario.name}"
             )
+        )
+    if api is not None and answer is not None:
+        _warn(
+            f"{api.url} shows the scenario {answer.scenario}, and {plan.scenario.name} is flown; "
+            f"start it with --scenario {plan.scenario.name}"
         )
     return TelemetryJudge(plan.new_referee()), plan

@@ -22,8 +22,6 @@ if TYPE_CHECKING:  # it imports the statechart library, which the virtual camera
     from offboard.mission import Mission
 
 P = TypeVar("P", bound=Part)
-CAMERA_DELAY_S = 0.1
-"""From exposure to arrival of an image, where it was not measured."""
 StartPose = tuple[float, float, float, float]
 """x, y, z of the drone's centre (metres) and yaw (radians), arena axes."""
 
@@ -121,12 +119,6 @@ class FlightPlan:
                 "position_flu_m": camera.position_flu_m if place_m is None else place_m,
             }
         )
-
-    def camera_delay_s(self, given_s: float | None) -> float:
-        """Age of an image that arrives without a time stamp: as given, else the calibration's, else usual."""
-        measured_s = None if self.calibration is None else self.calibration.delay_s
-        known = (each for each in (given_s, measured_s) if each is not None)
-        return next(known, CAMERA_DELAY_S)
 
     @property
     def box(self) -> Box:

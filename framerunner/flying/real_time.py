@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
 from framerunner.flying.fly import FinishedFlight, fly
-from framerunner.flying.plan import CAMERA_DELAY_S, FlightPlan
+from framerunner.flying.plan import FlightPlan
 from framerunner.flying.timing import flight_timing
 from framerunner.runs.recorder import RecordingCamera, RunRecords
 from framerunner.runs.run_folder import warn
@@ -43,7 +44,7 @@ class RealTimeSettings:
     speed: float = 1.0  # of the simulator that is started: simulated seconds a second
     instance: int = 0  # of the simulator that is started: shifts its ports
     autopilot: GenuineAutopilot | None = None  # flies in the simulator that is started; None: our own does
-    camera_delay_s: float = CAMERA_DELAY_S  # age on arrival of an image without a time stamp
+    camera_delay: CameraDelay = UNMEASURED
     hardware: HardwareSettings | None = None  # of a drone that may be a real one; None: it is simulated
     monitor_socket: Path | None = None  # of the monitor that was started here
     unattended: bool = False  # one of many flights: nothing is shown, and there is no video
@@ -107,7 +108,7 @@ async def fly_in_real_time(
         drone.use_companion(companion)
         camera = await _camera(plan, vehicle, records, stack, reporter, drone=drone, settings=settings)
         perception = _perception(plan, vehicle, judge, camera)
-        perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
+        perception.assume_times(drone.vehicle_time_us, settings.camera_delay.age_s)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
         if clock is not None:
             clock.wait_for_images_of(perception)
@@ -164,7 +165,7 @@ async def _safety(
     checks = PreflightSettings(
         drone_url,
         settings.camera_url,
-        settings.camera_delay_s,
+        settings.camera_delay,
         set_parameters=hardware.set_parameters,
         accepted=hardware.accepted,
         folder=records.folder.path,

@@ -156,11 +156,11 @@ def restore(session: VehicleSession, kept: KeptState, tell: Callable[[str], None
         raise DroneError("the vehicle is armed; land and disarm it before its parameters are changed")
     for parameter in kept.parameters:
         set_parameter(session, parameter)
-        tell(f"{parameter.name} is {parameter.value:g} again")
+        tell(f"{parameter.name} is {parameter.value:g} now")
     if kept.fence is not None:
         upload_fence(session, kept.fence)
         count = len(kept.fence)
-        tell(f"the fence has its {count} items again" if count else "there is no fence again")
+        tell(f"the fence has {count} items, as before" if count else "there is no fence, as before")
 
 
 def _item_line(item: FenceItem) -> str:

@@ -14,11 +14,12 @@ from pathlib import Path
 from errors import UserError
 from firmware_py.geodesy import LocalProjection
 from firmware_py.types import GeodeticPoint
+from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
 from framerunner.doctor.camera_times import CameraTimes, calibration_facts, measure_camera
 from framerunner.doctor.checks import examine
 from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import Record
-from framerunner.flying.plan import CAMERA_DELAY_S, FlightPlan
+from framerunner.flying.plan import FlightPlan
 from framerunner.preflight.check_names import CHECK_NAMES, RENAMED, REPLACED
 from framerunner.preflight.estimator import estimator_facts, has_global_position
 from framerunner.preflight.fence_upload import (
@@ -68,7 +69,7 @@ class PreflightSettings:
     Attributes:
         drone_url: of the vehicle.
         camera_url: of its camera; None: it is not checked.
-        camera_delay_s: of images without time stamps.
+        camera_delay: of images without time stamps.
         set_parameters: failsafe parameters that fail are set, and their old values kept.
         accepted: names of checks that may fail.
         folder: where the old values are written.
@@ -77,7 +78,7 @@ class PreflightSettings:
 
     drone_url: str
     camera_url: str | None = None
-    camera_delay_s: float = CAMERA_DELAY_S
+    camera_delay: CameraDelay = UNMEASURED
     set_parameters: bool = False
     accepted: tuple[str, ...] = ()
     folder: Path = Path()
@@ -118,13 +119,20 @@ class PreflightReport:
         """Whether no check prevents arming."""
         return not failures(self.checks)
 
+    @property
+    def verdict(self) -> str:
+        """Whether it may be armed, in words, and what prevents it."""
+        names = [check.name for check in failures(self.checks)]
+        if not names:
+            return "it may be armed"
+        what = "a check has failed" if len(names) == 1 else f"{len(names)} checks have failed"
+        each = "it, or accept it" if len(names) == 1 else "them, or accept each"
+        return f"not armed: {what} ({', '.join(names)}); correct {each} by --accept NAME"
+
     def require(self) -> None:
         """Raise `NotArmedError` if a check prevents arming."""
-        failed = failures(self.checks)
-        if failed:
-            names = ", ".join(check.name for check in failed)
-            what = "a check has failed" if len(failed) == 1 else f"{len(failed)} checks have failed"
-            raise NotArmedError(f"not armed: {what} ({names}); correct it, or accept it by --accept NAME")
+        if not self.may_arm:
+            raise NotArmedError(self.verdict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +180,7 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
     ]
     if times is not None:
         clock_ms = record.clock_ms[-1] if record.clock_ms else None
-        checks += camera_checks(times.facts(clock_ms, settings.camera_delay_s))
+        checks += camera_checks(times.facts(clock_ms, settings.camera_delay))
         if plan.chart.vision == "frames":
             checks += calibration_checks(calibration_facts(plan.calibration, times.size_px))
     accepted = tuple(accept(checks, settings.accepted))

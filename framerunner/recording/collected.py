@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from math import ceil
 from tempfile import TemporaryFile
 from typing import BinaryIO, cast
 
@@ -12,7 +11,7 @@ import cv2
 import numpy as np
 
 from framerunner.recording.events import Crossed, Recorded, RecordedImage, RecordingError
-from framerunner.recording.tlog_reader import MAX_TICKS, TlogRecording
+from framerunner.recording.tlog_reader import MAX_TICKS, TlogRecording, motors_on_us
 from offboard.app import Moment
 from scenarios.result import FlightResult
 from vision.types import Image
@@ -133,10 +132,7 @@ def collect(recorded: Recorded, images: ImageFile | None = None) -> CollectedFli
     if not moments:
         raise RecordingError(f"recording '{recorded.title}': holds no telemetry; nothing can be shown")
     result = recorded.result
-    times_s = {} if result is None else result.times_s
-    began_us = _began_us(moments, crossings, times_s)
-    if not crossings:
-        crossings = [Crossed(began_us + ceil(time_s * 1e6), colour) for colour, time_s in times_s.items()]
+    began_us = _began_us(moments, crossings, {} if result is None else result.times_s)
     is_known = not isinstance(recorded, TlogRecording)
     return CollectedFlight(
         recorded.title, result, tuple(moments), images, tuple(crossings), began_us, is_known
@@ -147,7 +143,4 @@ def _began_us(moments: list[Moment], crossings: list[Crossed], times_s: dict[str
     """When the motors went on: by the referee's time of the first crossing, else by the mission's time."""
     if crossings and crossings[0].colour in times_s:
         return crossings[0].time_us - round(times_s[crossings[0].colour] * 1e6)
-    for moment in moments:
-        if moment.flight_time_s > 0.0:
-            return moment.state.time_us - round(moment.flight_time_s * 1e6)
-    return moments[0].state.time_us
+    return motors_on_us(moments)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import heapq
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from math import ceil
 from pathlib import Path
 
 import cv2
 
 from framerunner.flying.plan import FlightPlan
-from framerunner.recording.events import Event, RecordedImage, RecordingError, time_of_event
+from framerunner.recording.events import Crossed, Event, RecordedImage, RecordingError, time_of_event
 from geometry.axes import Alignment, Pose
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
@@ -23,12 +24,16 @@ from wire.px4_modes import OFFBOARD, px4_name
 from wire.vehicle_telemetry import AttitudeReport, PositionReport, VehicleTelemetry
 
 TICK_US = 50_000
+_READ = ["HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "COMMAND_LONG"]
+_ARM_US = 2_000_000  # in which a command to arm shows in a heartbeat, which comes once a second
 MAX_TICKS = 576_000
 """Eight hours: what has more is damaged."""
 
 
 class TlogRecording:
     """Telemetry and images of a run folder; they contain neither the mission's states nor its detections.
+
+    The crossings are those of the result, counted from when the motors went on.
 
     The video has no times: its last image gets the time of the last telemetry, the others are spaced at the
     camera's rate.
@@ -50,10 +55,14 @@ class TlogRecording:
         self._moments = _read_moments(folder / "flight.tlog", _start(scenario))
         if not self._moments:
             raise RecordingError(f"replay '{folder}': flight.tlog holds no position; nothing can be shown")
+        times_s = {} if result is None else result.times_s
+        began_us = motors_on_us(self._moments)
+        crossings = [Crossed(began_us + ceil(at_s * 1e6), colour) for colour, at_s in times_s.items()]
+        self._crossings = sorted(crossings, key=time_of_event)
 
     def events(self) -> Iterator[Event]:
-        """Telemetry and images, in order of vehicle time."""
-        return heapq.merge(self._moments, self._images(), key=time_of_event)
+        """Telemetry, images and crossings, in order of vehicle time."""
+        return heapq.merge(self._moments, self._images(), self._crossings, key=time_of_event)
 
     def _images(self) -> Iterator[RecordedImage]:
         if not self._video.exists():
@@ -75,6 +84,14 @@ class TlogRecording:
                 yield RecordedImage(max(0, last_us - round(age_s * 1e6)), image)
         finally:
             video.release()
+
+
+def motors_on_us(moments: Sequence[Moment]) -> int:
+    """Vehicle time at which the motors went on, microseconds; of the first tick if they never were."""
+    for moment in moments:
+        if moment.flight_time_s > 0.0:
+            return moment.state.time_us - round(moment.flight_time_s * 1e6)
+    return moments[0].state.time_us
 
 
 def _start(scenario: Scenario | None) -> Pose:
@@ -101,7 +118,7 @@ def _read_moments(path: Path, start: Pose) -> list[Moment]:
     moments: list[Moment] = []
     try:
         while True:
-            message = log.recv_match(type=["HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED"])
+            message = log.recv_match(type=_READ)
             if message is None:
                 return moments
             moment = ticks.take(message)
@@ -120,18 +137,24 @@ class _Ticks:
         self._start = start
         self._telemetry = VehicleTelemetry()
         self._alignment: Alignment | None = None
+        self._arm_command_us = -_ARM_US
         self._armed_us = 0
         self._next_us = 0
 
     def take(self, message: Message) -> Moment | None:
         """Add a message; returns a tick with a position that follows an attitude, if one is due."""
         telemetry, kind = self._telemetry, message.get_msgId()
+        if kind == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
+            if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and message.param1 == 1.0:
+                self._arm_command_us = self._next_us
+            return None
         if kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT and not is_vehicle(message):
             return None
         was_armed = telemetry.armed
         is_newest = telemetry.take(message)
         if telemetry.armed and not was_armed:
-            self._armed_us = self._next_us
+            was_commanded = self._next_us - self._arm_command_us < _ARM_US
+            self._armed_us = self._arm_command_us if was_commanded else self._next_us
         position = telemetry.position
         if kind != mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED or not is_newest or position is None:
             return None
@@ -147,7 +170,7 @@ class _Ticks:
         if self._alignment is None:
             self._alignment = Alignment(self._start, ned)
         pose = self._alignment.pose(ned)
-        mode = px4_name(telemetry.custom_mode) if telemetry.mode_name else ""
+        mode = px4_name(telemetry.custom_mode) if telemetry.is_px4 else telemetry.mode_name.upper()
         state = DroneState(
             position.time_us,
             *pose.position_m,

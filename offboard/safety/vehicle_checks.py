@@ -84,7 +84,7 @@ class CameraFacts:
     age_s: float = float("nan")
     has_stamps: bool = False
     assumed_age_s: float = 0.0
-    assumed_by: str = "--camera-delay"
+    assumed_by: str = ""
     size_px: tuple[int, int] = (0, 0)
     problem: str = ""
 
@@ -186,7 +186,7 @@ def _camera_delay_check(facts: CameraFacts) -> Check:
         return Check(name, Outcome.NOTE, value, limit, "let the link carry ATTITUDE")
     if not facts.assumed_by:
         value = f"never measured; {facts.assumed_age_s:g} s are assumed, as its images have no time stamps"
-        told = "run framerunner camera latency, and give fly --camera-delay"
+        told = "run framerunner camera latency, and give --camera-delay"
         return Check(name, Outcome.NOTE, value, limit, told)
     good = 0.0 <= facts.assumed_age_s <= MAX_CAMERA_AGE_S
     value = f"{facts.assumed_age_s:.3f} s by {facts.assumed_by}; its images have no time stamps"

@@ -48,6 +48,18 @@ async def test_the_frame_on_a_phone_offline_and_by_keyboard(monkeypatch, chromiu
         assert page.complaints == []
 
 
+async def test_the_navigation_shows_the_current_page_where_not_all_have_room(monkeypatch, chromium):
+    async with serving(monkeypatch, "monitor.pages.table") as served, phone(chromium) as page:
+        for width in (PHONE["width"], 950):
+            await page.set_viewport_size({"width": width, "height": 800})
+            await page.goto(served.url)
+            row, here = [
+                await page.locator(each).first.bounding_box()
+                for each in (".top nav", ".top nav [aria-current]")
+            ]
+            assert row["x"] <= here["x"] and here["x"] + here["width"] <= row["x"] + row["width"]
+
+
 async def test_a_page_comes_back_by_itself_when_the_server_does(monkeypatch, chromium):
     async with phone(chromium) as page:
         async with serving(monkeypatch, SAMPLE) as served:

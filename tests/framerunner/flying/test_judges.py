@@ -101,6 +101,19 @@ async def test_what_is_not_the_referee_of_this_scenario_does_not_judge(body):
         assert (judge.source, plan) == ("telemetry", PLAN)
 
 
+@pytest.mark.parametrize(("source", "told"), [("truth", True), ("telemetry", False)])
+async def test_a_simulator_that_has_flown_before_is_told(source, told, capsys):
+    async with referee({**answer(over=True, began_us=3), "source": source}) as (root, session, _):
+        await choose_judge(PLAN, SimulatorApi(root), session)
+    assert ("a try was flown at" in capsys.readouterr().err) is told
+
+
+async def test_a_camera_that_shows_another_scenario_is_told(capsys):
+    async with referee(answer("another-place")) as (root, session, _):
+        await choose_judge(PLAN, SimulatorApi(root), session)
+    assert f"warning: {root} shows the scenario another-place" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("url", ["http://127.0.0.1:9/video", "rtsp://127.0.0.1/live", "0", "/tmp/images"])
 async def test_another_camera_leaves_the_verdict_to_telemetry(url):
     async with aiohttp.ClientSession() as session:

@@ -190,8 +190,8 @@ def test_a_real_time_flight_is_read_from_its_log_and_video(tmp_path):
     poses = recording["poses"]
     assert (recording["chart"], recording["result"], recording["detections"][0]["width"]) == (None, None, 64)
     assert all(pose["c"] is None for pose in poses)
-    assert poses[0]["t"] == pytest.approx(-2.0, abs=0.1)  # motors on after two of ten seconds
-    assert poses[-1]["t"] == pytest.approx(8.0, abs=0.1)
+    assert poses[0]["t"] == pytest.approx(-1.2, abs=0.1)  # motors on after 1.2 of ten seconds
+    assert poses[-1]["t"] == pytest.approx(8.8, abs=0.1)
     assert poses[-1]["p"][2] - poses[0]["p"][2] == pytest.approx(0.8, abs=0.02)
     assert recording["states"][poses[-1]["s"]] == "offboard"
     assert len(recording["images"]) == 50

@@ -238,10 +238,10 @@ async def test_the_old_fence_is_kept_and_returned(link, plan, tmp_path):
     assert is_same_fence(kept.fence, OLD_FENCE)
     told = []
     restore(session, kept, told.append)
-    assert told == ["the fence has its 4 items again"]
+    assert told == ["the fence has 4 items, as before"]
     assert is_same_fence(download_fence(session), OLD_FENCE)
     restore(session, KeptState("", (), ()), told.append)
-    assert (download_fence(session), told[-1]) == ((), "there is no fence again")
+    assert (download_fence(session), told[-1]) == ((), "there is no fence, as before")
 
 
 async def test_a_fence_that_cannot_be_kept_is_not_replaced(link, plan, tmp_path):

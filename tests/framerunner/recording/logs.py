@@ -4,14 +4,20 @@ from pymavlink.dialects.v20 import common as mavlink
 
 
 def write_log(path):
-    """Ten seconds of telemetry; the vehicle's local frame is rotated and shifted against the arena."""
+    """Ten seconds of telemetry; the vehicle's local frame is rotated and shifted against the arena.
+
+    It is armed by a command at 6.2 s, which its heartbeat shows at 7 s.
+    """
     link = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
     with path.open("wb") as file:
 
         def add(message, time_ms):
             file.write((1_700_000_000_000_000 + time_ms * 1000).to_bytes(8, "big") + message.pack(link))
 
+        arm = mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         for time_ms in range(5000, 15_000, 20):
+            if time_ms == 6200:
+                add(arm, time_ms)
             if time_ms % 1000 == 0:
                 armed = time_ms >= 7000
                 flags = 1 | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0)

@@ -141,7 +141,7 @@ def test_a_real_time_flight_is_shown_from_its_log_and_video(tmp_path, capsys):
     assert (first.x, first.y, first.yaw) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
     assert last.z - first.z == pytest.approx(0.8, abs=0.01)
     assert last.armed and last.mode == "OFFBOARD"
-    assert moments[-1].flight_time_s == pytest.approx(8.0, abs=0.1)
+    assert moments[-1].flight_time_s == pytest.approx(8.8, abs=0.1)
     assert len(images) == 50
     assert images[-1].time_us == last.time_us
     assert images[0].time_us == last.time_us - 4_900_000
@@ -150,6 +150,17 @@ def test_a_real_time_flight_is_shown_from_its_log_and_video(tmp_path, capsys):
     said = capsys.readouterr()
     assert "offboard" in said.err
     assert said.out == "no result: the flight was not judged\n"
+
+
+def test_the_crossings_of_a_real_time_flight_are_those_of_its_result(tmp_path, capsys):
+    write_log(tmp_path / "flight.tlog")
+    result = {"frames_crossed": ["red", "green"], "crossing_times_s": [2.0, 4.5]}
+    (tmp_path / "result.json").write_text(json.dumps({"verdict": "aborted", **result}), encoding="utf-8")
+    assert run(["replay", str(tmp_path), "--fast"]) == 0
+    told = [line.split() for line in capsys.readouterr().err.splitlines()]
+    when_s = {line[-1]: float(line[0]) for line in reversed(told) if "crossed:" in line}
+    assert when_s["red"] == pytest.approx(2.0, abs=0.11)
+    assert when_s["green"] == pytest.approx(4.5, abs=0.11)
 
 
 def test_a_killed_real_time_flight_is_shown_from_its_log(tmp_path, recorded):

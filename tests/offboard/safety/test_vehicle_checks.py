@@ -20,7 +20,7 @@ from offboard.safety.vehicle_checks import (
 
 ESTIMATOR = EstimatorFacts(True, True, True, True, 0.1)
 LINK = LinkFacts(0.0, (0.02,) * 20, 20)
-CAMERA = CameraFacts(30.0, 0.05, 0.1, assumed_age_s=0.1, size_px=(320, 240))
+CAMERA = CameraFacts(30.0, 0.05, 0.1, assumed_age_s=0.1, assumed_by="--camera-delay", size_px=(320, 240))
 
 
 def failed(*checks):
@@ -83,6 +83,19 @@ def test_a_bad_link_fails(changed, names):
 )
 def test_a_bad_camera_fails(changed, names):
     assert failed(*camera_checks(replace(CAMERA, **changed))) == names
+
+
+@pytest.mark.parametrize(
+    ("by", "outcome", "words"),
+    [
+        ("the calibration", Outcome.PASS, "0.100 s by the calibration"),
+        ("", Outcome.NOTE, "never measured; 0.1 s are assumed"),
+    ],
+)
+def test_a_camera_delay_that_nobody_measured_is_noted(by, outcome, words):
+    _, delay = camera_checks(replace(CAMERA, age_s=nan, assumed_by=by))
+    assert delay.outcome is outcome
+    assert delay.value.startswith(words)
 
 
 def test_a_failure_is_accepted_by_name_or_all():

@@ -14,10 +14,19 @@ def test_noise_and_another_vehicle_do_not_take_the_place_of_the_vehicle():
     said = []
     sender = mavlink_sender(9046, 5, said.append)
     stranger, vehicle = ("127.0.0.1", 50001), ("127.0.0.1", 50002)
-    for data in (b"\xfd", bytes(100), heartbeat(1), heartbeat(5)[:-1]):
+    for data in (b"\xfd", bytes([200] * 100), heartbeat(1), heartbeat(5)[:-1]):
         assert sender.select([(data, stranger)]) == []
     assert sender.select([(heartbeat(5), vehicle)]) == [heartbeat(5)]
     assert said == [
         "warning: what 127.0.0.1:50001 sends to UDP 9046 is ignored: it is no MAVLink of ArduPilot with "
         "--sysid 5; end it, or choose another --instance"
     ]
+
+
+def test_the_text_of_its_start_is_not_reported():
+    said = []
+    sender = mavlink_sender(9046, 5, said.append)
+    vehicle = ("127.0.0.1", 50002)
+    assert sender.select([(b"\n\nInit ArduCopter V4.7.0\n", vehicle), (b"0 ", vehicle)]) == []
+    assert sender.select([(b"Init Gyro", vehicle), (heartbeat(5), vehicle)]) == [b"Init Gyro", heartbeat(5)]
+    assert said == []

@@ -40,9 +40,10 @@ function show([state, words]) {
   if (element.textContent !== said) element.textContent = said;
 }
 
-// On a phone the navigation is a row that is moved sideways: begin where we are.
+// On a narrow screen the navigation is a row that is moved sideways: begin where we are.
 const here = /** @type {HTMLElement|null} */ (document.querySelector(".top nav [aria-current]"));
-if (here) here.closest("nav").scrollLeft = here.offsetLeft - 40;
+const row = here?.closest("nav");
+if (row) row.scrollLeft = here.offsetLeft - row.offsetLeft - 40;
 
 let wasAway = false;
 const channel = new LiveChannel(["status"]);
