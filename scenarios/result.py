@@ -273,6 +273,13 @@ class LocalFrame(_Record):
     yaw_rad: float = 0.0
 
 
+class StandingPlace(_Record):
+    """Where a drone stands: position of its centre, and its heading, arena axes."""
+
+    position_arena_m: tuple[Metres, Metres, Metres]
+    yaw_rad: float
+
+
 class Standing(_Record):
     """How a try stands, as `/referee.json` has it."""
 
@@ -281,6 +288,9 @@ class Standing(_Record):
     lift_m: Metres = 0.0  # how much higher than in the scenario the frames are
     time_us: int | None = None  # vehicle time
     local_frame: LocalFrame | None = None  # None while it is unknown
+    stands_at: StandingPlace | None = (
+        None  # None if it does not stand upright with its motors off, or unknown
+    )
     snapshot: RefereeSnapshot
     report: RefereeReport  # what the try would be worth if it ended now
     faults: FaultFacts = FaultFacts()

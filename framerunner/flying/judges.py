@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from dataclasses import replace
 from math import cos, sin
 from typing import TYPE_CHECKING, Protocol
 
@@ -12,9 +13,16 @@ from pydantic import ValidationError
 from errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
-from scenarios.models import TrueState
+from scenarios.models import Scenario, TrueState
 from scenarios.referee import Referee
-from scenarios.result import FaultFacts, RefereeReport, RefereeSnapshot, Standing
+from scenarios.result import (
+    FaultFacts,
+    RefereeReport,
+    RefereeSnapshot,
+    Standing,
+    StandingPlace,
+    first_error,
+)
 from wire.simulator_api import SimulatorApi
 
 if TYPE_CHECKING:  # a flight in lockstep needs no HTTP
@@ -169,6 +177,20 @@ def _warn(words: str) -> None:
     print(f"warning: {words}", file=sys.stderr, flush=True)
 
 
+def _started_at(plan: FlightPlan, place: StandingPlace | None, api: SimulatorApi) -> FlightPlan:
+    """The plan of a drone that starts from where it stands; as it was, with a warning, if it cannot."""
+    problem = "does not stand upright with its motors off"
+    if place is not None:
+        (x_m, y_m, _), scenario = place.position_arena_m, plan.scenario
+        start = {"x_m": x_m, "y_m": y_m, "yaw_rad": place.yaw_rad}
+        try:
+            return replace(plan, scenario=Scenario.model_validate({**scenario.model_dump(), "start": start}))
+        except ValidationError as error:
+            problem = f"stands where no flight can start, {first_error(error)}"
+    _warn(f"the drone at {api.url} has flown before and {problem}; start the simulator again")
+    return plan
+
+
 async def ask_referee(
     api: SimulatorApi, session: aiohttp.ClientSession, parameters: dict[str, str] | None = None
 ) -> Standing | None:
@@ -190,8 +212,8 @@ async def choose_judge(
 ) -> tuple[Judge, FlightPlan]:
     """Choose the referee of the simulator that flies or, without one, telemetry.
 
-    What makes the flight fail is told on standard error: a simulator that was not named and has another
-    scenario, and one whose drone has flown before and may not stand as on its start.
+    A simulated drone that has flown before starts from where it stands now. On standard error it is told if
+    it cannot, and if the simulator was not named and has another scenario.
 
     Args:
         plan: of the flight; a simulator with another scenario cannot judge it.
@@ -200,7 +222,7 @@ async def choose_judge(
         named: whether the user named the simulator, which must then answer.
 
     Returns:
-        The judge, and the plan with its frames as high as the simulator has them.
+        The judge, and the plan with its start and its frames' heights as the simulator has them.
 
     Raises:
         SettingError: the named simulator does not judge this scenario.
@@ -210,10 +232,7 @@ async def choose_judge(
         plan = plan.lifted(answer.lift_m)
         earlier_us = answer.snapshot.began_us if answer.snapshot.over else None
         if earlier_us is not None and answer.source == "truth":  # a virtual camera places the arena anew
-            _warn(
-                f"a try was flown at {api.url} before, and the drone is taken to stand on the start with the "
-                "start's heading; if it does not, start the simulator again"
-            )
+            plan = _started_at(plan, answer.stands_at, api)
         return TruthJudge(api, session, plan, answer.source, earlier_us), plan
     if api is not None and named:
         raise SettingError(

@@ -98,7 +98,10 @@ async def fly_in_real_time(
     async with AsyncExitStack() as stack:
         session = await stack.enter_async_context(aiohttp.ClientSession())
         vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
+        declared = plan.scenario
         judge, plan = await choose_judge(plan, vehicle.api, session, named=settings.simulator is not None)
+        if plan.scenario is not declared:
+            records.folder.write_plan(plan.scenario, plan.chart)  # by which the flight is replayed
         plan, safety, system_id = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)

@@ -7,8 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from geometry.rotations import rotation, yaw_of
 from geometry.solids import Solid
-from scenarios.result import LocalFrame, Standing
+from scenarios.models import TrueState
+from scenarios.result import LocalFrame, Standing, StandingPlace
 from sitl.server_settings import ServerSettings
 from sitl.vehicle import SimulatedVehicle
 from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from sitl.faults.images import FaultyFeed
     from sitl.streaming.rtp import RtpSender
     from sitl.video import Image, VideoServer
+
+_UPRIGHT = 0.98  # cosine of the tilt
 
 
 class DroneVideo:
@@ -110,8 +114,16 @@ class DroneVideo:
             source="truth",
             time_us=simulation.time_us,
             local_frame=None if origin_arena_m is None else LocalFrame(origin_arena_m=origin_arena_m),
+            stands_at=standing_place(simulation.truth),
             snapshot=referee.snapshot(),
             report=referee.report(query.get("state", ""), query.get("ended")),
             faults=simulation.fault_facts(),
         )
         return standing.model_dump(mode="json")
+
+
+def standing_place(truth: TrueState) -> StandingPlace | None:
+    """Where a drone stands; None if it flies, or lies on its side."""
+    if truth.motors_on or rotation(truth.attitude_arena)[8] < _UPRIGHT:
+        return None
+    return StandingPlace(position_arena_m=truth.position_arena_m, yaw_rad=yaw_of(truth.attitude_arena))

@@ -4,6 +4,7 @@ import asyncio
 import socket
 import time
 from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
 
 import aiohttp
 import pytest
@@ -15,6 +16,7 @@ from sitl.pacing.pacer import LagNotices
 from sitl.server import SimulatorServer
 from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
+from sitl.streaming.drone_video import standing_place
 from sitl.video import VideoError
 from sitl.world import CONTROL_PERIOD_US
 from tests.processes import bound, free_instance
@@ -102,6 +104,16 @@ async def test_who_looks_on_learns_the_scenario_and_where_the_local_frame_is():
     assert (x_m + north_m, y_m - east_m, z_m - down_m) == pytest.approx(
         simulation.truth.position_arena_m, abs=1e-6
     )
+
+
+async def test_who_looks_on_learns_where_the_drone_stands_while_it_stands_upright():
+    simulation = Simulation(load_scenario("test-case-1"))
+    async with serving(simulation) as (_, settings):
+        place, true = (await referee(settings))["stands_at"], simulation.truth
+        assert place["position_arena_m"] == pytest.approx(true.position_arena_m, abs=0.01)
+        assert place["yaw_rad"] == pytest.approx(simulation.scenario.start.yaw_rad, abs=0.01)
+    upside_down = replace(true, attitude_arena=(0.0, 1.0, 0.0, 0.0))
+    assert standing_place(upside_down) is standing_place(replace(true, motors_on=True)) is None
 
 
 async def test_before_its_origin_is_fixed_the_local_frame_is_nowhere():

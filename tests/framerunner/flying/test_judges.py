@@ -101,11 +101,27 @@ async def test_what_is_not_the_referee_of_this_scenario_does_not_judge(body):
         assert (judge.source, plan) == ("telemetry", PLAN)
 
 
-@pytest.mark.parametrize(("source", "told"), [("truth", True), ("telemetry", False)])
-async def test_a_simulator_that_has_flown_before_is_told(source, told, capsys):
-    async with referee({**answer(over=True, began_us=3), "source": source}) as (root, session, _):
-        await choose_judge(PLAN, SimulatorApi(root), session)
-    assert ("a try was flown at" in capsys.readouterr().err) is told
+def standing_at(x, y, yaw):
+    return {"position_arena_m": [x, y, 0.5], "yaw_rad": yaw}
+
+
+async def test_a_drone_that_has_flown_before_starts_from_where_it_stands():
+    before = answer(over=True, began_us=3)
+    async with referee({**before, "stands_at": standing_at(-2.9, -3.1, 1.5)}) as (root, session, _):
+        _, plan = await choose_judge(PLAN, SimulatorApi(root), session)
+    assert plan.start_pose == (-2.9, -3.1, PLAN.start_pose[2], 1.5)
+    assert plan.layout.frames == PLAN.layout.frames
+    async with referee({**before, "source": "telemetry"}, answer()) as (root, session, _):
+        for _ in range(2):  # a virtual camera; then a first flight
+            assert (await choose_judge(PLAN, SimulatorApi(root), session))[1].start_pose == PLAN.start_pose
+
+
+@pytest.mark.parametrize("place", [None, standing_at(90.0, 0.0, 0.0)], ids=["on its side", "outside"])
+async def test_a_drone_that_cannot_start_from_where_it_is_is_told(place, capsys):
+    async with referee({**answer(over=True, began_us=3), "stands_at": place}) as (root, session, _):
+        _, plan = await choose_judge(PLAN, SimulatorApi(root), session)
+    assert plan.start_pose == PLAN.start_pose
+    assert "has flown before" in capsys.readouterr().err
 
 
 async def test_a_camera_that_shows_another_scenario_is_told(capsys):
