@@ -58,7 +58,7 @@ class TruthJudge:
         session: for the requests.
         plan: of the flight.
         source: the states that it judges by.
-        earlier_us: vehicle time at which a try began that is already over; None: there is none.
+        earlier_us: vehicle time at which the try of an earlier flight began; None: there is none.
     """
 
     def __init__(
@@ -200,8 +200,7 @@ async def choose_judge(
     answer = None if api is None else await ask_referee(api, session)
     if api is not None and answer is not None and answer.scenario == plan.scenario.name:
         plan = plan.lifted(answer.lift_m)
-        earlier_us = answer.snapshot.began_us if answer.snapshot.over else None
-        return TruthJudge(api, session, plan, answer.source, earlier_us), plan
+        return TruthJudge(api, session, plan, answer.source, answer.snapshot.began_us), plan
     if api is not None and named:
         raise SettingError(
             f"--simulator {api.url}: "
