@@ -11,6 +11,8 @@ from wire.framing import PacketReader
 def mavlink_sender(port: int, system_id: int, notice: Callable[[str], None]) -> SoleSender[bytes]:
     """Selects ArduPilot's datagrams; others cannot take its place by being the first.
 
+    Its first port is its console until its MAVLink begins: it prints text there.
+
     Args:
         port: UDP port that they are sent to.
         system_id: of its MAVLink.
@@ -21,5 +23,5 @@ def mavlink_sender(port: int, system_id: int, notice: Callable[[str], None]) -> 
         return any(message.get_srcSystem() == system_id for message in PacketReader().feed(data))
 
     sender = SoleSender[bytes]("ArduPilot", port, notice)
-    sender.sign = Sign(is_of_vehicle, f"MAVLink of ArduPilot with --sysid {system_id}")
+    sender.sign = Sign(is_of_vehicle, f"MAVLink of ArduPilot with --sysid {system_id}", bytes.isascii)
     return sender

@@ -14,7 +14,8 @@ def test_noise_and_another_vehicle_do_not_take_the_place_of_the_vehicle():
     said = []
     sender = mavlink_sender(9046, 5, said.append)
     stranger, vehicle = ("127.0.0.1", 50001), ("127.0.0.1", 50002)
-    for data in (b"\xfd", bytes(100), heartbeat(1), heartbeat(5)[:-1]):
+    assert sender.select([(b"Init ArduCopter\n", vehicle)]) == said == []
+    for data in (b"\xfd", b"\xff" * 100, heartbeat(1), heartbeat(5)[:-1]):
         assert sender.select([(data, stranger)]) == []
     assert sender.select([(heartbeat(5), vehicle)]) == [heartbeat(5)]
     assert said == [
