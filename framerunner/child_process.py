@@ -118,6 +118,8 @@ class ChildProcess:
             await _wait_or_cancel(work, watching)
             if not work.done():
                 work.cancel()
+                await asyncio.wait({work}, timeout=_GRACE_S)
+                work.cancel()  # what it still asks of the child is not answered
                 await asyncio.gather(work, return_exceptions=True)
                 raise SettingError(watching.result())
             return work.result()
