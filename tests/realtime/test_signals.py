@@ -19,7 +19,7 @@ pytestmark = pytest.mark.realtime
 
 @pytest.fixture
 def flight(tmp_path):
-    """A flight of test case 1 that has left the ground, its instance and its children, first the simulator."""
+    """A flight of test case 1 in the air, its instance and its child processes, first the simulator."""
     instance = free_instance()
     with program(tmp_path, "fly", "test-case-1", "--instance", str(instance), "--speed", "4") as running:
         running.wait_for("red.", 60.0)
