@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,9 +29,6 @@ def hang_notice(trace: Path, line: str) -> Iterator[None]:
         trace: an empty file, to which the guard writes.
         line: what has happened.
     """
-    if sys.stderr is None:
-        yield
-        return
     try:
         shell = subprocess.Popen(
             [_SHELL, "-c", _SCRIPT, _SHELL, str(trace), line],
