@@ -183,11 +183,12 @@ class MavsdkDrone:
             await self._wait_for_checks(limit_s)
         except TimeoutError:
             missing = ", ".join(self._feed.missing())
-            await self._hold_on_ground()
-            raise DroneError(
-                f"not ready within {limit_s:g} s: {missing}{self._feed.recent_texts()}; "
-                f"framerunner doctor --drone {self._url.text} says what is missing"
-            ) from None
+            if not self._feed.armed:  # else it may be in the air, and another app's
+                await self._hold_on_ground()
+                raise DroneError(
+                    f"not ready within {limit_s:g} s: {missing}{self._feed.recent_texts()}; "
+                    f"framerunner doctor --drone {self._url.text} says what is missing"
+                ) from None
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
         await self._ticks.before_arming(self._telemetry)
