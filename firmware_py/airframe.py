@@ -237,11 +237,11 @@ def _read(name: str, text: str) -> Airframe:
     """The airframe that a file's text declares; `name` is for messages."""
     try:
         return Airframe.model_validate(yaml.safe_load(text))
-    except yaml.YAMLError as error:
-        raise AirframeError(f"airframe {name}: not YAML: {str(error).splitlines()[0]}") from error
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "airframe"
         raise AirframeError(
             f"airframe {name}: {where}: {first['msg']} (got {first['input']!r:.60})"
         ) from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # also of what is nested deeply
+        raise AirframeError(f"airframe {name}: not YAML: {str(error).splitlines()[0]}") from error

@@ -99,6 +99,8 @@ class ChildProcess:
         """Wait until the process ends by itself, and return why: its last line. Waits forever otherwise."""
         assert self._process is not None
         code = await self._process.wait()
+        if code < 0:  # its last line says nothing of that
+            return f"{self._name} was ended by signal {-code}"
         if self._reader is not None:
             await asyncio.wait({self._reader}, timeout=_LAST_LINE_S)
         return f"{self._name} ended with code {code}: {self._last_line.removeprefix('error: ')}"
@@ -116,6 +118,8 @@ class ChildProcess:
             await _wait_or_cancel(work, watching)
             if not work.done():
                 work.cancel()
+                await asyncio.wait({work}, timeout=_GRACE_S)
+                work.cancel()  # what it still asks of the child is not answered
                 await asyncio.gather(work, return_exceptions=True)
                 raise SettingError(watching.result())
             return work.result()

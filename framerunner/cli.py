@@ -87,6 +87,7 @@ def _version() -> str:
 
 def main() -> None:
     """Run the command line and exit."""
+    _open_closed_streams()
     _handle_signals()
     # Read by libraries when they are first imported: matrices here are too small for several threads,
     # and a camera that cannot be opened is reported by this program in one line.
@@ -101,6 +102,13 @@ def main() -> None:
     for number in (signal.SIGALRM, signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_DFL)  # an exception at shutdown would be a traceback
     sys.exit(code)
+
+
+def _open_closed_streams() -> None:
+    """Replace a standard stream that was closed by the null device; a file would get its number."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - until the end
 
 
 def run(arguments: list[str]) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shlex
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -199,7 +200,9 @@ def read_base(mission: MissionFile) -> MissionFile:
 def _find(name: str, folder: Path, place: Place) -> Path:
     """A file if it looks like one, otherwise a mission of the package."""
     if name.endswith((".yaml", ".yml")) or "/" in name:
-        path = (folder / name).resolve()
+        path = folder / name
+        with contextlib.suppress(RuntimeError):  # links in a loop, before Python 3.13
+            path = path.resolve()
         if path.is_file():
             return path
         code = "file.irregular" if path.exists() else "file.missing"

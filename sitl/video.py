@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -72,6 +73,13 @@ def encode_jpeg(image: Image, quality: int = JPEG_QUALITY) -> bytes:
     return bytes(data)
 
 
+def _is_own_fault(record: logging.LogRecord) -> bool:
+    """Whether a message of the HTTP library is not only about what somebody has sent that is no HTTP."""
+    from aiohttp.http_exceptions import HttpProcessingError
+
+    return record.exc_info is None or not isinstance(record.exc_info[1], HttpProcessingError)
+
+
 class VideoServer:
     """Serves the images published to it, and JSON documents beside them."""
 
@@ -124,6 +132,7 @@ class VideoServer:
             VideoError: the port is in use or the address is not this machine's.
         """
         web = await asyncio.to_thread(import_module, "aiohttp.web")
+        logging.getLogger("aiohttp.server").addFilter(_is_own_fault)
         app = web.Application()
         app.router.add_get(VIDEO_PATH, self._video, allow_head=False)
         app.router.add_get("/image.jpg", self._image)

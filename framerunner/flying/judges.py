@@ -67,7 +67,7 @@ class TruthJudge:
         session: for the requests.
         plan: of the flight.
         source: the states that it judges by.
-        earlier_us: vehicle time at which a try began that is already over; None: there is none.
+        earlier_us: vehicle time at which the try of an earlier flight began; None: there is none.
     """
 
     def __init__(
@@ -230,10 +230,11 @@ async def choose_judge(
     answer = None if api is None else await ask_referee(api, session)
     if api is not None and answer is not None and answer.scenario == plan.scenario.name:
         plan = plan.lifted(answer.lift_m)
-        earlier_us = answer.snapshot.began_us if answer.snapshot.over else None
-        if earlier_us is not None and answer.source == "truth":  # a virtual camera places the arena anew
+        now = answer.snapshot
+        # A virtual camera places the arena anew; a drone that flies is refused later.
+        if now.began_us is not None and not now.motors_on and answer.source == "truth":
             plan = _started_at(plan, answer.stands_at, api)
-        return TruthJudge(api, session, plan, answer.source, earlier_us), plan
+        return TruthJudge(api, session, plan, answer.source, now.began_us), plan
     if api is not None and named:
         raise SettingError(
             f"--simulator {api.url}: "

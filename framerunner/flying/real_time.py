@@ -13,6 +13,7 @@ from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.timing import flight_timing
+from framerunner.runs.hang_notice import hang_notice
 from framerunner.runs.recorder import RecordingCamera, RunRecords
 from framerunner.runs.run_folder import warn
 from offboard.app import MissionEnd
@@ -22,6 +23,8 @@ from vision.types import CameraFrame
 from wire.simulator_api import SimulatorApi
 
 if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow to import
+    import aiohttp
+
     from framerunner.flying.judges import Judge
     from framerunner.flying.mission_reporter import MissionReporter
     from framerunner.flying.simulator_process import GenuineAutopilot, SitlProcess
@@ -91,23 +94,19 @@ async def fly_in_real_time(
     import aiohttp
 
     from framerunner.flying.display import FlightDisplay
-    from framerunner.flying.judges import choose_judge
     from framerunner.flying.mission_reporter import MissionReporter
     from offboard.link.companion import Companion
 
     async with AsyncExitStack() as stack:
         session = await stack.enter_async_context(aiohttp.ClientSession())
         vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
-        declared = plan.scenario
-        judge, plan = await choose_judge(plan, vehicle.api, session, named=settings.simulator is not None)
-        if plan.scenario is not declared:
-            records.folder.write_plan(plan.scenario, plan.chart)  # by which the flight is replayed
+        judge, plan = await _judge(plan, vehicle, settings, records, session)
         plan, safety, system_id = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)
         source = records.folder.mission.read_text(encoding="utf-8")
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
-        drone = _drone(plan, vehicle, records, stack, safety, hardware=settings.hardware, system_id=system_id)
+        drone = _drone(plan, vehicle, records, stack, safety, settings=settings, system_id=system_id)
         drone.use_companion(companion)
         camera = await _camera(plan, vehicle, records, stack, reporter, drone=drone, settings=settings)
         perception = _perception(plan, vehicle, judge, camera)
@@ -134,6 +133,22 @@ async def fly_in_real_time(
         flown = await fly(*what, run=run, measured=timing, before_tick=reporter.look, safety=safety)
         await reporter.send_result(records.complete(flown.result))
     return flown
+
+
+async def _judge(
+    plan: FlightPlan,
+    vehicle: _Endpoints,
+    settings: RealTimeSettings,
+    records: RunRecords,
+    session: aiohttp.ClientSession,
+) -> tuple[Judge, FlightPlan]:
+    """The judge, and the plan as the simulator has it, by which the flight is replayed."""
+    from framerunner.flying.judges import choose_judge
+
+    judge, changed = await choose_judge(plan, vehicle.api, session, named=settings.simulator is not None)
+    if changed.scenario is not plan.scenario:
+        records.folder.write_plan(changed.scenario, changed.chart)
+    return judge, changed
 
 
 async def _safety(
@@ -214,15 +229,18 @@ def _drone(
     stack: AsyncExitStack,
     safety: SafetyRules,
     *,
-    hardware: HardwareSettings | None,
+    settings: RealTimeSettings,
     system_id: int | None,
 ) -> MavsdkDrone:
     """The drone on its link, which is closed with the stack; in a dry run it is never armed."""
     from offboard.dry_run import DryRunDrone
     from offboard.mavsdk_drone import MavsdkDrone
 
-    hang_report = stack.enter_context(records.folder.hang_report.open("w", encoding="utf-8"))
-    dry_run = hardware is not None and hardware.dry_run
+    trace = records.folder.hang_report
+    hang_report = stack.enter_context(trace.open("w", encoding="utf-8"))
+    if not settings.unattended:
+        stack.enter_context(hang_notice(trace, _hang_line(trace, waits=vehicle.sitl is not None)))
+    dry_run = settings.hardware is not None and settings.hardware.dry_run
     drone = (DryRunDrone if dry_run else MavsdkDrone)(
         vehicle.drone_url,
         start_arena=plan.start_pose,
@@ -241,6 +259,16 @@ def _drone(
         drone.share_with(vehicle.shared_with)
     stack.push_async_callback(drone.disconnect)  # not before the result has been sent over its link
     return drone
+
+
+def _hang_line(trace: Path, *, waits: bool) -> str:
+    """For a hang that ended this program while it commanded a drone, whose time may wait for it."""
+    from offboard.link.watchdog import LIMITS, PATIENT_LIMITS
+
+    limits, then = LIMITS, "the drone gets no more setpoints and acts by its failsafe; if not, take control"
+    if waits:
+        limits, then = PATIENT_LIMITS, "its simulator ends with it"
+    return f"error: the app hung for {limits.locked_s:g} s and was ended: {then}; where it hung is in {trace}"
 
 
 async def _camera(

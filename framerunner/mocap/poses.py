@@ -162,6 +162,8 @@ def read_poses(path: Path, axes: Axes, name: str | None) -> list[Pose]:
         PoseError: it cannot be read, or a line is wrong; the message names file, line and what to do.
     """
     number, poses = 0, []
+    if path.exists() and not path.is_file():  # a device may never end
+        raise PoseError(f"{path}: is not a regular file; give a .csv or .jsonl file of poses")
     try:
         with path.open(encoding="utf-8", newline="") as file:
             for number, raw in _raw(file, is_csv=path.suffix.lower() == ".csv"):  # noqa: B007 - errors name it

@@ -5,15 +5,15 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
+import mavsdk.logging as native_log
 from mavsdk.asyncio import Configuration, ForwardingOption, Mavsdk, MavsdkError
 from mavsdk.asyncio.component_type import ComponentType
-from mavsdk.logging import log_subscribe
 
 from offboard.drone import DroneError
 from offboard.link.companion import Companion
 from offboard.link.tlog import TlogRecorder
+from wire.status_text import plain
 from wire.transports.sockets import check_free
 from wire.transports.urls import LinkError, LinkUrl
 
@@ -25,7 +25,7 @@ def new_mavsdk() -> Mavsdk:
 
     Its messages go to this module's logger, from its first one on.
     """
-    log_subscribe(_log)
+    native_log._cmavsdk_lib.mavsdk_log_subscribe(_log, None)
     return Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
 
 
@@ -78,6 +78,8 @@ async def open_connections(
     return recorder
 
 
-def _log(level: Any, message: str, _file: object, _line: object) -> bool:  # noqa: ANN401 - MAVSDK is untyped
-    logger.debug("mavsdk %s: %s", getattr(level, "name", level), message)
+@native_log.LogCallback  # type: ignore[untyped-decorator]
+def _log(level: int, message: bytes | None, _file: bytes | None, _line: int, _user: object) -> bool:
+    """Take a message; MAVSDK prints one in which its own wrapper finds bytes that are no text."""
+    logger.debug("mavsdk %d: %s", level, plain(message or b""))
     return True  # handled: MAVSDK prints nothing itself

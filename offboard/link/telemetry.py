@@ -33,6 +33,7 @@ from offboard.link.dialect import Dialect, TickExchange
 from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
 from wire.dialect import AUTOPILOT_COMPONENT_ID
 from wire.mission_tunnel import TEXT_PREFIX
+from wire.status_text import plain
 from wire.vehicle_telemetry import MessageOrder
 
 TICK_US = 50_000
@@ -274,9 +275,9 @@ class TelemetryFeed:
         self.health = health
 
     def _on_text(self, text: Any, _user: object) -> None:  # noqa: ANN401
-        stripped = text.text.strip()
-        if not stripped.startswith(TEXT_PREFIX):  # MAVSDK also passes the texts of this app's companion
-            self._texts.append((self._clock(), stripped))
+        said = plain(text.text)
+        if not said.startswith(TEXT_PREFIX):  # MAVSDK also passes the texts of this app's companion
+            self._texts.append((self._clock(), said))
 
     def _wake(self) -> None:
         loop = self._loop

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from sitl.autopilots.sole_sender import Sign, SoleSender
+from wire.dialect import mavlink
 from wire.framing import PacketReader
 
 
 def mavlink_sender(port: int, system_id: int, notice: Callable[[str], None]) -> SoleSender[bytes]:
     """Selects ArduPilot's datagrams; others cannot take its place by being the first.
 
-    ArduPilot writes what it does at its start as plain text to the same port, before its MAVLink.
+    Its first port is its console until its MAVLink begins: it prints text there.
 
     Args:
         port: UDP port that they are sent to.
@@ -20,7 +21,12 @@ def mavlink_sender(port: int, system_id: int, notice: Callable[[str], None]) -> 
     """
 
     def is_of_vehicle(data: bytes) -> bool:
-        return any(message.get_srcSystem() == system_id for message in PacketReader().feed(data))
+        return any(
+            message.get_type() == "HEARTBEAT"
+            and message.get_srcSystem() == system_id
+            and message.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+            for message in PacketReader().feed(data)
+        )
 
     sender = SoleSender[bytes]("ArduPilot", port, notice)
     sender.sign = Sign(is_of_vehicle, f"MAVLink of ArduPilot with --sysid {system_id}", bytes.isascii)

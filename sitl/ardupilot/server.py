@@ -252,7 +252,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         reason = "ArduPilot has started again"
         if self._grants is not None:
             at_s = self._simulation.time_us / 1e6
-            raise AutopilotEndedError(f"{reason} at {at_s:.1f} s of simulated time")
+            raise AutopilotEndedError(f"at {at_s:.1f} s of simulated time {reason}")
         self._renew()
         self._notice(f"{reason}: a new drone is on the start, at time zero")
 
@@ -297,7 +297,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
                     task.cancel()
                 await asyncio.gather(ended, opened, return_exceptions=True)
             if not self._connected.is_set():
-                raise AutopilotEndedError(f"{reason} (its output: {process.log})")
+                raise AutopilotEndedError(f"{reason} ({process.where_its_output_is})")
             self._connected.clear()
             self._sender.forget()
             if self._holding is not None:  # a frame that need not be answered any more

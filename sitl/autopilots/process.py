@@ -46,6 +46,7 @@ class AutopilotProcess(ABC):
         processor: int | None = None,
     ) -> None:
         self._name, self._option = name, option
+        self._is_kept = folder is not None
         if folder is None:
             self._temporary = TemporaryFolder(f"framerunner-files-{name.lower()}-")
             folder = self._temporary.path
@@ -65,6 +66,11 @@ class AutopilotProcess(ABC):
     def log(self) -> Path:
         """What it prints; one that is restarted goes on with the same file."""
         return self.folder / f"{self._name.lower()}.log"
+
+    @property
+    def where_its_output_is(self) -> str:
+        """For the end of a message, in brackets."""
+        return f"its output: {self.log}" if self._is_kept else "--storage DIR keeps its output"
 
     @abstractmethod
     def command(self) -> list[str]:

@@ -128,7 +128,7 @@ class AutopilotServer(ABC, Generic[V]):
         at_s = self._simulation.time_us / 1e6
         self._notice(f"{reason}; at {at_s:.1f} s the motors stop")
         if self._grants is not None:
-            raise AutopilotEndedError(f"{reason} at {at_s:.1f} s of simulated time")
+            raise AutopilotEndedError(f"at {at_s:.1f} s of simulated time {reason}")
         simulation = self._simulation
         pacer = Pacer(self._settings.speed, time.monotonic(), simulation.time_us)
         end_us = simulation.time_us + FALL_US

@@ -22,7 +22,7 @@ class Sign(Generic[T]):
 
     is_in: Callable[[T], bool]  # whether what was received shows it; only asked about new senders
     words: str  # what it is, for people, after "it is no"
-    may_precede: Callable[[T], bool] = lambda _: False  # what the program may send before it; is not reported
+    may_come_before: Callable[[T], bool] = lambda item: False  # what the program sends first, without it
 
 
 class SoleSender(Generic[T]):
@@ -65,7 +65,7 @@ class SoleSender(Generic[T]):
         if all(sender != self.address for _, sender in received) and self._has_gone():
             genuine = next((sender for item, sender in received if self._is_genuine(item)), None)
             if genuine is None:
-                self._report_any(received)
+                self._report_strangers(received)
                 return []
             self.address, self._noticed = genuine, False
         selected = [item for item, sender in received if sender == self.address]
@@ -82,11 +82,12 @@ class SoleSender(Generic[T]):
     def _is_genuine(self, item: T) -> bool:
         return self.sign is None or self.sign.is_in(item)
 
-    def _report_any(self, received: Sequence[tuple[T, Address]]) -> None:
+    def _report_strangers(self, received: Sequence[tuple[T, Address]]) -> None:
+        """Report who has sent what the program does not send."""
         assert self.sign is not None, "the first sender would be connected"
-        strange = [sender for item, sender in received if not self.sign.may_precede(item)]
-        if strange:
-            self._report(strange[0])
+        strange = (sender for item, sender in received if not self.sign.may_come_before(item))
+        if (stranger := next(strange, None)) is not None:
+            self._report(stranger)
 
     def _report(self, other: Address) -> None:
         if self._noticed:

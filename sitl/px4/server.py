@@ -100,7 +100,7 @@ class Px4Server(AutopilotServer[Px4Simulation]):
             task.cancel()
         await asyncio.gather(ended, connected, return_exceptions=True)
         if connected not in done:
-            raise AutopilotEndedError(f"{ended.result()} (its output: {process.log})")
+            raise AutopilotEndedError(f"{ended.result()} ({process.where_its_output_is})")
         connected.result()
 
     async def _reason(self) -> str:

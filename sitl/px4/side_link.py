@@ -60,7 +60,7 @@ class SideLink:
         self._placed: Px4Simulation | None = None  # the one whose PX4 knows the place of its local frame
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        self._px4 = ("127.0.0.1", CAMERA_PORT + instance)
+        self._socket.connect(("127.0.0.1", CAMERA_PORT + instance))  # nobody else is heard
         self._output = None if output is None else _Output(output)
 
     def step(self, simulation: Px4Simulation) -> None:
@@ -109,7 +109,7 @@ class SideLink:
 
     def _send(self, packet: bytes) -> None:
         with contextlib.suppress(OSError):  # PX4 has not started
-            self._socket.sendto(packet, self._px4)
+            self._socket.send(packet)
 
     def _pack(self, battery: BatteryState) -> bytes:
         cells = min(max(battery.cells, 1), _MAX_CELLS)

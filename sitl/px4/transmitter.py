@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from collections.abc import Callable
 from struct import Struct
 
@@ -82,7 +84,12 @@ class Joystick:
             self._device = None
 
     def _open(self) -> None:
-        self._device = os.open(self._path, os.O_RDONLY | os.O_NONBLOCK)
+        opened = os.open(self._path, os.O_RDONLY | os.O_NONBLOCK)
+        kind = os.fstat(opened).st_mode
+        if stat.S_ISREG(kind) or stat.S_ISDIR(kind):  # would be a receiver without a signal
+            os.close(opened)
+            raise OSError(errno.ENODEV, "is no device")
+        self._device = opened
 
     def _is_back(self) -> bool:
         self._calls += 1

@@ -49,3 +49,11 @@ def test_an_unknown_weight_is_refused(tmp_path):
 def test_an_airframe_too_heavy_for_its_rotors_is_refused():
     with pytest.raises(ValueError, match="cannot carry"):
         Airframe.model_validate(declared("x500", mass_kg=4.0))
+
+
+@pytest.mark.parametrize("text", ["[" * 5000, "a: " + "9" * 5000])
+def test_what_cannot_be_read_is_refused_in_one_line(tmp_path, text):
+    path = tmp_path / "odd.yaml"
+    path.write_text(text)
+    with pytest.raises(AirframeError, match=r"odd\.yaml: not YAML: [^\n]+$"):
+        load_airframe(str(path))

@@ -422,6 +422,13 @@ def test_a_reader_that_closes_its_pipe_is_no_fault():
         assert writer.wait(20) == 0
 
 
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_closed_standard_stream_is_no_fault(closed):
+    shell = f'"$0" -m framerunner scenario list {closed}'
+    done = subprocess.run(["sh", "-c", shell, sys.executable], cwd=ROOT, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
 def test_the_version_is_printed(capsys):
     assert run(["--version"]) == 0
     assert capsys.readouterr().out.strip().count(".") == 2

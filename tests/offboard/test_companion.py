@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from offboard.link import companion as module
 from offboard.link.companion import Companion
+from offboard.link.connections import _log
 from offboard.link.telemetry import TelemetryFeed
 from wire.mission_tunnel import (
     DocumentAssembler,
@@ -309,6 +310,11 @@ async def test_an_error_at_a_beat_ends_the_reports_and_not_the_loop(silent, capl
 
 def test_the_companion_s_texts_are_not_taken_for_the_vehicle_s():
     feed = TelemetryFeed()
-    for words in ("mission: red.turning", "Preflight Fail: no heading"):
+    for words in ("mission: red.turning", "\x1bPreflight Fail: no heading\n"):
         feed._on_text(type("Text", (), {"text": words}), None)
     assert feed.recent_texts() == "; the vehicle says: Preflight Fail: no heading"
+
+
+def test_a_vehicle_s_bytes_that_are_no_text_are_not_printed(capfd):
+    assert _log(0, b"MAVLink: emergency: \x93\x1b", None, 0, None)
+    assert capfd.readouterr() == ("", "")

@@ -447,6 +447,19 @@ async def test_an_armed_vehicle_is_not_taken(vehicle):
             pass
 
 
+async def test_an_armed_vehicle_that_is_not_ready_is_left_alone(vehicle):
+    """It may be flown by another app, which a request for hold would stop."""
+    vehicle.armed, vehicle.armable = True, False
+    drone = MavsdkDrone(f"udpin://127.0.0.1:{vehicle.port}", ready_limit_s=0.8)
+    try:
+        await drone.connect()
+        with pytest.raises(DroneError, match="armed already"):
+            await drone.ready()
+    finally:
+        await drone.close()
+    assert 176 not in [command[0] for command in vehicle.commands]
+
+
 async def test_a_vehicle_that_others_have_armed_meanwhile_is_not_taken(vehicle):
     async with connected(vehicle) as drone:
         vehicle.armed = True

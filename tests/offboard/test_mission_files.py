@@ -221,6 +221,13 @@ def test_unknown_name_and_missing_file():
         load_mission("/dev/zero")
 
 
+def test_a_link_to_itself_is_no_mission(tmp_path):
+    path = tmp_path / "loop.yaml"
+    path.symlink_to(path)
+    with pytest.raises(MissionError, match="does not exist"):
+        load_mission(str(path))
+
+
 def test_a_mission_cannot_extend_itself(tmp_path):
     assert "circle" in problems(tmp_path, "name: a\nextends: m.yaml\n")
 

@@ -148,7 +148,10 @@ async def test_clients_connect_and_disconnect_quietly(caplog: pytest.LogCaptureF
             if cut:
                 await reader.readexactly(cut)
             writer.transport.abort()
-        await asyncio.sleep(0.05)
+        reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+        writer.write(b"GET / HTTP/1.1\r\n\r\n")  # without the host, which HTTP/1.1 demands
+        assert (await reader.readline()).split()[1] == b"400"
+        writer.close()
         status, _, _ = await get(server.url + "image.jpg")
         assert status == 200
     assert [record.message for record in caplog.records if record.levelname != "DEBUG"] == []

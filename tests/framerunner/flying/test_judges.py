@@ -67,7 +67,7 @@ def answer(scenario=SCENARIO.name, time_us=0, **snapshot):
 
 
 async def test_the_simulator_of_the_camera_is_the_judge():
-    async with referee(answer()) as (root, session, _):
+    async with referee(answer(began_us=None), answer()) as (root, session, _):
         judge, _ = await choose_judge(PLAN, SimulatorApi.of_video(f"{root}/video"), session)
         assert judge.source == "truth"
         standing = await judge.standing()
@@ -81,9 +81,10 @@ async def test_a_referee_by_telemetry_is_not_taken_for_the_truth():
         assert judge.source == "telemetry"
 
 
-async def test_the_verdict_of_an_earlier_flight_is_not_that_of_this_one():
+@pytest.mark.parametrize("over", [True, False])
+async def test_the_verdict_of_an_earlier_flight_is_not_that_of_this_one(over):
     """A flight that is stopped before arming begins no try."""
-    earlier, now = answer(over=True, began_us=3), answer(over=True, began_us=7)
+    earlier, now = answer(over=over, settled=True, began_us=3), answer(over=True, began_us=7)
     async with referee(earlier, earlier, earlier, earlier, now) as (root, session, _):
         judge, _ = await choose_judge(PLAN, SimulatorApi(root), session)
         assert await judge.standing() is None

@@ -115,11 +115,20 @@ async def test_that_a_stranger_has_taken_the_place_of_ardupilot_is_heard(tmp_pat
     assert f"sends to UDP {port} is ignored: ArduPilot at 127.0.0.1:" in heard[0]
 
 
-async def test_its_end_cancels_the_work_that_it_guards():
+async def asks_it_once_more():
+    try:
+        await asyncio.sleep(30)
+    finally:
+        await asyncio.sleep(30)
+
+
+@pytest.mark.parametrize("work", [lambda: asyncio.sleep(30), asks_it_once_more])
+async def test_its_end_cancels_the_work_that_it_guards(work, monkeypatch):
+    monkeypatch.setattr("framerunner.child_process._GRACE_S", 0.1)
     async with SitlProcess("empty", instance=free_instance()) as sitl:
-        work = asyncio.create_task(asyncio.sleep(30))
+        work = asyncio.create_task(work())
         os.kill(sitl._process.pid, signal.SIGKILL)
-        with pytest.raises(SettingError, match="code -9"):
+        with pytest.raises(SettingError, match="was ended by signal 9"):
             await sitl.guard(work)
         assert work.cancelled()
 

@@ -5,6 +5,7 @@ import os
 import socket
 import time
 from math import nan, radians
+from pathlib import Path
 
 import pytest
 
@@ -116,6 +117,11 @@ def test_a_file_with_a_fault_is_refused_in_one_line(tmp_path, text, words):
 def test_a_missing_file_is_refused_in_one_line(tmp_path):
     with pytest.raises(PoseError, match=r"cannot be read .*give a \.csv or \.jsonl file of poses"):
         read_poses(tmp_path / "none.csv", Axes.FLU, None)
+
+
+def test_a_device_is_no_file_of_poses():
+    with pytest.raises(PoseError, match="is not a regular file"):
+        read_poses(Path("/dev/zero"), Axes.FLU, None)
 
 
 def test_jitter_of_arrival_is_removed_from_time_stamps():

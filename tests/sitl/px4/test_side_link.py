@@ -103,6 +103,10 @@ def test_what_px4_prints_and_its_mode_become_the_failsafes_of_the_flight(tmp_pat
     with flight.output.open("a") as output:
         output.write("battery level\x1b[0m\t\nWARN  [failsafe] Failsafe activated\t\n")
     flight.fly(0.2)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        genuine, flight.px4 = flight.px4, stranger
+        flight.heartbeat(0, mavlink.MAV_STATE_CRITICAL)
+        flight.px4 = genuine
     flight.heartbeat(LAND, mavlink.MAV_STATE_CRITICAL)
     flight.fly(0.2)
     facts = flight.simulation.fault_facts()

@@ -95,10 +95,11 @@ def test_a_joystick_moves_the_channels_until_it_is_pulled_out(tmp_path):
     assert [joystick() for _ in range(120)] == [None] * 120
 
 
-def test_a_device_that_is_not_there_is_one_line():
+@pytest.mark.parametrize("name", ["/dev/no", "/dev", __file__])
+def test_what_is_no_device_is_one_line(name):
     assert open_transmitter("centred")() == CENTRED
-    with pytest.raises(SettingError, match=r"--transmitter /dev/no: cannot be read .* or centred"):
-        open_transmitter("/dev/no")
+    with pytest.raises(SettingError, match=rf"--transmitter {name}: cannot be read .* or centred"):
+        open_transmitter(name)
 
 
 def test_a_gyroscope_that_is_off_is_not_flagged_and_its_tick_is_not_answered():
