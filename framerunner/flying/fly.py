@@ -21,6 +21,7 @@ from offboard.drone import Drone
 from offboard.perception import Perception
 from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.faults.outcome import fault_fields
+from scenarios.models import Scenario
 from scenarios.result import FlightResult, RefereeReport
 
 Run = Callable[[Coroutine[Any, Any, MissionEnd]], Awaitable[MissionEnd]]
@@ -33,6 +34,7 @@ class FinishedFlight:
     result: FlightResult  # without wall times
     outcome: MissionEnd  # how the mission ended
     track: Track  # where the drone was, 20 times a second
+    layout: Scenario  # as it was flown
 
 
 async def fly(
@@ -93,7 +95,7 @@ async def fly(
     result = _result(
         plan, report, outcome, track, cause=cause, judged_by=judge.source, measured={**failed, **measured()}
     )
-    return FinishedFlight(result, outcome, track)
+    return FinishedFlight(result, outcome, track, plan.layout)
 
 
 def _result(

@@ -90,7 +90,7 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
         if recording is not None:
             warn(recording.problem)
         result = records.complete(flown.result)
-        write_outcome(folder, plan.lifted(result.lift_m).layout, flown.track, result)
+        write_outcome(folder, flown.layout, flown.track, result)
     finally:
         folder.remove_if_empty()
     late = "" if result.timing is None else result.timing.words
