@@ -15,10 +15,13 @@ _SHELL = "/bin/sh"
 _SCRIPT = r"""
 read -r _
 [ -s "$1" ] || exit 0
-[ ! -t 2 ] || printf '\033[?25h\n' >&2
+if [ -t 2 ]; then
+    stty icanon echo <&2 2>/dev/null
+    printf '\033[?25h\n' >&2
+fi
 printf '%s\n' "$2" >&2
 """
-"""The live table hides the cursor of a terminal and leaves it within a line."""
+"""Who reads the operator's keys leaves a terminal without lines and echo; the live table hides its cursor."""
 
 
 @contextlib.contextmanager

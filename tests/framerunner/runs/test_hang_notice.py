@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import pty
 import subprocess
 import sys
+import termios
+import tty
 from textwrap import dedent
 
 import pytest
@@ -31,3 +35,22 @@ def test_a_process_that_has_left_a_trace_is_told_of(tmp_path, end, code, printed
     command = [sys.executable, "-c", PROGRAM, str(tmp_path / "hang.txt"), end]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (code, printed)
+
+
+def test_the_terminal_has_lines_and_echo_again(tmp_path):
+    ours, terminal = pty.openpty()
+    try:
+        tty.setcbreak(terminal)
+        end = "trace.write_text('Timeout'); os._exit(1)"
+        command = [sys.executable, "-c", PROGRAM, str(tmp_path / "hang.txt"), end]
+        with subprocess.Popen(command, stdin=terminal, stderr=terminal) as program:
+            program.wait()
+            printed = b""
+            while b"the app hung" not in printed:
+                printed += os.read(ours, 1024)
+        modes = termios.tcgetattr(terminal)[3]
+        assert modes & termios.ICANON
+        assert modes & termios.ECHO
+    finally:
+        os.close(ours)
+        os.close(terminal)
