@@ -179,11 +179,15 @@ class MavsdkDrone:
         """Wait until the vehicle can be armed; then determine the axes."""
         limit_s = self._ready_limit_s or self._stream.ready_limit_s
         await self._ticks.begin_exchange(self._stream, self._requests)
-        with contextlib.suppress(TimeoutError):
+        is_ready = True
+        try:
             await self._wait_for_checks(limit_s)
+        except TimeoutError:
+            is_ready = False
         if self._feed.armed:  # it may be in the air, and another app's
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        if missing := ", ".join(self._feed.missing()):
+        if not is_ready:
+            missing = ", ".join(self._feed.missing())
             await self._hold_on_ground()
             raise DroneError(
                 f"not ready within {limit_s:g} s: {missing}{self._feed.recent_texts()}; "
