@@ -179,20 +179,18 @@ class MavsdkDrone:
         """Wait until the vehicle can be armed; then determine the axes."""
         limit_s = self._ready_limit_s or self._stream.ready_limit_s
         await self._ticks.begin_exchange(self._stream, self._requests)
-        is_ready = True
         try:
             await self._wait_for_checks(limit_s)
         except TimeoutError:
-            is_ready = False
-        if self._feed.armed:  # it may be in the air, and another app's
+            if not self._feed.armed:  # else it may be in the air, and another app's
+                missing = ", ".join(self._feed.missing())
+                await self._hold_on_ground()
+                raise DroneError(
+                    f"not ready within {limit_s:g} s: {missing}{self._feed.recent_texts()}; "
+                    f"framerunner doctor --drone {self._url.text} says what is missing"
+                ) from None
+        if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        if not is_ready:
-            missing = ", ".join(self._feed.missing())
-            await self._hold_on_ground()
-            raise DroneError(
-                f"not ready within {limit_s:g} s: {missing}{self._feed.recent_texts()}; "
-                f"framerunner doctor --drone {self._url.text} says what is missing"
-            )
         await self._ticks.before_arming(self._telemetry)
         self._alignment = Alignment(self._start_arena, pose_of(self._feed))
         await self._ticks.begin()
