@@ -199,15 +199,17 @@ def solutions(views: list[View], prior: Prior) -> list[Solution]:
     return sorted((one for one in found if one is not None), key=lambda solution: -solution.log_weight)
 
 
+def upright_edges(view: View) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """The upright edges that are seen from end to end: upper and lower end, each right and down, pixels."""
+    places = iter([(right, down) for right, down in view.corners_px.reshape(-1, 2).tolist()])
+    corner = [next(places) if seen else None for seen in view.seen]
+    ends = ((corner[0], corner[3]), (corner[1], corner[2]))
+    return [(high, low) for high, low in ends if high is not None and low is not None]
+
+
 def _starts(view: View) -> list[Floats]:
     """States to begin the search at: the distance from the height of an upright edge, several yaws."""
-    places = iter(view.corners_px.reshape(-1, 2).tolist())
-    corner = [next(places) if seen else None for seen in view.seen]
-    heights = [
-        low[1] - high[1]
-        for high, low in ((corner[0], corner[3]), (corner[1], corner[2]))
-        if high is not None and low is not None
-    ]
+    heights = [low[1] - high[1] for high, low in upright_edges(view)]
     if not heights or min(heights) < 0.5:
         return []
     forward = view.focal_px * 2.0 * HALF_HEIGHT_M / (sum(heights) / len(heights))

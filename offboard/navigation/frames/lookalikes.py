@@ -15,7 +15,13 @@ import numpy.typing as npt
 
 from geometry.rotations import to_world
 from geometry.vectors import Vec3
-from offboard.navigation.frames.frame_measurement import HALF_HEIGHT_M, HALF_WIDTH_M, Floats, View
+from offboard.navigation.frames.frame_measurement import (
+    HALF_HEIGHT_M,
+    HALF_WIDTH_M,
+    Floats,
+    View,
+    upright_edges,
+)
 
 Mask: TypeAlias = npt.NDArray[np.bool_]
 
@@ -155,20 +161,22 @@ class _Sightings:
 
 def _sighting_of(view: View) -> _Sightings | None:
     """What a view says of direction and distance; None if no upright edge is seen from end to end."""
-    m, focal_px = view.camera.rotation, view.focal_px
-    rays = [
-        to_world(m, 1.0, -right / focal_px, -down / focal_px)
-        for right, down in view.corners_px.reshape(-1, 2).tolist()
-    ]
-    slopes = iter([z / hypot(x, y) for x, y, z in rays])
-    left_top, right_top, right_low, left_low = (next(slopes) if seen else None for seen in view.seen)
+    rotation, focal_px = view.camera.rotation, view.focal_px
+
+    def ray(right_px: float, down_px: float) -> Vec3:
+        return to_world(rotation, 1.0, -right_px / focal_px, -down_px / focal_px)
+
+    def slope(place_px: tuple[float, float]) -> float:
+        x, y, z = ray(*place_px)
+        return z / hypot(x, y)
+
     # At a horizontal distance of 1 m, an upright edge is as long as the difference of its ends' slopes.
-    edges = ((left_top, left_low), (right_top, right_low))
-    lengths = [top - low for top, low in edges if top is not None and low is not None]
+    lengths = [slope(high) - slope(low) for high, low in upright_edges(view)]
     if not lengths or min(lengths) * focal_px < 1.0:
         return None
     length = sum(lengths) / len(lengths)
-    middle = np.sum([np.divide(ray, hypot(*ray)) for ray in rays], axis=0)
+    rays = np.array([ray(*place_px) for place_px in view.corners_px.reshape(-1, 2).tolist()])
+    middle = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).sum(axis=0)
     middle /= np.linalg.norm(middle)
     away_m = 2.0 * HALF_HEIGHT_M / length / hypot(middle[0], middle[1])
     std = hypot(EDGE_STD, EDGE_STD_PX / (length * focal_px))
