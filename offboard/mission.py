@@ -121,10 +121,12 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
         pilot: a contestant's file from `read_pilot`, or a subclass of `Pilot`; None for `Pilot` itself.
 
     Raises:
-        MissionError: every problem, one a line, as `file:line: text`.
+        MissionError: every problem, one a line, as `file:line: text`, with the file as it was named.
     """
-    path = _find(str(name_or_path), Path.cwd(), Place(str(name_or_path)))
-    return _checked(read_mission_file(_read_text(path), path), path, pilot)
+    name = str(name_or_path)
+    path = _find(name, Path.cwd(), Place(name))
+    label = path.name if path.parent == MISSIONS else name
+    return _checked(read_mission_file(_read_text(path, label), path, label), path, pilot)
 
 
 def mission_from_text(
@@ -194,7 +196,7 @@ def read_base(mission: MissionFile) -> MissionFile:
     if path.parent != MISSIONS and not path.is_relative_to(folder.resolve()):
         raise mission_error(mission.place, Message("extends.elsewhere", name=mission.extends))
     label = path.name if path.name != mission.path.name else str(path)
-    return read_mission_file(_read_text(path), path, label)
+    return read_mission_file(_read_text(path, label), path, label)
 
 
 def _find(name: str, folder: Path, place: Place) -> Path:
@@ -214,17 +216,17 @@ def _find(name: str, folder: Path, place: Place) -> Path:
     raise mission_error(place, Message("file.unknown", name=name, advice=advice))
 
 
-def _read_text(path: Path) -> str:
+def _read_text(path: Path, label: str) -> str:
     try:
         with path.open("rb") as file:  # a file may grow, or have no size, such as a device
             data = file.read(MAX_FILE_BYTES + 1)
         if len(data) > MAX_FILE_BYTES:
-            raise mission_error(Place(path.name), Message("file.too_large"))
+            raise mission_error(Place(label), Message("file.too_large"))
         return data.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None)
         message = Message("file.unreadable", reason=reason) if reason else Message("file.not_utf8")
-        raise mission_error(Place(path.name), message) from None
+        raise mission_error(Place(label), message) from None
 
 
 def mermaid(mission: Mission, active: str | None = None) -> str:

@@ -22,7 +22,8 @@ class SimulatorServer:
     Args:
         simulation: one or several; drone n has the ports and the system id of instance + n.
         settings: ports and speed.
-        notice: called with lines for people: the addresses once all is open, when it cannot keep up.
+        notice: called with lines for people: the addresses once all is open, that every drone can be armed
+            (once), when it cannot keep up.
         grants: how far the time of a single simulation may advance; None: without a limit.
     """
 
@@ -83,6 +84,7 @@ class SimulatorServer:
         simulation = drones[0].simulation
         pacer = Pacer(self._settings.speed, time.monotonic(), simulation.time_us)
         notices = LagNotices(self._notice, self._settings.speed)
+        ready = False
         while True:
             if video_task.done():
                 video_task.result()  # a busy port ends the simulator
@@ -97,6 +99,9 @@ class SimulatorServer:
             lost_s = pacer.give_up_lag(now_s, simulation.time_us)
             if video_task.done():  # until then much is loaded
                 notices.lag(lost_s, now_s)
+                if not ready and all(drone.simulation.autopilot.status.ready for drone in drones):
+                    ready = True
+                    self._notice("Ready for takeoff!")  # PX4's words, for which scripts wait
             if self._grants is not None and simulation.time_us > self._until_us:
                 await drones[0].hold(self._grants)
                 continue

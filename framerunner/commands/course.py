@@ -66,11 +66,13 @@ def start(
     except OSError as error:
         raise SettingError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
     print(f"{text.title.in_language(language)}\n\n{text.goal.in_language(language)}\n")
+    print(f"written: {path}. The steps are for the editor:\n\n  framerunner edit {path}\n")
     for number, step in enumerate(text.steps, start=1):
         print(f"{number}. {step.in_language(language)}")
     for hint in text.hints:
         print(f"*  {hint.in_language(language)}")
-    print(f"\nwritten: {path}\n\n  framerunner course check {found.number} {path}")
+    print("\nOnly the editor's page Course has a tab Lesson; a file is checked by this command instead:\n")
+    print(f"  framerunner course check {found.number} {path}")
     return 0
 
 

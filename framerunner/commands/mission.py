@@ -33,9 +33,11 @@ def list_() -> int:
     """
     from offboard.mission import list_missions, load_mission
 
-    for name in list_missions():
+    names = list_missions()
+    width = max(map(len, names))
+    for name in names:
         mission = load_mission(name)
-        print(f"{name:18s} {mission.description} ({mission.rules})")
+        print(f"{name:{width}s}  {mission.description} ({mission.rules})")
     return 0
 
 
@@ -79,7 +81,7 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOpt
         f"{file}{with_pilot}: good, mission '{loaded.name}' with {len(loaded.leaves)} states, {loaded.rules}"
     )
     for remark in loaded.remarks:
-        if remark.place.file == loaded.path.name:
+        if remark.place.file == str(file):
             print(remark)
     return 0
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from errors import SettingError
 from framerunner.commands import WholeNumber, check_range, say
 
 if TYPE_CHECKING:
@@ -98,6 +99,8 @@ def monitor(
     from wire.transports.urls import parse_url
 
     parse_url(drone)
+    if missions != MISSIONS and not missions.is_dir():  # the default is made when the first mission is
+        raise SettingError(f"--missions {missions}: is not a folder; make it (mkdir -p), or choose another")
     flown = None if scenario is None else load_scenario(scenario)
     given = equipment(drone, flown, runs, camera_host, missions=missions, pilot=pilot)
     password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sitl.simulation import Simulation
     from wire.signing import SigningKey
 
-_MAX_COUNT = 20
+_MAX_INSTANCES = 10  # as PX4: the apps' port of an eleventh is the ground stations' port of the first
 
 
 class _Server(Protocol):
@@ -206,8 +206,8 @@ def sim(
         framerunner sim --autopilot ardupilot --ardupilot ../ardupilot
     """
     check_range("--speed", speed, 0.01, 1000)
-    check_range("--instance", instance, 0, 9)
-    check_range("--count", count, 1, _MAX_COUNT)
+    check_range("--instance", instance, 0, _MAX_INSTANCES - 1)
+    check_range("--count", count, 1, _MAX_INSTANCES - instance)
     chosen, onboard = connections or Connections(), onboard or Onboard()
     flown_by = flown_by or FlownBy()
     watcher = _monitor(chosen.video_port, count) if monitor and flown_by.autopilot == "own" else None

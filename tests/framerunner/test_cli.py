@@ -88,10 +88,31 @@ def test_a_scenario_with_a_bad_value_is_refused_with_field_value_and_line(refuse
 
 @pytest.mark.parametrize("command", [["mission", "check"], ["mission", "show"], ["fly", "--mission"]])
 def test_a_mission_with_an_unknown_primitive_is_refused(refused, command):
-    path = write("mine.yaml", PAPER.replace("- fly_to_goal", "- flap_wings", 1))
+    Path("missions").mkdir()
+    path = write("missions/mine.yaml", PAPER.replace("- fly_to_goal", "- flap_wings", 1))
     line = refused(*command, path)
     assert "flap_wings" in line
     assert f"{path}:{1 + PAPER[: PAPER.index('- fly_to_goal')].count(chr(10))}" in line
+
+
+def test_remarks_name_the_file_as_it_was_named(capsys):
+    Path("missions").mkdir()
+    path = write("missions/waits.yaml", PAPER)
+    assert run(["mission", "check", str(path)]) == 0
+    good, *remarks = capsys.readouterr().out.splitlines()
+    assert remarks
+    assert all(line.startswith(f"{path}:") for line in (good, *remarks))
+
+
+def test_descriptions_of_missions_are_in_one_column(capsys):
+    assert run(["mission", "list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    start = max(map(len, list_missions())) + 2
+    assert all(line[start - 1] == " " and line[start] != " " for line in lines)
+
+
+def test_a_folder_of_missions_that_is_not_there_is_refused(refused):
+    assert "--missions nowhere: is not a folder" in refused("monitor", "--missions", "nowhere")
 
 
 @pytest.mark.parametrize(

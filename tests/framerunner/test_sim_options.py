@@ -39,9 +39,13 @@ def test_a_link_given_twice(refused):
     assert f"--link {link}: given twice" in refused("--link", link, "--link", link)
 
 
-@pytest.mark.parametrize("count", ["0", "21", "-1", "1.5", "many"])
+@pytest.mark.parametrize("count", ["0", "11", "-1", "1.5", "many"])
 def test_a_bad_count(refused, count):
     assert "--count" in refused("--count", count)
+
+
+def test_a_drone_more_than_there_are_instances(refused):
+    assert "--count 3: must be from 1 to 2" in refused("--count", 3, "--instance", 8)
 
 
 def test_more_drones_than_the_arena_has_room_for(refused, tmp_path):

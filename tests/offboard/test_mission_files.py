@@ -48,7 +48,9 @@ def load(tmp_path: Path, text: str, pilot_class=Pilot):
 def problems(tmp_path: Path, text: str) -> str:
     with pytest.raises(MissionError) as caught:
         load(tmp_path, text)
-    return str(caught.value)
+    said = str(caught.value)
+    assert all(line.startswith(f"{tmp_path}/m.yaml") for line in said.splitlines())  # as it was named
+    return said.replace(f"{tmp_path}/", "")
 
 
 def test_the_package_has_its_missions():

@@ -56,7 +56,7 @@ def said(tmp_path, text: str) -> str:
     path.write_text(text, encoding="utf-8")
     with pytest.raises(MissionError) as caught:
         load_mission(str(path))
-    return str(caught.value)
+    return str(caught.value).replace(f"{tmp_path}/", "")
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: repr(mistake["wrong"]))
@@ -183,7 +183,7 @@ def test_an_expression_as_deep_as_may_be_is_checked(tmp_path, sign):
     path = tmp_path / "m.yaml"
     deep = sign * (490 // len(sign))
     path.write_text(GOOD.replace("when: frame_seen", f"when: {deep}"), encoding="utf-8")
-    with pytest.raises(MissionError, match=r"^m.yaml:22"):
+    with pytest.raises(MissionError, match=r"/m.yaml:22"):
         load_mission(str(path))
 
 

@@ -141,6 +141,16 @@ async def test_telemetry_goes_out_on_both_links_before_anybody_spoke():
         pass  # free again
 
 
+async def test_it_is_said_once_that_the_drone_can_be_armed():
+    simulation = Simulation(load_scenario("empty"))
+    async with serving(simulation, speed=50.0) as (lines, _), asyncio.timeout(10.0):
+        start_us = simulation.time_us
+        while simulation.time_us < start_us + 5_000_000:
+            await asyncio.sleep(0.01)
+        assert lines.count("Ready for takeoff!") == 1
+        assert simulation.autopilot.status.ready
+
+
 async def test_a_machine_that_is_too_slow_slows_time_and_skips_nothing(monkeypatch):
     monkeypatch.setattr("sitl.pacing.pacer._NOTICE_PERIOD_S", 1.0)
     simulation = SlowSimulation(load_scenario("empty"))

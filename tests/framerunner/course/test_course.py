@@ -61,6 +61,7 @@ def test_a_lesson_is_begun_and_checked_at_the_command_line(language, tmp_path, c
     told = capsys.readouterr().out
     assert LESSONS[0].text.goal.in_language(language) in told
     path = tmp_path / "lesson_1.yaml"
+    assert f"framerunner edit {path}" in told  # the steps are about its page
     assert path.read_text() == LESSONS[0].start
     assert run(["course", "check", "1", str(path)]) == 1
     assert "not yet: aborted" in capsys.readouterr().out
