@@ -25,7 +25,7 @@ from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.view import NavigationView
 from offboard.observation import ChartNow, check_change, guards_now, read_values, values_now
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
-from offboard.pilot_file import PilotFile, in_words, place_in
+from offboard.pilot_file import PilotFile, in_words, is_interrupt, place_in
 from scenarios.models import COLOURS
 from vision.types import Detections
 
@@ -188,7 +188,9 @@ class MissionEngine:
             raise self._error(str(error)) from None
         except MissionRunError:
             raise
-        except (Exception, SystemExit) as error:  # of an expression or a contestant's primitive
+        except BaseException as error:  # of an expression or a contestant's primitive
+            if is_interrupt(error):
+                raise
             raise self._error(self._place(error) + in_words(error)) from error
 
     def pause(self, time_us: int) -> None:

@@ -13,6 +13,7 @@ from errors import UserError
 from offboard.chart.described import unit_of
 from offboard.chart.expressions import Evaluate, names_in
 from offboard.chart.spec import RESUME, THEN, Leaf, State, Transition, transition_id
+from offboard.pilot_file import is_interrupt
 
 if TYPE_CHECKING:
     from offboard.mission import Mission
@@ -96,7 +97,9 @@ def read_values(names: Sequence[str] | dict[str, None], pilot: Pilot) -> tuple[t
         try:
             for part in name.split("."):
                 value = getattr(value, part)
-        except (Exception, SystemExit):  # of a value that the guard itself did not read
+        except BaseException as error:  # of a value that the guard itself did not read
+            if is_interrupt(error):
+                raise
             continue
         found.append((name, value))
     return tuple(found)
@@ -169,5 +172,7 @@ def _carried(old: State, new: State) -> dict[str, str]:
 def _truth(guard: Evaluate, pilot: Pilot) -> bool | None:
     try:
         return bool(guard(pilot))
-    except (Exception, SystemExit):  # such as of a contestant's property
+    except BaseException as error:  # such as of a contestant's property
+        if is_interrupt(error):
+            raise
         return None

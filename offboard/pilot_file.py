@@ -7,11 +7,15 @@ from __future__ import annotations
 
 import inspect
 import re
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from types import ModuleType, TracebackType
+from types import FrameType, ModuleType, TracebackType
 from typing import get_type_hints
 
 from statemachine import StateChart
@@ -67,19 +71,26 @@ class PilotFile:
         module = ModuleType(f"pilot_file_{digest[:16]}")
         module.__file__ = self.name
         sys.modules[module.__name__] = module  # where typing and dataclasses look up a class's module
-        try:
+        with self._whatever_it_raises(module.__name__, "cannot be imported"):
             exec(code, vars(module))
-        except (Exception, SystemExit) as error:  # it may raise anything
-            line = _last_line_in(error.__traceback__, module.__name__)
-            raise self._refused(f"cannot be imported: {in_words(error)}", line) from None
         return module
+
+    @contextmanager
+    def _whatever_it_raises(self, module_name: str, what: str) -> Iterator[None]:
+        """Make an exception of any kind, but not the user's Ctrl-C, a `MissionError`."""
+        with _interrupts_noted() as interrupts:
+            try:
+                yield
+            except BaseException as error:
+                if isinstance(error, KeyboardInterrupt) and interrupts:
+                    raise
+                line = _last_line_in(error.__traceback__, module_name)
+                raise self._refused(f"{what}: {in_words(error)}", line) from None
 
     def _check(self, kind: type[Pilot]) -> None:
         """Refuse members that would fail only in flight."""
-        try:
-            get_type_hints(kind)
-        except Exception as error:  # an annotation may be any expression
-            raise self._refused(f"a type in class {kind.__name__} is unknown: {in_words(error)}") from None
+        with self._whatever_it_raises(kind.__module__, f"a type in class {kind.__name__} is unknown"):
+            get_type_hints(kind)  # an annotation may be any expression
         for name, member in inspect.getmembers(kind):
             if name.startswith("_") or getattr(Pilot, name, None) is member:
                 continue
@@ -90,11 +101,8 @@ class PilotFile:
     def new_pilot(self, variables: dict[str, object]) -> Pilot:
         """A pilot of a new class, with the mission's variables. Raises `MissionError`."""
         kind = self.pilot_class()
-        try:
+        with self._whatever_it_raises(kind.__module__, f"{kind.__name__} cannot be created"):
             pilot = kind(variables)
-        except (Exception, SystemExit) as error:  # it may raise anything
-            line = _last_line_in(error.__traceback__, kind.__module__)
-            raise self._refused(f"{kind.__name__} cannot be created: {in_words(error)}", line) from None
         if not hasattr(pilot, "memory"):
             text = f"{kind.__name__}.__init__ must begin with 'super().__init__(variables)'"
             raise self._refused(text, _line_of(kind.__init__))
@@ -128,6 +136,36 @@ def place_in(pilot: PilotFile, module_name: str, error: BaseException) -> str:
     """Where in a contestant's file, executed as a module, an error was raised: "file:line: " or empty."""
     line = _last_line_in(error.__traceback__, module_name)
     return f"{Place(pilot.name, line)}: " if line else ""
+
+
+def is_interrupt(error: BaseException) -> bool:
+    """Whether an exception that came out of a contestant's code is the user's Ctrl-C.
+
+    Within asyncio it is not: there the handler of SIGINT cancels the main task instead.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    return isinstance(error, KeyboardInterrupt) and handler is signal.default_int_handler
+
+
+@contextmanager
+def _interrupts_noted() -> Iterator[list[int]]:
+    """While open, signals that interrupt (Ctrl-C) are added to the list, and handled as before."""
+    noted: list[int] = []
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield noted  # no handler of Python's runs in this thread
+        return
+    handle = before
+
+    def note(number: int, frame: FrameType | None) -> None:
+        noted.append(number)
+        handle(number, frame)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield noted
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def in_words(error: BaseException) -> str:

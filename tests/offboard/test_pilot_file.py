@@ -1,8 +1,11 @@
 """A contestant's Python file: what it may be, what is said if not, and that it travels with a mission."""
 
+import os
 import pickle
+import signal
 import subprocess
 import sys
+import threading
 from textwrap import dedent
 
 import pytest
@@ -122,6 +125,8 @@ BAD_TEXTS = [
     (GOOD + "\n\nclass Other(Pilot):\n    pass\n", "several subclasses of Pilot: MyPilot, Other; leave one"),
     ("import sys\nimport wings\n", "my_pilot.py:2: cannot be imported: ModuleNotFoundError: No module named"),
     ("x = 1\nraise SystemExit\n", "my_pilot.py:2: cannot be imported: SystemExit"),
+    ("class Stop(BaseException): pass\nraise Stop(7)\n", "my_pilot.py:2: cannot be imported: Stop: 7"),
+    ("raise KeyboardInterrupt\n", "my_pilot.py:1: cannot be imported: KeyboardInterrupt"),
     ("\n\n\nraise ValueError('two\\nlines')\n", "my_pilot.py:4: cannot be imported: ValueError: two lines"),
     ("x = '\\0'\n".replace("\\0", "\0"), "my_pilot.py: Python syntax: "),
     (
@@ -144,6 +149,14 @@ def test_a_bad_file_is_refused_in_one_line(tmp_path, text, message):
     said = refusal(pilot_file(tmp_path, text))
     assert message in said
     assert said.startswith("my_pilot.py:")
+
+
+def test_ctrl_c_while_a_file_is_imported_is_the_user_s(tmp_path):
+    path = pilot_file(tmp_path, "while True:\n    pass\n")
+    threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        read_pilot(path)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_file_that_cannot_be_read_is_refused(tmp_path):

@@ -20,6 +20,7 @@ from sitl.streaming.drone_video import standing_place
 from sitl.video import VideoError
 from sitl.world import CONTROL_PERIOD_US
 from tests.processes import bound, free_instance
+from tests.waiting import until
 from wire.signing import SigningKey
 from wire.transports.urls import LinkError
 
@@ -143,10 +144,9 @@ async def test_telemetry_goes_out_on_both_links_before_anybody_spoke():
 
 async def test_it_is_said_once_that_the_drone_can_be_armed():
     simulation = Simulation(load_scenario("empty"))
-    async with serving(simulation, speed=50.0) as (lines, _), asyncio.timeout(10.0):
+    async with serving(simulation, speed=50.0) as (lines, _):
         start_us = simulation.time_us
-        while simulation.time_us < start_us + 5_000_000:
-            await asyncio.sleep(0.01)
+        await until(lambda: simulation.time_us > start_us + 5_000_000)
         assert lines.count("Ready for takeoff!") == 1
         assert simulation.autopilot.status.ready
 
