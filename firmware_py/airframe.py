@@ -16,7 +16,6 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 from errors import UserError
-from geometry.vectors import Vec3
 
 GRAVITY_M_S2 = 9.80665
 
@@ -30,14 +29,22 @@ class AirframeError(UserError):
     """An airframe that cannot be used; the message is one line for people."""
 
 
+_Coordinate = Annotated[float, Field(ge=-10, le=10)]
+_Inertia = Annotated[float, Field(ge=1e-8, le=1000)]
+_DragCoefficient = Annotated[float, Field(ge=0, le=1000)]
+_Size = Annotated[float, Field(ge=0.01, le=20)]
+
+
 class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Rotor(_Part):
     """One rotor: its position and direction of rotation."""
 
-    position_frd_m: Vec3 = Field(description="hub relative to the centre of mass: forward, right, down")
+    position_frd_m: tuple[_Coordinate, _Coordinate, _Coordinate] = Field(
+        description="hub relative to the centre of mass: forward, right, down"
+    )
     spin: Literal["cw", "ccw"] = Field(description="seen from above; the drag torque on the body is opposite")
 
     @property
@@ -49,18 +56,24 @@ class Rotor(_Part):
 class Motor(_Part):
     """Properties of every motor with its propeller."""
 
-    thrust_n_s2: float = Field(gt=0, description="thrust per squared rotor speed, N/(rad/s)^2")
-    torque_nm_s2: float = Field(gt=0, description="drag torque per squared rotor speed, N m/(rad/s)^2")
-    max_speed_rad_s: float = Field(gt=0)
+    thrust_n_s2: float = Field(ge=1e-10, le=1, description="thrust per squared rotor speed, N/(rad/s)^2")
+    torque_nm_s2: float = Field(
+        ge=1e-12, le=1, description="drag torque per squared rotor speed, N m/(rad/s)^2"
+    )
+    max_speed_rad_s: float = Field(ge=10, le=1e5)
     time_constant_s: float = Field(0.03, ge=0, le=1, description="first-order lag of the speed; 0: none")
-    radius_m: float = Field(0.05, gt=0)
+    radius_m: float = Field(0.05, ge=0.005, le=5)
 
 
 class Drag(_Part):
     """Quadratic drag in body axes: F = -k v|v|, M = -k w|w|."""
 
-    force_n_s2_m2: Vec3 = Field((0.0, 0.0, 0.0), description="N/(m/s)^2: forward, right, down")
-    moment_nm_s2: Vec3 = Field((0.0, 0.0, 0.0), description="N m/(rad/s)^2: roll, pitch, yaw")
+    force_n_s2_m2: tuple[_DragCoefficient, _DragCoefficient, _DragCoefficient] = Field(
+        (0.0, 0.0, 0.0), description="N/(m/s)^2: forward, right, down"
+    )
+    moment_nm_s2: tuple[_DragCoefficient, _DragCoefficient, _DragCoefficient] = Field(
+        (0.0, 0.0, 0.0), description="N m/(rad/s)^2: roll, pitch, yaw"
+    )
 
 
 class AirEffects(_Part):
@@ -69,6 +82,7 @@ class AirEffects(_Part):
     rotor_drag_n_s2_m_rad: float = Field(
         0.0,
         ge=0,
+        le=1,
         description="drag of each rotor in its plane, N per m/s of air and rad/s of the rotor: F = -c w v",
     )
     ground_effect: bool = Field(False, description="thrust increases near base and floor")
@@ -77,30 +91,32 @@ class AirEffects(_Part):
 class Contact(_Part):
     """Contact with ground and solids: a spring and a damper with friction at each contact point."""
 
-    stiffness_n_m: float = Field(300.0, gt=0)
-    damping_n_s_m: float = Field(6.0, ge=0)
-    friction: float = Field(0.8, ge=0)
+    stiffness_n_m: float = Field(300.0, ge=1, le=1e6)
+    damping_n_s_m: float = Field(6.0, ge=0, le=1e5)
+    friction: float = Field(0.8, ge=0, le=10)
 
 
 class Battery(_Part):
     """The battery."""
 
     cells: int = Field(4, ge=1, le=16, description="in series")
-    capacity_mah: float = Field(5000.0, gt=0)
-    resistance_ohm: float = Field(0.02, ge=0, description="of the whole battery with its leads")
-    efficiency: float = Field(0.75, gt=0, le=1, description="mechanical over electrical power of the motors")
-    electronics_a: float = Field(0.5, ge=0, description="current of everything except the motors")
+    capacity_mah: float = Field(5000.0, ge=10, le=1e6)
+    resistance_ohm: float = Field(0.02, ge=0, le=10, description="of the whole battery with its leads")
+    efficiency: float = Field(
+        0.75, ge=0.01, le=1, description="mechanical over electrical power of the motors"
+    )
+    electronics_a: float = Field(0.5, ge=0, le=1000, description="current of everything except the motors")
 
 
 class Limits(_Part):
     """Limits of the stabiliser's commands."""
 
-    tilt_rad: float = Field(0.52, gt=0, lt=1.3)
-    roll_pitch_rate_rad_s: float = Field(4.0, gt=0)
-    yaw_rate_rad_s: float = Field(2.0, gt=0)
-    speed_horizontal_m_s: float = Field(2.0, gt=0)
-    speed_up_m_s: float = Field(1.5, gt=0)
-    speed_down_m_s: float = Field(1.0, gt=0)
+    tilt_rad: float = Field(0.52, ge=0.05, lt=1.3)
+    roll_pitch_rate_rad_s: float = Field(4.0, ge=0.05, le=100)
+    yaw_rate_rad_s: float = Field(2.0, ge=0.05, le=100)
+    speed_horizontal_m_s: float = Field(2.0, ge=0.05, le=100)
+    speed_up_m_s: float = Field(1.5, ge=0.05, le=100)
+    speed_down_m_s: float = Field(1.0, ge=0.05, le=100)
 
 
 class Weights(_Part):
@@ -110,27 +126,29 @@ class Weights(_Part):
     airframes of any size.
     """
 
-    tilt_rad: float = Field(0.6, gt=0)
-    roll_pitch_rate_rad_s: float = Field(4.0, gt=0)
-    yaw_rate_rad_s: float = Field(0.5, gt=0)
-    velocity_horizontal_m_s: float = Field(0.6, gt=0)
-    velocity_vertical_m_s: float = Field(0.3, gt=0)
-    integral_horizontal_m: float = Field(0.3, gt=0, description="only of the level law")
-    integral_vertical_m: float = Field(0.1, gt=0, description="only of the level law")
-    integral_yaw_rad: float = Field(0.1, gt=0, description="only of the level law")
-    acceleration_vertical_m_s2: float = Field(3.0, gt=0)
-    acceleration_roll_pitch_rad_s2: float = Field(60.0, gt=0)
-    acceleration_yaw_rad_s2: float = Field(6.0, gt=0)
-    observer_force_rad_s: float = Field(2.0, gt=0, description="bandwidth for unknown forces")
-    observer_moment_rad_s: float = Field(4.0, gt=0, description="bandwidth for unknown moments")
+    tilt_rad: float = Field(0.6, ge=0.05, le=1000)
+    roll_pitch_rate_rad_s: float = Field(4.0, ge=0.05, le=100)
+    yaw_rate_rad_s: float = Field(0.5, ge=0.05, le=100)
+    velocity_horizontal_m_s: float = Field(0.6, ge=0.001, le=1000)
+    velocity_vertical_m_s: float = Field(0.3, ge=0.001, le=1000)
+    integral_horizontal_m: float = Field(0.3, ge=0.001, le=1000, description="only of the level law")
+    integral_vertical_m: float = Field(0.1, ge=0.001, le=1000, description="only of the level law")
+    integral_yaw_rad: float = Field(0.1, ge=0.001, le=1000, description="only of the level law")
+    acceleration_vertical_m_s2: float = Field(3.0, ge=0.001, le=1000)
+    acceleration_roll_pitch_rad_s2: float = Field(60.0, ge=0.001, le=1000)
+    acceleration_yaw_rad_s2: float = Field(6.0, ge=0.001, le=1000)
+    observer_force_rad_s: float = Field(2.0, ge=0.001, le=1000, description="bandwidth for unknown forces")
+    observer_moment_rad_s: float = Field(4.0, ge=0.001, le=1000, description="bandwidth for unknown moments")
 
 
 class Airframe(_Part):
     """A multicopter."""
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")
-    mass_kg: float = Field(gt=0)
-    inertia_kg_m2: Vec3 = Field(description="principal moments about forward, right, down")
+    mass_kg: float = Field(ge=0.005, le=1000)
+    inertia_kg_m2: tuple[_Inertia, _Inertia, _Inertia] = Field(
+        description="principal moments about forward, right, down"
+    )
     rotors: tuple[Rotor, ...] = Field(min_length=4)
     motor: Motor
     drag: Drag = Drag()
@@ -142,7 +160,9 @@ class Airframe(_Part):
     parameters: dict[ParameterName, int | float] = Field(
         default_factory=dict, description="defaults of the autopilot's parameters for this airframe"
     )
-    envelope_m: Vec3 = Field(description="length, width, height of the box around it, centred on the mass")
+    envelope_m: tuple[_Size, _Size, _Size] = Field(
+        description="length, width, height of the box around it, centred on the mass"
+    )
 
     def __hash__(self) -> int:
         """Without the parameters, which have no hash; what is designed from an airframe is kept by it."""

@@ -35,7 +35,7 @@ class Wind(Part):
     )
     gust_m_s: float = Field(0.0, ge=0, le=MAX_WIND_M_S, description="highest speed of each gust; 0: none")
     gust_period_s: float = Field(
-        10.0, gt=0, le=3600, description="mean time from the beginning of a gust to that of the next"
+        10.0, ge=0.1, le=3600, description="mean time from the beginning of a gust to that of the next"
     )
     gust_s: float = Field(1.0, ge=0.05, le=60, description="length of a gust")
 

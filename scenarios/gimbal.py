@@ -18,7 +18,7 @@ class Gimbal(Part):
     )
     pitch_max_rad: float = Field(0.52, ge=0, le=pi / 2, description="highest, to the horizon")
     yaw_max_rad: float = Field(2.79, ge=0, le=pi, description="to either side, from the drone's heading")
-    rate_max_rad_s: float = Field(1.57, gt=0, le=20, description="at which it turns to a new angle")
+    rate_max_rad_s: float = Field(1.57, ge=0.01, le=20, description="at which it turns to a new angle")
 
     @model_validator(mode="after")
     def _turns(self) -> Self:

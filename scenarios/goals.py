@@ -7,15 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import atan2, dist, hypot, pi, remainder
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from geometry.rotations import yaw_of
 from geometry.vectors import Quaternion, Vec3
-from scenarios.part import Part, refusal
+from scenarios.part import Metres, Part, refusal
 
 _DISTANCES_M = (0.0, 100.0)
+_Distance = Annotated[float, Field(ge=0, le=1000)]
 
 
 class Goal(Part):
@@ -24,13 +25,13 @@ class Goal(Part):
     A goal has `hold_m` or `face`.
     """
 
-    hold_m: Vec3 | None = Field(None, description="the place, arena axes")
-    radius_m: float = Field(0.3, gt=0, le=10, description="how far from the place counts as there")
+    hold_m: tuple[Metres, Metres, Metres] | None = Field(None, description="the place, arena axes")
+    radius_m: float = Field(0.3, ge=0.01, le=10, description="how far from the place counts as there")
     face: Literal["red", "green", "blue"] | None = Field(None, description="colour of the frame")
-    distance_m: tuple[float, float] = Field(
+    distance_m: tuple[_Distance, _Distance] = Field(
         _DISTANCES_M, description="least and greatest horizontal distance from the frame"
     )
-    angle_rad: float = Field(0.2, gt=0, le=3.15, description="between heading and direction to its centre")
+    angle_rad: float = Field(0.2, ge=0.01, le=3.15, description="between heading and direction to its centre")
     seconds: float = Field(1.0, ge=0, le=600, description="for how long")
 
     @model_validator(mode="after")

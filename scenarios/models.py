@@ -21,7 +21,7 @@ from scenarios.gimbal import Gimbal
 from scenarios.goals import Goal
 from scenarios.imaging.clutter import Hall, Patch
 from scenarios.imaging.effects import CameraEffects
-from scenarios.part import Part, refusal
+from scenarios.part import Metres, Part, refusal
 
 Colour = Literal["red", "green", "blue"]
 COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
@@ -42,11 +42,16 @@ _OFTEN_UNUSED = (
     "gripper",
     "goals",
 )
+_SHORTEST_DIRECTION = 1e-6
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
-Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
+OnDrone = Annotated[float, Field(ge=-10, le=10)]
+"""A coordinate on the drone, metres."""
+Turn = Annotated[float, Field(ge=-MAX_MOUNTING_RAD, le=MAX_MOUNTING_RAD)]
+Component = Annotated[float, Field(ge=-1e6, le=1e6)]
+"""Of a direction, whose length does not matter."""
 
 
 class ScenarioError(UserError):
@@ -56,9 +61,9 @@ class ScenarioError(UserError):
 class Arena(Part):
     """The flying space, centred on the origin, its floor at z = 0."""
 
-    length_x_m: float = Field(10.0, gt=0, le=1000, description="extent along x")
-    width_y_m: float = Field(10.0, gt=0, le=1000, description="extent along y")
-    height_m: float = Field(4.0, gt=0, le=1000, description="ceiling above the floor")
+    length_x_m: float = Field(10.0, ge=0.1, le=1000, description="extent along x")
+    width_y_m: float = Field(10.0, ge=0.1, le=1000, description="extent along y")
+    height_m: float = Field(4.0, ge=0.1, le=1000, description="ceiling above the floor")
     margin_m: float = Field(1.0, ge=0, le=100, description="how far outside the app lets the drone fly")
 
 
@@ -68,7 +73,7 @@ class Base(Part):
     x_m: Metres = Field(0.0, description="centre")
     y_m: Metres = Field(0.0, description="centre")
     edge_m: float = Field(0.5, gt=0.1, le=10, description="edge of the square top")
-    top_m: float = Field(0.51, gt=0, le=10, description="height of the top above the floor")
+    top_m: float = Field(0.51, ge=0.001, le=10, description="height of the top above the floor")
 
     @property
     def solid(self) -> Solid:
@@ -91,11 +96,11 @@ class UprightFrame(Part):
     colour: str
     x_m: Metres = Field(description="centre of the opening")
     y_m: Metres = Field(description="centre of the opening")
-    z_m: float = Field(gt=0, le=100, description="centre of the opening above the floor")
+    z_m: float = Field(ge=0.01, le=100, description="centre of the opening above the floor")
     yaw_rad: Radians = Field(0.0, description="heading of its normal, counter-clockwise from x")
-    outer_width_m: float = Field(0.42, gt=0, le=10, description="horizontal, bars included")
-    outer_height_m: float = Field(0.22, gt=0, le=10, description="vertical, bars included")
-    bar_m: float = Field(0.02, gt=0, le=1, description="edge of the square bars")
+    outer_width_m: float = Field(0.42, ge=0.01, le=10, description="horizontal, bars included")
+    outer_height_m: float = Field(0.22, ge=0.01, le=10, description="vertical, bars included")
+    bar_m: float = Field(0.02, ge=0.001, le=1, description="edge of the square bars")
 
     @property
     def position_arena_m(self) -> Vec3:
@@ -136,7 +141,7 @@ class Decoy(UprightFrame):
     colour: DecoyColour = Field(description="pure cyan or magenta")
 
 
-Height = Annotated[float, Field(gt=0, le=1000)]
+Height = Annotated[float, Field(ge=0.01, le=1000)]
 
 
 class Pole(Part):
@@ -220,15 +225,17 @@ class Camera(Part):
     width_px: int = Field(320, ge=16, le=4096, description="columns of the image")
     height_px: int = Field(240, ge=16, le=4096, description="rows of the image")
     horizontal_fov_rad: float = Field(1.57, gt=0.1, lt=3.0, description="angle of view over the width")
-    rate_hz: float = Field(10.0, gt=0, le=120, description="images a second of simulated time")
+    rate_hz: float = Field(10.0, ge=0.1, le=120, description="images a second of simulated time")
     latency_s: float = Field(0.05, ge=0, le=2, description="from exposure to sending the image")
-    position_flu_m: Vec3 = Field((0.08, 0.0, 0.0), description="in body axes forward, left, up")
-    mounting_frd_rad: Vec3 = Field(
+    position_flu_m: tuple[OnDrone, OnDrone, OnDrone] = Field(
+        (0.08, 0.0, 0.0), description="in body axes forward, left, up"
+    )
+    mounting_frd_rad: tuple[Turn, Turn, Turn] = Field(
         (0.0, 0.0, 0.0),
         description="roll, pitch and yaw on the drone; to the right, up and to the right are positive",
     )
-    near_m: float = Field(0.01, gt=0, description="nothing nearer is drawn")
-    far_m: float = Field(20.0, gt=0, description="nothing farther is drawn")
+    near_m: float = Field(0.01, ge=0.001, le=100, description="nothing nearer is drawn")
+    far_m: float = Field(20.0, ge=0.01, le=10_000, description="nothing farther is drawn")
     effects: CameraEffects | None = Field(
         None, description="what a real camera does to images; by default they are ideal"
     )
@@ -245,8 +252,6 @@ class Camera(Part):
         if self.near_m >= self.far_m:
             raise refusal(self.near_m, f"must be below far_m {self.far_m}", "near_m")
         largest_rad = max(map(abs, self.mounting_frd_rad))
-        if largest_rad > MAX_MOUNTING_RAD:
-            raise refusal(largest_rad, f"must be {MAX_MOUNTING_RAD} at most", "mounting_frd_rad")
         if self.gimbal is not None and largest_rad > 0.0:
             raise refusal(largest_rad, "does not go with a gimbal; leave one of them out", "mounting_frd_rad")
         lens = None if self.effects is None else self.effects.lens
@@ -264,7 +269,9 @@ class Camera(Part):
 class Light(Part):
     """One sun and ambient light."""
 
-    sun_direction_arena: Vec3 = Field((-0.5, 0.1, -0.9), description="direction of its light; any length")
+    sun_direction_arena: tuple[Component, Component, Component] = Field(
+        (-0.5, 0.1, -0.9), description="direction of its light; any length"
+    )
     ambient: float = Field(0.5, ge=0, le=1, description="brightness of surfaces in shadow")
     turn_rad_s: float = Field(
         0.0, ge=-1, le=1, description="how fast the direction turns about the upright axis, counter-clockwise"
@@ -278,10 +285,9 @@ class Light(Part):
 
     @model_validator(mode="after")
     def _sun_has_direction(self) -> Self:
-        if not any(self.sun_direction_arena):
-            raise refusal(
-                "[0, 0, 0]", "has no direction; one number must differ from 0", "sun_direction_arena"
-            )
+        if hypot(*self.sun_direction_arena) < _SHORTEST_DIRECTION:
+            message = f"has no direction; one number must be {_SHORTEST_DIRECTION} or more"
+            raise refusal(str(list(self.sun_direction_arena)), message, "sun_direction_arena")
         return self
 
     @model_serializer(mode="wrap")
@@ -322,7 +328,7 @@ class Scenario(Part):
     light: Light = Field(Light(), description="sun and sky")
     hall: Hall | None = Field(None, description="walls around the arena that are only seen")
     patches: tuple[Patch, ...] = Field((), description="flat things on the floor and on the hall's walls")
-    try_limit_s: float = Field(180.0, gt=0, le=36000, description="longest try, motors on to motors off")
+    try_limit_s: float = Field(180.0, ge=1, le=36000, description="longest try, motors on to motors off")
     airframe: str = Field("abejorro", description="name of the drone to fly")
     origin: Origin = Field(Origin(), description="where on Earth the arena is")
     gripper: bool = Field(False, description="whether the drone has one; what it holds has no mass")

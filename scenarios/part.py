@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
+
+Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
+"""A coordinate in the arena."""
 
 
 def refusal(value: float | str, message: str, *at: str | int) -> PydanticCustomError:

@@ -22,7 +22,7 @@ class RandomWind(Part):
     gust_m_s: Range = Field(_STILL, description="highest speed of each gust")
     length_m: float = Field(Wind().length_m, ge=0.1, le=1000, description="length scale of turbulence")
     gust_period_s: float = Field(
-        Wind().gust_period_s, gt=0, le=3600, description="mean time from one gust to the next"
+        Wind().gust_period_s, ge=0.1, le=3600, description="mean time from one gust to the next"
     )
     gust_s: float = Field(Wind().gust_s, ge=0.05, le=60, description="length of a gust")
 

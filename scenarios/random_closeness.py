@@ -20,16 +20,20 @@ class Closeness(Part):
     """How near frames are, and the straight way through each, along its normal, from one side at least."""
 
     border_m: float = Field(
-        gt=0,
+        ge=0.01,
         le=100,
         description="the centre of each frame is this near a side of the arena, floor or ceiling",
     )
-    together_m: float = Field(gt=0, le=100, description="the centres of two frames are this near each other")
-    apart_m: float = Field(gt=0, le=100, description="minimum distance of any two frames' centres, in space")
-    before_m: float = Field(gt=0, le=5, description="length of the way before the opening")
-    behind_m: float = Field(gt=0, le=5, description="length of the way behind the opening")
+    together_m: float = Field(
+        ge=0.01, le=100, description="the centres of two frames are this near each other"
+    )
+    apart_m: float = Field(
+        ge=0.01, le=100, description="minimum distance of any two frames' centres, in space"
+    )
+    before_m: float = Field(ge=0.01, le=5, description="length of the way before the opening")
+    behind_m: float = Field(ge=0.01, le=5, description="length of the way behind the opening")
     clear_m: float = Field(
-        gt=0, le=5, description="from the way to the arena's border, the base and the other frames"
+        ge=0.01, le=5, description="from the way to the arena's border, the base and the other frames"
     )
 
     def allows(self, centres_arena_m: Sequence[Vec3]) -> bool:

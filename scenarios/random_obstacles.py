@@ -58,7 +58,7 @@ class Obstacles(Part):
     x_m: Range = Field(description="centres of the obstacles")
     y_m: Range = Field(description="centres of the obstacles")
     free_m: float = Field(
-        gt=0,
+        ge=0.01,
         le=10,
         description="least gap, seen from above, between an obstacle and any other thing; a doorway counts "
         "as wall, so that this is free before and behind it",

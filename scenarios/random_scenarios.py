@@ -29,7 +29,9 @@ class Layout(Part):
 
     x_m: Range = Field(description="centres of base and frames")
     y_m: Range = Field(description="centres of base and frames")
-    apart_m: float = Field(gt=0, le=1000, description="minimum distance of any two centres, seen from above")
+    apart_m: float = Field(
+        ge=0.01, le=1000, description="minimum distance of any two centres, seen from above"
+    )
     frame_z_m: Range = Field(description="centres of the openings above the floor")
     frame_yaw_rad: Range = Field(description="headings of the frames' normals")
     start_yaw_rad: Range = Field(description="the drone's heading at the start")

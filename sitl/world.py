@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import dist, hypot, sqrt
+from math import dist, hypot, isfinite, sqrt
 
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.types import MotorSpeeds, Sensors
@@ -12,7 +12,7 @@ from geometry.solids import Solid
 from geometry.vectors import ZERO3, Vec3
 from scenarios.models import Scenario, TrueState, is_over_base, start_position
 from sitl.air.wind import SimulatedWind
-from sitl.dynamics import Dynamics
+from sitl.dynamics import Dynamics, DynamicsError
 from sitl.solids import frame_solids, touch
 
 PHYSICS_RATE_HZ = 500
@@ -27,6 +27,13 @@ MAX_TURN_RAD = 0.2  # in a step of the physics; of a faster rotation the steps a
 MAX_RATE_RAD_S = MAX_TURN_RAD * PHYSICS_RATE_HZ
 _BRAKED = 0.5  # of a rotation that is too fast, in a step
 _MAX_FAR_TICKS = 250  # the longest time for which distant solids are not checked
+
+
+def _diverged(airframe: str, time_us: int) -> DynamicsError:
+    return DynamicsError(
+        f"airframe {airframe}: its motion is not a number after {time_us / 1e6:g} s; make it heavier "
+        "(mass_kg, inertia_kg_m2), its contact softer (stiffness_n_m, damping_n_s_m), or its drag smaller"
+    )
 
 
 class World:
@@ -128,7 +135,11 @@ class World:
         self.dynamics.run()
 
     def end_step(self) -> None:
-        """End a control period; a drone that turns faster than can be simulated has crashed."""
+        """End a control period; a drone that turns faster than can be simulated has crashed.
+
+        Raises:
+            DynamicsError: the motion is not finite: forces are too large for the mass and the physics' step.
+        """
         dynamics = self.dynamics
         p, q, r = dynamics.angular_rate_frd_rad_s()
         if abs(p) > MAX_RATE_RAD_S or abs(q) > MAX_RATE_RAD_S or abs(r) > MAX_RATE_RAD_S:
@@ -137,6 +148,8 @@ class World:
             dynamics.set_ground_height(self._ground_m)
         self.time_us += CONTROL_PERIOD_US
         self._position_ned_m = position = dynamics.position_ned_m()
+        if not isfinite(position[0] + position[1] + position[2]):
+            raise _diverged(self.scenario.airframe, self.time_us)
         self.position_arena_m = flip_vector(position)
 
     def sensors(self) -> Sensors:
@@ -235,6 +248,8 @@ class World:
         if distance_m <= 0.0:
             return 0
         speed_m_s, most = hypot(*self.dynamics.velocity_ned_m_s()), self._acceleration_m_s2
+        if not isfinite(speed_m_s):
+            raise _diverged(self.scenario.airframe, self.time_us)
         time_s = (sqrt(speed_m_s * speed_m_s + 2.0 * most * distance_m) - speed_m_s) / most
         return min(int(time_s * 1e6 / CONTROL_PERIOD_US), _MAX_FAR_TICKS)
 

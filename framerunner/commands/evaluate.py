@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load_mission_with, say
+from framerunner.commands import (
+    DEFAULT_MISSION,
+    Sensors,
+    WholeNumber,
+    check_range,
+    load_mission_with,
+    say,
+    with_sensors,
+)
 
 if TYPE_CHECKING:
     from framerunner.evaluation.backends import Backend, Pool
@@ -70,6 +78,7 @@ def evaluate(
     seed: _SeedOption = None,
     mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
     pilot: Annotated[Path | None, Parameter(help="Python file with a subclass of Pilot")] = None,
+    sensors: Sensors = None,
     response: _Response = None,
     px4: _Px4 = None,
     ardupilot: _ArduPilot = None,
@@ -93,6 +102,8 @@ def evaluate(
 
         framerunner evaluate --level calm --mission mine.yaml --compare runs/before
 
+        framerunner evaluate --level calm --sensors flow
+
         framerunner evaluate --level calm --response lag=0.6,dead-time=0.15
 
         framerunner evaluate my_scenarios/ --out runs/mine
@@ -109,7 +120,8 @@ def evaluate(
 
     from framerunner.evaluation import evaluate as evaluation
 
-    plan = _flown_by(_plan(scenarios, level, seed, count, load_mission_with(mission, pilot)), response, use)
+    plan = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
+    plan = _flown_by(_sensing_by(plan, sensors), response, use)
     settings = evaluation.EvaluationSettings(
         plan=plan,
         pool=_pool(backend, jobs, address, use),
@@ -122,6 +134,13 @@ def evaluate(
         genuine=use,
     )
     return evaluation.evaluate(settings)
+
+
+def _sensing_by(plan: Plan, sensors: str | None) -> Plan:
+    """The plan with drones that have another sensor suite."""
+    if sensors is None:
+        return plan
+    return plan.sensing_by(sensors, [with_sensors(each, sensors) for each in plan.scenarios])
 
 
 def _flown_by(plan: Plan, response: str | None, use: GenuineUse | None) -> Plan:

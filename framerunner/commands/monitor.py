@@ -99,8 +99,6 @@ def monitor(
     from wire.transports.urls import parse_url
 
     parse_url(drone)
-    if missions != MISSIONS and not missions.is_dir():  # the default is made when the first mission is
-        raise SettingError(f"--missions {missions}: is not a folder; make it (mkdir -p), or choose another")
     flown = None if scenario is None else load_scenario(scenario)
     given = equipment(drone, flown, runs, camera_host, missions=missions, pilot=pilot)
     password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()
@@ -132,6 +130,7 @@ def equipment(
 
     Raises:
         MissionError: the contestant's file, which is executed, cannot be used.
+        SettingError: the folder of missions is not there.
     """
     from tempfile import mkdtemp
 
@@ -149,6 +148,8 @@ def equipment(
     from scenarios.loader import list_scenarios, load_scenario
     from wire.transports.vehicle_link import VehicleLink
 
+    if missions != MISSIONS and not missions.is_dir():  # the default is made when the first mission is
+        raise SettingError(f"--missions {missions}: is not a folder; make it (mkdir -p), or choose another")
     pilot_class = Pilot if pilot is None else read_pilot(pilot).pilot_class()
     session = Path(mkdtemp(prefix="framerunner-flights-"))
     atexit.register(shutil.rmtree, session, ignore_errors=True)

@@ -134,6 +134,11 @@ class Plan:
         """The same flights by a vehicle that answers late."""
         return replace(self, title=f"{self.title}, response {response}", response=response)
 
+    def sensing_by(self, suite: str, scenarios: Sequence[Scenario]) -> Plan:
+        """The same flights by drones with another sensor suite, which these scenarios have."""
+        label = f"{self.label}-{Path(suite).stem}"
+        return replace(self, title=f"{self.title}, sensors {suite}", label=label, scenarios=scenarios)
+
     def flown_by(self, autopilot: str, scenarios: Sequence[Scenario]) -> Plan:
         """The flights of these scenarios, changed for a genuine autopilot, of which some may be missing."""
         seeds = dict(zip((each.name for each in self.scenarios), self.seeds, strict=True))

@@ -159,7 +159,9 @@ class Fault(Part):
     part: _PartName = Field(description="what fails")
     kind: _KindName = Field(description="how it fails")
     at_s: float = Field(0.0, ge=0, le=MAX_TIME_S, description="when it begins: seconds after arming")
-    for_s: float | None = Field(None, gt=0, le=MAX_TIME_S, description="how long; without it, until the end")
+    for_s: float | None = Field(
+        None, ge=0.001, le=MAX_TIME_S, description="how long; without it, until the end"
+    )
     size: float | None = Field(None, description="how much; each kind has a default")
     number: int | None = Field(None, ge=1, le=16, description="which motor, from 1; without it, the first")
 

@@ -124,8 +124,10 @@ class RandomClutter(Part):
     size_m: Range = Field(description="width and height of each; a border has the proportions of a frame")
     up_m: Range = Field(description="centres of the posters above the floor")
     border_m: Range = Field(description="width of borders")
-    beyond_m: float = Field(Hall().beyond_m, gt=0, le=100, description="from the arena to the hall's walls")
-    height_m: float = Field(Hall().height_m, gt=0, le=100, description="of the hall")
+    beyond_m: float = Field(
+        Hall().beyond_m, ge=0.01, le=100, description="from the arena to the hall's walls"
+    )
+    height_m: float = Field(Hall().height_m, ge=0.1, le=100, description="of the hall")
 
     @model_validator(mode="after")
     def _every_draw_is_valid(self) -> Self:

@@ -8,12 +8,14 @@ from pydantic import Field, model_validator
 
 from scenarios.part import Part, refusal
 
-Sigma = Annotated[float, Field(ge=0, le=1e6)]
+Sigma = Annotated[float, Field(ge=0, le=1e4)]
 """A standard deviation; 0: no such error."""
+FieldSigma = Annotated[float, Field(ge=0, le=10)]
+"""A standard deviation of a magnetic field, gauss; Earth's is about half a gauss."""
 Share = Annotated[float, Field(ge=0, le=0.5)]
 """A standard deviation as a share of the measured value."""
-TimeConstant = Annotated[float, Field(gt=0, le=1e6)]
-Rate = Annotated[float, Field(gt=0, le=1000)]
+TimeConstant = Annotated[float, Field(ge=0.01, le=1e6)]
+Rate = Annotated[float, Field(ge=0.1, le=1000)]
 """Samples a second; more than one in a control tick are not delivered."""
 DelayTime = Annotated[float, Field(ge=0, le=5)]
 
@@ -31,7 +33,7 @@ class GyroscopeSpec(Part):
     vibration_at_hover_rad_s: Sigma = Field(
         description="1 sigma of a sample at hover; grows with the mean squared rotor speed"
     )
-    max_rate_rad_s: float = Field(gt=0, description="full scale; larger values saturate")
+    max_rate_rad_s: float = Field(ge=0.1, le=1e6, description="full scale; larger values saturate")
 
 
 class AccelerometerSpec(Part):
@@ -45,7 +47,7 @@ class AccelerometerSpec(Part):
     vibration_at_hover_m_s2: Sigma = Field(
         description="1 sigma of a sample at hover; grows with the mean squared rotor speed"
     )
-    max_specific_force_m_s2: float = Field(gt=0, description="full scale; larger values saturate")
+    max_specific_force_m_s2: float = Field(ge=1, le=1e6, description="full scale; larger values saturate")
 
 
 class ImuSpec(Part):
@@ -59,8 +61,10 @@ class MagnetometerSpec(Part):
     """A magnetometer after its calibration."""
 
     rate_hz: Rate = Field(description="samples a second")
-    noise_gauss: Sigma = Field(description="white noise of a sample, 1 sigma of each axis")
-    hard_iron_gauss: Sigma = Field(description="constant error that calibration leaves, drawn once; 1 sigma")
+    noise_gauss: FieldSigma = Field(description="white noise of a sample, 1 sigma of each axis")
+    hard_iron_gauss: FieldSigma = Field(
+        description="constant error that calibration leaves, drawn once; 1 sigma"
+    )
     scale_error: Share = Field(description="1 sigma of the error of each axis's scale factor, drawn once")
 
 
@@ -97,7 +101,7 @@ class RangeFinderSpec(Part):
     noise_m: Sigma = Field(description="white noise of a sample, 1 sigma")
     offset_m: Sigma = Field(description="constant error, drawn once; 1 sigma")
     min_distance_m: float = Field(ge=0, le=1000, description="nearest distance that it measures")
-    max_distance_m: float = Field(gt=0, le=1000, description="farthest distance that it measures")
+    max_distance_m: float = Field(ge=0.01, le=1000, description="farthest distance that it measures")
 
     @model_validator(mode="after")
     def _measures_something(self) -> Self:
@@ -116,8 +120,8 @@ class OpticalFlowSpec(Part):
     gyro_noise_density_rad_s_sqrt_hz: Sigma = Field(description="white noise of its gyroscope")
     gyro_bias_rad_s: Sigma = Field(description="constant bias of its gyroscope, drawn once; 1 sigma")
     min_distance_m: float = Field(ge=0, le=1000, description="to the ground; nearer, the quality is 0")
-    max_distance_m: float = Field(gt=0, le=1000, description="to the ground; farther, the quality is 0")
-    max_flow_rad_s: float = Field(gt=0, le=100, description="faster, the quality is 0")
+    max_distance_m: float = Field(ge=0.01, le=1000, description="to the ground; farther, the quality is 0")
+    max_flow_rad_s: float = Field(ge=0.01, le=100, description="faster, the quality is 0")
     quality: int = Field(ge=1, le=255, description="of a usable sample")
 
     @model_validator(mode="after")

@@ -141,12 +141,13 @@ FRAME = "name: a\nframes:\n  - {colour: red, x_m: 1, y_m: 1, z_m: 1}\n"
         ("name: a\ntry_limit_s: yes", 'f.yaml:2: try_limit_s is "yes": must be a number'),
         ("name: a\ntry_limit_s: true", "f.yaml:2: try_limit_s is true: must be a number"),
         ("name: a\ntry_limit_s: '9'", 'f.yaml:2: try_limit_s is "9": must be a number'),
-        ("name: a\ntry_limit_s: 0", "f.yaml:2: try_limit_s is 0: must be above 0.0"),
+        ("name: a\ntry_limit_s: 0", "f.yaml:2: try_limit_s is 0: must be at least 1.0"),
         ("name: a\ntry_limit_s: .nan", "f.yaml:2: try_limit_s is NaN: must be a finite number"),
         ("name: a\ncamera:\n  far_m: .inf", "f.yaml:3: camera.far_m is Infinity: must be a finite number"),
         ("name: a\ncamera: {width_px: 3.5}", "f.yaml:2: camera.width_px is 3.5: must be a whole number"),
         ("name: a\ncamera: {rate_hz: 999}", "f.yaml:2: camera.rate_hz is 999: must be at most 120.0"),
-        ("name: a\ncamera:\n  far_m: 0.001", "f.yaml:2: camera.near_m 0.01 must be below far_m 0.001"),
+        ("name: a\ncamera: {rate_hz: 1e-320}", "f.yaml:2: camera.rate_hz is 1e-320: must be at least 0.1"),
+        ("name: a\ncamera:\n  far_m: 0.01", "f.yaml:2: camera.near_m 0.01 must be below far_m 0.01"),
         ("name: a\nstart:", "f.yaml:2: start is empty: must hold fields, each written `name: value`"),
         ("name: a\nframes: {red: 1}", 'f.yaml:2: frames is {"red": 1}: must be a list'),
         (
@@ -159,7 +160,8 @@ FRAME = "name: a\nframes:\n  - {colour: red, x_m: 1, y_m: 1, z_m: 1}\n"
         ),
         (
             "name: a\nlight: {sun_direction_arena: [0, 0, 0]}",
-            "f.yaml:2: light.sun_direction_arena [0, 0, 0] has no direction; one number must differ from 0",
+            "f.yaml:2: light.sun_direction_arena [0.0, 0.0, 0.0] has no direction; "
+            "one number must be 1e-06 or more",
         ),
         (
             FRAME.replace("red", "pink"),

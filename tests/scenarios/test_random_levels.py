@@ -61,7 +61,7 @@ def test_a_level_loads_by_path(tmp_path):
             CALM.replace("    high: 4.0", "    high: 4.0\n    hihg: 4.0", 1),
             "f.yaml:7: layout.x_m.hihg is not a known field; did you mean high?",
         ),
-        (CALM.replace("1.5", "0.0"), "f.yaml:10: layout.apart_m is 0.0: must be above 0.0"),
+        (CALM.replace("1.5", "0.0"), "f.yaml:10: layout.apart_m is 0.0: must be at least 0.01"),
         (CALM.replace("1.5", ".nan"), "f.yaml:10: layout.apart_m is NaN: must be a finite number"),
         (CALM.replace("0.5", "2.6"), "f.yaml:12: layout.frame_z_m.low 2.6 must not be above high 2.5"),
         (

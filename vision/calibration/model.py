@@ -80,9 +80,9 @@ class Calibration(BaseModel):
         description="from exposure to arrival of an image without a time stamp; None: --camera-delay says it",
     )
     rms_px: float | None = Field(
-        None, ge=0, description="root mean square of what is left of the corners' errors"
+        None, ge=0, le=10_000, description="root mean square of what is left of the corners' errors"
     )
-    images: int | None = Field(None, ge=1, description="how many images it was made from")
+    images: int | None = Field(None, ge=1, le=1_000_000, description="how many images it was made from")
     made_on: _Day | None = Field(None, description="the day on which the lens was calibrated, year-month-day")
 
     @classmethod

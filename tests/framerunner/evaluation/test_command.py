@@ -9,6 +9,7 @@ from framerunner.cli import run
 from framerunner.evaluation import evaluate as evaluate_module
 from framerunner.evaluation.rows import Row
 from framerunner.evaluation.terminal import EvaluationProgress
+from scenarios.loader import load_scenario
 from tests.framerunner.evaluation.flights import made_row, write_scenarios
 
 
@@ -63,8 +64,10 @@ def test_a_level_is_drawn_with_consecutive_seeds(capsys, monkeypatch):
             yield made_row(task.scenario.name, seed=task.seed)
 
     monkeypatch.setattr(evaluate_module, "fly_all", made)
-    code, said = evaluate(capsys, "--level", "calm", "--count", 3, "--seed", 8, "--out", "here")
+    options = ["--count", 3, "--seed", 8, "--sensors", "flow", "--out", "here"]
+    code, said = evaluate(capsys, "--level", "calm", *options)
     assert code == 0, said.err
+    assert load_scenario("here/scenarios/calm-8.yaml").sensors == "flow"
     names = [path.name for path in sorted(Path("here/scenarios").iterdir())]
     assert names == ["calm-10.yaml", "calm-8.yaml", "calm-9.yaml"]
     lines = Path("here/results.csv").read_text(encoding="utf-8").splitlines()
