@@ -66,11 +66,12 @@ class ControlCommand:
         """
         raise NotImplementedError
 
-    def with_limited_climb(self, limit: Callable[[float], float]) -> ControlCommand:
+    def with_limited_climb(self, limit: Callable[[float], tuple[float, float]]) -> ControlCommand:
         """The same with a limited climb, if the command is a velocity.
 
         Args:
-            limit: from the commanded vertical velocity, below zero, to the one allowed, m/s down.
+            limit: from the commanded vertical velocity, below zero, to the one allowed, m/s down, and its
+                acceleration, m/s^2 down.
         """
         del limit
         return self
@@ -93,12 +94,14 @@ class VelocityCommand(ControlCommand):
         """Its vertical velocity."""
         return self.velocity_level_m_s[2]
 
-    def with_limited_climb(self, limit: Callable[[float], float]) -> ControlCommand:
-        """The same with a limited climb and without feed-forward."""
+    def with_limited_climb(self, limit: Callable[[float], tuple[float, float]]) -> ControlCommand:
+        """The same with a limited climb, and with feed-forward of that alone."""
         forward_m_s, right_m_s, down_m_s = self.velocity_level_m_s
         if down_m_s >= 0.0:
             return self
-        return VelocityCommand((forward_m_s, right_m_s, limit(down_m_s)), self.yaw_rate_rad_s)
+        down_m_s, down_m_s2 = limit(down_m_s)
+        velocity_m_s = (forward_m_s, right_m_s, down_m_s)
+        return VelocityCommand(velocity_m_s, self.yaw_rate_rad_s, (0.0, 0.0, down_m_s2))
 
     def straight_up(self) -> ControlCommand:
         """Its vertical velocity only."""
@@ -135,11 +138,12 @@ class TiltCommand(ControlCommand):
         """Its vertical velocity."""
         return self.down_m_s
 
-    def with_limited_climb(self, limit: Callable[[float], float]) -> ControlCommand:
+    def with_limited_climb(self, limit: Callable[[float], tuple[float, float]]) -> ControlCommand:
         """The same with a limited climb."""
         if self.down_m_s >= 0.0:
             return self
-        return TiltCommand(self.roll_rad, self.pitch_rad, self.yaw_rate_rad_s, limit(self.down_m_s))
+        down_m_s, _ = limit(self.down_m_s)
+        return TiltCommand(self.roll_rad, self.pitch_rad, self.yaw_rate_rad_s, down_m_s)
 
     def straight_up(self) -> ControlCommand:
         """Its vertical velocity, level."""

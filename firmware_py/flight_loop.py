@@ -264,7 +264,7 @@ class FlightLoop:
             command,
             guidance.command_down_m_s,
             may_lift=self._commander.state not in _STAYS_ON_GROUND or guidance.mode.departs(self.state),
-            climb_ramp=guidance.mode.climb_ramp,
+            builds_up_climb=guidance.mode.builds_up_climb,
         )
 
     def _follow(self, row: Row) -> None:
@@ -395,7 +395,7 @@ class FlightLoop:
             limits.limit_tilt(radians(value("MPC_TILTMAX_AIR")))
             limits.rate_rad_s = radians(min(value("MC_ROLLRATE_MAX"), value("MC_PITCHRATE_MAX")))
             limits.min_thrust, limits.max_thrust = value("MPC_THR_MIN"), value("MPC_THR_MAX")
-        self._lift_off.configure(parameters)
+        self._lift_off.configure(airframe, parameters)
         self._land_detector.configure(parameters)
         tilt_deg = min(parameters.value("FD_FAIL_P"), parameters.value("FD_FAIL_R")) or 180.0  # 0: never
         self._upright_cosine = cos(radians(tilt_deg))

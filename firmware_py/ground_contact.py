@@ -10,8 +10,9 @@ from __future__ import annotations
 from math import hypot, inf, radians
 from typing import TYPE_CHECKING
 
+from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand
-from firmware_py.guidance.mode import ClimbRamp
+from firmware_py.guidance.limits import speed_limits
 from firmware_py.parameters import Parameters
 from firmware_py.types import MotorOutput, VehicleState
 
@@ -28,6 +29,9 @@ _LIFTED_HEIGHT_M = 0.03
 _MIN_CLIMB_SHARE = 0.02  # of the commanded climb, also where the ramp allows less
 _LIFT_M_S = 0.04  # a commanded climb above this starts a lift-off
 _LIFT_HELD_TICKS = 125  # half a second in which integrals are held: the ground may carry the weight
+_GRAVITY_M_S2 = 9.80665
+_GAIN_1_S, _INTEGRAL_GAIN_1_S2 = 4.0, 2.0  # PX4's defaults of MPC_Z_VEL_P_ACC and MPC_Z_VEL_I_ACC
+_FIRST_CLIMB_M_S = -0.7  # of PX4's trajectory on the ground
 
 
 class LandDetector:
@@ -149,6 +153,54 @@ class LandDetector:
             self._last_still_us = state.time_us
 
 
+class _ClimbRamp:
+    """The climb during a take-off, as PX4's vertical velocity loop answers to its ramp.
+
+    The loop's setpoint is limited, at first to a descent at which it gives no thrust; over the ramp the limit
+    rises to the maximum climb. Meanwhile the integral winds up below zero, so the vehicle lifts off later
+    than the limit allows a climb, and climbs slowly at first (PX4 v1.17, mc_pos_control: Takeoff.cpp and
+    PositionControl.cpp, at the default gains).
+
+    Attributes:
+        climb_m_s: allowed now; zero until it lifts.
+        climb_m_s2: its acceleration.
+        running: the climb commanded is not reached yet.
+    """
+
+    __slots__ = ("_integral_m_s2", "_time_us", "climb_m_s", "climb_m_s2", "running")
+
+    def __init__(self) -> None:
+        self.running = False
+        self.climb_m_s = self.climb_m_s2 = self._integral_m_s2 = 0.0
+        self._time_us = 0
+
+    def start(self, time_us: int) -> None:
+        """Begin on the ground."""
+        self.running = True
+        self.climb_m_s = self._integral_m_s2 = 0.0
+        self._time_us = time_us
+
+    def step(self, time_us: int, climb_m_s: float, *, share: float, max_m_s: float) -> None:
+        """Take one tick.
+
+        Args:
+            time_us: now.
+            climb_m_s: commanded.
+            share: of the ramp that has passed, 0..1.
+            max_m_s: the limit at its end.
+        """
+        period_s = (time_us - self._time_us) / 1e6
+        self._time_us = time_us
+        least_m_s = -_GRAVITY_M_S2 / _GAIN_1_S
+        error_m_s = min(climb_m_s, least_m_s + share * (max_m_s - least_m_s)) - self.climb_m_s
+        climb_m_s2 = max(_GAIN_1_S * error_m_s + self._integral_m_s2, -_GRAVITY_M_S2)
+        if climb_m_s2 > -_GRAVITY_M_S2 or error_m_s > 0.0:
+            self._integral_m_s2 += _INTEGRAL_GAIN_1_S2 * error_m_s * period_s
+        self.climb_m_s = max(0.0, self.climb_m_s + climb_m_s2 * period_s)
+        self.climb_m_s2 = climb_m_s2 if self.climb_m_s > 0.0 else 0.0
+        self.running = share < 1.0 or self.climb_m_s < climb_m_s
+
+
 class LiftOff:
     """Limits commands on the ground and at lift-off, and passes them on to the stabiliser.
 
@@ -158,37 +210,53 @@ class LiftOff:
         ramp_us: duration of the climb ramp since a climb is commanded (MPC_TKO_RAMP_T).
     """
 
-    __slots__ = ("_armed_us", "_climb_ramp", "_ramp_start_us", "_wanted", "ramp_us", "spool_up_us", "ticks")
+    __slots__ = (
+        "_armed_us",
+        "_build_up_m_s2",
+        "_builds_up",
+        "_max_climb_m_s",
+        "_ramp",
+        "_ramp_start_us",
+        "_wanted",
+        "ramp_us",
+        "spool_up_us",
+        "ticks",
+    )
 
     def __init__(self) -> None:
         self.ticks = 0
         self.spool_up_us = 0
         self.ramp_us = 0
-        self._climb_ramp = ClimbRamp(0.0, 0.0)
+        self._ramp = _ClimbRamp()
+        self._max_climb_m_s = self._build_up_m_s2 = 0.0
+        self._builds_up = False
         self._armed_us = 0
         self._wanted = False  # a lift-off
-        self._ramp_start_us = -(10**15)
+        self._ramp_start_us = 0
 
-    def configure(self, parameters: Parameters) -> None:
+    def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Apply changed parameters."""
+        limits = speed_limits(airframe, parameters)
+        self._max_climb_m_s, self._build_up_m_s2 = limits.up_m_s, limits.takeoff_m_s2
         self.spool_up_us = round(parameters.value("COM_SPOOLUP_TIME") * 1e6)
         self.ramp_us = round(parameters.value("MPC_TKO_RAMP_T") * 1e6)
 
     def arm(self, time_us: int) -> None:
         """Begin after arming."""
-        self.ticks = 0
+        self.rest()
         self._wanted = False
         self._armed_us = time_us
 
     def rest(self) -> None:
         """The motors are stopped."""
         self.ticks = 0
+        self._ramp.running = False
 
     def fly(self, stabiliser: Stabiliser, state: VehicleState, command: ControlCommand) -> MotorOutput:
         """Motor output for a command in the air."""
         self.ticks = 0
         self._wanted = False
-        if state.time_us - self._ramp_start_us < self.ramp_us:
+        if self._ramp.running:
             command = self._ramped(command, state.time_us)
         return stabiliser.step(state, command)
 
@@ -200,7 +268,7 @@ class LiftOff:
         down_m_s: float,
         *,
         may_lift: bool,
-        climb_ramp: ClimbRamp,
+        builds_up_climb: bool,
     ) -> MotorOutput:
         """Motor output for a command on the ground.
 
@@ -210,36 +278,47 @@ class LiftOff:
             command: of guidance.
             down_m_s: its vertical velocity; below zero: up.
             may_lift: the mode may leave the ground.
-            climb_ramp: of the mode.
+            builds_up_climb: see `Mode`.
         """
-        self._climb_ramp = climb_ramp
-        ramped = command.controls_climb and self.ramp_us > 0
-        if not self._lifts(state.time_us, down_m_s, may_lift=may_lift, ramped=ramped):
+        self._builds_up = builds_up_climb
+        if not self._lifts(state.time_us, down_m_s, may_lift=may_lift):
             self.ticks = 0
+            self._ramp.running = False
             stabiliser.reset()
             return stabiliser.idle()
-        self.ticks += 1
-        if self.ramp_us > 0:
+        command = command.straight_up()
+        if command.controls_climb and self._ramp.running:
             command = self._ramped(command, state.time_us)
-        return stabiliser.step(state, command.straight_up(), grounded=self.ticks <= _LIFT_HELD_TICKS)
+            if self.ticks == 0 and self._ramp.climb_m_s == 0.0:
+                stabiliser.reset()
+                return stabiliser.idle()
+        self.ticks += 1
+        return stabiliser.step(state, command, grounded=self.ticks <= _LIFT_HELD_TICKS)
 
-    def _lifts(self, time_us: int, down_m_s: float, *, may_lift: bool, ramped: bool) -> bool:
-        """Whether to lift off: a climb is commanded, and the ramp allows it."""
+    def _lifts(self, time_us: int, down_m_s: float, *, may_lift: bool) -> bool:
+        """Whether a climb is commanded that may leave the ground, possibly after a ramp."""
         if time_us - self._armed_us < self.spool_up_us or not may_lift or down_m_s > -_LIFT_M_S:
             self._wanted = False
             return False
         if not self._wanted:
             self._wanted = True
             self._ramp_start_us = time_us
-        return self.ticks > 0 or not ramped or self._ramp(down_m_s, time_us) < 0.0
-
-    def _ramp(self, down_m_s: float, time_us: int) -> float:
-        """The vertical velocity that the ramp allows for a commanded one, below zero: up."""
-        ramp = self._climb_ramp
-        share = min((time_us - self._ramp_start_us) / self.ramp_us, 1.0)
-        return max(down_m_s, -ramp.from_m_s - share * (ramp.to_m_s - ramp.from_m_s))
+            if self.ramp_us > 0:
+                self._ramp.start(time_us)
+        return True
 
     def _ramped(self, command: ControlCommand, time_us: int) -> ControlCommand:
-        return command.with_limited_climb(
-            lambda down_m_s: min(self._ramp(down_m_s, time_us), _MIN_CLIMB_SHARE * down_m_s)
-        )
+        """The command with the climb that the ramp allows."""
+        limited = command.with_limited_climb(lambda down_m_s: self._allowed(down_m_s, time_us))
+        if limited is command:  # it does not climb
+            self._ramp.running = False
+        return limited
+
+    def _allowed(self, down_m_s: float, time_us: int) -> tuple[float, float]:
+        """The vertical velocity that is allowed for a commanded one, and its acceleration; below zero: up."""
+        since_us, climb_m_s = time_us - self._ramp_start_us, -down_m_s
+        if self._builds_up:
+            climb_m_s = min(climb_m_s, _FIRST_CLIMB_M_S + self._build_up_m_s2 * since_us / 1e6)
+        share = min(since_us / self.ramp_us, 1.0) if self.ramp_us > 0 else 1.0
+        self._ramp.step(time_us, climb_m_s, share=share, max_m_s=self._max_climb_m_s)
+        return min(-self._ramp.climb_m_s, _MIN_CLIMB_SHARE * down_m_s), -self._ramp.climb_m_s2

@@ -64,7 +64,11 @@ class TargetMask(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class LocalTarget:
-    """The fields of SET_POSITION_TARGET_LOCAL_NED; vectors of shape (3,), metres, seconds, radians."""
+    """The fields of SET_POSITION_TARGET_LOCAL_NED; vectors of shape (3,), metres, seconds, radians.
+
+    A SET_POSITION_TARGET_GLOBAL_INT is given so, too, with its position in the local frame; `message` names
+    what was received, for refusals.
+    """
 
     frame: int
     type_mask: int
@@ -73,6 +77,7 @@ class LocalTarget:
     acceleration_m_s2: Vec3 = ZERO3
     yaw_rad: float = 0.0
     yaw_rate_rad_s: float = 0.0
+    message: str = _LOCAL
 
 
 def setpoint_from_target(
@@ -100,14 +105,13 @@ def setpoint_from_target(
             north, east, down = to_world(rotation(state.attitude), *target.acceleration_m_s2)
             acceleration = (_finite(north), _finite(east), _finite(down))
     else:
-        return SetpointRefusal(f"{_LOCAL} coordinate frame {target.frame} unsupported")
+        return SetpointRefusal(f"{target.message} coordinate frame {target.frame} unsupported")
     if mask & TargetMask.FORCE and _any_finite(acceleration):
-        return SetpointRefusal(f"{_LOCAL} force not supported")
+        return SetpointRefusal(f"{target.message} force not supported")
     yaw_rad = nan if mask & TargetMask.YAW else _finite(target.yaw_rad)
     yaw_rate_rad_s = nan if mask & TargetMask.YAW_RATE else _finite(target.yaw_rate_rad_s)
-    return _checked(
-        TrajectorySetpoint(time_us, position, velocity, acceleration, yaw_rad, yaw_rate_rad_s), body_velocity
-    )
+    wanted = TrajectorySetpoint(time_us, position, velocity, acceleration, yaw_rad, yaw_rate_rad_s)
+    return _checked(wanted, body_velocity, target.message)
 
 
 def setpoint_from_attitude(
@@ -181,7 +185,7 @@ def setpoint_from_body_velocity(
     if isfinite(sum(velocity_ned_m_s)) and isfinite(sum(velocity_level_m_s)):
         return BodyVelocitySetpoint(time_us, velocity_level_m_s, nan, yaw_rate_rad_s, velocity_ned_m_s)
     wanted = TrajectorySetpoint(time_us, NAN3, velocity_ned_m_s, NAN3, nan, yaw_rate_rad_s)
-    return _checked(wanted, velocity_level_m_s)
+    return _checked(wanted, velocity_level_m_s, _LOCAL)
 
 
 class SetpointQueue:
@@ -233,11 +237,13 @@ class SetpointQueue:
         return waiting
 
 
-def _checked(wanted: TrajectorySetpoint, body_velocity: Vec3 | None) -> Setpoint | SetpointRefusal:
+def _checked(
+    wanted: TrajectorySetpoint, body_velocity: Vec3 | None, message: str
+) -> Setpoint | SetpointRefusal:
     """Refuse a setpoint without any component; brake if an axis or one of the horizontal pair is missing."""
     groups = (wanted.position_ned_m, wanted.velocity_ned_m_s, wanted.acceleration_ned_m_s2)
     if not any(_any_finite(group) for group in groups):
-        return SetpointRefusal(f"{_LOCAL} invalid")
+        return SetpointRefusal(f"{message} invalid")
     yaw_rad, yaw_rate_rad_s = wanted.yaw_rad, wanted.yaw_rate_rad_s
     pairs_whole = all(isfinite(group[0]) == isfinite(group[1]) for group in groups)
     axes_held = all(any(isfinite(group[axis]) for group in groups) for axis in range(3))

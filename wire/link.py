@@ -186,7 +186,7 @@ class Budget:
         return min(max(1.0, needed_bytes_s / self.bytes_s), _MAX_STRETCH)
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(slots=True, eq=False, weakref_slot=True)
 class Link:
     """One link at run time."""
 

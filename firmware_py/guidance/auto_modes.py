@@ -29,8 +29,6 @@ _AT_HOME_M = 0.5  # a landing descends vertically, so it begins over the place
 class HoldMode(TrajectoryMode):
     """Brakes and holds position and yaw, or flies to a place and holds there."""
 
-    takes_off = True
-
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Brake, or continue to the present target (after a take-off or a mission)."""
         if not entry.keep_target or entry.previous is not self:
@@ -85,7 +83,7 @@ class HoldMode(TrajectoryMode):
 class TakeoffMode(Mode):
     """Climbs vertically to a height; it does not descend to a lower one."""
 
-    takes_off = True
+    builds_up_climb = True
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Climb to the height of the entry's target, from here."""

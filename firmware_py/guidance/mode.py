@@ -18,22 +18,6 @@ from firmware_py.types import ManualInput, VehicleState
 from geometry.vectors import NAN3, ZERO3, Vec3
 
 _FACING_M = 0.5  # nearer than this, the direction of a region of interest is not used
-_RAMP_FROM_M_S = -2.45  # PX4's: no thrust, g over its velocity gain
-_WIND_UP_M_S = 0.95  # fitted to heights of x500 flights: PX4's velocity loop winds up during the ramp
-_AUTO_CLIMB_SHARE = 1.2  # of MPC_Z_V_AUTO_UP: the limit of PX4's automatic modes
-
-
-@dataclass(frozen=True, slots=True)
-class ClimbRamp:
-    """The climb allowed during a take-off, m/s; as PX4's, it ends at a limit, not at the commanded climb.
-
-    Attributes:
-        from_m_s: at its beginning; below zero.
-        to_m_s: at its end, after MPC_TKO_RAMP_T.
-    """
-
-    from_m_s: float
-    to_m_s: float
 
 
 @dataclass(slots=True)
@@ -78,12 +62,12 @@ class Mode(ABC):
     """A flight mode.
 
     Attributes:
-        takes_off: it leaves the ground by itself.
+        builds_up_climb: on the ground it begins with a descent, from which its climb is built up.
         setpoint: followed now, for telemetry.
         target_reached: a take-off has reached its height.
     """
 
-    takes_off: ClassVar[bool] = False
+    builds_up_climb: ClassVar[bool] = False
 
     def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
         self._context = context
@@ -107,14 +91,6 @@ class Mode(ABC):
         """Whether the mode flies to a place well above, for which it leaves the ground even in hold."""
         del state
         return False
-
-    @property
-    def climb_ramp(self) -> ClimbRamp:
-        """The limit of the climb during a take-off in this mode."""
-        limits = self._context.limits
-        if self.takes_off:
-            return ClimbRamp(_RAMP_FROM_M_S, _AUTO_CLIMB_SHARE * limits.auto_up_m_s)
-        return ClimbRamp(_RAMP_FROM_M_S - _WIND_UP_M_S, limits.up_m_s)
 
     @property
     def hold_target(self) -> tuple[Vec3, float] | None:

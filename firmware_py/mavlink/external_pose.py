@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntFlag
-from math import hypot, isfinite
+from math import hypot, isfinite, nan
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
@@ -55,7 +55,7 @@ class ReceivedPose:
     Attributes:
         time_us: vehicle time at which it was true, as far as its sender knows.
         position_ned_m: shape (3,).
-        attitude: body FRD to NED, not necessarily of unit length.
+        attitude: body FRD to NED, not necessarily of unit length; NaN: not known.
         position_variance_m2: shape (3,).
         attitude_variance_rad2: shape (3,).
         reset_counter: changes when the sender's frame has jumped.
@@ -163,11 +163,12 @@ class ExternalPoseService(Service):
 
     def _vision_position_estimate(self, link: Link, message: Message) -> None:
         position, attitude = _diagonal(message.covariance)
+        angles_rad = (message.roll, message.pitch, message.yaw)
         self._use(
             ReceivedPose(
                 self._vehicle_time_us(link, message.usec),
                 (message.x, message.y, message.z),
-                quaternion_from_euler(message.roll, message.pitch, message.yaw),
+                quaternion_from_euler(*angles_rad) if all(map(isfinite, angles_rad)) else (nan,) * 4,
                 position,
                 attitude,
                 message.reset_counter,

@@ -26,12 +26,7 @@ from wire.exchange import Exchange
 from wire.link import Link
 
 _REPEAT_TEXT_US = 1_000_000
-_ALTITUDES = {
-    mavlink.MAV_FRAME_GLOBAL: False,
-    mavlink.MAV_FRAME_GLOBAL_INT: False,
-    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT: True,
-    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True,
-}
+_IS_RELATIVE = {mavlink.MAV_FRAME_GLOBAL_INT: False, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True}
 _POSITION = TargetMask.X | TargetMask.Y | TargetMask.Z
 _NO_ATTITUDE = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 _NO_RATES = (
@@ -62,23 +57,25 @@ class OffboardService(Service):
     def _local(self, _link: Link, message: Message) -> None:
         if self._exchange.is_for_us(message, or_everyone=True):
             position = (message.x, message.y, message.z)
-            self._take(self._from_target(message, message.coordinate_frame, position))
+            self._take_target(message, message.coordinate_frame, position)
 
     def _global(self, _link: Link, message: Message) -> None:
-        """As `_local`, with latitude, longitude and altitude; all of them or none, as in PX4."""
+        """As `_local`, with latitude, longitude and altitude; all of them or none, as in PX4.
+
+        The frame is only that of the position.
+        """
         if not self._exchange.is_for_us(message, or_everyone=True):
-            return
-        relative = _ALTITUDES.get(message.coordinate_frame)
-        if relative is None:
-            frame = message.coordinate_frame
-            text = f"SET_POSITION_TARGET_GLOBAL_INT invalid coordinate frame {frame}"
-            self._take(SetpointRefusal(text))
             return
         position: Vec3 | None = NAN3
         if not message.type_mask & _POSITION:
+            relative = _IS_RELATIVE.get(message.coordinate_frame)
+            if relative is None:
+                text = f"{message.get_type()} invalid coordinate frame {message.coordinate_frame}"
+                self._take(SetpointRefusal(text))
+                return
             position = self._local_position(message, relative=relative)
         if position is not None:  # PX4 takes no setpoint relative to an unknown home either
-            self._take(self._from_target(message, mavlink.MAV_FRAME_LOCAL_NED, position))
+            self._take_target(message, mavlink.MAV_FRAME_LOCAL_NED, position)
 
     def _attitude(self, _link: Link, message: Message) -> None:
         if not self._exchange.is_for_us(message, or_everyone=True):
@@ -117,7 +114,7 @@ class OffboardService(Service):
             self._refused_us[request.text] = self._exchange.time_us
             self._autopilot.say(mavlink.MAV_SEVERITY_CRITICAL, request.text)
 
-    def _from_target(self, message: Message, frame: int, position_m: Vec3) -> Setpoint | SetpointRefusal:
+    def _take_target(self, message: Message, frame: int, position_m: Vec3) -> None:
         target = LocalTarget(
             frame=frame,
             type_mask=message.type_mask,
@@ -126,8 +123,9 @@ class OffboardService(Service):
             acceleration_m_s2=(message.afx, message.afy, message.afz),
             yaw_rad=message.yaw,
             yaw_rate_rad_s=message.yaw_rate,
+            message=message.get_type(),
         )
-        return setpoint_from_target(target, self._autopilot.state, self._exchange.time_us)
+        self._take(setpoint_from_target(target, self._autopilot.state, self._exchange.time_us))
 
     def _local_position(self, message: Message, *, relative: bool) -> Vec3 | None:
         """The position of a global target in the local frame; None when it is not known."""

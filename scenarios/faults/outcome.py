@@ -65,6 +65,8 @@ def _ended_so(row: FaultRow, report: RefereeReport, text: str, *, reaction_s: fl
     if report.completed and not text:  # with another end than this, it must have ended before
         by_app = row.end in {FaultEnd.APP_ENDS, FaultEnd.TIME_LIMIT}
         return row.within_s is None or by_app or late_s <= row.within_s + REACTION_S
+    if row.end is FaultEnd.DISPLACED:
+        return not text
     if row.end is FaultEnd.APP_ENDS:
         return row.reaction in report.reason
     if row.end is FaultEnd.TIME_LIMIT:

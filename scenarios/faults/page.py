@@ -9,6 +9,7 @@ from scenarios.faults.table import TABLE, FaultEnd, FaultRow
 
 _ENDS = {
     FaultEnd.FLIES_ON: "flies on",
+    FaultEnd.DISPLACED: "flies on by the wrong position: it may miss frames and base, or touch them",
     FaultEnd.LANDS: "descends, lands and disarms",
     FaultEnd.TERMINATES: "stops the motors until it is disarmed",
     FaultEnd.APP_ENDS: "the app ends the flight: the drone holds, or its own failsafe follows",

@@ -13,6 +13,7 @@ class FaultEnd(StrEnum):
     """How a flight with a fault ends."""
 
     FLIES_ON = "flies on"
+    DISPLACED = "flies on, displaced"
     LANDS = "lands"
     TERMINATES = "terminates"
     APP_ENDS = "the app ends the flight"
@@ -48,7 +49,7 @@ class FaultRow:
             return False
         if own.for_s is not None:
             return fault.for_s is not None and fault.for_s <= own.for_s
-        return fault.for_s is None or self.end is FaultEnd.FLIES_ON
+        return fault.for_s is None or self.end in {FaultEnd.FLIES_ON, FaultEnd.DISPLACED}
 
 
 _INDOORS, _OUTDOORS, _FLOW, _RACER = (
@@ -93,6 +94,10 @@ def _lost(text: str, flown: tuple[str, str], within_s: float, why: str = _NO_AID
     return _row(text, flown, why, FaultEnd.LANDS, after=(within_s, _POSITION_LOST))
 
 
+def _displaced(text: str, flown: tuple[str, str]) -> FaultRow:
+    return _row(text, flown, "a position that does not fit; after 1 s it is followed", FaultEnd.DISPLACED)
+
+
 def _app(text: str, notices: str, within_s: float, reaction: str) -> FaultRow:
     return _row(text, _INDOORS, notices, FaultEnd.APP_ENDS, after=(within_s, reaction))
 
@@ -123,7 +128,7 @@ TABLE: tuple[FaultRow, ...] = (
     _lost("gps off", _OUTDOORS, 6.0),
     _row("gps off for 3 s", _OUTDOORS, "no position, for less than 5 s"),
     _lost("gps stuck", _OUTDOORS, 7.0, "the same value for 1 s, then " + _NO_AID),
-    _row("gps wrong 5 m", _OUTDOORS, "a position that does not fit; after 1 s it is followed"),
+    _displaced("gps wrong 5 m", _OUTDOORS),
     _row("gps noisy 3 m", _OUTDOORS, "its noise, which is measured"),
     _lost("gps delayed 0.5 s", _OUTDOORS, 6.0, "samples too old to be fused; " + _NO_AID),
     _row("gps lossy 0.5", _OUTDOORS, "nothing"),
@@ -137,7 +142,7 @@ TABLE: tuple[FaultRow, ...] = (
     _lost("external_pose off", _RACER, 6.0),
     _row("external_pose off for 3 s", _INDOORS, "no position, for less than 5 s"),
     _lost("external_pose stuck", _INDOORS, 6.3, "the same value for 0.3 s, then " + _NO_AID),
-    _row("external_pose wrong 0.3 m", _INDOORS, "a position that does not fit; after 1 s it is followed"),
+    _displaced("external_pose wrong 0.3 m", _INDOORS),
     _row("external_pose noisy 0.05 m", _INDOORS, "its noise, which is measured"),
     _row("external_pose delayed 0.05 s", _INDOORS, "nothing; each is fused at its own time"),
     _lost("external_pose delayed 0.2 s", _INDOORS, 6.0, "poses too old to be fused; " + _NO_AID),

@@ -112,6 +112,17 @@ def test_hash_is_the_plain_crc_over_names_and_bytes():
     assert Parameters(declarations=(declared,)).hash() == crc
 
 
+def test_what_qgroundcontrol_insists_on_is_there_with_px4_s_values():
+    """The facts of its page Sensors, and of its list of parameters of every vehicle."""
+    defaults = {declared.name: declared.default for declared in DECLARATIONS}
+    for number, device in enumerate((197388, 0, 0, 0)):
+        assert (defaults[f"CAL_MAG{number}_ID"], defaults[f"CAL_MAG{number}_ROT"]) == (device, -1)
+    names = ("SENS_BOARD_ROT", "SENS_BOARD_X_OFF", "SENS_BOARD_Y_OFF", "SENS_BOARD_Z_OFF", "SENS_DPRES_OFF")
+    assert [defaults[name] for name in names] == [0, 1e-6, 0.0, 0.0, 0.001]
+    assert (defaults["TRIG_MODE"], defaults["SYS_PARAM_VER"]) == (0, 1)
+    assert "UAVCAN_ENABLE" not in defaults  # PX4's SITL has none either
+
+
 def test_a_vehicles_own_defaults_do_not_count_as_changes():
     parameters = Parameters({"NAV_DLL_ACT": 3}, defaults={"MPC_THR_HOVER": 0.6, "SYS_AUTOSTART": 10040})
     assert parameters.value("MPC_THR_HOVER") == 0.6

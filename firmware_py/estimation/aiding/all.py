@@ -55,6 +55,7 @@ class Aiding:
         self._magnetometer = MagnetometerAiding(self.target, settings, field_ned_gauss)
         self.ground = GroundAiding(self.target, settings)
         self._has_position_sensor = settings.external or settings.gps
+        self._has_flow = settings.flow_sigma_rad_s is not None
         self._stood_us = NEVER_US
         pose, gps = self._pose, self._gps
         self.aids: dict[Sensor, tuple[Aid, ...]] = {
@@ -73,11 +74,14 @@ class Aiding:
 
     @property
     def position_us(self) -> int:
-        """When the horizontal position was measured last; without such a sensor, its velocity."""
+        """When the horizontal position was measured last; with optical flow alone, its velocity.
+
+        That a vehicle stands still tells where it is only if something can measure its motion in flight.
+        """
         if self._has_position_sensor:
             pose_us, gps_us = self._pose.horizontal.fused_us, self._gps.horizontal.fused_us
             return pose_us if pose_us > gps_us else gps_us
-        return max(self.ground.flow.fused_us, self._stood_us)
+        return max(self.ground.flow.fused_us, self._stood_us) if self._has_flow else NEVER_US
 
     @property
     def velocity_us(self) -> int:

@@ -45,7 +45,6 @@ class FlightCommands(Service):
             mavlink.MAV_CMD_DO_SET_ROI: self._set_roi,
             mavlink.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode,
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
-            mavlink.MAV_CMD_DO_SET_GLOBAL_ORIGIN: self._set_origin,
         }
 
     def _arm_disarm(self, command: Command) -> CommandResult | None:
@@ -136,11 +135,6 @@ class FlightCommands(Service):
         if not command.has_place or not isfinite(command.altitude_m):
             return CommandResult.DENIED
         return self._autopilot.set_home(
-            GeodeticPoint(command.latitude_deg, command.longitude_deg, command.altitude_m)
-        )
-
-    def _set_origin(self, command: Command) -> CommandResult:
-        return self._autopilot.set_origin(
             GeodeticPoint(command.latitude_deg, command.longitude_deg, command.altitude_m)
         )
 

@@ -1,7 +1,7 @@
-"""Remote identification, OPEN_DRONE_ID_LOCATION and _SYSTEM: the positions of the vehicle and its operator.
+"""Remote identification, OPEN_DRONE_ID_...: the vehicle's serial number and position, and its operator's.
 
-As in PX4, the operator's position is where the vehicle was armed; the vehicle is not registered, so there is
-no identity.
+As in PX4, the operator's position is where the vehicle was armed; the serial number, which is that of
+AUTOPILOT_VERSION, is sent on request.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from firmware_py.mavlink.service import Service
 from firmware_py.status import LandedState, VehicleStatus
 from wire.dialect import BROADCAST, Message, degrees_e7, mavlink, whole
 from wire.exchange import Exchange
+from wire.vehicle_identity import simulator_uid
 
 _NO_IDENTITY = [0] * 20
 _UNKNOWN_M = -1000.0
@@ -23,15 +24,28 @@ _EPOCH_2019_S = 1_546_300_800
 
 
 class RemoteIdService(Service):
-    """Streams both messages."""
+    """Sends the messages."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self.sources = {
+            mavlink.MAVLINK_MSG_ID_OPEN_DRONE_ID_BASIC_ID: self._basic_id,
             mavlink.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION: self._location,
             mavlink.MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM: self._system,
         }
+
+    def _basic_id(self) -> Message:
+        """OPEN_DRONE_ID_BASIC_ID: the serial number in hexadecimal digits, as PX4 has it."""
+        serial_number = f"{simulator_uid(self._exchange.system_id):016x}".encode()
+        return mavlink.MAVLink_open_drone_id_basic_id_message(
+            BROADCAST,
+            BROADCAST,
+            _NO_IDENTITY,
+            mavlink.MAV_ODID_ID_TYPE_SERIAL_NUMBER,
+            mavlink.MAV_ODID_UA_TYPE_HELICOPTER_OR_MULTIROTOR,
+            [*serial_number.ljust(20, b"\0")],
+        )
 
     def _location(self) -> Message | None:
         """OPEN_DRONE_ID_LOCATION, once there is a position; with the accuracies of GPS_RAW_INT."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from weakref import WeakSet
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.missions.execution import MissionExecution
@@ -33,6 +34,13 @@ _PLAN_TYPES = {int(plan_type): plan_type for plan_type in PlanType}
 _MISSION_PLANNER = 190  # MAV_COMP_ID_MISSIONPLANNER, which PX4 accepts as its own id here
 _CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
 _MAX_DOWNLOADS = 32
+_FORMS = {
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: False,
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM: False,
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: True,
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: True,
+}
+"""Messages that show whether the other side uses the integer form."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +60,6 @@ class _Upload:
     count: int  # of all items
     received_us: int  # vehicle time of the partner's last message
     requested_us: int  # vehicle time of the last request for an item
-    as_int: bool = True  # request MISSION_ITEM_INT
     items: list[MissionItem] = field(default_factory=list)  # received so far
     current: int | None = None  # the item marked as current
 
@@ -87,6 +94,7 @@ class MissionService(Service):
         self._store = autopilot.missions
         self._upload: _Upload | None = None
         self._outcome: _Outcome | None = None
+        self._float_links: WeakSet[Link] = WeakSet()  # whose other side last used the form with floats
         # The plan that is read, and the time of the last request.
         self._downloads: dict[tuple[_Partner, PlanType], tuple[Plan, int]] = {}
         self.handlers = {
@@ -124,8 +132,16 @@ class MissionService(Service):
             for_us = message.target_system == self._exchange.system_id
         else:
             for_us = self._exchange.is_for_us(message)
-        if for_us:
-            work(_Partner(link, (message.get_srcSystem(), message.get_srcComponent())), message)
+        if not for_us:
+            return
+        as_int = _FORMS.get(message.get_msgId())
+        if as_int is not None:
+            self._use_form(link, as_int)
+        work(_Partner(link, (message.get_srcSystem(), message.get_srcComponent())), message)
+
+    def _use_form(self, link: Link, as_int: bool) -> None:
+        """Request items of uploads on this link with integers, or with floats."""
+        (self._float_links.discard if as_int else self._float_links.add)(link)
 
     # Uploads
 
@@ -155,7 +171,7 @@ class MissionService(Service):
         """Request the next item."""
         upload.requested_us = self._exchange.time_us
         fields = (*upload.partner.address, upload.next_seq, int(upload.plan_type))
-        if upload.as_int:
+        if upload.partner.link not in self._float_links:
             request = mavlink.MAVLink_mission_request_int_message(*fields)
         else:
             request = mavlink.MAVLink_mission_request_message(*fields)
@@ -233,7 +249,7 @@ class MissionService(Service):
         if message.type == mavlink.MAV_MISSION_OPERATION_CANCELLED:
             self._upload = None
         elif message.type == mavlink.MAV_MISSION_UNSUPPORTED:
-            upload.as_int = not upload.as_int
+            self._use_form(partner.link, partner.link in self._float_links)
             self._request_next(upload)
 
     # Downloads

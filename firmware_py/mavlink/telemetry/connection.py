@@ -120,10 +120,10 @@ class ConnectionService(Service):
             mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
             mavlink.MAVLINK_MSG_ID_TIMESYNC: self._timesync_request,
             mavlink.MAVLINK_MSG_ID_PING: self._ping_request,
+            mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION: _protocol_version,
         }
         self.replies = {
             mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: lambda _, __: [_autopilot_version(exchange.system_id)],
-            mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION: lambda _, __: [_protocol_version()],
             mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES: lambda _, index: _available_modes(index),
         }
 

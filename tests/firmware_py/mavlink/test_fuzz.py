@@ -1,7 +1,7 @@
 """Valid packets with random content, handled by the real autopilot."""
 
 import random
-from math import isfinite
+from math import inf, isfinite, nan
 from struct import pack
 
 import pytest
@@ -10,12 +10,21 @@ from hypothesis import strategies as st
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.commands import FlightLimits
+from firmware_py.mavlink.camera.model import CameraModel
+from firmware_py.mavlink.node import MavlinkNode, NodeOptions
+from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.status import FlightMode
 from firmware_py.types import GeodeticPoint, MotorOutput, Sensors
+from scenarios.gimbal import Gimbal
+from scenarios.loader import load_scenario
+from sitl.payload.gimbal import SimulatedGimbal
+from sitl.simulation import Simulation
 from tests.node_input import deliver
 from wire.dialect import mavlink
 
 LINKS = ("onboard", "ground")
+ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)
+EXTREMES = (nan, inf, -inf, 3e38)
 AWKWARD = [
     0.0,
     -0.0,
@@ -35,7 +44,7 @@ AWKWARD = [
 
 @pytest.fixture
 def real(airframe):
-    autopilot = Autopilot(airframe, GeodeticPoint(47.397742, 8.545594, 489.0))
+    autopilot = Autopilot(airframe, ORIGIN)
     for tick in range(300):
         autopilot.step(standing(tick * 4000))
     return autopilot
@@ -90,30 +99,31 @@ def test_twenty_thousand_sound_packets_of_every_id_with_random_content(real, mak
     assert real.parameters.version == 0
 
 
-HANDLED = [
-    mavlink.MAVLink_command_long_message,
-    mavlink.MAVLink_command_int_message,
-    mavlink.MAVLink_set_mode_message,
-    mavlink.MAVLink_param_request_read_message,
-    mavlink.MAVLink_param_request_list_message,
-    mavlink.MAVLink_param_set_message,
-    mavlink.MAVLink_param_ext_request_read_message,
-    mavlink.MAVLink_param_ext_request_list_message,
-    mavlink.MAVLink_param_ext_set_message,
-    mavlink.MAVLink_request_event_message,
-    mavlink.MAVLink_set_position_target_local_ned_message,
-    mavlink.MAVLink_timesync_message,
-    mavlink.MAVLink_ping_message,
-    mavlink.MAVLink_system_time_message,
-    mavlink.MAVLink_rc_channels_override_message,
-    mavlink.MAVLink_heartbeat_message,
-    mavlink.MAVLink_mission_request_list_message,
-    mavlink.MAVLink_mission_count_message,
-    mavlink.MAVLink_mission_clear_all_message,
-    mavlink.MAVLink_file_transfer_protocol_message,
-]
+ALL_DEVICES = {
+    "camera": CameraModel(320, 240, 1.57, 10.0),
+    "gimbal": SimulatedGimbal(Gimbal()),
+    "gripper": True,
+    "shell": True,
+}
+
+
+@pytest.fixture(scope="module")
+def handled(airframe):
+    """Kinds of all messages that a vehicle with all devices handles, all commands, a strategy of messages."""
+    services = MavlinkNode(Autopilot(airframe, ORIGIN), (ONBOARD,), NodeOptions(**ALL_DEVICES)).services
+    ids = {message_id for service in services for message_id in service.handlers}
+    kinds = [mavlink.mavlink_map[message_id] for message_id in sorted(ids)]
+    return kinds, sorted({command for service in services for command in service.commands}), messages(kinds)
+
+
 COMMANDS = [20, 21, 22, 176, 262, 300, 400, 401, 410, 420, 510, 511, 512, 519, 520, 2000, 31999]
 NAMES = [b"MIS_TAKEOFF_ALT", b"COM_OBL_RC_ACT", b"_HASH_CHECK", b"", b"\xff" * 16, b"A" * 16]
+
+
+def limits(type_name):
+    """The least and the largest value of an integer type, such as uint8_t."""
+    bits = int("".join(filter(str.isdigit, type_name)))
+    return (0, 2**bits - 1) if type_name.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
 def content(kind, field, type_name, array_length):
@@ -128,48 +138,76 @@ def content(kind, field, type_name, array_length):
         return st.sampled_from([6, 9, 0])
     if field == "coordinate_frame":
         return st.sampled_from([1, 8, 7])
-    bits = {
-        "uint8_t": 8,
-        "uint16_t": 16,
-        "uint32_t": 32,
-        "int16_t": -16,
-        "int32_t": -32,
-        "int64_t": -64,
-        "uint64_t": 64,
-    }
     if type_name == "float":
         element = st.one_of(st.sampled_from(AWKWARD), st.floats(width=32))
     else:
-        size = bits[type_name]
-        element = (
-            st.integers(0, 2**size - 1)
-            if size > 0
-            else st.integers(-(2 ** (-size - 1)), 2 ** (-size - 1) - 1)
-        )
+        element = st.integers(*limits(type_name))
     return st.lists(element, min_size=array_length, max_size=array_length) if array_length else element
 
 
-def messages():
+def fields_of(kind):
+    """Name, type and array length (0: no array) of each field."""
+    lengths = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
+    return [
+        (name, type_name, lengths[name])
+        for name, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True)
+    ]
+
+
+def messages(kinds):
     return st.one_of(
-        *[
-            st.builds(
-                kind,
-                *[
-                    content(kind, field, type_name, kind.array_lengths[kind.ordered_fieldnames.index(field)])
-                    for field, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True)
-                ],
-            )
-            for kind in HANDLED
-        ]
+        *[st.builds(kind, *[content(kind, *field) for field in fields_of(kind)]) for kind in kinds]
     )
 
 
+def ordinary(kind):
+    """A message for us with ordinary content, as a dictionary."""
+    values = {}
+    for name, type_name, length in fields_of(kind):
+        value = 0.5 if type_name == "float" else 1
+        values[name] = b"" if type_name == "char" else [value] * length if length else value
+    return values
+
+
+def one_extreme_each(kind, **given):
+    """Messages with one field that is extreme, and ordinary content elsewhere."""
+    plain = ordinary(kind) | given
+    for name, type_name, length in fields_of(kind):
+        if type_name != "char" and name not in given:
+            for value in EXTREMES if type_name == "float" else limits(type_name):
+                yield kind(**plain | {name: [value] * length if length else value})
+
+
+def test_each_number_of_each_handled_message_may_be_extreme(handled, make_peer):
+    kinds, commands, _ = handled
+    simulation = Simulation(load_scenario("open-field").model_copy(update={"sensors": "external"}))
+    autopilot = simulation.autopilot
+    peer = make_peer(autopilot, node_options=ALL_DEVICES)
+    with_command = (mavlink.MAVLink_command_long_message, mavlink.MAVLink_command_int_message)
+    sent = [message for kind in kinds if kind not in with_command for message in one_extreme_each(kind)]
+    sent += [
+        message for kind in with_command for c in commands for message in one_extreme_each(kind, command=c)
+    ]
+    internal = []
+    for count, message in enumerate(sent):
+        peer.send(message)
+        internal += [said.text for said in autopilot.take_texts() if said.text.startswith("Internal error")]
+        if count % 100 == 0:
+            simulation.tick()
+            peer.advance(0.004)
+    assert internal == []
+    assert peer.node.failed_messages == 0
+    assert len(kinds) > 40
+    assert all(map(isfinite, autopilot.output.speeds_rad_s))
+
+
 @settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.lists(messages(), min_size=1, max_size=8))
-def test_awkward_content_in_every_handled_message(airframe, make_peer, sent):
-    autopilot = Autopilot(airframe, GeodeticPoint(47.397742, 8.545594, 489.0), stabiliser=Calm())
+@given(st.data())
+def test_awkward_content_in_handled_messages(airframe, make_peer, handled, data):
+    autopilot = Autopilot(airframe, ORIGIN, stabiliser=Calm())
     peer = make_peer(autopilot)
     autopilot.step(standing(0))
+    sent = data.draw(st.lists(handled[2], min_size=1, max_size=8))
     for place, message in enumerate(sent):
         peer.send(message, LINKS[place % 2])
         autopilot.step(standing(4000 * (place + 1)))

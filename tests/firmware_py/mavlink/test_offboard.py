@@ -109,6 +109,27 @@ def test_places_that_are_none(autopilot, peer):
     assert autopilot.texts[-1].text == "SET_POSITION_TARGET_GLOBAL_INT invalid coordinate frame 1"
 
 
+@pytest.mark.parametrize(
+    ("frame", "mask", "says"),
+    [
+        (6, 0xFFF, "invalid"),
+        (6, 0x638, "force not supported"),
+        (0, 0xDF8, "invalid coordinate frame 0"),
+        (11, 0xDF8, "invalid coordinate frame 11"),
+    ],
+)
+def test_a_refusal_names_the_message(autopilot, peer, frame, mask, says):
+    peer.send(global_target(frame, mask))
+    assert autopilot.setpoints == []
+    assert [said.text for said in autopilot.texts] == [f"SET_POSITION_TARGET_GLOBAL_INT {says}"]
+
+
+def test_without_a_position_any_frame_is_taken(autopilot, peer):
+    peer.send(global_target(frame=0, mask=0xDC7))
+    (setpoint,) = autopilot.setpoints
+    assert setpoint.velocity_ned_m_s == (0.0, 0.0, 0.0)
+
+
 def controls(*values, group=0):
     padded = [*values, *[0.0] * (8 - len(values))]
     return mavlink.MAVLink_set_actuator_control_target_message(0, group, 1, 1, padded)

@@ -50,6 +50,8 @@ def outcome(*texts, fault="external pose off at 10 s", after_s=5.96, text=LOST, 
         ({"fault": "external pose off at 10 s for 2 s"}, False),
         ({"fault": "motor 3 weak 0.1 at 10 s", "text": "", "verdict": "completed"}, True),
         ({"fault": "motor 3 weak 0.1 at 10 s", "text": "", "verdict": "timed out"}, False),
+        ({"fault": "external pose wrong 0.3 at 10 s", "text": "", "verdict": "wrong order"}, True),
+        ({"fault": "external pose wrong 0.3 at 10 s", "verdict": "aborted"}, False),
         (
             {
                 "fault": "gyroscope off at 10 s",

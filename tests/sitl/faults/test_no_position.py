@@ -1,9 +1,17 @@
-"""30 s without GPS or motion capture end in a controlled landing."""
+"""Without GPS, motion capture and flow nothing is armed; 30 s without them end in a controlled landing."""
+
+from pathlib import Path
 
 import pytest
+import yaml
 
+import sitl.sensors
+from firmware_py.status import CommandResult, FlightMode
+from firmware_py.types import ManualInput
 from scenarios.air import Wind
 from scenarios.faults.parse import parse_fault
+from scenarios.loader import load_scenario
+from sitl.simulation import Simulation
 from tests.sitl.faults.hovering import hover
 
 LOST = "Failsafe activated: position lost, descending"
@@ -32,3 +40,21 @@ def test_30_s_without_a_position_end_in_a_controlled_landing(
     assert seen.tilt_deg < 30.0
     assert seen.touchdown_m_s < 1.5
     assert seen.moved_m < 8.0
+
+
+def test_what_cannot_measure_its_motion_is_armed_only_in_modes_that_need_no_position(tmp_path):
+    suite = yaml.safe_load((Path(sitl.sensors.__file__).parent / "suites" / "flow.yaml").read_text())
+    del suite["optical_flow"]
+    (tmp_path / "blind.yaml").write_text(yaml.safe_dump(suite))
+    scenario = load_scenario("open-field").model_copy(update={"sensors": str(tmp_path / "blind.yaml")})
+    simulation = Simulation(scenario, seed=1)
+    for _ in range(500):
+        simulation.tick()
+    autopilot = simulation.autopilot
+    assert autopilot.status.not_ready == "Arming denied: no position estimate"
+    assert autopilot.arm() is CommandResult.TEMPORARILY_REJECTED
+    autopilot.manual_input(ManualInput(simulation.time_us))
+    autopilot.set_mode(FlightMode.POSITION)
+    assert autopilot.arm() is CommandResult.TEMPORARILY_REJECTED
+    autopilot.set_mode(FlightMode.ALTITUDE)
+    assert autopilot.arm() is CommandResult.ACCEPTED

@@ -50,6 +50,7 @@ TABLE = [
     pytest.param(300, [], DENIED, [], id="mission-start-without-mission"),
     pytest.param(401, [], ACCEPTED, [], id="run-prearm-checks"),
     pytest.param(31999, [], UNSUPPORTED, [], id="unknown"),
+    pytest.param(611, [0, 0, 0, 0, 47.4, 8.5, 500], UNSUPPORTED, [], id="origin, as PX4 1.17"),
     pytest.param(2000, [], UNSUPPORTED, [], id="image-start-capture"),
     pytest.param(209, [], UNSUPPORTED, [], id="motor-test"),
     pytest.param(115, [], UNSUPPORTED, [], id="condition-yaw"),

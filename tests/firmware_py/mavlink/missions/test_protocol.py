@@ -220,6 +220,26 @@ def test_the_old_float_messages_work_both_ways(peer):
     assert (read.frame, read.x, read.y) == (6, 475000000, 85000000)
 
 
+def test_a_link_is_asked_in_the_form_that_it_used_last(peer):
+    float_item = [
+        mavlink.MAVLink_mission_item_message(1, 1, seq, 3, 16, 0, 1, 1, 2, 3, 4, 47.5, 8.5, 20, 0)
+        for seq in range(2)
+    ]
+    (request,) = peer.ask(mavlink.MAVLink_mission_count_message(1, 1, 2, 0))
+    assert request.get_type() == "MISSION_REQUEST_INT"
+    (request,) = peer.ask(float_item[0])
+    assert (request.get_type(), request.seq) == ("MISSION_REQUEST", 1)
+    assert acknowledgement(peer.ask(float_item[1])[0])[0] == OK
+    kinds = []
+    for link, as_int in [("onboard", True), ("onboard", False), ("ground", True), ("onboard", None)]:
+        if as_int is not None:
+            download(peer, link=link, as_int=as_int)
+        (request,) = peer.ask(mavlink.MAVLink_mission_count_message(1, 1, 1, 0), link)
+        kinds.append(request.get_type())
+        peer.ask(mavlink.MAVLink_mission_ack_message(1, 1, mavlink.MAV_MISSION_OPERATION_CANCELLED, 0), link)
+    assert kinds == ["MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_REQUEST"]
+
+
 def test_float_items_have_no_int_frame(peer):
     peer.ask(mavlink.MAVLink_mission_count_message(1, 1, 1, 0))
     message = mavlink.MAVLink_mission_item_message(1, 1, 0, 6, 16, 0, 1, 1, 2, 3, 4, 47.5, 8.5, 20, 0)

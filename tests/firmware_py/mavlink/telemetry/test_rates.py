@@ -96,3 +96,19 @@ def test_px4s_silent_streams_are_accepted_and_silent(holding, make_peer, name):
 @pytest.mark.parametrize("message_id", NOT_IN_PX4)
 def test_what_px4_has_no_stream_of_fails(peer, message_id):
     assert [m.result for m in peer.ask(peer.long(511, message_id, 50_000))] == [4]
+
+
+@pytest.mark.parametrize("name", ["PROTOCOL_VERSION", "OPEN_DRONE_ID_BASIC_ID"])
+def test_what_is_sent_on_request_can_be_streamed(peer, name):
+    message_id = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
+    assert name not in {m.get_type() for _, m in peer.advance(2.5)}
+    assert [m.get_type() for m in peer.ask(peer.long(512, message_id))] == [name, "COMMAND_ACK"]
+    assert [m.result for m in peer.ask(peer.long(511, message_id, 200_000))] == [0]
+    assert 4 <= [m.get_type() for _, m in peer.advance(1.0)].count(name) <= 6
+
+
+def test_the_serial_number_of_remote_id_is_that_of_the_autopilot(peer):
+    (identity, _) = peer.ask(peer.long(512, mavlink.MAVLINK_MSG_ID_OPEN_DRONE_ID_BASIC_ID))
+    (version, _) = peer.ask(peer.long(512, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION))
+    assert int(bytes(identity.uas_id).rstrip(b"\0"), 16) == version.uid
+    assert (identity.id_type, identity.ua_type) == (1, 2)
