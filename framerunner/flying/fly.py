@@ -15,6 +15,7 @@ from framerunner.flying.cause import CauseWatch, Flown
 from framerunner.flying.envelopes import bound_s
 from framerunner.flying.judges import Judge
 from framerunner.flying.plan import FlightPlan
+from framerunner.runs.run_folder import UNFINISHED
 from framerunner.runs.track import Track, TrackRecorder
 from offboard.app import MissionEnd, Moment, Observer, TickHook, fly_mission
 from offboard.drone import Drone
@@ -24,6 +25,7 @@ from scenarios.faults.outcome import fault_fields
 from scenarios.models import Scenario
 from scenarios.result import FlightResult, RefereeReport
 
+KEEP_US = 1_000_000  # vehicle time
 Run = Callable[[Coroutine[Any, Any, MissionEnd]], Awaitable[MissionEnd]]
 
 
@@ -48,6 +50,7 @@ async def fly(
     measured: Callable[[], Mapping[str, Any]] = dict,
     before_tick: TickHook | None = None,
     safety: SafetyRules = SIMULATED,
+    keep: Callable[[FlightResult], None] | None = None,
 ) -> FinishedFlight:
     """Fly a plan's mission from connecting to the verdict.
 
@@ -61,14 +64,15 @@ async def fly(
         measured: called at the end; further fields of the result, such as `timing`.
         before_tick: awaited before each tick of the mission; it may wait only in lockstep.
         safety: the operator, and what the drone does when the flight is aborted.
+        keep: called once a second with the result that the flight has if this program is ended now.
 
     Raises:
-        DroneError: the drone cannot be reached or made ready.
-        CameraLostError: the camera gives no image at the start.
+        DroneError, CameraLostError: the drone cannot be made ready, or there is no image at the start.
         ValueError: the plan has no mission.
     """
     recorder, causes = TrackRecorder(), CauseWatch()
-    watching = (recorder.see, causes.see, *observers, judge.see)
+    kept = () if keep is None else (_Keeper(plan, judge, recorder, keep).see,)
+    watching = (recorder.see, causes.see, *observers, judge.see, *kept)
 
     def observe(moment: Moment) -> None:
         for see in watching:
@@ -91,11 +95,31 @@ async def fly(
     began_us = None if standing is None else standing.began_us
     track = recorder.track(began_us)
     cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
-    failed = fault_fields(await judge.faults(), report, plan.scenario.sensors)
-    result = _result(
-        plan, report, outcome, track, cause=cause, judged_by=judge.source, measured={**failed, **measured()}
-    )
+    more = {**fault_fields(await judge.faults(), report, plan.scenario.sensors), **measured()}
+    result = _result(plan, report, outcome, track, cause=cause, judged_by=judge.source, measured=more)
     return FinishedFlight(result, outcome, track, plan.layout)
+
+
+class _Keeper:
+    """Gives away, once a second of vehicle time, the result of a flight that is not finished."""
+
+    def __init__(
+        self, plan: FlightPlan, judge: Judge, recorder: TrackRecorder, keep: Callable[[FlightResult], None]
+    ) -> None:
+        self._plan, self._judge, self._recorder, self._keep = plan, judge, recorder, keep
+        self._next_us = 0
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        time_us, state = moment.state.time_us, moment.mission_state
+        if time_us < self._next_us:
+            return
+        self._next_us = time_us + KEEP_US
+        end = MissionEnd("aborted", UNFINISHED, state, moment.flight_time_s, 0)
+        report = self._judge.so_far(state, UNFINISHED)
+        track = self._recorder.track(time_us - round(moment.flight_time_s * 1e6))
+        what = (self._plan, report, end, track)
+        self._keep(_result(*what, cause=UNFINISHED, judged_by="telemetry", measured={}))
 
 
 def _result(

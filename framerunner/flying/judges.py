@@ -47,6 +47,10 @@ class Judge(Protocol):
     async def standing(self) -> RefereeSnapshot | None:
         """How the try stands now; None if that is unknown."""
 
+    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
+        """Judge the ticks seen so far, at once."""
+        ...
+
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Return the report, when the drone has come to rest."""
         ...
@@ -87,6 +91,10 @@ class TruthJudge:
     def see(self, moment: Moment) -> None:
         """Show the tick to the substitute; the referee itself sees the simulation."""
         self._substitute.see(moment)
+
+    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
+        """By the telemetry seen."""
+        return self._substitute.so_far(mission_state, ended)
 
     async def standing(self) -> RefereeSnapshot | None:
         """As of now, or None without a valid answer."""
@@ -164,8 +172,12 @@ class TelemetryJudge:
         """As of the last tick."""
         return self._referee.snapshot()
 
+    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
+        """Judge what was seen."""
+        return self._referee.report(mission_state, ended)
+
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
-        """Judge what was seen so far."""
+        """Judge what was seen."""
         return self._referee.report(mission_state, ended)
 
     async def faults(self) -> FaultFacts:

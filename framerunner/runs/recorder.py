@@ -203,6 +203,10 @@ class RunRecords:
         }
         return result.model_copy(update=wall)
 
+    def keep_unfinished(self, result: FlightResult) -> None:
+        """Keep what the result is to be if this program is ended now."""
+        self.folder.keep_unfinished(self.complete(result))
+
     def finish(self, result: FlightResult, track: Track) -> None:
         """Add the result to the recording."""
         if self.recording is not None:
