@@ -144,6 +144,11 @@ class MavsdkDrone:
         """How many ticks the flight had, and how many of them this app did not get in time."""
         return self._ticks.in_flight, self._ticks.late
 
+    @property
+    def gone(self) -> str:
+        """See `Drone`."""
+        return self._ticks.gone
+
     def vehicle_time_us(self, wall_s: float) -> int | None:
         """Vehicle time at a monotonic wall time, as telemetry shows it; None before any has arrived."""
         return self._feed.time_at_us(wall_s)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import metadata
 from typing import Any
 
@@ -96,7 +97,8 @@ async def fly(
     track = recorder.track(began_us)
     cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
     more = {**fault_fields(await judge.faults(), report, plan.scenario.sensors), **measured()}
-    result = _result(plan, report, outcome, track, cause=cause, judged_by=judge.source, measured=more)
+    words = {"cause": cause, "judged_by": judge.source}
+    result = _result(plan, report, outcome, track, measured={**words, **more, **_bound(plan, report)})
     return FinishedFlight(result, outcome, track, plan.layout)
 
 
@@ -108,6 +110,7 @@ class _Keeper:
     ) -> None:
         self._plan, self._judge, self._recorder, self._keep = plan, judge, recorder, keep
         self._next_us = 0
+        self._words = {"cause": UNFINISHED, "judged_by": "telemetry"}
 
     def see(self, moment: Moment) -> None:
         """Take a tick."""
@@ -118,8 +121,7 @@ class _Keeper:
         end = MissionEnd("aborted", UNFINISHED, state, moment.flight_time_s, 0)
         report = self._judge.so_far(state, UNFINISHED)
         track = self._recorder.track(time_us - round(moment.flight_time_s * 1e6))
-        what = (self._plan, report, end, track)
-        self._keep(_result(*what, cause=UNFINISHED, judged_by="telemetry", measured={}))
+        self._keep(_result(self._plan, report, end, track, measured=self._words))
 
 
 def _result(
@@ -128,28 +130,32 @@ def _result(
     end: MissionEnd,
     track: Track,
     *,
-    cause: str,
-    judged_by: str,
     measured: Mapping[str, Any],
 ) -> FlightResult:
     """The contents of `result.json`, but for wall times."""
-    least_s = bound_s(plan, plan.chart.mission_class)
     return FlightResult(
         scenario=plan.scenario.name,
         mission=plan.chart.name,
         mission_class=plan.chart.mission_class,
         seed=plan.seed,
         **dict(report),
-        cause=cause,
         mission_state=end.mission_state,
         ended=end.ended,
         seconds_in_state=track.seconds_in_state(),
         kept_in_box_s=end.kept_in_box_s,
-        bound_s=least_s,
-        times_bound=round(report.try_time_s / least_s, 3) if least_s and report.completed else None,
-        judged_by=judged_by,
         response=str(plan.response or ""),
-        version=metadata.version("framerunner"),
+        version=_version(),
         **({"lift_m": plan.lift_m} if plan.lift_m else {}),
         **measured,
     )
+
+
+def _bound(plan: FlightPlan, report: RefereeReport) -> dict[str, float | None]:
+    least_s = bound_s(plan, plan.chart.mission_class)
+    times = round(report.try_time_s / least_s, 3) if least_s and report.completed else None
+    return {"bound_s": least_s, "times_bound": times}
+
+
+@cache
+def _version() -> str:
+    return metadata.version("framerunner")

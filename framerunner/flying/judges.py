@@ -86,6 +86,7 @@ class TruthJudge:
         self._earlier_us = earlier_us
         self._api = api
         self._session = session
+        self._latest: Standing | None = None
         self._substitute = TelemetryJudge(plan.new_referee())
 
     def see(self, moment: Moment) -> None:
@@ -99,6 +100,7 @@ class TruthJudge:
     async def standing(self) -> RefereeSnapshot | None:
         """As of now, or None without a valid answer."""
         answer = await ask_referee(self._api, self._session)
+        self._latest = answer or self._latest
         return None if answer is None or self._is_earlier(answer) else answer.snapshot
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
@@ -117,8 +119,8 @@ class TruthJudge:
         return answer.report
 
     async def faults(self) -> FaultFacts:
-        """As the simulator tells; nothing without a valid answer."""
-        answer = await ask_referee(self._api, self._session)
+        """As the simulator tells, or has told last; nothing without a valid answer."""
+        answer = await ask_referee(self._api, self._session) or self._latest
         return FaultFacts() if answer is None else answer.faults
 
     def _is_earlier(self, answer: Standing) -> bool:

@@ -150,8 +150,8 @@ async def _run(
         outcome = await (task if vehicle.sitl is None else vehicle.sitl.guard(task))
     camera.close()
     warn(camera.problem)
-    if settings.unattended and vehicle.sitl is not None and vehicle.sitl.has_failed:
-        raise SettingError(await vehicle.sitl.failed())  # such a flight is not one of an evaluation
+    if settings.unattended and vehicle.sitl is not None and vehicle.sitl.clock.gone:
+        raise SettingError(vehicle.sitl.clock.gone)  # such a flight is not one of an evaluation
     return outcome
 
 

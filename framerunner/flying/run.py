@@ -87,11 +87,13 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
                 else:
                     flown = await fly_in_real_time(plan, settings.real_time, records, monitor_url, guard)
             except BaseException as error:
+                records.stop_keeping()
                 interrupted = isinstance(error, asyncio.CancelledError | KeyboardInterrupt)
                 folder.stopped_before_start = interrupted and records.recorder.latest is None
                 if guard is not None and guard.is_used and folder.end_unfinished(_why(error)):
                     warn(f"the flight ended without its end: {folder.result} has what was flown until then")
                 raise
+            records.stop_keeping()
             result = records.complete(flown.result)
             write_outcome(folder, flown.layout, flown.track, result)
             records.finish(flown.result, flown.track)

@@ -342,9 +342,11 @@ class VehicleClock(Protocol):
 
     Attributes:
         answers_take_time: the vehicle answers requests only while its time goes on, as PX4 does.
+        gone: why the vehicle exists no longer; empty: it does.
     """
 
     answers_take_time: bool
+    gone: str
 
     async def stop(self) -> int:
         """Stop time; returns the time of the last telemetry, microseconds."""
@@ -396,6 +398,11 @@ class TickSource:
     def steps(self) -> bool:
         """Vehicle time can wait, and the vehicle answers only while it goes on; see `SteppedPx4Dialect`."""
         return self._clock is not None and self._clock.answers_take_time
+
+    @property
+    def gone(self) -> str:
+        """Why the vehicle exists no longer; empty: it does, or that cannot be known."""
+        return "" if self._clock is None else self._clock.gone
 
     async def begin(self) -> None:
         """Let vehicle time wait from now on, if it can."""
