@@ -14,7 +14,7 @@ from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
 from geometry.axes import Alignment, Pose
-from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.drone import DroneError, DroneState, ResponsePrior, VelocityCommand
 from offboard.keep_in_box import Box, confine
 from offboard.link.asking import CONFIRM_S, SHOWN_S, Asking, not_shown
 from offboard.link.autopilots import open_dialect
@@ -24,6 +24,7 @@ from offboard.link.connections import check_is_free, new_mavsdk, open_connection
 from offboard.link.dialect import Dialect
 from offboard.link.process_guard import ProcessGuard
 from offboard.link.reported_state import reported_state
+from offboard.link.resets import ResetFeed, followed
 from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, pose_of
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
@@ -45,7 +46,7 @@ class MavsdkDrone:
     """A vehicle over MAVLink. What PX4 and ArduPilot do differently is in their dialects (`offboard/link/`).
 
     Axes: the vehicle is on `start_arena` when it connects; its telemetry there gives the transform between
-    its local axes and the arena's (see `Alignment`), so it must be disarmed then.
+    its local axes and the arena's (see `Alignment`), so it must be disarmed then; see `followed` for resets.
 
     Time: its clock is the time stamp of its ATTITUDE messages, which may run slower or faster than the
     wall's. Wall time is used only to find out whether link and app are alive.
@@ -96,6 +97,7 @@ class MavsdkDrone:
         self._ready_limit_s = ready_limit_s
         self._feed = TelemetryFeed()
         self._ticks = TickSource(self._feed)
+        self._resets = ResetFeed()
         self._sent = VelocityCommand()
         self._system_id = system_id
         self._advice = "give another address"
@@ -179,6 +181,8 @@ class MavsdkDrone:
         steps = self._ticks.steps
         self._dialect = new = await open_dialect(system, self._direct, self._feed, room_m, stepped=steps)
         self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct), new.numbered_modes)
+        if new.response_prior is not ResponsePrior.OWN:
+            self._resets.subscribe(synchronous(self._direct))
         if new.exchange is None:
             await self._requests.wait(new.request_streams())
 
@@ -198,7 +202,8 @@ class MavsdkDrone:
                 ) from None
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        await self._ticks.before_arming(self._telemetry)
+        await self._ticks.before_arming(self._telemetry, self._resets.request)
+        self._resets.take()  # those until now are in the start's pose
         self._alignment = Alignment(self._start_arena, pose_of(self._feed))
         await self._ticks.begin()
 
@@ -439,6 +444,9 @@ class MavsdkDrone:
         """The state at the last tick; it holds those of the ticks that were skipped before it."""
         assert self._alignment is not None, "ready() comes first"
         sample, missed = self._feed.take_samples()
+        for jump in self._resets.take():
+            self._alignment = followed(self._alignment, jump)
+            self._tracker.reset()
         fixed = (self._feed, self._alignment, self._stream)
         return reported_state(sample, *fixed, tuple(reported_state(before, *fixed) for before in missed))
 

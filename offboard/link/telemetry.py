@@ -422,13 +422,18 @@ class TickSource:
         self.exchange = dialect.exchange
         await self.until_done(requests.wait(dialect.request_streams()))
 
-    async def before_arming(self, plugin: Any) -> None:  # noqa: ANN401
-        """Request rates, from MAVSDK's asyncio plugin.
+    async def before_arming(
+        self,
+        plugin: Any,  # noqa: ANN401
+        request_more: Callable[[Any], Awaitable[None]],
+    ) -> None:
+        """Request rates and more, from MAVSDK's asyncio plugin.
 
         With an exchange let time pass to a multiple of `ARM_US`, so all such flights begin at the same time.
         """
         if self.exchange is None:
             await request_rates(self._feed, plugin)
+            await request_more(plugin)
             return
         end_us = _next_multiple_us(self._number, ARM_US)
         while self._number * TICK_US < end_us and await self.next(TICK_LOST_S):
