@@ -162,9 +162,8 @@ def fly(
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
-    api = _simulator_api(simulator, drone)
+    api, autopilot = _simulator_api(simulator, drone), _genuine(genuine, drone=drone, lockstep=lockstep)
     camera = api.video_url if api is not None and camera is None else camera
-    autopilot = _genuine(genuine, drone=drone, lockstep=lockstep)
     _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
     seed, procedure = _checked_seed(seed, monitor, lockstep, autopilot), hardware_of(hardware, drone)
 
@@ -176,13 +175,16 @@ def fly(
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
     delay = delay_of(camera_delay, plan.calibration)
-    with nullcontext(instance or 0) if instance is not None or autopilot is None else _claimed() as number:
-        ends = (drone, camera, api, speed, number, autopilot)
-        flown = None if lockstep else RealTimeSettings(*ends, delay, procedure)
+    with _instance(instance, autopilot) as number:
+        ends = (drone, camera, api, speed, number, autopilot, delay, procedure)
+        flown = None if lockstep else RealTimeSettings(*ends)
         return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
 
 
-def _claimed() -> AbstractContextManager[int]:
+def _instance(given: int | None, autopilot: GenuineAutopilot | None) -> AbstractContextManager[int]:
+    """The instance; with a genuine autopilot one that nobody uses, if none is given."""
+    if given is not None or autopilot is None:
+        return nullcontext(given or 0)
     from framerunner.instances import claimed_instance
 
     return claimed_instance()

@@ -93,13 +93,11 @@ async def fly(
     why = None if outcome.ended == "finished" else outcome.reason
     report = await judge.report(outcome.mission_state, why)
     standing = await judge.standing()
-    began_us = None if standing is None else standing.began_us
-    track = recorder.track(began_us)
-    cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
+    track = recorder.track(began_us := None if standing is None else standing.began_us)
     more = {**fault_fields(await judge.faults(), report, plan.scenario.sensors), **measured()}
-    words = {"cause": cause, "judged_by": judge.source}
-    result = _result(plan, report, outcome, track, measured={**words, **more, **_bound(plan, report)})
-    return FinishedFlight(result, outcome, track, plan.layout)
+    cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
+    more |= {"cause": cause, "judged_by": judge.source, **_bound(plan, report)}
+    return FinishedFlight(_result(plan, report, outcome, track, measured=more), outcome, track, plan.layout)
 
 
 class _Keeper:

@@ -320,7 +320,7 @@ async def test_it_flies_with_the_acknowledgement_of_arming_whatever_older_heartb
 
 
 async def test_an_arming_that_no_heartbeat_shows_ends_the_flight_after_the_limit(vehicle, monkeypatch):
-    monkeypatch.setattr("offboard.link.asking.CONFIRM_S", 1.2)
+    monkeypatch.setattr("offboard.mavsdk_drone.CONFIRM_S", 1.2)
     async with armed_by_acknowledgement(vehicle) as (_, ticks):
         before_s = vehicle.time_s
         assert all(state.armed for state in await take(ticks, 10))
