@@ -174,10 +174,9 @@ def fly(
     chosen = _scenario(scenario, sensors, fault, hardware, autopilot, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
-    delay = delay_of(camera_delay, plan.calibration)
     with _instance(instance, autopilot) as number:
-        ends = (drone, camera, api, speed, number, autopilot, delay, procedure)
-        flown = None if lockstep else RealTimeSettings(*ends)
+        ends = (drone, camera, api, speed, number, autopilot, delay_of(camera_delay, plan.calibration))
+        flown = None if lockstep else RealTimeSettings(*ends, procedure)
         return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
 
 
