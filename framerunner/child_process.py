@@ -108,7 +108,8 @@ class ChildProcess:
     async def guard(self, work: asyncio.Task[T]) -> T:
         """Wait for some work, but not longer than the child lives.
 
-        When this is cancelled, so is the work; if the work still ends with a result, that is returned.
+        When this is cancelled or the child ends, so is the work; if it still ends with a result, that is
+        returned.
 
         Raises:
             SettingError: the child could not start or ended; its last line is the reason.
@@ -121,7 +122,8 @@ class ChildProcess:
                 await asyncio.wait({work}, timeout=_GRACE_S)
                 work.cancel()  # what it still asks of the child is not answered
                 await asyncio.gather(work, return_exceptions=True)
-                raise SettingError(watching.result())
+                if work.cancelled() or work.exception() is not None:
+                    raise SettingError(watching.result())
             return work.result()
         finally:
             watching.cancel()

@@ -99,8 +99,9 @@ def main() -> None:
         sys.stdout.flush()
     except OSError:
         _discard_output()  # the command's own error is reported already
-    for number in (signal.SIGALRM, signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_DFL)  # an exception at shutdown would be a traceback
+    for number in (signal.SIGALRM, signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)  # an exception at shutdown would be a traceback
     sys.exit(code)
 
 
@@ -165,13 +166,15 @@ def _discard_output() -> None:
 
 
 def _handle_signals() -> None:
-    """Let SIGTERM do what Ctrl-C does, also where Ctrl-C is ignored."""
+    """Let SIGTERM and a closed terminal do what Ctrl-C does, also where Ctrl-C is ignored."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         # Started in the background by a script. Ctrl-C keeps having no effect, but asyncio ends its tasks in
         # order only where SIGINT has Python's own handler, which `_terminate` calls.
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, _terminate)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
+        signal.signal(signal.SIGHUP, _terminate)
     signal.signal(signal.SIGALRM, _terminate)
     report = sys.unraisablehook
 

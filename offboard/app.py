@@ -413,6 +413,9 @@ class _Flight:
 
     async def _stop(self, ended: Literal["timed out", "aborted"], reason: str) -> MissionEnd:
         """Stop commanding, and hold or land."""
+        if gone := self._drone.gone:
+            logger.warning("the flight ends: %s", gone)
+            return self._outcome("aborted", gone)
         if self._motors_requested:
             self._flying = False
             operator = self._operator

@@ -86,6 +86,11 @@ class Drone(Protocol):
     back or `refuse` lets it hold. An adapter whose vehicle no pilot can take never shows this.
     """
 
+    @property
+    def gone(self) -> str:
+        """Why the vehicle exists no longer, so that nothing can be requested of it; empty: it does."""
+        ...
+
     async def connect(self) -> None:
         """Find the vehicle; `DroneError` after a time limit."""
 

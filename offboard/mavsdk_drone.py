@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from math import inf
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from mavsdk.asyncio import Mavsdk, MavsdkError
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
 from geometry.axes import Alignment, Pose
-from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.drone import DroneError, DroneState, ResponsePrior, VelocityCommand
 from offboard.keep_in_box import Box, confine
+from offboard.link.asking import CONFIRM_S, SHOWN_S, Asking, not_shown
 from offboard.link.autopilots import open_dialect
 from offboard.link.commands import PendingRequests, synchronous
 from offboard.link.companion import Companion
 from offboard.link.connections import check_is_free, new_mavsdk, open_connections
 from offboard.link.dialect import Dialect
+from offboard.link.process_guard import ProcessGuard
 from offboard.link.reported_state import reported_state
+from offboard.link.resets import ResetFeed, followed
 from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, pose_of
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
@@ -33,9 +36,7 @@ from wire.transports.urls import parse_url
 STAND_STILL_S = 0.5  # wall time without a tick after which a velocity of zero is sent
 LINK_LOST_S = 1.0  # wall time without telemetry
 HEARTBEAT_LOST_S = 6.0  # wall time; there is one a second, and a lossy link may lose three in a row
-CONFIRM_S = 6.0  # until one of the heartbeats, one a second, shows what was requested
 HOLD_ATTEMPTS = 3
-HOLD_SHOWN_S = 1.5  # wall time until a heartbeat, one a second, shows the new mode
 LAND_LIMIT_S = 120.0  # vehicle time
 STREAM_BEFORE_OFFBOARD_S = 0.3  # PX4 enters offboard only with fresh setpoints
 FIRST_MODE_S = 8.0  # wall time for PX4's checks to pass in the mode it starts in
@@ -45,7 +46,7 @@ class MavsdkDrone:
     """A vehicle over MAVLink. What PX4 and ArduPilot do differently is in their dialects (`offboard/link/`).
 
     Axes: the vehicle is on `start_arena` when it connects; its telemetry there gives the transform between
-    its local axes and the arena's (see `Alignment`), so it must be disarmed then.
+    its local axes and the arena's (see `Alignment`), so it must be disarmed then; see `followed` for resets.
 
     Time: its clock is the time stamp of its ATTITUDE messages, which may run slower or faster than the
     wall's. Wall time is used only to find out whether link and app are alive.
@@ -61,7 +62,7 @@ class MavsdkDrone:
         start_arena: where the drone is: x, y, z (metres) and yaw (radians), arena axes.
         connect_limit_s: wall time to find the vehicle.
         ready_limit_s: wall time until it can be armed; None: the autopilot's usual one.
-        hang_report: a real file for the stack of a hung app; by default standard error.
+        guard: ends a hung app; closed here only if it was not given.
         box: commands that were corrected here do not leave it; None: there is none.
         corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
         caps: no command exceeds them, and none leads out of the box; None: there are none.
@@ -82,7 +83,7 @@ class MavsdkDrone:
         start_arena: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
         connect_limit_s: float = 10.0,
         ready_limit_s: float | None = None,
-        hang_report: TextIO | None = None,
+        guard: ProcessGuard | None = None,
         box: Box | None = None,
         corrects: bool = True,
         caps: Caps | None = None,
@@ -96,6 +97,7 @@ class MavsdkDrone:
         self._ready_limit_s = ready_limit_s
         self._feed = TelemetryFeed()
         self._ticks = TickSource(self._feed)
+        self._resets = ResetFeed()
         self._sent = VelocityCommand()
         self._system_id = system_id
         self._advice = "give another address"
@@ -105,6 +107,7 @@ class MavsdkDrone:
         self._telemetry: Any = None
         self._direct: Any = None  # kept, because MAVSDK ends the subscriptions of a plugin that is deleted
         self._requests = PendingRequests()
+        self._asking = Asking(self._feed, self._ticks, self._requests)
         self._tracker = CommandTracker()
         self._corrects = corrects
         self._latest: DroneState | None = None
@@ -113,7 +116,8 @@ class MavsdkDrone:
         self._tlog_path: Path | None = None
         self._recorder: TlogRecorder | None = None
         self._companion: Companion | None = None
-        self._watchdog = Watchdog(self._stand_still, self._stop_from_watchdog, hang_report)
+        self._guard, self._owns_guard = guard or ProcessGuard(), guard is None
+        self._watchdog = Watchdog(self._stand_still, self._stop_from_watchdog, self._guard)
         self._when_hung, self._asked_when_hung = when_hung, "stopped sending"
         self._shared_with: list[str] = []
         self._box = box
@@ -141,6 +145,11 @@ class MavsdkDrone:
     def ticks_in_flight(self) -> tuple[int, int]:
         """How many ticks the flight had, and how many of them this app did not get in time."""
         return self._ticks.in_flight, self._ticks.late
+
+    @property
+    def gone(self) -> str:
+        """See `Drone`."""
+        return self._ticks.gone
 
     def vehicle_time_us(self, wall_s: float) -> int | None:
         """Vehicle time at a monotonic wall time, as telemetry shows it; None before any has arrived."""
@@ -172,6 +181,8 @@ class MavsdkDrone:
         steps = self._ticks.steps
         self._dialect = new = await open_dialect(system, self._direct, self._feed, room_m, stepped=steps)
         self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct), new.numbered_modes)
+        if new.response_prior is not ResponsePrior.OWN:
+            self._resets.subscribe(synchronous(self._direct))
         if new.exchange is None:
             await self._requests.wait(new.request_streams())
 
@@ -191,7 +202,8 @@ class MavsdkDrone:
                 ) from None
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        await self._ticks.before_arming(self._telemetry)
+        await self._ticks.before_arming(self._telemetry, self._resets.request)
+        self._resets.take()  # those until now are in the start's pose
         self._alignment = Alignment(self._start_arena, pose_of(self._feed))
         await self._ticks.begin()
 
@@ -207,14 +219,14 @@ class MavsdkDrone:
                 while not self._in_offboard and not self._feed.armed:
                     with contextlib.suppress(MavsdkError):  # refused without a position
                         await self._ticks.until_done(self._requests.wait(self._stream.request_offboard()))
-                    await self._becomes(lambda: self._in_offboard, HOLD_SHOWN_S)
+                    await self._asking.becomes(lambda: self._in_offboard, SHOWN_S)
         with contextlib.suppress(TimeoutError):  # with an exchange its checks have had their time
             first_s = 0.0 if self._stream.exchange else min(FIRST_MODE_S, limit_s / 2)
-            await self._until(lambda: not self._feed.missing(), first_s)
+            await self._asking.until(lambda: not self._feed.missing(), first_s)
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
-            await self._request("offboard mode", self._stream.request_offboard())
-        await self._until(lambda: not self._feed.missing(), limit_s)
+            await self._asking.request("offboard mode", self._stream.request_offboard())
+        await self._asking.until(lambda: not self._feed.missing(), limit_s)
 
     async def ticks(self) -> AsyncIterator[DroneState]:
         """States at 20 Hz of vehicle time; ticks that were not waited for are skipped."""
@@ -240,9 +252,11 @@ class MavsdkDrone:
         self._watchdog.start()
         try:
             offboard, request = self._stream.modes.offboard, self._stream.request_offboard()
-            await self._request(f"{offboard.lower()} mode", request, lambda: self._feed.mode == offboard)
+            await self._asking.request(
+                f"{offboard.lower()} mode", request, lambda: self._feed.mode == offboard
+            )
             armed = (lambda: bool(self._feed.armed)) if confirmed else None
-            await self._request("arming", self._stream.arm(), armed)
+            await self._asking.request("arming", self._stream.arm(), armed)
         except BaseException:
             self._watchdog.stop()
             await self._hold_on_ground()
@@ -270,7 +284,9 @@ class MavsdkDrone:
         """Stop the motors at once (forced disarm), in the air too."""
         self._commanding = False
         self._feed.arming.forget()
-        await self._request("stopping the motors", self._stream.kill(), lambda: self._feed.armed is False)
+        await self._asking.request(
+            "stopping the motors", self._stream.kill(), lambda: self._feed.armed is False
+        )
         self._watchdog.stop()
         with contextlib.suppress(MavsdkError):
             await self._ticks.until_done(self._requests.wait(self._stream.request_hold()))
@@ -284,13 +300,13 @@ class MavsdkDrone:
 
         self._commanding = False
         request, land = self._stream.land(), self._stream.modes.land
-        await self._request("landing", request, lambda: feed.mode == land or not armed())
+        await self._asking.request("landing", request, lambda: feed.mode == land or not armed())
         self._watchdog.stop()
         limit_us = feed.time_us + int(LAND_LIMIT_S * 1e6)
         while armed():
             self._check_alive(await self._ticks.next(LINK_LOST_S))
             # One heartbeat has mode and arming, but MAVSDK passes them on one after the other.
-            if feed.mode != land and not await self._becomes(lambda: not armed(), 0.5):
+            if feed.mode != land and not await self._asking.becomes(lambda: not armed(), 0.5):
                 raise DroneError(f"landing was interrupted: mode {feed.mode}{feed.recent_texts()}")
             if feed.time_us > limit_us:
                 raise DroneError(f"still not landed after {LAND_LIMIT_S:g} s{feed.recent_texts()}")
@@ -302,6 +318,7 @@ class MavsdkDrone:
         if self._dialect is None:
             await self.hold()
             return
+        await self._know_mode()
         modes, mode = self._dialect.modes, self._feed.mode
         if mode not in (modes.offboard, modes.land) and not (demanded and mode not in modes.pilot):
             await self.hold()
@@ -318,6 +335,7 @@ class MavsdkDrone:
         self._watchdog.stop()
         if self._dialect is None:
             return
+        await self._know_mode()
         modes = self._dialect.modes
         if self._in_offboard:
             await self._leave_offboard()
@@ -325,6 +343,16 @@ class MavsdkDrone:
                 raise DroneError(f"the vehicle is in {mode} instead{self._feed.recent_texts()}")
         else:
             await asyncio.to_thread(self._stream.end)
+
+    async def _know_mode(self) -> None:
+        """Wait for a new heartbeat after a stop of this process or a silence: others may have the vehicle."""
+        watchdog, feed = self._watchdog, self._feed
+        left_s = SHOWN_S if watchdog.stood_still else SHOWN_S - feed.heard_for_s()
+        if left_s > 0.0:
+            await self._asking.becomes(lambda: False, left_s)
+        if watchdog.stood_still and feed.heartbeat_age_s() > SHOWN_S:
+            raise DroneError("the vehicle is not heard, so nothing is requested of it; its failsafe acts")
+        watchdog.stood_still = False
 
     async def refuse(self) -> None:
         """Let the vehicle that was given back hold, and wait until it is given back again."""
@@ -341,10 +369,10 @@ class MavsdkDrone:
         for _ in range(HOLD_ATTEMPTS):
             refusal = None
             try:
-                await self._request("hold", stream.request_hold())
+                await self._asking.request("hold", stream.request_hold())
             except DroneError as error:
                 refusal = error
-            if await self._becomes(lambda: not self._in_offboard, HOLD_SHOWN_S):
+            if await self._asking.becomes(lambda: not self._in_offboard, SHOWN_S):
                 return
         raise refusal or DroneError(
             f"requested {HOLD_ATTEMPTS} times and acknowledged, but telemetry still shows offboard; "
@@ -386,6 +414,8 @@ class MavsdkDrone:
         if self._mavsdk is not None:
             await asyncio.to_thread(self._mavsdk.destroy)
             self._mavsdk = None
+        if self._owns_guard:
+            self._guard.close()
         if self._recorder is not None:
             self.recording_problem = self._recorder.problem
             self._recorder.close()
@@ -414,12 +444,17 @@ class MavsdkDrone:
         """The state at the last tick; it holds those of the ticks that were skipped before it."""
         assert self._alignment is not None, "ready() comes first"
         sample, missed = self._feed.take_samples()
+        for jump in self._resets.take():
+            self._alignment = followed(self._alignment, jump)
+            self._tracker.reset()
         fixed = (self._feed, self._alignment, self._stream)
         return reported_state(sample, *fixed, tuple(reported_state(before, *fixed) for before in missed))
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s
         if hung_s and self._commanding:  # afterwards the vehicle is only watched
+            if self._watchdog.stood_still:
+                raise DroneError(f"this app was stopped for {hung_s:.1f} s; it commands no more")
             did = self._asked_when_hung
             raise DroneError(f"this app hung for more than {hung_s:.1f} s; its watchdog {did}")
         if self._ticks.waits:
@@ -438,7 +473,7 @@ class MavsdkDrone:
         if not all(one.is_finite for one in (*state.missed, state)):
             raise DroneError("the vehicle's position, velocity or attitude is not finite")
         if self._commanding and self._feed.arming.is_overdue(state.time_us):
-            raise DroneError(self._feed.not_shown("arming", CONFIRM_S))
+            raise DroneError(not_shown(self._feed, "arming"))
         if not self._commanding or self._pilot_has_it:
             return
         leaves = not state.offboard and state.mode not in self._stream.modes.pilot
@@ -449,50 +484,14 @@ class MavsdkDrone:
             raise DroneError(f"the pilot or a failsafe took over: mode {state.mode}{texts}")
         self._pilot_has_it = not state.offboard
 
-    async def _request(
-        self, what: str, request: Awaitable[object], shown: Callable[[], bool] | None = None
-    ) -> None:
-        """Wait for the answer and, with `shown`, until telemetry shows the effect.
-
-        Acknowledgements are not trusted: PX4 sends two for a mode, the first one always "accepted"; and a
-        link may lose all answers to a request that had its effect.
-        """
-        feed = self._feed
-        try:
-            await self._ticks.until_done(self._requests.wait(request))
-        except MavsdkError as error:
-            result = getattr(getattr(error, "result", None), "name", str(error))
-            if result == "TIMEOUT" and shown is not None and await self._becomes(shown, HOLD_SHOWN_S):
-                return
-            raise DroneError(f"{what} was refused: {result}{feed.recent_texts()}") from None
-        if shown is None:
-            return
-        try:
-            await self._until(shown, CONFIRM_S)
-        except TimeoutError:
-            raise DroneError(feed.not_shown(what, CONFIRM_S)) from None
-
-    async def _becomes(self, condition: Callable[[], bool], limit_s: float) -> bool:
-        with contextlib.suppress(TimeoutError):
-            await self._until(condition, limit_s)
-        return condition()
-
-    async def _until(self, condition: Callable[[], bool], limit_s: float) -> None:
-        """Wait for a condition; the limit is vehicle time if that waits for the app, else wall time."""
-        waits, limit_us = self._ticks.waits, self._ticks.time_us + round(limit_s * 1e6)
-        async with asyncio.timeout(None if waits else limit_s):
-            while not condition():
-                if waits and self._ticks.time_us > limit_us:
-                    raise TimeoutError
-                await self._ticks.next(0.05)
-
     def _stop_from_watchdog(self) -> None:
         """On the watchdog's thread: end the native stream and, in offboard, request hold or landing.
 
-        A vehicle that a pilot has must not be given back to a hung app, so the stream ends permanently.
+        A vehicle that a pilot has must not be given back to a hung app, so the stream ends permanently. The
+        mode that is known is old when the whole process stood still: then nothing is requested here.
         """
         with contextlib.suppress(Exception):  # without setpoints the vehicle's failsafe acts
-            if not self._in_offboard:
+            if self._watchdog.stood_still or not self._in_offboard:
                 self._stream.end()
                 return
             lands = self._when_hung == "land"

@@ -232,7 +232,8 @@ def _genuine_use(
         raise SettingError(
             f"--backend {backend}: {title} is started on this machine; leave it out with {option}"
         )
-    from framerunner.evaluation.genuine_flight import INSTANCES, GenuineUse
+    from framerunner.evaluation.genuine_flight import GenuineUse
+    from framerunner.instances import INSTANCES
 
     check_range("--speed", speed, 0.01, _MAX_GENUINE_SPEED)
     check_range("--jobs", jobs, 1, INSTANCES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -56,6 +57,13 @@ _Simulator = Annotated[
     Parameter(
         help="with --drone: http://HOST:PORT of the simulator that flies it: its referee judges, and without "
         "--camera its camera is used. By default that of an http --camera, if there is one"
+    ),
+]
+_Instance = Annotated[
+    WholeNumber | None,
+    Parameter(
+        help="of the simulated drone: shifts its ports, 0 to 9; by default 0, with --px4 or --ardupilot the "
+        "first that is free"
     ),
 ]
 _Lockstep = Annotated[
@@ -121,7 +129,7 @@ def fly(
     calibration: _Calibration = None,
     simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: seconds a second, 0.01 to 100")] = 1.0,
-    instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
+    instance: _Instance = None,
     genuine: GenuineOptions = _OWN,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
@@ -154,9 +162,8 @@ def fly(
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
-    api = _simulator_api(simulator, drone)
+    api, autopilot = _simulator_api(simulator, drone), _genuine(genuine, drone=drone, lockstep=lockstep)
     camera = api.video_url if api is not None and camera is None else camera
-    autopilot = _genuine(genuine, drone=drone, lockstep=lockstep)
     _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
     seed, procedure = _checked_seed(seed, monitor, lockstep, autopilot), hardware_of(hardware, drone)
 
@@ -167,9 +174,19 @@ def fly(
     chosen = _scenario(scenario, sensors, fault, hardware, autopilot, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
-    ends, delay = (drone, camera, api, speed, instance, autopilot), delay_of(camera_delay, plan.calibration)
-    flown = None if lockstep else RealTimeSettings(*ends, delay, procedure)
-    return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
+    with _instance(instance, autopilot) as number:
+        ends = (drone, camera, api, speed, number, autopilot, delay_of(camera_delay, plan.calibration))
+        flown = None if lockstep else RealTimeSettings(*ends, procedure)
+        return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
+
+
+def _instance(given: int | None, autopilot: GenuineAutopilot | None) -> AbstractContextManager[int]:
+    """The instance; with a genuine autopilot one that nobody uses, if none is given."""
+    if given is not None or autopilot is None:
+        return nullcontext(given or 0)
+    from framerunner.instances import claimed_instance
+
+    return claimed_instance()
 
 
 def _run(settings: FlightSettings, *, lifeline: bool) -> int:
@@ -309,7 +326,7 @@ def _check(
     camera: str | None,
     delay_s: float | None,
     speed: float,
-    instance: int,
+    instance: int | None,
     *,
     lockstep: bool,
 ) -> None:
@@ -319,9 +336,9 @@ def _check(
         raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")
     if drone is None and camera is not None:
         raise SettingError("--drone: a camera given by --camera needs the URL of its drone too")
-    if drone is not None and (speed != 1.0 or instance != 0):
+    if drone is not None and (speed != 1.0 or instance):
         raise SettingError("--speed and --instance are for the simulated drone; leave them out with --drone")
-    unused = [("--drone", drone is not None), ("--speed", speed != 1.0), ("--instance", instance != 0)]
+    unused = [("--drone", drone is not None), ("--speed", speed != 1.0), ("--instance", bool(instance))]
     given = [option for option, is_given in unused if is_given]
     if lockstep and given:
         raise SettingError(

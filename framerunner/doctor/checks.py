@@ -241,7 +241,9 @@ def _streams(record: Record) -> Findings:
 def _link(record: Record) -> Findings:
     lost = record.packets.lost_share
     words = f"{lost:.1%} of {record.packets.passed} packets lost"
-    if lost > LOST_SHARE:
+    if record.silence:
+        yield _missing("link", f"the vehicle was {record.silence}: all this is old", "is it still running?")
+    elif lost > LOST_SHARE:
         yield _missing("link", words, "move nearer, or use a better link")
     else:
         yield _good("link", words)

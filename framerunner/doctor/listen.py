@@ -80,6 +80,7 @@ _ARDUPILOT_STREAMS_HZ = {  # it sends none by itself; these are requested for th
     "EKF_STATUS_REPORT": (EKF_STATUS_REPORT_ID, 2.0),
 }
 TEXTS_KEPT = 12
+SILENT_S = 2.5  # wall time; every vehicle sends a heartbeat each second, and a link loses one
 _AUTOPILOTS = {mavlink.MAV_AUTOPILOT_PX4: "PX4", mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ArduPilot"}
 _STATES = (
     *("not ready", "booting", "calibrating", "standby", "active"),
@@ -175,6 +176,8 @@ class Record:
     """All that was received on one link about one vehicle."""
 
     system_id: int | None = None  # of the vehicle; None before its first heartbeat
+    heard_s: float = 0.0  # wall time of its autopilot's latest packet
+    listened_s: float = 0.0  # wall time until which it was listened to
     latest: dict[str, Message] = field(default_factory=dict)  # by name, from its autopilot
     counts: dict[str, int] = field(default_factory=dict)  # messages received, by name
     times_s: dict[str, tuple[float, float]] = field(default_factory=dict)  # wall time, first and latest
@@ -199,6 +202,7 @@ class Record:
             self._note_sender(message)
         if message.get_srcSystem() != self.system_id or message.get_srcComponent() != AUTOPILOT_COMPONENT_ID:
             return
+        self.heard_s = now_s
         self.packets.take(message.get_seq())
         self.senders.take(message)
         self.octets += len(message.get_msgbuf())
@@ -220,6 +224,12 @@ class Record:
                 self.parameters[message.param_id] = value
         elif kind == "AVAILABLE_MODES" and not message.mode_name.startswith("("):  # "(": PX4 does not use it
             self.modes[message.custom_mode] = message.mode_name
+
+    @property
+    def silence(self) -> str:
+        """That the vehicle is heard no longer, in words, so that all it has told is old; empty: it is."""
+        silent_s = self.listened_s - self.heard_s
+        return f"not heard for {silent_s:.0f} s" if self.system_id and silent_s > SILENT_S else ""
 
     def rate_hz(self, kind: str) -> float:
         """Mean rate of a message from the first to the latest; 0 if fewer than two were received."""
@@ -355,6 +365,7 @@ def listen(link: VehicleLink, record: Record, seconds: float, progress: Progress
             elif now_s - requested_s >= _ASK_AGAIN_S:
                 requests = open_requests(record)
         _receive(link, record)
+    record.listened_s = time.monotonic()
     record.senders.addresses = link.addresses(_system_id(record), AUTOPILOT_COMPONENT_ID)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import metadata
 from typing import Any
 
@@ -15,6 +16,7 @@ from framerunner.flying.cause import CauseWatch, Flown
 from framerunner.flying.envelopes import bound_s
 from framerunner.flying.judges import Judge
 from framerunner.flying.plan import FlightPlan
+from framerunner.runs.run_folder import UNFINISHED
 from framerunner.runs.track import Track, TrackRecorder
 from offboard.app import MissionEnd, Moment, Observer, TickHook, fly_mission
 from offboard.drone import Drone
@@ -24,6 +26,7 @@ from scenarios.faults.outcome import fault_fields
 from scenarios.models import Scenario
 from scenarios.result import FlightResult, RefereeReport
 
+KEEP_US = 1_000_000  # vehicle time
 Run = Callable[[Coroutine[Any, Any, MissionEnd]], Awaitable[MissionEnd]]
 
 
@@ -48,6 +51,7 @@ async def fly(
     measured: Callable[[], Mapping[str, Any]] = dict,
     before_tick: TickHook | None = None,
     safety: SafetyRules = SIMULATED,
+    keep: Callable[[FlightResult], None] | None = None,
 ) -> FinishedFlight:
     """Fly a plan's mission from connecting to the verdict.
 
@@ -61,14 +65,15 @@ async def fly(
         measured: called at the end; further fields of the result, such as `timing`.
         before_tick: awaited before each tick of the mission; it may wait only in lockstep.
         safety: the operator, and what the drone does when the flight is aborted.
+        keep: called once a second with the result that the flight has if this program is ended now.
 
     Raises:
-        DroneError: the drone cannot be reached or made ready.
-        CameraLostError: the camera gives no image at the start.
+        DroneError, CameraLostError: the drone cannot be made ready, or there is no image at the start.
         ValueError: the plan has no mission.
     """
     recorder, causes = TrackRecorder(), CauseWatch()
-    watching = (recorder.see, causes.see, *observers, judge.see)
+    kept = () if keep is None else (_Keeper(plan, judge, recorder, keep).see,)
+    watching = (recorder.see, causes.see, *observers, judge.see, *kept)
 
     def observe(moment: Moment) -> None:
         for see in watching:
@@ -88,14 +93,33 @@ async def fly(
     why = None if outcome.ended == "finished" else outcome.reason
     report = await judge.report(outcome.mission_state, why)
     standing = await judge.standing()
-    began_us = None if standing is None else standing.began_us
-    track = recorder.track(began_us)
+    track = recorder.track(began_us := None if standing is None else standing.began_us)
+    more = {**fault_fields(await judge.faults(), report, plan.scenario.sensors), **measured()}
     cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
-    failed = fault_fields(await judge.faults(), report, plan.scenario.sensors)
-    result = _result(
-        plan, report, outcome, track, cause=cause, judged_by=judge.source, measured={**failed, **measured()}
-    )
-    return FinishedFlight(result, outcome, track, plan.layout)
+    more |= {"cause": cause, "judged_by": judge.source, **_bound(plan, report)}
+    return FinishedFlight(_result(plan, report, outcome, track, measured=more), outcome, track, plan.layout)
+
+
+class _Keeper:
+    """Gives away, once a second of vehicle time, the result of a flight that is not finished."""
+
+    def __init__(
+        self, plan: FlightPlan, judge: Judge, recorder: TrackRecorder, keep: Callable[[FlightResult], None]
+    ) -> None:
+        self._plan, self._judge, self._recorder, self._keep = plan, judge, recorder, keep
+        self._next_us = 0
+        self._words = {"cause": UNFINISHED, "judged_by": "telemetry"}
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        time_us, state = moment.state.time_us, moment.mission_state
+        if time_us < self._next_us:
+            return
+        self._next_us = time_us + KEEP_US
+        end = MissionEnd("aborted", UNFINISHED, state, moment.flight_time_s, 0)
+        report = self._judge.so_far(state, UNFINISHED)
+        track = self._recorder.track(time_us - round(moment.flight_time_s * 1e6))
+        self._keep(_result(self._plan, report, end, track, measured=self._words))
 
 
 def _result(
@@ -104,28 +128,32 @@ def _result(
     end: MissionEnd,
     track: Track,
     *,
-    cause: str,
-    judged_by: str,
     measured: Mapping[str, Any],
 ) -> FlightResult:
     """The contents of `result.json`, but for wall times."""
-    least_s = bound_s(plan, plan.chart.mission_class)
     return FlightResult(
         scenario=plan.scenario.name,
         mission=plan.chart.name,
         mission_class=plan.chart.mission_class,
         seed=plan.seed,
         **dict(report),
-        cause=cause,
         mission_state=end.mission_state,
         ended=end.ended,
         seconds_in_state=track.seconds_in_state(),
         kept_in_box_s=end.kept_in_box_s,
-        bound_s=least_s,
-        times_bound=round(report.try_time_s / least_s, 3) if least_s and report.completed else None,
-        judged_by=judged_by,
         response=str(plan.response or ""),
-        version=metadata.version("framerunner"),
+        version=_version(),
         **({"lift_m": plan.lift_m} if plan.lift_m else {}),
         **measured,
     )
+
+
+def _bound(plan: FlightPlan, report: RefereeReport) -> dict[str, float | None]:
+    least_s = bound_s(plan, plan.chart.mission_class)
+    times = round(report.try_time_s / least_s, 3) if least_s and report.completed else None
+    return {"bound_s": least_s, "times_bound": times}
+
+
+@cache
+def _version() -> str:
+    return metadata.version("framerunner")

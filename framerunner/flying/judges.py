@@ -47,6 +47,10 @@ class Judge(Protocol):
     async def standing(self) -> RefereeSnapshot | None:
         """How the try stands now; None if that is unknown."""
 
+    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
+        """Judge the ticks seen so far, at once."""
+        ...
+
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Return the report, when the drone has come to rest."""
         ...
@@ -82,15 +86,21 @@ class TruthJudge:
         self._earlier_us = earlier_us
         self._api = api
         self._session = session
+        self._latest: Standing | None = None
         self._substitute = TelemetryJudge(plan.new_referee())
 
     def see(self, moment: Moment) -> None:
         """Show the tick to the substitute; the referee itself sees the simulation."""
         self._substitute.see(moment)
 
+    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
+        """By the telemetry seen."""
+        return self._substitute.so_far(mission_state, ended)
+
     async def standing(self) -> RefereeSnapshot | None:
         """As of now, or None without a valid answer."""
         answer = await ask_referee(self._api, self._session)
+        self._latest = answer or self._latest
         return None if answer is None or self._is_earlier(answer) else answer.snapshot
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
@@ -109,8 +119,8 @@ class TruthJudge:
         return answer.report
 
     async def faults(self) -> FaultFacts:
-        """As the simulator tells; nothing without a valid answer."""
-        answer = await ask_referee(self._api, self._session)
+        """As the simulator tells, or has told last; nothing without a valid answer."""
+        answer = await ask_referee(self._api, self._session) or self._latest
         return FaultFacts() if answer is None else answer.faults
 
     def _is_earlier(self, answer: Standing) -> bool:
@@ -164,8 +174,12 @@ class TelemetryJudge:
         """As of the last tick."""
         return self._referee.snapshot()
 
+    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
+        """Judge what was seen."""
+        return self._referee.report(mission_state, ended)
+
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
-        """Judge what was seen so far."""
+        """Judge what was seen."""
         return self._referee.report(mission_state, ended)
 
     async def faults(self) -> FaultFacts:

@@ -126,6 +126,10 @@ class _SimulationJudge:
     async def standing(self) -> RefereeSnapshot:
         return self._vehicle.simulation.referee.snapshot()
 
+    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
+        """By the states so far."""
+        return self._vehicle.simulation.referee.report(mission_state, ended)
+
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         self._vehicle.drone.settle()
         return self._vehicle.simulation.referee.report(mission_state, ended)

@@ -71,6 +71,8 @@ class LockstepDrone:
         caps: applied to each command; None: there are none.
     """
 
+    gone = ""
+
     def __init__(
         self,
         simulation: Simulation,

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine
-from contextlib import AsyncExitStack, nullcontext
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from errors import SettingError
 from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.timing import flight_timing
-from framerunner.runs.hang_notice import hang_notice
 from framerunner.runs.recorder import RecordingCamera, RunRecords
-from framerunner.runs.run_folder import warn
+from framerunner.runs.run_folder import RunFolder, warn
 from offboard.app import MissionEnd
 from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.result import Timing
@@ -29,6 +30,7 @@ if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow t
     from framerunner.flying.mission_reporter import MissionReporter
     from framerunner.flying.simulator_process import GenuineAutopilot, SitlProcess
     from framerunner.preflight.settings import HardwareSettings
+    from offboard.link.process_guard import ProcessGuard
     from offboard.mavsdk_drone import MavsdkDrone
     from offboard.perception import CameraPerception
 
@@ -76,7 +78,11 @@ class _Endpoints:
 
 
 async def fly_in_real_time(
-    plan: FlightPlan, settings: RealTimeSettings, records: RunRecords, monitor_url: str | None
+    plan: FlightPlan,
+    settings: RealTimeSettings,
+    records: RunRecords,
+    monitor_url: str | None,
+    guard: ProcessGuard | None = None,
 ) -> FinishedFlight:
     """Fly a plan over MAVLink, with the display in the terminal and the records of all ticks and images.
 
@@ -85,6 +91,7 @@ async def fly_in_real_time(
         settings: what is flown.
         records: of the flight.
         monitor_url: where the monitor listens for the drone; None: there is none.
+        guard: ends this program when it hangs in flight; None: one that says nothing.
 
     Raises:
         DroneError: the drone cannot be reached or made ready.
@@ -106,33 +113,46 @@ async def fly_in_real_time(
         stack.push_async_callback(companion.close)
         source = records.folder.mission.read_text(encoding="utf-8")
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
-        drone = _drone(plan, vehicle, records, stack, safety, settings=settings, system_id=system_id)
+        drone = _drone(
+            plan, vehicle, records, stack, safety, settings=settings, system_id=system_id, guard=guard
+        )
         drone.use_companion(companion)
         camera = await _camera(plan, vehicle, records, stack, reporter, drone=drone, settings=settings)
-        perception = _perception(plan, vehicle, judge, camera)
-        perception.assume_times(drone.vehicle_time_us, settings.camera_delay.age_s)
+        perception = _perception(plan, vehicle, judge, camera, drone=drone, delay=settings.camera_delay)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
-        if clock is not None:
-            clock.wait_for_images_of(perception)
         display = FlightDisplay(plan.title, plan.limit_s, records.recorder, judge)
-
-        async def run(flight: Coroutine[Any, Any, MissionEnd]) -> MissionEnd:
-            async with nullcontext() if settings.unattended else display:
-                task = asyncio.create_task(flight)
-                outcome = await (task if vehicle.sitl is None else vehicle.sitl.guard(task))
-            camera.close()
-            warn(camera.problem)
-            return outcome
+        shown = nullcontext() if settings.unattended else display
 
         def timing() -> dict[str, Timing]:
             measured = (drone, perception, clock, records.recorder.real_time_factor, settings.speed)
             fused, repeats = plan.chart.vision == "frames", settings.repeats
             return {"timing": flight_timing(*measured, fused=fused, repeats=repeats)}
 
+        run = partial(_run, shown=shown, camera=camera, vehicle=vehicle, settings=settings)
         what = (plan, drone, perception, judge, (records.see, reporter.see))
-        flown = await fly(*what, run=run, measured=timing, before_tick=reporter.look, safety=safety)
+        seen, keep = reporter.look, None if guard is None else records.keep_unfinished
+        flown = await fly(*what, run=run, measured=timing, before_tick=seen, safety=safety, keep=keep)
         await reporter.send_result(records.complete(flown.result))
     return flown
+
+
+async def _run(
+    flight: Coroutine[Any, Any, MissionEnd],
+    shown: AbstractAsyncContextManager[object],
+    *,
+    camera: RecordingCamera,
+    vehicle: _Endpoints,
+    settings: RealTimeSettings,
+) -> MissionEnd:
+    """Wait for the flight itself, which is shown meanwhile."""
+    async with shown:
+        task = asyncio.create_task(flight)
+        outcome = await (task if vehicle.sitl is None else vehicle.sitl.guard(task))
+    camera.close()
+    warn(camera.problem)
+    if settings.unattended and vehicle.sitl is not None and vehicle.sitl.clock.gone:
+        raise SettingError(vehicle.sitl.clock.gone)  # such a flight is not one of an evaluation
+    return outcome
 
 
 async def _judge(
@@ -231,20 +251,17 @@ def _drone(
     *,
     settings: RealTimeSettings,
     system_id: int | None,
+    guard: ProcessGuard | None,
 ) -> MavsdkDrone:
     """The drone on its link, which is closed with the stack; in a dry run it is never armed."""
     from offboard.dry_run import DryRunDrone
     from offboard.mavsdk_drone import MavsdkDrone
 
-    trace = records.folder.hang_report
-    hang_report = stack.enter_context(trace.open("w", encoding="utf-8"))
-    if not settings.unattended:
-        stack.enter_context(hang_notice(trace, _hang_line(trace, waits=vehicle.sitl is not None)))
     dry_run = settings.hardware is not None and settings.hardware.dry_run
     drone = (DryRunDrone if dry_run else MavsdkDrone)(
         vehicle.drone_url,
         start_arena=plan.start_pose,
-        hang_report=hang_report,
+        guard=guard,
         box=plan.box,
         corrects=plan.corrects_commands,
         caps=plan.caps,
@@ -261,14 +278,23 @@ def _drone(
     return drone
 
 
-def _hang_line(trace: Path, *, waits: bool) -> str:
-    """For a hang that ended this program while it commanded a drone, whose time may wait for it."""
+def flight_guard(settings: RealTimeSettings, folder: RunFolder) -> ProcessGuard:
+    """Ends this program when it hangs while it commands a drone, and keeps the result however it ends."""
+    from offboard.link.process_guard import ProcessGuard
     from offboard.link.watchdog import LIMITS, PATIENT_LIMITS
 
     limits, then = LIMITS, "the drone gets no more setpoints and acts by its failsafe; if not, take control"
-    if waits:
+    if settings.drone_url is None:
         limits, then = PATIENT_LIMITS, "its simulator ends with it"
-    return f"error: the app hung for {limits.locked_s:g} s and was ended: {then}; where it hung is in {trace}"
+    kept, trace = f"what was flown is in {folder.result}", folder.hang_report
+    where = f"where it hung is in {trace}"
+    return ProcessGuard(
+        hung=f"error: the app hung for {limits.locked_s:g} s and was ended: {then}; {where}, {kept}",
+        ended=f"error: the app was ended, and its keys with it: {then}; {kept}",
+        trace=trace,
+        unfinished=folder.unfinished,
+        result=folder.result,
+    )
 
 
 async def _camera(
@@ -301,7 +327,13 @@ async def _camera(
 
 
 def _perception(
-    plan: FlightPlan, vehicle: _Endpoints, judge: Judge, camera: RecordingCamera
+    plan: FlightPlan,
+    vehicle: _Endpoints,
+    judge: Judge,
+    camera: RecordingCamera,
+    *,
+    drone: MavsdkDrone,
+    delay: CameraDelay,
 ) -> CameraPerception:
     """What the mission sees through the camera."""
     from framerunner.flying.detector import plan_detector
@@ -309,4 +341,8 @@ def _perception(
     from offboard.perception import CameraPerception
 
     rendered = isinstance(judge, TruthJudge) and vehicle.has_camera_of_simulator
-    return CameraPerception(camera, plan_detector(plan, rendered=rendered))
+    perception = CameraPerception(camera, plan_detector(plan, rendered=rendered))
+    perception.assume_times(drone.vehicle_time_us, delay.age_s)
+    if vehicle.sitl is not None:
+        vehicle.sitl.clock.wait_for_images_of(perception)
+    return perception

@@ -9,17 +9,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from errors import UserError
 from framerunner.flying.display import LockstepProgress, dry_run_line, result_lines
 from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.plan import FlightPlan
-from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
+from framerunner.flying.real_time import RealTimeSettings, flight_guard, fly_in_real_time
 from framerunner.runs.recorder import RunRecords, VideoFile
 from framerunner.runs.run_folder import RunFolder, left_lines, warn, write_outcome
+from offboard.app import INTERRUPTED
 from vision.types import Image
 from wire.simulator_api import SimulatorApi
 
 if TYPE_CHECKING:
     from framerunner.recording.mcap_writer import FlightRecording
+    from offboard.link.process_guard import ProcessGuard
 
 _INTERRUPTED_CODE = 130
 
@@ -76,21 +79,26 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
             from framerunner.camera_calibration.calibration_file import save_calibration
 
             save_calibration(plan.calibration, folder.calibration)
-        with _recording(settings, folder) as recording:
+        with _guard(settings, folder) as guard, _recording(settings, folder) as recording:
             records = RunRecords(folder, recording)
             try:
                 if settings.real_time is None:
                     flown = await _fly_in_lockstep(settings, records)
                 else:
-                    flown = await fly_in_real_time(plan, settings.real_time, records, monitor_url)
-            except (asyncio.CancelledError, KeyboardInterrupt):
-                folder.stopped_before_start = records.recorder.latest is None
+                    flown = await fly_in_real_time(plan, settings.real_time, records, monitor_url, guard)
+            except BaseException as error:
+                records.stop_keeping()
+                interrupted = isinstance(error, asyncio.CancelledError | KeyboardInterrupt)
+                folder.stopped_before_start = interrupted and records.recorder.latest is None
+                if guard is not None and guard.is_used and folder.end_unfinished(_why(error)):
+                    warn(f"the flight ended without its end: {folder.result} has what was flown until then")
                 raise
+            records.stop_keeping()
+            result = records.complete(flown.result)
+            write_outcome(folder, flown.layout, flown.track, result)
             records.finish(flown.result, flown.track)
         if recording is not None:
             warn(recording.problem)
-        result = records.complete(flown.result)
-        write_outcome(folder, flown.layout, flown.track, result)
     finally:
         folder.remove_if_empty()
     late = "" if result.timing is None else result.timing.words
@@ -104,6 +112,21 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
     if is_dry:
         return 1 if flown.outcome.ended == "aborted" else 0
     return 0 if result.completed else 1
+
+
+def _guard(settings: FlightSettings, folder: RunFolder) -> AbstractContextManager[ProcessGuard | None]:
+    if settings.real_time is None:
+        return nullcontext()
+    return flight_guard(settings.real_time, folder)
+
+
+def _why(error: BaseException) -> str:
+    """Why a flight ended for which the program was not made."""
+    if isinstance(error, asyncio.CancelledError | KeyboardInterrupt):
+        return INTERRUPTED
+    return (
+        str(error) if isinstance(error, UserError) else f"unexpected error: {type(error).__name__}: {error}"
+    )
 
 
 def _recording(settings: FlightSettings, folder: RunFolder) -> AbstractContextManager[FlightRecording | None]:

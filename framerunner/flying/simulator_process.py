@@ -111,6 +111,11 @@ class SitlProcess(ChildProcess):
             raise
         return self
 
+    async def failed(self) -> str:
+        """As of every child; the drone is gone then."""
+        self.clock.gone = await super().failed()
+        return self.clock.gone
+
     async def __aexit__(self, *problem: object) -> None:
         """Stop it; when it had failed, that is the reason of a UserError: SettingError with its last line."""
         self.clock.close()
@@ -137,6 +142,7 @@ class SimulatorClock:
     ) -> None:
         self.answers_take_time = answers_take_time
         self._answer_us = answer_us
+        self.gone = ""  # why the simulator has ended
         self.images_missed = 0  # ticks whose image did not arrive in time
         self.setpoints_missed = 0  # setpoints that did not arrive in time
         self._channel = channel

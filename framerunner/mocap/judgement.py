@@ -17,13 +17,15 @@ _CORRELATED = 0.7
 
 
 def is_fused(facts: Facts) -> bool | None:
-    """Whether the vehicle's position is made from the poses; None: it cannot be told yet."""
-    return dialect_of(facts.record).is_fused(facts)
+    """Whether the vehicle's position is made from the poses; None: it cannot be told, or not any more."""
+    return None if facts.record.silence else dialect_of(facts.record).is_fused(facts)
 
 
 def line(facts: Facts) -> str:
     """The state in one line."""
     comparison = facts.comparison
+    if facts.record.silence:
+        return f"the vehicle is {facts.record.silence}; is it running? · {facts.sent} poses"
     if facts.sent == 0:
         return "no pose yet"
     dialect = dialect_of(facts.record)
@@ -46,7 +48,10 @@ def line(facts: Facts) -> str:
 
 
 def judge(facts: Facts) -> list[Finding]:
-    """All findings, in the order in which they need to be right."""
+    """All findings, in the order in which they need to be right; of a vehicle that is gone, only that."""
+    if facts.record.silence:
+        advice = "is it running and sending to this address? What it used before is not known to hold"
+        return [*_sent(facts), missing("vehicle", facts.record.silence, advice)]
     return [
         finding
         for check in (_sent, _fused, _near, _axes, _tilt, _heading, _delay)

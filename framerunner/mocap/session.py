@@ -148,6 +148,7 @@ class MocapSession:
     def facts(self, now_s: float) -> Facts:
         """What is known now of poses and vehicle."""
         vehicle, source = self.vehicle, self._source
+        vehicle.listened(now_s)
         return Facts(
             record=vehicle.record,
             comparison=self._compare(),

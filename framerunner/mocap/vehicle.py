@@ -28,6 +28,7 @@ _ORIGIN_S = 1.0
 _TIMESYNC_S = 0.2
 _CONVERGED = 500  # answers after which PX4 converts time stamps
 _KEPT = 30  # round trips
+_STATE_S = 5.0  # for which a state counts that is requested twice a second
 _LOW = 0.6  # share of the wanted rate
 
 
@@ -121,12 +122,21 @@ class Vehicle:
             self.worst_ratio = max(self.worst_ratio, self.dialect.innovation_ratio(message))
         return None
 
+    def listened(self, now_s: float) -> None:
+        """All that has come by now was taken; a state of the estimator that is not renewed is forgotten."""
+        record = self.record
+        record.listened_s = now_s
+        for kind in (self.dialect.estimator, "SYS_STATUS"):
+            if now_s - record.times_s.get(kind, (now_s, now_s))[1] > _STATE_S:
+                record.latest.pop(kind, None)
+
     def _follow_restarts(self) -> None:
         """Forget what a vehicle loses when it is restarted."""
         restarts = self.record.telemetry.restarts
         if restarts != self._restarts:
             self._restarts = restarts
-            self.record.latest.pop("GPS_GLOBAL_ORIGIN", None)
+            for kind in ("GPS_GLOBAL_ORIGIN", self.dialect.estimator, "SYS_STATUS"):
+                self.record.latest.pop(kind, None)
             self._asked_origin = False
             self._offsets.clear()
 

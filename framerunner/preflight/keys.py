@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import os
+import signal
 import sys
 import termios
 import tty
@@ -24,6 +26,9 @@ FIRST_REPEAT_S = 0.8
 MIN_REPEATS = 10
 """Characters of a held key within a second; terminals repeat it 11 to 30 times, a person taps it 7 times."""
 _GO, _STOP, _KILL = "gG", " ", "kK"
+_STOPS = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
+"""By which a terminal stops programs."""
+logger = logging.getLogger(__name__)
 
 
 class KeyReader:
@@ -52,7 +57,8 @@ class KeyReader:
 class TerminalKeys:
     """Reads the keys of this program's terminal while it is entered, on the running event loop.
 
-    Without a terminal it does nothing.
+    The terminal cannot stop the program meanwhile, as by Ctrl-Z: a drone would be without commands. A program
+    that somebody else has stopped takes its keys again when it goes on. Without a terminal it does nothing.
 
     Args:
         operator: see `KeyReader`.
@@ -61,15 +67,16 @@ class TerminalKeys:
     def __init__(self, operator: Operator) -> None:
         self._keys = KeyReader(operator)
         self._before: list[Any] | None = None
+        self._handlers: dict[int, Any] = {}
 
     async def __aenter__(self) -> TerminalKeys:
         """Let the terminal give each character at once, without showing it."""
         if has_terminal():
-            number = sys.stdin.fileno()
-            self._before = termios.tcgetattr(number)
-            tty.setcbreak(number)
-            loop = asyncio.get_running_loop()
-            loop.add_reader(number, self._read, number, loop.time)
+            self._before = termios.tcgetattr(sys.stdin.fileno())
+            for number in _STOPS:
+                self._handlers[number] = signal.signal(number, signal.SIG_IGN)
+            asyncio.get_running_loop().add_signal_handler(signal.SIGCONT, self._go_on)
+            self._take_terminal()
         return self
 
     async def __aexit__(
@@ -78,20 +85,49 @@ class TerminalKeys:
         """Return the terminal as it was."""
         if self._before is None:
             return
-        number = sys.stdin.fileno()
-        asyncio.get_running_loop().remove_reader(number)
+        number, loop = sys.stdin.fileno(), asyncio.get_running_loop()
+        loop.remove_reader(number)
+        loop.remove_signal_handler(signal.SIGCONT)
         with contextlib.suppress(termios.error):  # the terminal was closed
-            termios.tcsetattr(number, termios.TCSADRAIN, self._before)
+            if _is_in_foreground(number):
+                termios.tcsetattr(number, termios.TCSADRAIN, self._before)
+        for stop, handler in self._handlers.items():
+            signal.signal(stop, handler)
+
+    def _take_terminal(self) -> bool:
+        """Read keys, unless the terminal is another program's, such as the shell's."""
+        number, loop = sys.stdin.fileno(), asyncio.get_running_loop()
+        if not _is_in_foreground(number):
+            return False
+        with contextlib.suppress(termios.error):
+            tty.setcbreak(number)
+            loop.add_reader(number, self._read, number, loop.time)
+        return True
+
+    def _go_on(self) -> None:
+        """This program was stopped; the shell may have the terminal since."""
+        if self._take_terminal():
+            logger.warning("the app goes on after a stop; SPACE lands, then K stops the motors")
+        else:
+            logger.warning("the app goes on after a stop, without its keys: type fg, then SPACE lands")
 
     def _read(self, number: int, clock: Callable[[], float]) -> None:
         try:
             data = os.read(number, 64)
         except OSError:
             data = b""
-        if not data:  # the terminal was closed; the flight goes on
+        if not data:  # the terminal was closed, or is another program's; the flight goes on
             asyncio.get_running_loop().remove_reader(number)
         for character in data.decode(errors="replace"):
             self._keys.take(character, clock())
+
+
+def _is_in_foreground(number: int) -> bool:
+    """Whether this program has the terminal; one that it does not control is read like a file."""
+    try:
+        return os.tcgetpgrp(number) == os.getpgrp()
+    except OSError:
+        return True
 
 
 def has_terminal() -> bool:

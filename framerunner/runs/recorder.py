@@ -177,6 +177,7 @@ class RunRecords:
         self.folder = folder
         self.recorder = FlightRecorder()
         self.recording = recording
+        self._keeper = ThreadPoolExecutor(1, "unfinished result")  # a slow disk must not delay a flight
 
     def see(self, moment: Moment) -> None:
         """Record a tick."""
@@ -202,6 +203,14 @@ class RunRecords:
             "started": self._started.isoformat(timespec="seconds"),
         }
         return result.model_copy(update=wall)
+
+    def keep_unfinished(self, result: FlightResult) -> None:
+        """Keep what the result is to be if this program is ended now."""
+        self._keeper.submit(self.folder.keep_unfinished, self.complete(result))
+
+    def stop_keeping(self) -> None:
+        """Wait until it is kept; afterwards there is no more."""
+        self._keeper.shutdown()
 
     def finish(self, result: FlightResult, track: Track) -> None:
         """Add the result to the recording."""

@@ -6,6 +6,7 @@ import os
 import shlex
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
@@ -17,7 +18,10 @@ from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
-from scenarios.result import FlightResult
+from scenarios.result import FlightResult, ResultError
+
+UNFINISHED = "the program was ended in flight"
+"""Why a flight ended whose result was not written in order."""
 
 
 class RunFolder:
@@ -58,6 +62,7 @@ class RunFolder:
         self.track = path / "track.png"
         self.tlog = path / "flight.tlog"
         self.video = path / "video.avi"
+        self.unfinished = path / "unfinished.json"
         self.hang_report = path / "hang.txt"
         self.scenario = path / "scenario.yaml"
         self.mission = path / "mission.yaml"
@@ -88,19 +93,30 @@ class RunFolder:
         Raises:
             OSError: it cannot be written.
         """
-        part = self.result.with_suffix(".part")
+        _write_whole(self.result, result.text())
+        self.unfinished.unlink(missing_ok=True)
+
+    def keep_unfinished(self, result: FlightResult) -> None:
+        """Keep what `result.json` is to be if this program is ended now; it does not matter if that fails."""
+        with suppress(OSError):
+            _write_whole(self.unfinished, result.text())
+
+    def end_unfinished(self, why: str) -> bool:
+        """Make what was kept the result, with the reason in it; whether there was something."""
         try:
-            part.write_text(result.text(), encoding="utf-8")
-            os.replace(part, self.result)
-        except OSError:
-            part.unlink(missing_ok=True)
-            raise
+            kept = FlightResult.parse(self.unfinished.read_bytes())
+        except (OSError, ResultError):
+            return False
+        told = {name: getattr(kept, name).replace(UNFINISHED, why) for name in ("reason", "cause")}
+        _try(self.result, lambda: self.write_result(kept.model_copy(update=told)))
+        return True
 
     def remove_if_empty(self) -> None:
         """Remove empty files, and the folder if no result, log or recording remains.
 
         If the flight was stopped before its first tick, all is removed, also `out` if it was made for it.
         """
+        self.unfinished.unlink(missing_ok=True)
         for path in self.path.iterdir():
             if path.is_dir():  # of PX4, with its log
                 continue
@@ -145,6 +161,16 @@ def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:
         command = shlex.join(["framerunner", "replay", str(folder.path)])
         lines.append(f"see it again: {command}")
     return lines
+
+
+def _write_whole(path: Path, text: str) -> None:
+    part = path.with_suffix(".part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def _try(path: Path, write: Callable[[], None]) -> None:

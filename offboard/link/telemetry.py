@@ -43,6 +43,7 @@ TICK_LOST_S = 0.5  # wall time; a tick whose telemetry has not arrived by then w
 _MAX_LOST_IN_A_ROW = 10
 LAG_GROWTH_S = 2e-5  # with each attitude: 1 ms a second, more than clocks differ
 MAX_JITTER_S = 0.05
+SILENT_S = 1.0  # wall time
 TEXTS_KEPT = 8
 TEXT_AGE_S = 8.0
 WANTED_RATE_HZ = 50.0
@@ -98,6 +99,7 @@ class TelemetryFeed:
         self.attitudes = 0  # how many were received
         self.positions = 0
         self._attitude_received_s = 0.0
+        self._heard_from_s = 0.0  # since then it was not silent for a second
         self._position_received_s = 0.0
         self._heartbeat_received_s = 0.0
         self._landed_received = False
@@ -183,6 +185,10 @@ class TelemetryFeed:
         """Wall time since the older of attitude and position was received, seconds."""
         return self._clock() - min(self._attitude_received_s, self._position_received_s)
 
+    def heard_for_s(self) -> float:
+        """Wall time since attitudes came again after a silence of `SILENT_S`, or came first, seconds."""
+        return self._clock() - self._heard_from_s
+
     def heartbeat_age_s(self) -> float:
         """Wall time since the last heartbeat was received, seconds."""
         return self._clock() - self._heartbeat_received_s
@@ -197,14 +203,6 @@ class TelemetryFeed:
     def armed(self) -> bool | None:
         """By the last heartbeat; None if none counts yet."""
         return self.arming.shown
-
-    def not_shown(self, what: str, limit_s: float) -> str:
-        """The message about a request that was acknowledged and had no effect within a time, seconds."""
-        armed = "armed" if self.armed else "disarmed"
-        return (
-            f"{what} was acknowledged, but telemetry still shows mode {self.mode}, {armed} "
-            f"after {limit_s:g} s{self.recent_texts()}"
-        )
 
     def missing(self) -> list[str]:
         """What has not been received yet, or what prevents arming; empty if the vehicle is ready."""
@@ -230,7 +228,10 @@ class TelemetryFeed:
             return
         self.yaw_ned_rad = radians(euler.yaw_deg)
         self.time_us = time_us
-        self._attitude_received_s = self._clock()
+        now_s = self._clock()
+        if now_s - self._attitude_received_s > SILENT_S:
+            self._heard_from_s = now_s
+        self._attitude_received_s = now_s
         self._lag_s = least_lag(self._lag_s, self._attitude_received_s - time_us * 1e-6)
         self.attitudes += 1
         tick = time_us // TICK_US
@@ -341,9 +342,11 @@ class VehicleClock(Protocol):
 
     Attributes:
         answers_take_time: the vehicle answers requests only while its time goes on, as PX4 does.
+        gone: why the vehicle exists no longer; empty: it does.
     """
 
     answers_take_time: bool
+    gone: str
 
     async def stop(self) -> int:
         """Stop time; returns the time of the last telemetry, microseconds."""
@@ -396,6 +399,11 @@ class TickSource:
         """Vehicle time can wait, and the vehicle answers only while it goes on; see `SteppedPx4Dialect`."""
         return self._clock is not None and self._clock.answers_take_time
 
+    @property
+    def gone(self) -> str:
+        """Why the vehicle exists no longer; empty: it does, or that cannot be known."""
+        return "" if self._clock is None else self._clock.gone
+
     async def begin(self) -> None:
         """Let vehicle time wait from now on, if it can."""
         if self._clock is not None and not self.waits:
@@ -414,13 +422,18 @@ class TickSource:
         self.exchange = dialect.exchange
         await self.until_done(requests.wait(dialect.request_streams()))
 
-    async def before_arming(self, plugin: Any) -> None:  # noqa: ANN401
-        """Request rates, from MAVSDK's asyncio plugin.
+    async def before_arming(
+        self,
+        plugin: Any,  # noqa: ANN401
+        request_more: Callable[[Any], Awaitable[None]],
+    ) -> None:
+        """Request rates and more, from MAVSDK's asyncio plugin.
 
         With an exchange let time pass to a multiple of `ARM_US`, so all such flights begin at the same time.
         """
         if self.exchange is None:
             await request_rates(self._feed, plugin)
+            await request_more(plugin)
             return
         end_us = _next_multiple_us(self._number, ARM_US)
         while self._number * TICK_US < end_us and await self.next(TICK_LOST_S):

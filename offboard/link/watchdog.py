@@ -2,8 +2,11 @@
 
 1. A thread: if the event loop has not run for half a second, it sends a velocity of zero, and the flight
    continues when the loop runs again; after three seconds it ends the setpoints and requests hold.
-2. A timer that needs no interpreter (`faulthandler`): a hang that holds the GIL stops that thread, too; then
-   the process is ended, and without setpoints the vehicle's own offboard-loss failsafe acts.
+2. A process of its own (`ProcessGuard`): a hang that holds the GIL stops that thread, too; then this process
+   is ended, and without setpoints the vehicle's own offboard-loss failsafe acts.
+
+A process that is stopped as a whole sends nothing. When it goes on after three seconds or more, the first
+guard ends the setpoints and requests nothing: the vehicle may be somebody else's by then.
 
 Both run only while the drone is being commanded. A task shows that the loop runs.
 """
@@ -11,16 +14,16 @@ Both run only while the drone is being commanded. A task shows that the loop run
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import faulthandler
-import sys
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TextIO
+
+from offboard.link.process_guard import ProcessGuard
 
 BEAT_S = 0.1
+KNOWN_S = 1.5
+"""After the process stood still; a heartbeat, one a second, has shown the vehicle's mode by then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,26 +45,31 @@ class Watchdog:
 
     Args:
         stand_still: called on the watchdog's thread, once a hang, after `limits.stand_s`.
-        stop_commanding: called on the watchdog's thread, once, after `limits.hang_s`.
-        report: a real file for the second guard's stack trace; by default standard error.
+        stop_commanding: called once, after `limits.hang_s`, on the watchdog's thread; when `stood_still` is
+            set perhaps on the event loop, which it must not block then.
+        guard: the second guard.
 
     Attributes:
         tripped_after_s: how long the loop had hung when commanding was ended; 0 if it was not.
+        stood_still: then the whole process had stood still, so what is known of the vehicle is old.
     """
 
     def __init__(
         self,
         stand_still: Callable[[], None],
         stop_commanding: Callable[[], None],
-        report: TextIO | None = None,
+        guard: ProcessGuard,
         limits: HangLimits = LIMITS,
     ) -> None:
         self.limits = limits
         self.tripped_after_s = 0.0
+        self.stood_still = False
         self._stand_still = stand_still
         self._stop_commanding = stop_commanding
-        self._report = report
+        self._guard = guard
         self._beat_s = 0.0
+        self._looked_s = 0.0  # when the thread ran last
+        self._still_s = -KNOWN_S  # when it ran again after it had stood still
         self._stop = threading.Event()
         self._arming = threading.Lock()  # of the second guard, which must not be armed after the end
         self._thread: threading.Thread | None = None
@@ -72,8 +80,8 @@ class Watchdog:
         if self._thread is not None:
             return
         self._stop.clear()
-        self._beat()
-        self._guard_lock()
+        self._beat_s = self._looked_s = time.monotonic()
+        self._expect_beats()
         self._task = asyncio.create_task(self._keep_beating(), name="watchdog beat")
         self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
         self._thread.start()
@@ -82,38 +90,49 @@ class Watchdog:
         """Stop watching."""
         with self._arming:
             self._stop.set()
+            self._guard.expect(0.0)
         if self._task is not None:
             self._task.cancel()
             self._task = None
-        if self._thread is not None:
-            faulthandler.cancel_dump_traceback_later()
-            self._thread = None
+        self._thread = None
 
     async def _keep_beating(self) -> None:
         while not self.tripped_after_s:
-            self._beat()
+            hung_s = time.monotonic() - self._beat_s
+            if hung_s > self.limits.hang_s:  # the thread has not run either
+                self._trip(hung_s)
+                return
+            self._beat_s = time.monotonic()
             await asyncio.sleep(BEAT_S)
 
-    def _beat(self) -> None:
-        self._beat_s = time.monotonic()
-
-    def _guard_lock(self) -> None:
-        """Let the process end unless this is called again in time, which needs the interpreter's lock."""
-        with self._arming, contextlib.suppress(OSError, ValueError, RuntimeError):
+    def _expect_beats(self) -> None:
+        with self._arming:
             if not self._stop.is_set():
-                file = sys.stderr if self._report is None else self._report  # not real: guard 1 only
-                faulthandler.dump_traceback_later(self.limits.locked_s, exit=True, file=file)
+                self._guard.expect(self.limits.locked_s)
 
     def _watch(self) -> None:
         stopped_at_beat_s = 0.0
         while not self._stop.wait(BEAT_S):
-            self._guard_lock()
-            hung_s = time.monotonic() - self._beat_s
+            self._expect_beats()
+            now_s = time.monotonic()
+            if now_s - self._looked_s > self.limits.stand_s:
+                self._still_s = now_s
+            self._looked_s, hung_s = now_s, now_s - self._beat_s
             if hung_s > self.limits.stand_s and stopped_at_beat_s != self._beat_s:
                 stopped_at_beat_s = self._beat_s
                 self._stand_still()
             if hung_s > self.limits.hang_s:
-                self.tripped_after_s = hung_s
-                faulthandler.cancel_dump_traceback_later()  # this thread runs, so the GIL is free
-                self._stop_commanding()
+                self._trip(hung_s)
                 return
+
+    def _trip(self, hung_s: float) -> None:
+        """End commanding, once: on the thread or, where that stood still as well, on the event loop."""
+        with self._arming:
+            if self._stop.is_set() or self.tripped_after_s:
+                return
+            now_s = time.monotonic()
+            thread_stood = now_s - self._looked_s > self.limits.stand_s
+            self.stood_still = thread_stood or now_s - self._still_s < KNOWN_S
+            self.tripped_after_s = hung_s
+            self._guard.expect(0.0)  # the GIL is free
+        self._stop_commanding()

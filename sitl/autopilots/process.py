@@ -115,8 +115,9 @@ class AutopilotProcess(ABC):
         """Wait until it ends; how, in words."""
         assert self._process is not None, "start() comes first"
         code = await self._process.wait()
-        how = f"was ended by signal {-code}" if code < 0 else f"ended with code {code}"
-        return f"{self._name} {how}{self._last_words()}"
+        if code < 0:  # its last line says nothing of that
+            return f"{self._name} was ended by signal {-code}"
+        return f"{self._name} ended with code {code}{self._last_words()}"
 
     async def stop(self) -> None:
         """End it and its start-up script at once; its flight log is complete from disarming on."""

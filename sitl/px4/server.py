@@ -52,6 +52,7 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         self.link: Px4Link | None = None
         self._idle: IdleCheck | None = None  # of the PX4 that was started here
         self._side_link: SideLink | None = None
+        self._ended: asyncio.Task[str] | None = None  # how the PX4 that was started here ends
 
     def _open(self) -> None:
         settings, process = self._settings, self._autopilot.process
@@ -60,6 +61,8 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         self._side_link = SideLink(settings, self._simulation.scenario.camera, output)
 
     def _close(self) -> None:
+        if self._ended is not None:
+            self._ended.cancel()
         if self.link is not None:
             self.link.close()
         if self._side_link is not None:
@@ -71,6 +74,8 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         link = self.link
         assert link is not None, "it was opened"
         while True:
+            if self._ended is not None:
+                self._ended.cancel()
             await self._start(link)
             self._notice("PX4 is connected")
             await self._video_is_open.wait()
@@ -93,15 +98,16 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         if self._idle is not None:
             self._idle.close()
         self._idle = None if process.process_id is None else IdleCheck(process.process_id, _OWN_TIME)
-        ended = asyncio.create_task(process.ended())
+        self._ended = ended = asyncio.create_task(process.ended())
         connected = asyncio.create_task(link.connected())
-        done, _ = await asyncio.wait({ended, connected}, return_when=asyncio.FIRST_COMPLETED)
-        for task in (ended, connected):
-            task.cancel()
-        await asyncio.gather(ended, connected, return_exceptions=True)
-        if connected not in done:
-            raise AutopilotEndedError(f"{ended.result()} ({process.where_its_output_is})")
-        connected.result()
+        try:
+            await asyncio.wait({ended, connected}, return_when=asyncio.FIRST_COMPLETED)
+            if not connected.done():
+                raise AutopilotEndedError(f"{ended.result()} ({process.where_its_output_is})")
+            connected.result()
+        finally:
+            connected.cancel()
+            await asyncio.gather(connected, return_exceptions=True)
 
     async def _reason(self) -> str:
         """Why PX4 is no longer connected."""
@@ -175,7 +181,19 @@ class Px4Server(AutopilotServer[Px4Simulation]):
             await asyncio.sleep(_FIRST_S)
 
     async def _hold(self) -> None:
-        """Wait until simulated time may advance; what PX4 sends before that has been sent then."""
+        """Wait until simulated time may advance; what PX4 sends before that has been sent then.
+
+        Raises:
+            AutopilotEndedError: PX4 has ended, which no sensors find out meanwhile.
+        """
         if self._idle is not None:
             await self._wait_idle(self._idle)
-        await super()._hold()
+        held = asyncio.create_task(super()._hold())
+        ended = () if self._ended is None else (self._ended,)
+        try:
+            await asyncio.wait({held, *ended}, return_when=asyncio.FIRST_COMPLETED)
+            if not held.done() and self._ended is not None:
+                await self._end_try(self._ended.result())
+        finally:
+            held.cancel()
+            await asyncio.gather(held, return_exceptions=True)

@@ -25,6 +25,7 @@ from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flying.plan import FlightPlan
 from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box
+from offboard.link.asking import Asking
 from offboard.link.dialect import Px4Dialect
 from offboard.link.telemetry import TelemetryFeed, TickSource
 from offboard.link.watchdog import LIMITS
@@ -275,7 +276,7 @@ class SimulatedWatchdog:
     """As the adapter's watchdog, with simulated time for its thread's and the event loop's."""
 
     def __init__(self, stand_still, stop_commanding):
-        self.tripped_after_s = 0.0
+        self.tripped_after_s, self.stood_still = 0.0, False
         self._stand_still, self._stop_commanding = stand_still, stop_commanding
         self._runs = self._stood = False
         self._beat_s = 0.0
@@ -320,6 +321,7 @@ class LinkedDrone(MavsdkDrone):
         self._vehicle = vehicle
         self._feed = TelemetryFeed(vehicle.time_s)
         self._ticks = TickSource(self._feed)
+        self._asking = Asking(self._feed, self._ticks, self._requests)
         self._watchdog = vehicle.watchdog = SimulatedWatchdog(self._stand_still, self._stop_from_watchdog)
 
     async def connect(self):

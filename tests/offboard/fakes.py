@@ -64,6 +64,7 @@ class KinematicDrone:
         self.pilot_m_s = (0.0, 0.0, 0.0)
         self.landed = False
         self.landing_us = 0
+        self.gone = ""
 
     async def connect(self) -> None:
         self.calls.append("connect")

@@ -58,6 +58,15 @@ async def test_a_hold_that_fails_is_told_as_well():
     assert drone.calls[-1] == "close"
 
 
+async def test_nothing_is_asked_of_a_drone_that_is_gone():
+    drone, perception = starting()
+    drone.faults[50] = DroneError("link lost")
+    drone.gone = "the simulator has ended"
+    outcome = await fly_mission(drone, perception, MISSION)
+    assert (outcome.ended, outcome.reason) == ("aborted", "the simulator has ended")
+    assert drone.calls == ["connect", "ready", "motors_on", "close"]
+
+
 async def test_no_hold_is_asked_of_a_drone_that_never_started():
     drone, perception = starting()
     drone.faults[1] = DroneError("link lost")

@@ -217,7 +217,7 @@ async def test_an_app_that_hangs_while_a_pilot_has_it_leaves_no_stream_and_asks_
         error = await until_error(ticks)
         assert error.startswith("this app hung") and error.endswith("its watchdog stopped sending")
         vehicle.mode = (6, 0)  # somebody gives it back to an app that has given up
-        await drone._until(lambda: drone._feed.mode == "OFFBOARD", 3.0)
+        await drone._asking.until(lambda: drone._feed.mode == "OFFBOARD", 3.0)
         await drone.hold()
         assert vehicle.mode == (4, 3)
         assert not fresh_setpoints(vehicle, 0.2)
@@ -275,7 +275,7 @@ async def test_a_silent_link_stands_still_before_it_is_lost(vehicle):
 
 
 async def test_hold_is_asked_for_again_when_the_request_is_lost(vehicle, monkeypatch):
-    monkeypatch.setattr("offboard.mavsdk_drone.HOLD_SHOWN_S", 0.7)
+    monkeypatch.setattr("offboard.mavsdk_drone.SHOWN_S", 0.7)
     async with connected(vehicle) as drone:
         await drone.motors_on()
         vehicle.setpoint_loss_s = math.inf
@@ -346,7 +346,7 @@ async def test_before_a_heartbeat_has_shown_the_arming_the_vehicle_lands_until_o
     async with armed_by_acknowledgement(vehicle) as (drone, ticks):
         await take(ticks, 16)
         landing = asyncio.create_task(drone.land())
-        await drone._until(lambda: drone._feed.mode == "LAND", 3.0)
+        await drone._asking.until(lambda: drone._feed.mode == "LAND", 3.0)
         assert not landing.done()
         vehicle.tells_disarmed = False
         await landing
@@ -390,7 +390,7 @@ async def test_a_refused_arming_gives_the_vehicle_s_reason(vehicle):
 
 
 async def test_an_acknowledged_mode_that_does_not_come_is_no_success(vehicle, monkeypatch):
-    monkeypatch.setattr("offboard.mavsdk_drone.CONFIRM_S", 0.7)
+    monkeypatch.setattr("offboard.link.asking.CONFIRM_S", 0.7)
     vehicle.ignore_modes = True
     async with connected(vehicle) as drone:
         with pytest.raises(

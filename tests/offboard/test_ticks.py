@@ -178,5 +178,5 @@ async def test_a_flight_begins_and_arms_at_multiples_of_a_period_whenever_the_ap
     assert clock.granted[-1] == (10_000_000, None)
     assert await source.next(1.0)
     assert feed.sample.time_us == 10_050_000
-    await source.before_arming(None)
+    await source.before_arming(None, None)
     assert feed.sample.time_us == 15_000_000

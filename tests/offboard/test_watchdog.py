@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import ctypes
+import signal
 import subprocess
 import sys
 import time
@@ -10,6 +12,7 @@ from textwrap import dedent
 
 import pytest
 
+from offboard.link.process_guard import ProcessGuard
 from offboard.link.watchdog import HangLimits, Watchdog
 
 pytestmark = pytest.mark.realtime
@@ -71,8 +74,8 @@ def test_a_hung_loop_is_stopped_and_hold_is_asked_for(vehicle):
 def test_a_hang_that_blocks_the_interpreter_ends_the_process(vehicle):
     app, hung_s = run_app(vehicle, "locked")
     _, report = app.communicate(timeout=15)
-    assert app.returncode == 1
-    assert "Timeout" in report
+    assert app.returncode == -signal.SIGKILL
+    assert "most recent call first" in report
     last_s = max(at for at, *_ in vehicle.setpoints)
     assert last_s - hung_s < 5.0
     deadline_s = time.monotonic() + 5
@@ -85,15 +88,17 @@ def test_a_hang_that_blocks_the_interpreter_ends_the_process(vehicle):
 LIMITS = HangLimits(stand_s=0.3, hang_s=1.5, locked_s=10.0)
 
 
-async def hang(seconds):
+async def hang(seconds, sleep=time.sleep):
     """What a watchdog did while the event loop stood still, and the watchdog."""
     done = []
-    watchdog = Watchdog(lambda: done.append("stand"), lambda: done.append("stop"), limits=LIMITS)
-    watchdog.start()
-    await asyncio.sleep(2 * LIMITS.stand_s)
-    time.sleep(seconds)  # noqa: ASYNC251 - the hang
-    await asyncio.sleep(2 * LIMITS.stand_s)
-    watchdog.stop()
+    stand, stop = (lambda: done.append("stand")), (lambda: done.append("stop"))
+    with ProcessGuard() as guard:
+        watchdog = Watchdog(stand, stop, guard, limits=LIMITS)
+        watchdog.start()
+        await asyncio.sleep(2 * LIMITS.stand_s)
+        sleep(seconds)
+        await asyncio.sleep(2 * LIMITS.stand_s)
+        watchdog.stop()
     return done, watchdog
 
 
@@ -113,3 +118,12 @@ async def test_a_long_hang_ends_commanding_once():
     done, watchdog = await hang(3.0)
     assert done == ["stand", "stop"]
     assert watchdog.tripped_after_s == pytest.approx(LIMITS.hang_s, abs=0.5)
+    assert not watchdog.stood_still
+
+
+async def test_a_process_that_was_stopped_knows_it_and_ends_commanding_once():
+    """No thread of Python runs meanwhile, as after SIGSTOP."""
+    done, watchdog = await hang(2, ctypes.PyDLL(None).sleep)
+    assert done.count("stop") == 1
+    assert watchdog.tripped_after_s == pytest.approx(2.0, abs=0.5)
+    assert watchdog.stood_still

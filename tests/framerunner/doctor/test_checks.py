@@ -161,6 +161,12 @@ def test_a_bad_link_is_missing():
     assert missing(record) == {"link"}
 
 
+def test_a_vehicle_that_died_while_it_was_listened_to_cannot_fly():
+    record = healthy()
+    record.heard_s, record.listened_s = 10.0, 13.0
+    assert missing(record) == {"link"}
+
+
 def test_an_estimate_that_drifts_is_noted():
     record = healthy()
     record.places.append((0.0, 0.0, 0.4))

@@ -5,17 +5,21 @@ import json
 import os
 import signal
 import socket
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from errors import SettingError
+from framerunner import instances
 from framerunner.cli import run
-from framerunner.evaluation import genuine_flight, runner
-from framerunner.evaluation.genuine_flight import claimed_instance, interrupted_once
+from framerunner.evaluation import runner
+from framerunner.evaluation.genuine_flight import interrupted_once
 from framerunner.evaluation.plan import plan_files
 from framerunner.flying.lockstep import fly_lockstep
+from framerunner.instances import claimed_instance
 from offboard.mission import load_mission
 from scenarios.faults.parse import parse_fault
 from scenarios.loader import dump_yaml, load_scenario
@@ -30,11 +34,12 @@ def _own_folder(tmp_path, monkeypatch):
 @pytest.fixture
 def three_instances(monkeypatch, tmp_path):
     """Their ports are not those of other tests, nor their locks; returns the folder of the locks."""
-    monkeypatch.setattr(genuine_flight, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr(genuine_flight, "INSTANCES", 3)
-    monkeypatch.setattr(genuine_flight, "_TCP_PORTS", (24560,))
-    monkeypatch.setattr(genuine_flight, "_UDP_PORTS", (24580,))
-    monkeypatch.setattr(genuine_flight, "_ARDUPILOT_UDP_PORTS", ())
+    monkeypatch.setattr(instances, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(instances, "INSTANCES", 3)
+    monkeypatch.setattr(instances, "_TCP_PORTS", (24560,))
+    monkeypatch.setattr(instances, "_UDP_PORTS", (24580,))
+    monkeypatch.setattr(instances, "_ARDUPILOT_UDP_PORTS", ())
+    monkeypatch.setattr(instances, "_PX4_LOCKS", str(tmp_path / "px4_lock-"))
     return tmp_path
 
 
@@ -160,6 +165,20 @@ def test_each_flight_at_once_has_an_instance_of_its_own():
                 pass
         with claimed_instance() as again:
             assert again == 0
+
+
+def test_an_instance_whose_px4_runs_already_is_left_to_it(three_instances):
+    lock = three_instances / "px4_lock-0"
+    lock.touch()
+    with claimed_instance() as instance:
+        assert instance == 0  # left by a PX4 that has ended
+    hold = "import fcntl, sys; f = open(sys.argv[1], 'r+'); fcntl.lockf(f, fcntl.LOCK_EX); print(); input()"
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", hold, str(lock)], **pipes) as other:
+        other.stdout.readline()
+        with claimed_instance() as instance:
+            assert instance == 1
+        other.communicate(b"\n")
 
 
 def test_a_flight_that_is_interrupted_twice_still_ends_in_order():

@@ -388,6 +388,29 @@ def test_an_app_that_is_stopped_and_continued_leaves_the_landing_to_the_vehicle(
     assert came_down(flight)
 
 
+def test_an_app_that_goes_on_after_a_long_stop_requests_nothing_of_a_drone_that_others_have(
+    tmp_path, monkeypatch
+):
+    """What it knew before is old: the drone has begun to land by itself, and others have taken it since."""
+    monkeypatch.setattr("offboard.abort.ATTEND_US", 4_000_000)
+
+    def stop(vehicle):
+        directions, watchdog = (vehicle.up, vehicle.beats, vehicle.down), vehicle.watchdog
+        vehicle.up = vehicle.beats = vehicle.down = Direction(SILENT, Random(0))
+        vehicle.watchdog = None
+        vehicle.hang(2.0)
+        vehicle.autopilot.set_mode(FlightMode.HOLD)
+        vehicle.hang(2.0)
+        vehicle.up, vehicle.beats, vehicle.down = directions
+        vehicle.watchdog, watchdog.stood_still = watchdog, True
+        watchdog.check(vehicle.time_s())
+
+    flight = fly(tmp_path, events=[(12.0, stop)])
+    assert flight.outcome.reason.startswith("this app was stopped for 4.")
+    after = [moment.state for moment in flight.moments if moment.state.time_us > 17_100_000]
+    assert {(state.mode, state.armed) for state in after} == {("HOLD", True)}
+
+
 def test_hold_on_abort_holds_without_an_operator(tmp_path):
     scenario = hall(limit_s=6.0)
     safety = SafetyRules("hold")

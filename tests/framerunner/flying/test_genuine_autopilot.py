@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from framerunner import instances
 from framerunner.cli import run
 from framerunner.flying import run as flying
 from framerunner.flying import simulator_process
@@ -33,6 +34,21 @@ def test_that_px4_may_not_use_real_time_priorities_is_said_once(px4, allowed, ca
     monkeypatch.setattr(simulator_process, "may_use_real_time", lambda: allowed)
     assert run(["fly", "--px4", str(px4)]) == 0
     assert capsys.readouterr().err.count("may not use real-time priorities") == (not allowed)
+
+
+@pytest.mark.parametrize(("options", "number"), [((), 2), (("--instance", "1"), 1)])
+def test_a_flight_of_px4_takes_the_first_free_instance(px4, options, number, monkeypatch, tmp_path):
+    taken = []
+
+    async def fly_once(settings):
+        taken.append(settings.real_time.instance)
+        return 0
+
+    monkeypatch.setattr(flying, "fly_once", fly_once)
+    monkeypatch.setattr(instances, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(instances, "_is_free", lambda instance: instance >= 2)
+    assert run(["fly", "--px4", str(px4), *options]) == 0
+    assert taken == [number]
 
 
 @pytest.mark.parametrize("allowed", [True, False])

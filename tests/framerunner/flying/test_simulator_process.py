@@ -93,6 +93,20 @@ async def test_an_error_that_follows_from_its_end_is_replaced_by_its_last_line(e
             raise CameraError("cannot connect")
 
 
+async def test_a_flight_whose_simulator_ends_ends_with_the_reason_and_its_result():
+    async with SitlProcess("empty", instance=free_instance()) as sitl:
+
+        async def fly():
+            try:
+                await asyncio.Event().wait()
+            except asyncio.CancelledError:
+                return sitl.clock.gone
+
+        flight = asyncio.create_task(fly())
+        os.kill(sitl._process.pid, signal.SIGKILL)
+        assert await sitl.guard(flight) == "the simulator was ended by signal 9"
+
+
 async def test_that_a_stranger_has_taken_the_place_of_ardupilot_is_heard(tmp_path):
     heard, instance = [], free_instance()
     program = tmp_path / "build" / "sitl" / "bin" / "arducopter"

@@ -129,6 +129,22 @@ def test_a_standing_drone_uses_the_poses_and_nothing_in_it_is_changed():
     assert trial.autopilot.parameters.changed() == {}
 
 
+def test_what_a_vehicle_has_told_before_it_died_does_not_count():
+    trial = Trial().run(8.0)
+    facts = trial.session.facts(trial.now_s + 20.0)
+    assert line(facts).startswith("the vehicle is not heard for 20 s; is it running?")
+    assert is_fused(facts) is None
+    (gone,) = (finding for finding in judge(facts) if finding.level is Level.MISSING)
+    assert (gone.subject, gone.text) == ("vehicle", "not heard for 20 s")
+    assert "· fused" in line(trial.run(3.0).facts())  # it was only silent
+
+
+def test_an_estimator_that_tells_nothing_more_is_not_known_to_use_the_poses():
+    trial = Trial().run(8.0)
+    trial.session.vehicle.record.heard_s = trial.now_s + 6.0  # by its heartbeats
+    assert is_fused(trial.session.facts(trial.now_s + 6.0)) is None
+
+
 def test_what_is_sent():
     trial = Trial(position_sigma_m=0.02, attitude_sigma_rad=0.03).run(2.0)
     pose = trial.sent_of("ODOMETRY")[-1]

@@ -1,11 +1,19 @@
 """Characters of a terminal and their times, and what the operator demands by them."""
 
+import os
+import pty
+import signal
+import subprocess
+import sys
+import termios
 from math import ceil
+from textwrap import dedent
 
 import pytest
 
 from framerunner.preflight.keys import KeyReader
 from offboard.safety.operator import Operator
+from tests.processes import wait_until
 
 
 def type_keys(operator, *characters):
@@ -97,3 +105,41 @@ def test_k_alone_means_nothing():
 def test_no_go_after_a_stop():
     operator = type_keys(Operator(), (" ", 1.0), *held("g", 2.0, 4.0))
     assert (operator.has_go, operator.stops) == (False, 1)
+
+
+PROGRAM = dedent("""\
+    import asyncio
+    from framerunner.preflight.keys import TerminalKeys
+    from offboard.safety.operator import Operator
+
+    async def main():
+        operator, stopped = Operator(), asyncio.Event()
+        operator.on_stop(stopped.set)
+        async with TerminalKeys(operator):
+            print("ready", flush=True)
+            await stopped.wait()
+
+    asyncio.run(main())
+    """)
+
+
+def test_a_program_that_was_stopped_takes_its_keys_again():
+    """As a shell does, somebody sets the terminal's modes meanwhile; a stop by the terminal has no effect."""
+    ours, terminal = pty.openpty()
+    cooked = termios.tcgetattr(terminal)
+    command = [sys.executable, "-c", PROGRAM]
+    try:
+        with subprocess.Popen(command, stdin=terminal, stdout=subprocess.PIPE) as program:
+            assert program.stdout.readline() == b"ready\n"
+            program.send_signal(signal.SIGTSTP)
+            program.send_signal(signal.SIGSTOP)
+            os.waitid(os.P_PID, program.pid, os.WSTOPPED)
+            termios.tcsetattr(terminal, termios.TCSANOW, cooked)
+            program.send_signal(signal.SIGCONT)
+            assert wait_until(lambda: not termios.tcgetattr(terminal)[3] & termios.ICANON, 5.0)
+            os.write(ours, b" ")
+            assert program.wait(5.0) == 0
+        assert termios.tcgetattr(terminal)[3] & termios.ICANON
+    finally:
+        os.close(ours)
+        os.close(terminal)

@@ -5,8 +5,13 @@ import re
 
 import pytest
 
-from errors import SettingError
-from framerunner.runs.run_folder import RunFolder
+from errors import SettingError, UserError
+from framerunner.flying import run
+from framerunner.flying.plan import FlightPlan
+from framerunner.flying.real_time import RealTimeSettings
+from framerunner.runs.run_folder import UNFINISHED, RunFolder
+from offboard.mission import load_mission
+from scenarios.loader import load_scenario
 from scenarios.result import FlightResult
 
 
@@ -63,3 +68,32 @@ def test_what_was_recorded_stays(tmp_path):
     folder.tlog.write_bytes(b"\xfd")
     folder.remove_if_empty()
     assert {path.name for path in folder.path.iterdir()} == {"scenario.yaml", "flight.tlog"}
+
+
+@pytest.mark.parametrize(
+    ("error", "armed", "why"),
+    [
+        (ZeroDivisionError("no reason"), True, "unexpected error: ZeroDivisionError: no reason"),
+        (UserError("the referee is gone"), True, "the referee is gone"),
+        (UserError("it was refused"), False, None),
+    ],
+)
+async def test_a_flight_that_armed_leaves_a_result_whatever_error_ended_it(
+    tmp_path, monkeypatch, error, armed, why
+):
+    async def fly(plan, settings, records, monitor_url, guard):
+        told = {"verdict": "aborted", "reason": f"aborted ({UNFINISHED})", "cause": UNFINISHED}
+        records.keep_unfinished(FlightResult(**told))
+        if armed:
+            guard.expect(10.0)
+        raise error
+
+    monkeypatch.setattr(run, "fly_in_real_time", fly)
+    plan = FlightPlan(load_scenario("empty"), load_mission("hover"))
+    with pytest.raises(type(error)):
+        await run.fly_once(run.FlightSettings(plan, RealTimeSettings(), tmp_path))
+    results = [json.loads(path.read_text(encoding="utf-8")) for path in tmp_path.glob("*/result.json")]
+    assert [(each["reason"], each["cause"]) for each in results] == (
+        [(f"aborted ({why})", why)] if why else []
+    )
+    assert not list(tmp_path.glob("*/unfinished.json"))

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -16,8 +17,9 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from errors import SettingError
 from scenarios.loader import load_scenario
-from sitl.autopilots.process import AutopilotStart
+from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.sensors import with_estimable_sensors
+from sitl.pacing.time_grants import Grant, TimeGrants
 from sitl.px4.build import Px4Process, find_build
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
 from sitl.px4.messages import ActuatorControls
@@ -221,6 +223,26 @@ async def test_a_px4_that_ends_at_once_is_reported_with_its_error(tmp_path):
     assert await process.ended() == "PX4 ended with code 3: ERROR [init] no airframe"
     assert "PX4_PARAM_MPC_THR_HOVER=0.5" in process.log.read_text()
     assert "PX4_SIM_MODEL=none_iris" in process.log.read_text()
+
+
+async def test_a_px4_that_ends_while_simulated_time_waits_ends_the_server_in_words(tmp_path):
+    instance = free_instance()
+    build = build_of(tmp_path, f"exec {sys.executable} {FAKE} {FIRST_PORT + instance}")
+    process = Px4Process(build, instance, tmp_path / "files", {})
+    here, there = socket.socketpair()
+    settings = ServerSettings(instance=instance, speed=20.0)
+    start = AutopilotStart(process, "px4")
+    running = asyncio.create_task(Px4Server(new_simulation, settings, start, grants=TimeGrants(there)).run())
+    reader, writer = await asyncio.open_connection(sock=here)
+    assert await reader.readline() == b"up\n"
+    writer.write(Grant(0).line())
+    await reader.readline()
+    os.kill(process.process_id, signal.SIGKILL)
+    with pytest.raises(
+        AutopilotEndedError, match=r"^at \d+\.\d s of simulated time PX4 was ended by signal 9$"
+    ):
+        await asyncio.wait_for(running, 5.0)
+    writer.close()
 
 
 async def test_what_to_do_where_another_px4_has_the_instance_is_said(tmp_path):

@@ -1,0 +1,142 @@
+"""Resets of the vehicle's estimator, which turn or move its local frame under a flying app.
+
+PX4 counts them in ODOMETRY.reset_counter: it takes a new heading from its compass when it has left the
+ground, and a new position when its sensors disagree with it for long. Framerunner's own autopilot is not
+watched: it only returns to the frame of its sensors, and its flights in lockstep do the same.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import logging
+from collections import deque
+from dataclasses import dataclass
+from math import degrees, dist, isfinite, nan, pi, radians, remainder
+from typing import Any
+
+from mavsdk.asyncio import MavsdkError
+
+from geometry.axes import Alignment, Pose
+from geometry.rotations import rotation, to_world, yaw_of
+from geometry.vectors import Vec3
+from offboard.drone import DroneError
+from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
+
+RATE_HZ = 10.0
+MAX_STEP_S = 0.3  # between two reports, from which a jump can be told from motion
+MAX_MOVE_M = 0.3  # of the position in a reset; the vehicle's fence is so far from the app's box
+MIN_TURN_RAD = radians(1.0)  # a smaller one is not told from motion
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Jump:
+    """A reset: where the vehicle would be without it, and where it reports to be; local NED."""
+
+    expected: Pose
+    reported: Pose
+
+
+@dataclass(frozen=True, slots=True)
+class _Report:
+    """An ODOMETRY: local NED, vehicle time."""
+
+    time_us: int
+    resets: int
+    pose: Pose
+    velocity_ned_m_s: Vec3
+    yaw_rate_rad_s: float
+
+    def after(self, step_s: float) -> Pose:
+        """The pose with constant rates."""
+        x, y, z = (at + step_s * v for at, v in zip(self.pose.position_m, self.velocity_ned_m_s, strict=True))
+        return Pose((x, y, z), self.pose.yaw_rad + step_s * self.yaw_rate_rad_s)
+
+
+class ResetFeed:
+    """Collects resets on MAVSDK's thread.
+
+    Attributes:
+        heard: the vehicle reports how often its estimator was reset.
+    """
+
+    def __init__(self) -> None:
+        self.heard = self._is_wanted = False
+        self._last: _Report | None = None
+        self._jumps: deque[Jump | None] = deque(maxlen=100)
+
+    def subscribe(self, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
+        """Subscribe to MAVSDK's synchronous plugin `mavlink_direct`."""
+        self._is_wanted = True
+        direct.subscribe_message("ODOMETRY", self._on_odometry)
+
+    async def request(self, plugin: Any) -> None:  # noqa: ANN401
+        """Request reports, by MAVSDK's asyncio `telemetry`, if the vehicle sends none; it may refuse."""
+        if self._is_wanted and not self.heard:
+            with contextlib.suppress(MavsdkError):
+                await plugin.set_rate_odometry(RATE_HZ)
+
+    def take(self) -> list[Jump | None]:
+        """The resets since the last call, oldest first; None: by how much is not known."""
+        return [self._jumps.popleft() for _ in range(len(self._jumps))]
+
+    def _on_odometry(self, message: Any, _user: object) -> None:  # noqa: ANN401
+        fields = json.loads(message.fields_json)
+        if (
+            message.component_id != AUTOPILOT_COMPONENT_ID
+            or fields["frame_id"] != mavlink.MAV_FRAME_LOCAL_NED
+        ):
+            return  # it is for the vehicle, or of another frame
+        now, last = _report(fields), self._last
+        if last is not None and 0 <= last.time_us - now.time_us < MAX_STEP_S * 1e6:
+            return  # a link swaps packets
+        self.heard, self._last = True, now
+        if last is None or now.resets == last.resets:
+            return
+        step_s = (now.time_us - last.time_us) * 1e-6
+        jump = Jump(last.after(step_s), now.pose)
+        numbers = (*jump.expected.position_m, *jump.reported.position_m, jump.expected.yaw_rad)
+        known = 0.0 < step_s <= MAX_STEP_S and isfinite(sum(numbers) + jump.reported.yaw_rad)
+        self._jumps.append(jump if known else None)
+
+
+def followed(alignment: Alignment, jump: Jump | None) -> Alignment:
+    """The alignment after a reset: the drone has not moved, but its north may be another.
+
+    A small change of the position is a correction within the frame, and stays one.
+
+    Raises:
+        DroneError: where the drone is is not known any more.
+    """
+    if jump is None:
+        raise DroneError("the vehicle's estimator was reset, and by how much is not known")
+    moved_m = dist(jump.expected.position_m, jump.reported.position_m)
+    turned_rad = remainder(jump.reported.yaw_rad - jump.expected.yaw_rad, 2 * pi)
+    if moved_m > MAX_MOVE_M:
+        raise DroneError(f"the vehicle's estimator was reset, and moved its position by {moved_m:.1f} m")
+    if abs(turned_rad) < MIN_TURN_RAD:
+        return alignment
+    logger.warning(
+        "the vehicle's estimator has turned its north by %.0f°; the app follows", degrees(turned_rad)
+    )
+    place = alignment.pose(Pose(jump.reported.position_m, jump.expected.yaw_rad))
+    return Alignment(place, jump.reported)
+
+
+def _report(fields: dict[str, Any]) -> _Report:
+    def number(name: str) -> float:
+        value = fields[name]
+        return nan if value is None else float(value)  # JSON cannot express values that are not finite
+
+    w, x, y, z = (nan if each is None else float(each) for each in fields["q"])
+    attitude, velocity = (w, x, y, z), (number("vx"), number("vy"), number("vz"))
+    matrix = rotation(attitude)
+    if fields["child_frame_id"] != mavlink.MAV_FRAME_LOCAL_NED:
+        velocity = to_world(matrix, *velocity)
+    rates = (number("rollspeed"), number("pitchspeed"), number("yawspeed"))
+    pose = Pose((number("x"), number("y"), number("z")), yaw_of(attitude))
+    yaw_rate_rad_s = to_world(matrix, *rates)[2]
+    return _Report(
+        int(fields["time_usec"]), int(fields.get("reset_counter", 0)), pose, velocity, yaw_rate_rad_s
+    )
