@@ -180,9 +180,11 @@ class PathFlight:
         """
         if self.path is None:
             return self._stand(state, turn_rad_s or 0.0)
+        now_s = state.time_us * 1e-6
+        if self._anew:  # not before: until then the drone may brake on the path that it has left
+            self._follower.begin(now_s)
         self._left, self._anew = None, False
         prediction = self._response.predict() if self._follower.response.late else None
-        now_s = state.time_us * 1e-6
         return self._follower.command(self.path, state, now_s, prediction, turn_rad_s=turn_rad_s)
 
     def _leave(self) -> None:
@@ -236,8 +238,6 @@ class PathFlight:
         self.refusal, self._refusals = "", 0
         if not restarts and self._delays(found, obstacles):
             return
-        if restarts:
-            self._follower.begin(state.time_us * 1e-6)
         self.path = found if restarts else self._follower.continued(found)
         self._anew = restarts
         self._planned_for = (tuple(goals), obstacles)

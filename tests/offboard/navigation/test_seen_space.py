@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import atan2, dist, hypot, pi
+from math import atan2, cos, dist, hypot, pi, sin
 
 import pytest
 
@@ -118,6 +118,23 @@ def test_a_path_after_a_pause_begins_at_its_start():
     assert flight._follower.progress_on(flight.path) == 0.0
     flight.fly(goals, Obstacles(), replace(state, time_us=1_550_000), seen, VIEWED)
     assert flight._follower.progress_on(flight.path) == pytest.approx(0.05)
+
+
+def test_a_drone_that_stops_before_unseen_space_does_not_fly_on_while_it_plans():
+    """It finds ways round what may be there, and leaves each at once, because nothing of them was seen."""
+    seen, flight = seen_from(), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
+    state, stopping_m_s, most_m_s = DroneState(0, *HERE, yaw=0.0), [], 0.0
+    for tick in range(1, 160):
+        command = flight.fly([Point((4.0, 0.0, 1.0))], Obstacles((), seen.suspects_m), state, seen, VIEWED)
+        c, s, forward, left = cos(state.yaw), sin(state.yaw), command.forward_m_s, command.left_m_s
+        velocity = (c * forward - s * left, s * forward + c * left, command.up_m_s)
+        x, y, z = (at + 0.05 * v for at, v in zip((state.x, state.y, state.z), velocity, strict=True))
+        yaw = state.yaw + 0.05 * command.yaw_rate_rad_s
+        state = replace(state, time_us=50_000 * tick, x=x, y=y, z=z, yaw=yaw, velocity_arena_m_s=velocity)
+        stopping_m_s = [*stopping_m_s, hypot(*velocity)] if flight.path is None else []
+        most_m_s = max(most_m_s, *stopping_m_s[20:], 0.0)
+    assert len(seen.suspects_m) > 3  # for each of them it has planned again
+    assert most_m_s < 0.1
 
 
 def height_after_a_metre(gate: Gate, *, needed: bool) -> float:
