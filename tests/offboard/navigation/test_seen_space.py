@@ -12,7 +12,7 @@ from offboard.drone import DroneState
 from offboard.limits import CONTEST as CONTEST_LIMITS
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import CONTEST, Gate, Obstacles, Point
-from offboard.navigation.path_flight import PathFlight
+from offboard.navigation.path_flight import TICK_WORK, PathFlight
 from offboard.navigation.search.viewed_space import ViewedSpace
 from offboard.navigation.seen_space import SeenSpace
 from scenarios.models import Arena, Base, Camera
@@ -135,6 +135,21 @@ def test_a_drone_that_stops_before_unseen_space_does_not_fly_on_while_it_plans()
         most_m_s = max(most_m_s, *stopping_m_s[20:], 0.0)
     assert len(seen.suspects_m) > 3  # for each of them it has planned again
     assert most_m_s < 0.1
+
+
+def test_where_obstacles_block_a_gate_no_tick_searches_for_long():
+    ring = tuple((2.0 + 1.2 * cos(0.2 * i), 1.2 * sin(0.2 * i), 0.15) for i in range(32))
+    gate, obstacles = Gate((2.0, 0.0, 1.5), 0.3), Obstacles((Gate((2.0, 0.0, 1.5), 0.3),), ring)
+    seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
+    works = []
+    while not flight.refusal:
+        state = DroneState(50_000 * len(works), -1.0, 0.3, 1.0, yaw=0.0)
+        flight.fly([gate, Point((0.0, 0.0, 1.0))], obstacles, state, seen, VIEWED)
+        works.append(flight.work)
+        assert len(works) < 60
+    assert flight.refusal == "obstacles block the way to gate 1"
+    assert sum(works) > 4 * TICK_WORK  # what a tick would do without a limit
+    assert max(works) < 2.5 * TICK_WORK
 
 
 def height_after_a_metre(gate: Gate, *, needed: bool) -> float:
