@@ -17,6 +17,7 @@ from offboard.navigation.control.stuck_detector import StuckDetector
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
+from offboard.navigation.planner.clearance import SAME_FRAME_M
 from offboard.navigation.planner.passages import load_graphs
 from offboard.navigation.planning import Search, obstructed
 from offboard.navigation.search.lookout import Lookout, turn_to
@@ -34,6 +35,7 @@ NEARLY_SAME_M = 0.04  # likewise of the other frames
 SAME_RAD_M = 1.0  # likewise of headings, for each metre
 STILL_GOOD_M = 0.02  # an estimate that has moved less lets a path through it be kept, if another one is later
 LATER_S = 0.5  # by this
+ELSEWHERE_M = 0.08  # a frame that has moved by more, or turned, must not be flown through on the present path
 AHEAD_S = 0.7  # of the path that must be free, beside the vehicle's lag: it is long enough to stop
 LOOK_AHEAD_S = 2.0  # likewise; the drone turns in flight to look at what it has not seen there
 AHEAD_STEP_S = 0.1
@@ -179,7 +181,9 @@ class PathFlight:
                 self._plan(goals, obstacles, state)
         checked = self._must_check(obstacles, now_s)
         if checked and self._is_obstructed(obstacles):
-            if not begun:
+            search = self.search
+            searched_for = None if search is None else (search.goals, search.obstacles)
+            if not begun and _differ((goals, obstacles), searched_for, position_now(state)):
                 self._plan(goals, obstacles, state)
             if self._is_obstructed(obstacles):
                 self._leave()
@@ -265,8 +269,8 @@ class PathFlight:
             self.change()
             return
         if isinstance(found, Refusal):
-            if found.goal > 0:
-                self._plan(search.goals[: found.goal], search.obstacles, state)
+            if found.goal > 0 and len(search.goals) > 1:
+                self._plan(search.goals[:1], search.obstacles, state)
                 return
             self.refusal = found.reason
             self._refusals += 1
@@ -322,10 +326,21 @@ class PathFlight:
         return True
 
     def _is_obstructed(self, obstacles: Obstacles) -> bool:
-        """Whether an obstacle is where the drone will be; the frames it flies through are none."""
+        """Whether an obstacle is where the drone will be; the frames it flies through are none.
+
+        A frame that turns out to be elsewhere, or turned, is one: the path does not lead through its opening.
+        """
         if self.path is None:
             return False
-        gates = [crossing.gate for crossing in self.path.crossings]
+        gates = [
+            crossing.gate
+            for crossing in self.path.crossings
+            if not any(
+                dist(frame.centre_m, crossing.gate.centre_m) < SAME_FRAME_M
+                and _moved(frame, crossing.gate, ELSEWHERE_M)
+                for frame in obstacles.frames
+            )
+        ]
         places_m = self._ahead(AHEAD_S + CHECK_S)
         return obstructed(places_m, gates, obstacles=obstacles, arena=self._arena, style=self._style)
 

@@ -108,7 +108,10 @@ class Search:
         """Go on until this much work is done, and little more, or the search is over."""
         until = self.work + work
         while not self.over and self.work < until:
-            self.over = next(self._running, True)
+            try:
+                next(self._running)
+            except StopIteration:
+                self.over = True
 
     def path(self, start: Motion | None = None) -> Path | Refusal | None:
         """What was found.
@@ -132,7 +135,7 @@ class Search:
         yaw, yaw_rate = headings(samples, stretches, start, self._style)
         return slowed(samples, yaw, yaw_rate, stretches, self._style)
 
-    def _run(self, previous: Sequence[Crossing]) -> Generator[bool, None, None]:
+    def _run(self, previous: Sequence[Crossing]) -> Generator[None, None, None]:
         """The search itself; it pauses after each part."""
         if not self.goals:
             self._found = Refusal("there is no goal to fly to")
@@ -141,14 +144,8 @@ class Search:
         self._found = finder.prepare(self._begin(self._start), self.goals, previous)
         if self._found:
             return
-        running = _fastest(finder, self._legs, self._clearance)
-        while True:
-            try:
-                next(running)
-            except StopIteration as end:
-                self._found = _refusal(*end.value) or end.value
-                return
-            yield False
+        route = yield from _fastest(finder, self._legs, self._clearance)
+        self._found = _refusal(*route) or route
 
     def _begin(self, start: Motion) -> Motion:
         position, velocity = run_in(start, self._style)
