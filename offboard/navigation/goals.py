@@ -272,3 +272,4 @@ class Refusal:
     """No path was found."""
 
     reason: str  # one line for people
+    goal: int = 0  # index of the goal to which there is no way

@@ -29,6 +29,7 @@ AHEAD_STD_M = 0.3  # of a next frame; if it is known less well, it is not planne
 SPACED_S = 0.15  # in which one image is enough: one from nearly the same place adds little to the map
 SPACED_M_S = 1.5  # up to this speed
 NEAR_GATE_M = 1.5  # nearer to a frame to be crossed that is not certain yet, no image is left out
+VIEWPOINT_WORK = 250_000  # of choosing where to look next, in the unit of `PathFlight.work`
 SEARCH_AFTER_M = 2.0  # from behind a frame to the drone, when it is chosen where to look from there
 
 
@@ -123,8 +124,11 @@ class Navigator:
         """Fly to the view that shows most of what has not been seen."""
         state, now_s = self._begin("explore")
         if self._goal is None or now_s - self._chosen_s >= EXPLORE_S:
-            if self._goal is not None and self._flight.path is None and self._flight.refusal:
+            flight = self._flight
+            lost = flight.path is None and flight.search is None and flight.refusal
+            if self._goal is not None and lost:
                 self._world.refuse_viewpoint()
+            flight.spent += VIEWPOINT_WORK
             viewpoint = self._world.next_viewpoint(position_now(state), state.yaw)
             self._goal, self._chosen_s = Point(viewpoint.position_m, viewpoint.yaw_rad), now_s
         return self._fly(self._goal)
@@ -222,6 +226,7 @@ class Navigator:
         if crossing is None or behind is None or dist(behind.position_m, here_m) > SEARCH_AFTER_M:
             return []
         if crossing.after is None:
+            self._flight.spent += VIEWPOINT_WORK
             viewpoint = self._world.next_viewpoint(behind.position_m, behind.yaw_rad or 0.0, from_here=False)
             crossing.after = Point(viewpoint.position_m, viewpoint.yaw_rad)
         return [crossing.after]

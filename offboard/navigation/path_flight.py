@@ -17,7 +17,9 @@ from offboard.navigation.control.stuck_detector import StuckDetector
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
-from offboard.navigation.planning import obstructed, plan
+from offboard.navigation.planner.clearance import SAME_FRAME_M
+from offboard.navigation.planner.passages import load_graphs
+from offboard.navigation.planning import Search, obstructed
 from offboard.navigation.search.lookout import Lookout, turn_to
 from offboard.navigation.search.viewed_space import ViewedSpace
 from offboard.navigation.seen_space import SeenSpace
@@ -33,11 +35,15 @@ NEARLY_SAME_M = 0.04  # likewise of the other frames
 SAME_RAD_M = 1.0  # likewise of headings, for each metre
 STILL_GOOD_M = 0.02  # an estimate that has moved less lets a path through it be kept, if another one is later
 LATER_S = 0.5  # by this
+ELSEWHERE_M = 0.08  # a frame that has moved by more, or turned, must not be flown through on the present path
 AHEAD_S = 0.7  # of the path that must be free, beside the vehicle's lag: it is long enough to stop
 LOOK_AHEAD_S = 2.0  # likewise; the drone turns in flight to look at what it has not seen there
 AHEAD_STEP_S = 0.1
 CHECK_S = 0.2  # between two checks that a path is free, if neither it nor the obstacles have changed
 WAITING_REPLAN_S = 0.2  # between two attempts to go on
+TICK_WORK = 300_000
+"""Of searching for a path in one tick, in the unit of `LegFinder`: some milliseconds of a processor. Then the
+search pauses, so that no command is late; most paths need less."""
 MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
 LOOKED_AT_RAD = 0.3
 LOOK_GAIN_PER_S = 2.0
@@ -52,12 +58,18 @@ class PathFlight:
         path: the one that is flown; None while the drone stops or stands still.
         refusal: why the last planning found none; empty if it did.
         watched: the place that stopped the drone, which now looks there; None if none did.
+        search: the one for a path that goes on at the next tick; None if none does.
+        work: done at the last tick, in the unit of `LegFinder`.
+        spent: of the next tick's work, on something else.
     """
 
     def __init__(self, arena: Arena, style: FlightStyle, limits: CommandLimits) -> None:
         self.path: Path | None = None
         self.refusal = ""
         self.watched: Vec3 | None = None
+        self.search: Search | None = None
+        self.work = self.spent = 0
+        load_graphs()
         self._arena = arena
         self._style = self._usual_style = style
         self._follower = PathFollower(limits=limits)
@@ -84,7 +96,7 @@ class PathFlight:
         if response != self._follower.response:
             self._follower.response = response
             self._style = self._usual_style.adapted(response) if response.late else self._usual_style
-            self._planned_for = None
+            self._planned_for = self.search = None
 
     def _is_near_gate(self) -> bool:
         """Whether the path crosses a gate so soon that another model of the vehicle would disturb that."""
@@ -107,7 +119,7 @@ class PathFlight:
 
     def change(self) -> None:
         """Plan at the next tick, for other goals."""
-        self._planned_for = None
+        self._planned_for = self.search = None
         self._tried_s = -self._style.replan_s
 
     def fly(
@@ -119,6 +131,7 @@ class PathFlight:
         viewed: ViewedSpace,
     ) -> VelocityCommand:
         """Plan again if that is due and goals or obstacles have changed; the command for this tick."""
+        self.work, self.spent = self.spent, 0
         goals = self._goals_now(goals, state)
         looking = self._lookout.command(state, viewed)
         if looking is not None:
@@ -157,16 +170,21 @@ class PathFlight:
 
     def _plan_if_due(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> bool:
         """Plan again if goals or obstacles have changed, or stand in the way; whether that was checked."""
-        now_s = state.time_us * 1e-6
-        if now_s - self._tried_s >= (self._style.replan_s if self.path is not None else WAITING_REPLAN_S):
+        now_s, begun = state.time_us * 1e-6, False
+        if self.search is not None:
+            self._go_on(self.search, state)
+        elif now_s - self._tried_s >= (self._style.replan_s if self.path is not None else WAITING_REPLAN_S):
             planned_for = (tuple(goals), obstacles)
             off = self._stuck.is_held or self._follower.error_m > RESTART_M
             if self.path is None or off or _differ(planned_for, self._planned_for, position_now(state)):
-                self._tried_s = now_s
+                self._tried_s, begun = now_s, True
                 self._plan(goals, obstacles, state)
         checked = self._must_check(obstacles, now_s)
         if checked and self._is_obstructed(obstacles):
-            self._plan(goals, obstacles, state)
+            search = self.search
+            searched_for = None if search is None else (search.goals, search.obstacles)
+            if not begun and _differ((goals, obstacles), searched_for, position_now(state)):
+                self._plan(goals, obstacles, state)
             if self._is_obstructed(obstacles):
                 self._leave()
         return checked
@@ -180,9 +198,11 @@ class PathFlight:
         """
         if self.path is None:
             return self._stand(state, turn_rad_s or 0.0)
+        now_s = state.time_us * 1e-6
+        if self._anew:  # not before: until then the drone may brake on the path that it has left
+            self._follower.begin(now_s)
         self._left, self._anew = None, False
         prediction = self._response.predict() if self._follower.response.late else None
-        now_s = state.time_us * 1e-6
         return self._follower.command(self.path, state, now_s, prediction, turn_rad_s=turn_rad_s)
 
     def _leave(self) -> None:
@@ -222,25 +242,47 @@ class PathFlight:
         return self._own_motion(state), True
 
     def _plan(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> None:
-        start, restarts = self._start(state)
+        """Begin to search for a path from the motion now."""
         self._stuck.planned(state.time_us * 1e-6)
-        found = self._find(start, goals, obstacles)
-        if isinstance(found, Refusal) and len(goals) > 1:
-            found = self._find(start, goals[:1], obstacles)
+        start, _ = self._start(state)
+        arena, style = self._arena, self._style
+        search = Search(start, goals, obstacles=obstacles, arena=arena, style=style, previous=self.path)
+        self._go_on(search, state, begun=True)
+
+    def _go_on(self, search: Search, state: DroneState, *, begun: bool = False) -> None:
+        """Search on for this tick; take the path when there is one.
+
+        Args:
+            search: for a path.
+            state: of the drone.
+            begun: the search begins now.
+        """
+        before = search.work
+        search.advance(TICK_WORK - self.work)
+        self.work += search.work - before
+        self.search = None if search.over else search
+        if not search.over:
+            return
+        start, restarts = self._start(state)
+        found = search.path(None if begun else start)
+        if found is None:  # the drone is elsewhere by now
+            self.change()
+            return
         if isinstance(found, Refusal):
+            if found.goal > 0 and len(search.goals) > 1:
+                self._plan(search.goals[:1], search.obstacles, state)
+                return
             self.refusal = found.reason
             self._refusals += 1
             if self._refusals >= MAX_REFUSALS:
                 self._leave()
             return
         self.refusal, self._refusals = "", 0
-        if not restarts and self._delays(found, obstacles):
+        if not restarts and self._delays(found, search.obstacles):
             return
-        if restarts:
-            self._follower.begin(state.time_us * 1e-6)
         self.path = found if restarts else self._follower.continued(found)
         self._anew = restarts
-        self._planned_for = (tuple(goals), obstacles)
+        self._planned_for = (search.goals, search.obstacles)
 
     def _delays(self, found: Path, obstacles: Obstacles) -> bool:
         """Whether a new path is much later at the next gate than the present one, which is as good still."""
@@ -284,16 +326,23 @@ class PathFlight:
         return True
 
     def _is_obstructed(self, obstacles: Obstacles) -> bool:
-        """Whether an obstacle is where the drone will be; the frames it flies through are none."""
+        """Whether an obstacle is where the drone will be; the frames it flies through are none.
+
+        A frame that turns out to be elsewhere, or turned, is one: the path does not lead through its opening.
+        """
         if self.path is None:
             return False
-        gates = [crossing.gate for crossing in self.path.crossings]
+        gates = [
+            crossing.gate
+            for crossing in self.path.crossings
+            if not any(
+                dist(frame.centre_m, crossing.gate.centre_m) < SAME_FRAME_M
+                and _moved(frame, crossing.gate, ELSEWHERE_M)
+                for frame in obstacles.frames
+            )
+        ]
         places_m = self._ahead(AHEAD_S + CHECK_S)
         return obstructed(places_m, gates, obstacles=obstacles, arena=self._arena, style=self._style)
-
-    def _find(self, start: Motion, goals: Sequence[Goal], obstacles: Obstacles) -> Path | Refusal:
-        arena, style = self._arena, self._style
-        return plan(start, goals, obstacles=obstacles, arena=arena, style=style, previous=self.path)
 
 
 def position_now(state: DroneState) -> Vec3:

@@ -5,7 +5,7 @@ In this order: `route` chooses sides and speeds, `detours` finds clear legs, `ti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from math import dist, hypot, sqrt
@@ -14,10 +14,10 @@ import numpy as np
 
 from geometry.vectors import Vec3
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
-from offboard.navigation.path import Path
+from offboard.navigation.path import Crossing, Path
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M, SAME_FRAME_M, Clearance, frame_reach_m
 from offboard.navigation.planner.connect import Connector
-from offboard.navigation.planner.detours import LegFinder, open_ended
+from offboard.navigation.planner.detours import MOST_WORK, LegFinder, Step, Steps, open_ended
 from offboard.navigation.planner.legs import Array, Leg
 from offboard.navigation.planner.route import BLOCKED_S, Pass, RouteFinder, place
 from offboard.navigation.planner.timing import Stretch, headings, run_in, sample, slowed
@@ -33,7 +33,7 @@ USED_MARGIN_M = 0.05  # of the margin to obstacles, while a path is flown
 MAX_ROUTES = 6  # for which legs are sought
 SLOWER_S = 0.3  # legs slower than expected by this make another route worth a look
 
-_Legs = list[list[Leg] | None]
+_Route = tuple[list[Pass], list[Steps]]
 
 
 def plan(
@@ -58,24 +58,111 @@ def plan(
     Returns:
         The path, or why there is none.
     """
-    if not goals:
-        return Refusal("there is no goal to fly to")
-    clearance = Clearance(obstacles, arena, style)
-    position, velocity = run_in(start, style)
-    (x, y, z), (vx, vy, vz) = position.tolist(), velocity.tolist()
-    begin = replace(start, position_m=(x, y, z), velocity_m_s=(vx, vy, vz))
-    connector = Connector(style, obstacles.floor_m)
-    finder = RouteFinder(clearance, connector, style)
-    reason = finder.prepare(begin, goals, () if previous is None else previous.crossings)
-    if reason:
-        return Refusal(reason)
-    route, legs = _fastest(finder, LegFinder(clearance, connector, style), clearance)
-    stretches = _stretches(route, legs)
-    if isinstance(stretches, Refusal):
-        return stretches
-    samples = sample(stretches, start, style)
-    yaw, yaw_rate = headings(samples, stretches, start, style)
-    return slowed(samples, yaw, yaw_rate, stretches, style)
+    search = Search(start, goals, obstacles=obstacles, arena=arena, style=style, previous=previous)
+    while not search.over:
+        search.advance(MOST_WORK)
+    found = search.path()
+    assert found is not None
+    return found
+
+
+class Search:
+    """Looks for a path, which may take many ticks where obstacles block the way: a part of it at each.
+
+    Args: as for `plan`.
+
+    Attributes:
+        goals: where the path leads.
+        obstacles: that it keeps clear of.
+        over: whether it has ended, so that `path` tells what was found.
+        work: done so far, in the unit of `LegFinder`.
+    """
+
+    def __init__(
+        self,
+        start: Motion,
+        goals: Sequence[Goal],
+        *,
+        obstacles: Obstacles,
+        arena: Arena,
+        style: FlightStyle,
+        previous: Path | None = None,
+    ) -> None:
+        self.goals = tuple(goals)
+        self.obstacles = obstacles
+        self.over = False
+        self._start = start
+        self._style = style
+        self._clearance = Clearance(obstacles, arena, style)
+        self._connector = Connector(style, obstacles.floor_m)
+        self._legs = LegFinder(self._clearance, self._connector, style)
+        self._found: _Route | Refusal | None = None
+        self._running = self._run(() if previous is None else previous.crossings)
+
+    @property
+    def work(self) -> int:
+        """See the class."""
+        return self._legs.work
+
+    def advance(self, work: int) -> None:
+        """Go on until this much work is done, and little more, or the search is over."""
+        until = self.work + work
+        while not self.over and self.work < until:
+            try:
+                next(self._running)
+            except StopIteration:
+                self.over = True
+
+    def path(self, start: Motion | None = None) -> Path | Refusal | None:
+        """What was found.
+
+        Args:
+            start: where the drone is going to be now, if the search has taken some time: its own start then.
+
+        Returns:
+            The path, why there is none, or None if what was found is of no use from there.
+        """
+        route = self._found
+        if route is None or isinstance(route, Refusal):
+            return route
+        if start is not None:
+            route = self._from(start, *route)
+            if route is None:
+                return None
+        start = start or self._start
+        stretches = _stretches(*route)
+        samples = sample(stretches, start, self._style)
+        yaw, yaw_rate = headings(samples, stretches, start, self._style)
+        return slowed(samples, yaw, yaw_rate, stretches, self._style)
+
+    def _run(self, previous: Sequence[Crossing]) -> Generator[None, None, None]:
+        """The search itself; it pauses after each part."""
+        if not self.goals:
+            self._found = Refusal("there is no goal to fly to")
+            return
+        finder = RouteFinder(self._clearance, self._connector, self._style)
+        self._found = finder.prepare(self._begin(self._start), self.goals, previous)
+        if self._found:
+            return
+        route = yield from _fastest(finder, self._legs, self._clearance)
+        self._found = _refusal(*route) or route
+
+    def _begin(self, start: Motion) -> Motion:
+        position, velocity = run_in(start, self._style)
+        (x, y, z), (vx, vy, vz) = position.tolist(), velocity.tolist()
+        return replace(start, position_m=(x, y, z), velocity_m_s=(vx, vy, vz))
+
+    def _from(self, start: Motion, route: list[Pass], found: list[Steps]) -> _Route | None:
+        """The same from another start, where the way to the first place is as short."""
+        steps = found[0]
+        if steps is None or route[1].begun:
+            return None
+        begin = self._begin(start)
+        at = place(np.array(begin.position_m), np.array(begin.velocity_m_s), begin.yaw_rad)
+        leg = self._legs.clear_leg(at, steps[0].end)
+        if leg is None or leg.duration_s > steps[0].leg.duration_s + SLOWER_S:
+            return None
+        return [at, *route[1:]], [[Step(leg, steps[0].end), *steps[1:]], *found[1:]]
 
 
 def obstructed(
@@ -124,20 +211,22 @@ def _near(places_m: Sequence[Vec3], obstacles: Obstacles, style: FlightStyle) ->
     )
 
 
-def _fastest(finder: RouteFinder, leg_finder: LegFinder, clearance: Clearance) -> tuple[list[Pass], _Legs]:
+def _fastest(
+    finder: RouteFinder, leg_finder: LegFinder, clearance: Clearance
+) -> Generator[None, None, _Route]:
     """The fastest route and its legs, which are None where obstacles block all routes.
 
     Legs are sought only for the route that seems fastest; the time they take corrects what seems so, until
     the fastest one stays the same (Dellin & Srinivasa, "A unifying formalism for shortest path problems with
     expensive edge evaluations via lazy best-first search", 2016).
     """
-    best: tuple[float, list[Pass], _Legs] | None = None
+    best: tuple[float, list[Pass], list[Steps]] | None = None
     for _ in range(MAX_ROUTES):
         route, ways, expected_s = finder.best()
         full = _complete(route, clearance)
-        legs = leg_finder.route(full)
+        legs = yield from leg_finder.route(full)
         before = full.index(route[1]) - 1  # a way out may come before the first leg
-        times = [BLOCKED_S if found is None else sum(leg.duration_s for leg in found) for found in legs]
+        times = [BLOCKED_S if found is None else sum(step.leg.duration_s for step in found) for found in legs]
         times[: before + 1] = [sum(times[: before + 1])]
         total_s = sum(times) + sum(float(one.inner_s[0] + one.costs_s[0]) for one in route)
         if best is None or total_s < best[0]:
@@ -145,7 +234,7 @@ def _fastest(finder: RouteFinder, leg_finder: LegFinder, clearance: Clearance) -
         slower = [i for i, expected in enumerate(expected_s) if times[i] > expected + SLOWER_S]
         for leg in slower:
             finder.correct(leg, (ways[leg], ways[leg + 1]), min(times[leg], BLOCKED_S))
-        if not slower or sum(expected_s) >= BLOCKED_S:
+        if not slower or sum(expected_s) >= BLOCKED_S or leg_finder.work > MOST_WORK:
             break
     assert best is not None
     return best[1:]
@@ -183,21 +272,29 @@ def _stop_behind(crossing: Pass, clearance: Clearance) -> Array:
     return farthest
 
 
-def _stretches(route: list[Pass], found: _Legs) -> list[Stretch] | Refusal:
+def _refusal(route: list[Pass], found: list[Steps]) -> Refusal | None:
+    """Why there is no path, if one of the legs was not found."""
+    passed: list[Goal] = []
+    for after, steps in zip(route[1:], found, strict=True):
+        if steps is None:
+            gate = 1 + sum(isinstance(goal, Gate) for goal in passed)
+            what = f"gate {gate}" if isinstance(after.goal, Gate) else "the next point"
+            return Refusal(f"obstacles block the way to {what}", len(passed))
+        if after.goal is not None:
+            passed.append(after.goal)
+    return None
+
+
+def _stretches(route: list[Pass], found: list[Steps]) -> list[Stretch]:
     stretches: list[Stretch] = []
-    gates = 0
-    for (_, after), legs in zip(pairwise(route), found, strict=True):
+    for (_, after), steps in zip(pairwise(route), found, strict=True):
         goal = after.goal
-        if legs is None:
-            what = f"gate {gates + 1}" if isinstance(goal, Gate) else "the next point"
-            return Refusal(f"obstacles block the way to {what}")
         look = np.array(goal.centre_m) if isinstance(goal, Gate) else None
-        stretches += [Stretch(leg, goal, False, after.yaw_rad, look) for leg in legs]
+        stretches += [Stretch(step.leg, goal, False, after.yaw_rad, look) for step in steps or ()]
         if not isinstance(goal, Gate):
             continue
-        gates += 1
         if after.begun:
-            stretches[-1] = Stretch(legs[-1], goal, True, after.yaw_rad, None)
+            stretches[-1] = replace(stretches[-1], crosses=True, look_m=None)
         else:
             stretches.append(Stretch(_through(after), goal, True, after.yaw_rad, None))
     return stretches

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import hypot, remainder, tau
 from typing import Final
 
@@ -65,7 +64,6 @@ class SeenSpace:
         position_m: Vec3,
         attitude_arena: Quaternion,
         edges: tuple[ObstacleEdge, ...],
-        columns_m: Sequence[Vec3] = (),
     ) -> None:
         """Take in what an image showed of obstacles, which may be nothing.
 
@@ -75,13 +73,12 @@ class SeenSpace:
             position_m: of the drone's centre when the image was exposed, arena axes.
             attitude_arena: body FLU to arena.
             edges: the lower ends of obstacles, in every eighth column of the image that shows one.
-            columns_m: obstacles that are known, as discs in plan: x, y, radius.
         """
         self.has_obstacles = self.has_obstacles or bool(edges)
         if not self._is_new(position_m, yaw_of(attitude_arena)):
             return
         pose = self._camera.pose(position_m, attitude_arena)
-        limits_m = self._limits_m(pose, edges, columns_m) if edges else None
+        limits_m = self._limits_m(pose, edges) if edges else None
         self._waiting.append((position_m, pose, limits_m))
         if self.suspects_m:
             self.suspects_m = tuple(each for each in self.suspects_m if not self.is_seen(each))
@@ -154,13 +151,11 @@ class SeenSpace:
         self._last = (position_m, yaw_rad)
         return True
 
-    def _limits_m(
-        self, pose: CameraPose, edges: tuple[ObstacleEdge, ...], columns_m: Sequence[Vec3]
-    ) -> Doubles:
+    def _limits_m(self, pose: CameraPose, edges: tuple[ObstacleEdge, ...]) -> Doubles:
         """How far each column of the image is free; not farther than the columns beside it.
 
-        An obstacle whose foot is not seen is nearer than the floor there would be: it is the known one, if
-        one is.
+        An obstacle whose foot is below the image may be anywhere before the floor there, also where one is
+        known: that may be a part of the same wall farther away.
         """
         half_px = self._camera.half_width_px
         limits_m = np.full(max(int(2 * half_px / COLUMN_PX), 1), _FARTHEST_M)
@@ -169,24 +164,10 @@ class SeenSpace:
         known = np.isfinite(feet.range_m)
         before_m = np.where(known, feet.range_m, 0.0) - 2 * np.where(known, feet.error_m, 0.0) - _MARGIN_M
         cut = np.array([edge.cut for edge in edges], dtype=bool)
-        before_m = np.where(cut, self._known_m(pose, feet, columns_m), before_m)
+        before_m = np.where(cut, 0.0, before_m)
         for edge, end_m in zip(edges, before_m.tolist(), strict=True):
             column = min(max(int((edge.right_px + half_px) / COLUMN_PX), 0), limits_m.size - 1)
             limits_m[column] = min(limits_m[column], max(end_m, 0.0))
         padded = np.pad(limits_m, 1, mode="edge")
         narrowest: Doubles = np.minimum(np.minimum(padded[:-2], padded[2:]), limits_m)
         return narrowest
-
-    def _known_m(self, pose: CameraPose, feet: FloorPoints, columns_m: Sequence[Vec3]) -> Doubles:
-        """How far it is to the nearest known obstacle that is not beyond the foot; 0 if there is none."""
-        if not columns_m:
-            return np.zeros(feet.range_m.size)
-        columns: Doubles = np.array(columns_m)
-        x, y, radius = columns.T[:, None]
-        dx, dy = x - pose.position_m[0], y - pose.position_m[1]
-        ux, uy = feet.ux[:, None], feet.uy[:, None]
-        along_m = dx * ux + dy * uy - radius - _MARGIN_M / 2
-        met = (np.abs(dy * ux - dx * uy) < radius) & (along_m > 0.0) & (along_m < feet.range_m[:, None])
-        nearest: Doubles = np.where(met, along_m, np.inf).min(axis=1)
-        free: Doubles = np.where(np.isfinite(nearest), nearest, 0.0)
-        return free

@@ -80,7 +80,7 @@ class WorldModel:
         self._frames = None
         self._map.observe(image, pose, self._poses_of_rows(image, pose))
         self._obstacle_map.update(*where, image.obstacle_edges)
-        self.seen_space.update(*where, image.obstacle_edges, self._obstacle_map.columns_m())
+        self.seen_space.update(*where, image.obstacle_edges)
         self._explorer.update(*where, image.obstacle_edges)
         known = [colour for colour in COLOURS if self._map.best(colour) is not None]
         self.viewed_space.update(self._camera.pose(*where))

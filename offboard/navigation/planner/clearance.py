@@ -94,7 +94,7 @@ class Clearance:
         """How deep points are in the enlarged columns, in plan; shapes (n, 2 or 3) and (n, columns)."""
         dx = points_m[:, None, 0] - self._columns[:, 0]
         dy = points_m[:, None, 1] - self._columns[:, 1]
-        return np.asarray(self._radii_m - np.hypot(dx, dy))
+        return np.asarray(self._radii_m - np.sqrt(dx * dx + dy * dy))
 
     def is_column(self, obstacle: int) -> bool:
         """Whether an index of `depths` is a column's."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from math import pi, remainder
 
 import numpy as np
 
 from offboard.navigation.goals import FlightStyle
-from offboard.navigation.planner.clearance import Clearance
+from offboard.navigation.planner.clearance import Clearance, Mask
 from offboard.navigation.planner.connect import DESCENT_GAIN_PER_S2, Connector, Ends
 from offboard.navigation.planner.legs import Array, Leg, Legs
 from offboard.navigation.planner.passages import Passages, lengths
@@ -23,36 +24,59 @@ _STRAIN = 1.05  # a leg whose acceleration is this multiple of the limit is not 
 _SPEED_SHARES = (1.0, 0.5)
 _CORNER_SHARES = (1.0, 0.6, 0.3, 0.0)
 _TRIED = 3  # ways round an obstacle that are themselves blocked
+CHECK_WORK = 20_000  # of a check of legs, beside one for each point and obstacle
+ROUND_WORK = 200 * CHECK_WORK  # after which no other ways round an obstacle are tried
+MOST_WORK = 600 * CHECK_WORK  # likewise of all legs
 
 _Blocked = tuple[float, int]
 """When a leg is deepest in an obstacle, as a share of its duration, and in which."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """A leg, and where it ends."""
+
+    leg: Leg
+    end: Pass
+
+
+Steps = list[Step] | None
+Seeking = Generator[None, None, Steps]
+
+
 class LegFinder:
-    """Finds legs between the passes of a route.
+    """Finds legs between the passes of a route. Generators pause after each check, so that a search can wait.
 
     Args:
         clearance: the obstacles.
         connector: makes the legs.
         style: how boldly to fly.
+
+    Attributes:
+        work: done so far; in the unit of a point's distance from an obstacle, which takes some nanoseconds.
     """
 
     def __init__(self, clearance: Clearance, connector: Connector, style: FlightStyle) -> None:
+        self.work = 0
         self._clearance = clearance
         self._connector = connector
         self._style = style
         self._passages = Passages(clearance)
+        self._until_work = 0  # a way round an obstacle is sought
 
-    def route(self, passes: Sequence[Pass]) -> list[list[Leg] | None]:
+    def route(self, passes: Sequence[Pass]) -> Generator[None, None, list[Steps]]:
         """The legs from each pass to the next; None where no clear ones were found."""
         direct = self.direct(list(pairwise(passes)))
-        found: list[list[Leg] | None] = []
-        for index, (pair, blocked) in enumerate(zip(pairwise(passes), self._blocked(direct), strict=True)):
+        hits = self._blocked(direct)
+        yield
+        found: list[Steps] = []
+        for index, (pair, blocked) in enumerate(zip(pairwise(passes), hits, strict=True)):
             leg = direct[index]
             if blocked is None or pair[1].begun:
-                found.append([leg])
+                found.append([Step(leg, pair[1])])
                 continue
-            found.append(self._round(*pair, leg, blocked, MAX_DEPTH))
+            self._until_work = min(self.work + ROUND_WORK, MOST_WORK)
+            found.append((yield from self._round(*pair, leg, blocked, MAX_DEPTH)))
         return found
 
     def direct(self, pairs: Sequence[tuple[Pass, Pass]]) -> Legs:
@@ -60,16 +84,22 @@ class LegFinder:
         starts = Ends.joined([before.exits for before, _ in pairs])
         return self._connector.legs(starts, Ends.joined([after.entries for _, after in pairs]))
 
-    def _between(self, before: Pass, after: Pass, depth: int) -> list[Leg] | None:
+    def clear_leg(self, before: Pass, after: Pass) -> Leg | None:
+        """The direct leg; None if it is blocked or not possible."""
+        legs = self.direct([(before, after)])
+        return legs[0] if legs.motions.strains[0] <= _STRAIN and self._blocked(legs)[0] is None else None
+
+    def _between(self, before: Pass, after: Pass, depth: int) -> Seeking:
         legs = self.direct([(before, after)])
         if legs.motions.strains[0] > _STRAIN:
             return None
         blocked = self._blocked(legs)[0]
+        yield
         if blocked is None:
-            return [legs[0]]
-        return self._round(before, after, legs[0], blocked, depth) if depth else None
+            return [Step(legs[0], after)]
+        return (yield from self._round(before, after, legs[0], blocked, depth)) if depth else None
 
-    def _round(self, before: Pass, after: Pass, leg: Leg, blocked: _Blocked, depth: int) -> list[Leg] | None:
+    def _round(self, before: Pass, after: Pass, leg: Leg, blocked: _Blocked, depth: int) -> Seeking:
         """Legs round the obstacle in which the direct one is deepest."""
         share, obstacle = blocked
         ways = self._ways(before, after, leg, share, obstacle)
@@ -80,28 +110,38 @@ class LegFinder:
             times = legs.motions.durations_s[:n] + legs.motions.durations_s[n:]
             possible = np.maximum(legs.motions.strains[:n], legs.motions.strains[n:]) <= _STRAIN
             hits = self._blocked(legs)
+            yield
             clear = [i for i in range(n) if possible[i] and hits[i] is None and hits[n + i] is None]
             if clear:
                 fastest = min(clear, key=lambda i: float(times[i]))
-                return [legs[fastest], legs[n + fastest]]
+                return [Step(legs[fastest], ways[fastest]), Step(legs[n + fastest], after)]
             later = [(float(times[i]), ways[i]) for i in range(n) if possible[i]]
         if self._clearance.is_column(obstacle):
-            passed = self._through_passages(before, after, depth)
+            passed = yield from self._through_passages(before, after, depth)
             if passed is not None:
                 return passed
         tried = [way for _, way in sorted(later, key=lambda entry: entry[0])[:_TRIED]]
         if depth == MAX_DEPTH:  # beside the start, before it is too near to pass in one curve
             tried += self._ways(before, after, leg, 0.0, obstacle)
         for way in tried:
-            found = self._chain([before, way, after], depth - 1)
+            if self.work > self._until_work:
+                break
+            found = yield from self._chain([before, way, after], depth - 1)
             if found is not None:
                 return found
         return None
 
-    def _through_passages(self, before: Pass, after: Pass, depth: int) -> list[Leg] | None:
+    def _through_passages(self, before: Pass, after: Pass, depth: int) -> Seeking:
         """Legs along the shortest way between columns: past its corners as fast as they stay clear."""
         start_m, end_m = before.exits.places_m[0], after.entries.places_m[0]
+        work = self._passages.work
+        self._passages.prepare()
+        self.work += self._passages.work - work
+        yield
+        work = self._passages.work
         corners = self._passages.corners(start_m, end_m)
+        self.work += self._passages.work - work
+        yield
         if not corners:
             return None
         points = [start_m[:2], *corners, end_m[:2]]
@@ -117,19 +157,22 @@ class LegFinder:
                 chain.append(place(np.array([corner[0], corner[1], height_m]), speed, yaw))
             chain.append(after)
             legs = self.direct(list(pairwise(chain)))
-            if legs.motions.strains.max() <= _STRAIN and not any(self._blocked(legs)):
-                return [legs[i] for i in range(len(legs))]
-        return self._chain(chain, min(depth - 1, 1))
+            if legs.motions.strains.max() <= _STRAIN:
+                hits = self._blocked(legs)
+                yield
+                if not any(hits):
+                    return [Step(legs[i], end) for i, end in enumerate(chain[1:])]
+        return (yield from self._chain(chain, min(depth - 1, 1)))
 
-    def _chain(self, passes: Sequence[Pass], depth: int) -> list[Leg] | None:
+    def _chain(self, passes: Sequence[Pass], depth: int) -> Seeking:
         """Clear legs from pass to pass."""
-        legs: list[Leg] = []
+        steps: list[Step] = []
         for before, after in pairwise(passes):
-            found = self._between(before, after, depth)
+            found = yield from self._between(before, after, depth)
             if found is None:
                 return None
-            legs += found
-        return legs
+            steps += found
+        return steps
 
     def _blocked(self, legs: Legs) -> list[_Blocked | None]:
         """Where each leg is deepest in an obstacle; None if it is clear."""
@@ -137,12 +180,17 @@ class LegFinder:
         shares = np.linspace(0.0, 1.0, min(max(steps, _FEWEST), _MOST) + 1)
         positions = legs.positions(shares)
         depths = self._clearance.depths(positions.reshape(-1, 3)).reshape(len(legs), len(shares), -1)
-        flat = open_ended(depths).reshape(len(legs), -1)
-        deepest = flat.argmax(axis=1)
-        found: list[_Blocked | None] = []
-        for row, at in enumerate(deepest.tolist()):
-            index, obstacle = divmod(at, depths.shape[2])
-            found.append((float(shares[index]), obstacle) if flat[row, at] > 0.0 else None)
+        self.work += CHECK_WORK + depths.size
+        found: list[_Blocked | None] = [None] * len(legs)
+        touched: Mask = np.any(depths > 0.0, axis=1)
+        rows, obstacles = np.flatnonzero(touched.any(axis=1)), np.flatnonzero(touched.any(axis=0))
+        if not len(rows):
+            return found
+        flat = open_ended(depths[rows][..., obstacles]).reshape(len(rows), -1)
+        for row, values, at in zip(rows.tolist(), flat, flat.argmax(axis=1).tolist(), strict=True):
+            index, obstacle = divmod(at, len(obstacles))
+            if values[at] > 0.0:
+                found[row] = (float(shares[index]), int(obstacles[obstacle]))
         return found
 
     def _ways(self, before: Pass, after: Pass, leg: Leg, share: float, obstacle: int) -> list[Pass]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from importlib import import_module
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,8 @@ SPARE_M = 0.06  # how much farther than needed a way stays away from columns, so
 _SIGHT_STEP_M = 0.05
 _NEIGHBOURS = ((1, 0), (0, 1), (1, 1), (1, -1))
 _START_REACH_CELLS = 3
+_SHORTEST_WORK = 100_000  # of a shortest way
+_SIGHT_WORK = 2_000  # of a look from one point to another
 
 
 class Passages:
@@ -27,14 +30,23 @@ class Passages:
 
     Args:
         clearance: the obstacles.
+
+    Attributes:
+        work: done so far, in the unit of `LegFinder`.
     """
 
     def __init__(self, clearance: Clearance) -> None:
+        self.work = 0
         self._clearance = clearance
         low, high = clearance.low_m[:2], clearance.high_m[:2]
         self._low_m: Array = low
         self._counts = np.maximum(np.ceil((high - low) / CELL_M).astype(int) + 1, 2)
         self._steps_m: Array = (high - low) / (self._counts - 1)
+
+    def prepare(self) -> None:
+        """Do the part of the work that all ways have in common."""
+        if not self.work:
+            assert self._graph is not None
 
     def corners(self, start_m: Array, end_m: Array) -> list[Array] | None:
         """Where to turn on the way between two points in plan; None if there is no way."""
@@ -54,7 +66,9 @@ class Passages:
         return self._clear(points).reshape(tuple(self._counts))
 
     def _clear(self, points_m: Array) -> Mask:
-        deepest = self._clearance.column_depths(points_m).max(axis=1, initial=-1.0)
+        depths = self._clearance.column_depths(points_m)
+        self.work += depths.size
+        deepest = depths.max(axis=1, initial=-1.0)
         return np.asarray(deepest < -SPARE_M)
 
     def _nodes(self, point_m: Array) -> int | None:
@@ -70,8 +84,9 @@ class Passages:
         return int(nearest[0] * self._counts[1] + nearest[1])
 
     def _shortest(self, start: int, end: int) -> list[Array] | None:
-        from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415 - needed only where columns block the way
+        from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415 - see `load_graphs`
 
+        self.work += _SHORTEST_WORK
         found = dijkstra(self._graph, directed=False, indices=[start], return_predecessors=True)
         before = found[1][0]
         way = [end]
@@ -85,7 +100,7 @@ class Passages:
     @cached_property
     def _graph(self) -> csr_array[np.float64, tuple[int, int]]:
         """Lengths between neighbouring clear grid points, as a sparse matrix."""
-        from scipy.sparse import csr_array  # noqa: PLC0415
+        from scipy.sparse import csr_array  # noqa: PLC0415 - see `load_graphs`
 
         free = self._free
         index = np.arange(free.size).reshape(free.shape)
@@ -116,9 +131,15 @@ class Passages:
         return corners
 
     def _in_sight(self, one: Array, other: Array) -> bool:
+        self.work += _SIGHT_WORK
         count = max(int(np.linalg.norm(other - one) / _SIGHT_STEP_M), 1)
         points = one + np.linspace(0.0, 1.0, count + 1)[1:-1, None] * (other - one)
         return bool(self._clear(points).all()) if len(points) else True
+
+
+def load_graphs() -> None:
+    """Import scipy's graphs, which takes a quarter of a second: before a flight, and only if it plans."""
+    import_module("scipy.sparse.csgraph")
 
 
 def lengths(points: list[Array]) -> list[float]:

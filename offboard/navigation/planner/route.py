@@ -10,7 +10,7 @@ from math import cos, hypot, nan, pi, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from offboard.navigation.goals import PRESENT_SHARE, FlightStyle, Gate, Goal, Motion, Point
+from offboard.navigation.goals import PRESENT_SHARE, FlightStyle, Gate, Goal, Motion, Point, Refusal
 from offboard.navigation.path import Crossing
 from offboard.navigation.planner.clearance import Clearance
 from offboard.navigation.planner.connect import Connector, Ends
@@ -108,11 +108,11 @@ class RouteFinder:
         self._leg_s: list[Array] = []
         self._corrected: set[tuple[int, bool, bool]] = set()
 
-    def prepare(self, start: Motion, goals: Sequence[Goal], previous: Sequence[Crossing]) -> str:
+    def prepare(self, start: Motion, goals: Sequence[Goal], previous: Sequence[Crossing]) -> Refusal | None:
         """Collect the ways to pass all goals, and how long legs between them take.
 
         Returns:
-            Why there is none; empty if there is.
+            Why there is none; None if there is.
         """
         at, speed = np.array(start.position_m), np.array(start.velocity_m_s)
         self._stages = [place(at, speed, start.yaw_rad)]
@@ -124,14 +124,14 @@ class RouteFinder:
                 continue
             ways = self._through_gate(goal, openings.pop(0), start if index == 0 else None, previous)
             if ways is None:
-                return f"goal {index + 1}, a gate, has no room before or behind its opening"
+                return Refusal(f"goal {index + 1}, a gate, has no room before or behind its opening", index)
             self._stages.append(ways)
         for before, after in pairwise(self._stages):
             m, n = len(before.inner_s), len(after.inner_s)
             rows, columns = np.repeat(np.arange(m), n), np.tile(np.arange(n), m)
             times = self._connector.times(before.exits.take(rows), after.entries.take(columns))
             self._leg_s.append(times.reshape(m, n))
-        return ""
+        return None
 
     def best(self) -> tuple[list[Pass], list[int], list[float]]:
         """The fastest route, which way it takes at each goal, and how long its legs take."""

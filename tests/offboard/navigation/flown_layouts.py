@@ -57,6 +57,12 @@ class Layout:
         return tuple(disc for solid in self.scenario.prisms for disc in _discs(solid))
 
     @property
+    def obstacles(self) -> Obstacles:
+        """All of them, with the frames."""
+        decoys = tuple(Gate(decoy.position_arena_m, decoy.yaw_rad) for decoy in self.scenario.decoys)
+        return Obstacles((*self.gates, *decoys), self.columns_m, self.scenario.base)
+
+    @property
     def start(self) -> Motion:
         """On the base."""
         start = self.scenario.start
@@ -66,10 +72,8 @@ class Layout:
         self, start: Motion, goals: list[Goal], previous: Path | None = None, style: FlightStyle = CONTEST
     ) -> Path | Refusal:
         """A plan with all frames and obstacles known."""
-        decoys = tuple(Gate(decoy.position_arena_m, decoy.yaw_rad) for decoy in self.scenario.decoys)
-        obstacles = Obstacles((*self.gates, *decoys), self.columns_m, self.scenario.base)
         arena = self.scenario.arena
-        return plan(start, goals, obstacles=obstacles, arena=arena, style=style, previous=previous)
+        return plan(start, goals, obstacles=self.obstacles, arena=arena, style=style, previous=previous)
 
 
 def _discs(solid: Solid) -> list[Vec3]:

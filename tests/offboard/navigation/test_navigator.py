@@ -33,14 +33,15 @@ def test_a_drone_that_finds_no_way_to_a_viewpoint_looks_elsewhere(monkeypatch):
     """No way is found to anywhere that is higher than the drone, nor to the east of it."""
     plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
     navigator = Navigator(plan.surroundings, plan.command_limits)
-    find, asked = path_flight.plan, []
+    asked = []
 
-    def refusing(start, goals, **more):
-        x, _, z = goals[0].position_m
-        asked.append(goals[0])
-        return Refusal("something is in the way") if x > -0.1 or z > 1.1 else find(start, goals, **more)
+    class Refusing(path_flight.Search):
+        def path(self, start=None):
+            x, _, z = self.goals[0].position_m
+            asked.append(self.goals[0])
+            return Refusal("something is in the way") if x > -0.1 or z > 1.1 else super().path(start)
 
-    monkeypatch.setattr(path_flight, "plan", refusing)
+    monkeypatch.setattr(path_flight, "Search", Refusing)
     for tick in range(20 * 20):
         navigator.observe(replace(STATE, time_us=50_000 * tick, velocity_arena_m_s=(0.0, 0.0, 0.0)), ())
         navigator.explore()

@@ -8,7 +8,8 @@ import pytest
 from geometry.vectors import Vec3
 from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, Refusal
 from offboard.navigation.path import Path
-from offboard.navigation.planning import plan
+from offboard.navigation.planner.detours import MOST_WORK
+from offboard.navigation.planning import Search, plan
 from scenarios.models import Arena, Base
 from tests.offboard.navigation.flown_layouts import (
     STEP_S,
@@ -93,6 +94,27 @@ def test_harder_levels_are_planned_clear_of_everything(level: str, seed: int):
     for x_m, y_m, radius_m in layout.columns_m:
         away_m = np.hypot(sampled.positions[:, 0] - x_m, sampled.positions[:, 1] - y_m)
         assert away_m.min() > radius_m + 0.22
+
+
+def test_a_search_in_parts_finds_the_same_and_begins_where_the_drone_has_come_to():
+    layout = Layout.random(201, "crowded")
+    more = {"obstacles": layout.obstacles, "arena": layout.scenario.arena, "style": CONTEST}
+    at_once, in_parts = (Search(layout.start, layout.goals, **more) for _ in range(2))
+    at_once.advance(MOST_WORK)
+    parts = 0
+    while not in_parts.over:
+        in_parts.advance(100_000)
+        parts += 1
+    assert parts > 3
+    path, same = at_once.path(), in_parts.path()
+    assert isinstance(path, Path)
+    assert isinstance(same, Path)
+    assert same.knots == path.knots
+    later = in_parts.path(path.at(0.3))
+    assert isinstance(later, Path)
+    assert later.at(0.0).position_m == pytest.approx(path.at(0.3).position_m, abs=1e-3)
+    assert later.duration_s == pytest.approx(path.duration_s - 0.3, abs=0.3)
+    assert in_parts.path(Motion((-4.0, 4.0, 1.0))) is None  # from there it would be a long way
 
 
 def test_what_cannot_be_reached_is_refused():

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import atan2, dist, hypot, pi
+from math import atan2, cos, dist, hypot, pi, sin
 
 import pytest
 
 from geometry.rotations import quaternion_from_yaw
-from offboard.drone import DroneState
+from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST as CONTEST_LIMITS
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import CONTEST, Gate, Obstacles, Point
-from offboard.navigation.path_flight import PathFlight
+from offboard.navigation.path_flight import TICK_WORK, PathFlight
 from offboard.navigation.search.viewed_space import ViewedSpace
 from offboard.navigation.seen_space import SeenSpace
 from scenarios.models import Arena, Base, Camera
@@ -24,10 +24,10 @@ HERE = (0.0, 0.0, 1.0)
 VIEWED = ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0))  # without a view: nothing is asked of it
 
 
-def seen_from(position_m=HERE, yaw_rad=0.0, posts=POSTS, columns_m=()):
+def seen_from(position_m=HERE, yaw_rad=0.0, posts=POSTS):
     seen = SeenSpace(CAMERA, Arena())
     edges = edges_of(posts, position_m, yaw_rad)
-    seen.update(position_m, quaternion_from_yaw(yaw_rad), edges, columns_m)
+    seen.update(position_m, quaternion_from_yaw(yaw_rad), edges)
     return seen
 
 
@@ -48,11 +48,8 @@ def test_a_way_must_have_been_seen_once_an_obstacle_was():
     assert seen_from().first_unseen([(0.1 * step, 0.0, 1.0) for step in range(1, 20)], HERE) is None
 
 
-def test_an_obstacle_whose_foot_is_below_the_image_leaves_free_what_is_before_a_known_one():
-    near = [(1.0, 0.0, 0.2)]
-    assert not seen_from(posts=near).is_seen((0.5, 0.0, 1.0))
-    assert seen_from(posts=near, columns_m=near).is_seen((0.5, 0.0, 1.0))
-    assert not seen_from(posts=near, columns_m=[(2.0, 0.0, 0.2)]).is_seen((0.5, 0.0, 1.0))
+def test_before_an_obstacle_whose_foot_is_below_the_image_nothing_is_seen():
+    assert not seen_from(posts=[(1.0, 0.0, 0.2)]).is_seen((0.5, 0.0, 1.0))
 
 
 def test_a_suspect_is_forgotten_when_it_is_seen_to_be_free():
@@ -118,6 +115,55 @@ def test_a_path_after_a_pause_begins_at_its_start():
     assert flight._follower.progress_on(flight.path) == 0.0
     flight.fly(goals, Obstacles(), replace(state, time_us=1_550_000), seen, VIEWED)
     assert flight._follower.progress_on(flight.path) == pytest.approx(0.05)
+
+
+def flown(state: DroneState, command: VelocityCommand) -> DroneState:
+    """The state a tick later of a drone that flies as it is told."""
+    c, s, forward, left = cos(state.yaw), sin(state.yaw), command.forward_m_s, command.left_m_s
+    velocity = (c * forward - s * left, s * forward + c * left, command.up_m_s)
+    x, y, z = (at + 0.05 * v for at, v in zip((state.x, state.y, state.z), velocity, strict=True))
+    yaw, time_us = state.yaw + 0.05 * command.yaw_rate_rad_s, state.time_us + 50_000
+    return replace(state, time_us=time_us, x=x, y=y, z=z, yaw=yaw, velocity_arena_m_s=velocity)
+
+
+def test_a_drone_that_stops_before_unseen_space_does_not_fly_on_while_it_plans():
+    """It finds ways round what may be there, and leaves each at once, because nothing of them was seen."""
+    seen, flight = seen_from(), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
+    state, stopping_m_s, most_m_s = DroneState(0, *HERE, yaw=0.0), [], 0.0
+    for _ in range(160):
+        command = flight.fly([Point((4.0, 0.0, 1.0))], Obstacles((), seen.suspects_m), state, seen, VIEWED)
+        state = flown(state, command)
+        stopping_m_s = [*stopping_m_s, hypot(*state.velocity_arena_m_s)] if flight.path is None else []
+        most_m_s = max(most_m_s, *stopping_m_s[20:], 0.0)
+    assert len(seen.suspects_m) > 3  # for each of them it has planned again
+    assert most_m_s < 0.1
+
+
+def test_a_drone_stops_before_a_frame_that_turns_out_to_be_turned_if_there_is_no_other_way():
+    beside = ((2.31, 0.32, 0.05), (1.69, -0.32, 0.05))  # before and behind its opening as it is
+    seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
+    state = DroneState(0, *HERE, yaw=0.0)
+    for _ in range(80):
+        gate = Gate((2.0, 0.0, 1.0), 0.0 if state.x < 1.2 else 0.8)
+        obstacles = Obstacles((gate,), () if state.x < 1.2 else beside)
+        state = flown(state, flight.fly([gate], obstacles, state, seen, VIEWED))
+    assert flight.path is None
+    assert 1.2 < state.x < 1.75
+
+
+def test_where_obstacles_block_a_gate_no_tick_searches_for_long():
+    ring = tuple((2.0 + 1.2 * cos(0.2 * i), 1.2 * sin(0.2 * i), 0.15) for i in range(32))
+    gate, obstacles = Gate((2.0, 0.0, 1.5), 0.3), Obstacles((Gate((2.0, 0.0, 1.5), 0.3),), ring)
+    seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
+    works = []
+    while not flight.refusal:
+        state = DroneState(50_000 * len(works), -1.0, 0.3, 1.0, yaw=0.0)
+        flight.fly([gate, Point((0.0, 0.0, 1.0))], obstacles, state, seen, VIEWED)
+        works.append(flight.work)
+        assert len(works) < 60
+    assert flight.refusal == "obstacles block the way to gate 1"
+    assert sum(works) > 4 * TICK_WORK  # what a tick would do without a limit
+    assert max(works) < 2.5 * TICK_WORK
 
 
 def height_after_a_metre(gate: Gate, *, needed: bool) -> float:

@@ -1,0 +1,80 @@
+"""The app's longest ticks in many flights in lockstep: processor time from a state to its command.
+
+    python -m benchmarks.ticks LEVEL [--count N] [--seed S] [--repeats R]
+
+A tick is one turn of the mission: map, choice of a viewpoint, plan, command, records; images are painted and
+searched before it. A flight is the same each time, so of several repeats the least time of each tick counts:
+what other programs do to the processor's caches is left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import time
+
+from benchmarks.peers.job import SINGLE_THREADS
+
+os.environ.update(SINGLE_THREADS)  # before NumPy is imported
+
+import cv2
+import numpy as np
+
+from framerunner.evaluation.plan import plan_level
+from framerunner.flying.lockstep import lockstep_flight
+from framerunner.flying.plan import FlightPlan
+from offboard.app import Moment
+from offboard.drone import DroneState
+from offboard.engine import MissionEngine
+from offboard.mission import load_mission
+
+LIMIT_MS = 20.0
+
+
+def main() -> None:
+    """Fly and print."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.ticks", description=__doc__.partition("\n")[0]
+    )
+    parser.add_argument("level", nargs="?", default="crowded", metavar="LEVEL", help="name or file")
+    parser.add_argument("--mission", default="explorer", metavar="NAME", help="name or file")
+    parser.add_argument("--count", type=int, default=20, help="of flights")
+    parser.add_argument("--seed", type=int, default=1, help="of the first")
+    parser.add_argument("--repeats", type=int, default=1, help="of each flight")
+    options = parser.parse_args()
+    cv2.setNumThreads(1)
+    plans = plan_level(options.level, options.seed, options.count, load_mission(options.mission))
+    longest, every = (0.0, ""), []
+    for plan in plans.tasks():
+        repeats = [ticks(plan) for _ in range(options.repeats)]
+        for same in zip(*repeats, strict=True):
+            took_ms = min(ms for ms, _, _ in same)
+            _, at_s, state = same[0]
+            every.append(took_ms)
+            longest = max(longest, (took_ms, f"{plan.scenario.name}, {at_s:.2f} s after take-off in {state}"))
+    over = sum(ms > LIMIT_MS for ms in every)
+    print(f"longest tick: {longest[0]:.1f} ms ({longest[1]})")
+    print(f"{len(every)} ticks: {over} over {LIMIT_MS:g} ms", end="; ")
+    print(", ".join(f"{share} % below {np.percentile(every, share):.1f} ms" for share in (50, 99, 99.9)))
+
+
+def ticks(plan: FlightPlan) -> list[tuple[float, float, str]]:
+    """Of one flight: processor time, milliseconds, time of flight, seconds, and the mission's state."""
+    found: list[tuple[float, float, str]] = []
+    began_s = 0.0
+
+    async def begin(engine: MissionEngine, state: DroneState) -> None:
+        nonlocal began_s
+        began_s = time.thread_time()
+
+    def end(moment: Moment) -> None:
+        took_ms = 1e3 * (time.thread_time() - began_s)
+        found.append((took_ms, moment.flight_time_s, moment.mission_state))
+
+    asyncio.run(lockstep_flight(plan, observers=(end,), before_tick=begin))
+    return found
+
+
+if __name__ == "__main__":
+    main()
