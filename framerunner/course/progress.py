@@ -7,13 +7,13 @@ that it has half written is left out when the file is read.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
 from errors import SettingError
+from errors.folders import append_in_folder, read_in_folder
 
 EventKind = Literal["opened", "flown", "passed"]
 MAX_LEARNER = 40  # characters of a name
@@ -76,21 +76,18 @@ class CourseProgress:
         line = json.dumps(asdict(event), ensure_ascii=False) + "\n"
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            handle = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
-            try:
-                os.write(handle, line.encode("utf-8", "replace"))
-            finally:
-                os.close(handle)
+            append_in_folder(self._path, line.encode("utf-8", "replace"))
         except OSError as error:
             raise SettingError(f"{self._path}: cannot be written ({error.strerror})") from None
 
     def events(self) -> Iterator[CourseEvent]:
         """All events, in the order in which they were written; lines that are damaged are left out."""
         try:
-            with self._path.open("rb") as file:
-                content = file.read(_MAX_FILE_BYTES)
+            content = read_in_folder(self._path, _MAX_FILE_BYTES)
         except FileNotFoundError:
             return
+        except OSError as error:
+            raise SettingError(f"{self._path}: cannot be read ({error.strerror})") from None
         for line in content.splitlines():
             event = _read(line)
             if event is not None:

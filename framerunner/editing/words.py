@@ -22,6 +22,7 @@ _ENGLISH: Mapping[str, str] = {
     "access.course": "only those who logged in may take part",
     # Files.
     "desk.not_here": "'{name}' is no mission file of this folder; choose one from the list",
+    "desk.not_read": "{name}: cannot be read ({reason}); choose a mission file of this folder",
     "desk.too_many_open": "{limit} missions are open; close some pages first",
     "desk.source": "unknown source '{name}'; use empty, example or a mission of the package",
     "desk.taken": "{name} is there already; choose another name",
@@ -42,7 +43,6 @@ _ENGLISH: Mapping[str, str] = {
     "typed.elsewhere": (
         "the text was changed in another window at the same time; what you typed last is left out"
     ),
-    "typed.beyond": "typed text: {place} is after the end of the text; load the page again",
     # Flights.
     "flight.unknown": "'{name}': there is no such flight or batch; start it again",
     "flight.is_batch": "it is a batch; cancel it",
@@ -78,6 +78,7 @@ _SPANISH: Mapping[str, str] = {
     "access.fly": "solo pueden iniciar vuelos quienes han iniciado sesión",
     "access.course": "solo pueden participar quienes han iniciado sesión",
     "desk.not_here": "'{name}' no es un archivo de misión de esta carpeta; elige uno de la lista",
+    "desk.not_read": "{name}: no se puede leer ({reason}); elige un archivo de misión de esta carpeta",
     "desk.too_many_open": "hay {limit} misiones abiertas; cierra antes alguna página",
     "desk.source": "origen desconocido '{name}'; usa empty, example o una misión del paquete",
     "desk.taken": "{name} ya existe; elige otro nombre",
@@ -101,7 +102,6 @@ _SPANISH: Mapping[str, str] = {
     "typed.elsewhere": (
         "el texto se cambió a la vez en otra ventana; lo último que escribiste no se ha incluido"
     ),
-    "typed.beyond": "texto escrito: {place} está después del final del texto; carga la página de nuevo",
     "flight.unknown": "'{name}': no hay tal vuelo ni serie; empieza de nuevo",
     "flight.is_batch": "es una serie de vuelos; cancélala",
     "flight.over": "el vuelo ha terminado",

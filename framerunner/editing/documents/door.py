@@ -24,7 +24,6 @@ from framerunner.editing.documents.messages import (
     PageMessageError,
     SaveMessage,
     StepMessage,
-    TypedChange,
     TypeMessage,
     catalogue_message,
     changed_message,
@@ -36,8 +35,8 @@ from framerunner.editing.documents.messages import (
 from framerunner.editing.documents.open_document import OpenDocument
 from framerunner.editing.words import Language, Said, SaidError, language_of, reason, say
 from monitor.access import refuse
-from offboard.authoring import Change, Edit, EditError, export_scxml, import_scxml, mermaid_of, parse_edit
-from offboard.mission import MAX_FILE_BYTES, list_missions
+from offboard.authoring import Change, export_scxml, import_scxml, mermaid_of, parse_edit
+from offboard.mission import list_missions
 
 _Text = Annotated[str, Body(max_length=100)]
 _Scxml = Annotated[str, Body(max_length=1_000_000)]
@@ -300,22 +299,4 @@ def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[Change]:
 def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[Change]:
     if message.revision != opened.revision:
         raise SaidError("typed.elsewhere")
-    changes: list[Change] = []
-    try:
-        for typed in message.changes:
-            changes += opened.apply(_replacement(opened, typed))
-    except UserError:
-        opened.take_back(changes)
-        raise
-    return changes
-
-
-def _replacement(opened: OpenDocument, typed: TypedChange) -> Edit:
-    text, positions = opened.document.text, opened.document.positions
-    last = typed.start + typed.removed
-    if len(typed.inserted) > MAX_FILE_BYTES:
-        raise EditError("edit.too_large")
-    if last > positions.to_utf16(len(text)):
-        raise SaidError("typed.beyond", place=last)
-    start, end = positions.from_utf16(typed.start), positions.from_utf16(last)
-    return parse_edit({"kind": "replace_text", "start": start, "end": end, "text": typed.inserted})
+    return opened.type([(each.start, each.removed, each.inserted) for each in message.changes])
