@@ -163,12 +163,13 @@ class EditorDesk:
                 if shared.users == 0 and self._open.get(name) is shared:  # nobody has opened it meanwhile
                     del self._open[name]
 
-    def create(self, name: str, source: str) -> str:
+    def create(self, name: str, source: str, owner: str = "") -> str:
         """Make a mission file.
 
         Args:
             name: of the mission.
             source: "empty", "example", or a mission of the package to copy.
+            owner: key of the pupil whose it is; "": nobody's.
 
         Returns:
             The file's name. Raises `DeskError`.
@@ -183,12 +184,12 @@ class EditorDesk:
             text = re.sub(rf"(?m)^name: {source}$", f"name: {name}", text, count=1)
         else:
             raise DeskError("desk.source", name=source[:80])
-        return self.write(name, text)
+        return self.write(name, text, owner)
 
-    def write(self, name: str, text: str) -> str:
-        """Make a mission file with a text; return its name. Raises `DeskError`."""
+    def write(self, name: str, text: str, owner: str = "") -> str:
+        """Make a mission file with a text, see `create`; return its name. Raises `DeskError`."""
         _check_name(name)
-        path = self.folder / f"{name}.yaml"
+        path = self.folder / (f"{name}-{owner}.yaml" if owner else f"{name}.yaml")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with path.open("x", encoding="utf-8", newline="") as file:

@@ -16,6 +16,7 @@ from framerunner.editing import words
 from framerunner.editing.documents.desk import DeskError, EditorDesk
 from framerunner.editing.documents.messages import catalogue_message, document_message
 from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
+from monitor.access import Role, Visitor
 from offboard.authoring import read_layout
 from offboard.authoring.edits import AddState
 from offboard.authoring.messages import EDIT_ENGLISH, EDIT_SPANISH
@@ -142,7 +143,7 @@ def test_a_link_to_a_mission_stays_a_link(path):
 
 
 def test_only_those_who_may_act_reach_the_documents(path):
-    with served(path.parent, may_act=False) as server:
+    with served(path.parent, visitor=Visitor("Bo", Role.JUDGE)) as server:
         for answer in (
             server.http.get("/api/edit/files"),
             server.http.post("/api/edit/files", json={"name": "x", "source": "empty"}),

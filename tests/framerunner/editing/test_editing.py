@@ -20,6 +20,7 @@ from framerunner.editing.service import EditingSettings
 from framerunner.editing.web import EditingDoor
 from framerunner.evaluation.runner import fly_task
 from framerunner.flying.plan import FlightPlan
+from monitor.access import Role, Visitor
 from offboard.mission import MISSIONS, load_mission
 from scenarios.loader import load_scenario
 
@@ -98,7 +99,7 @@ class Page:
 
 
 @contextlib.contextmanager
-def page(*, may_act=True, **settings):
+def page(*, role=Role.ORGANISER, **settings):
     """A page that is connected to a server."""
     door = EditingDoor(EditingSettings(**{"jobs": 2, **settings}))
 
@@ -110,7 +111,7 @@ def page(*, may_act=True, **settings):
         await asyncio.gather(running, return_exceptions=True)
 
     web = FastAPI(lifespan=lifespan)
-    web.include_router(door.router(lambda _: may_act))
+    web.include_router(door.router(lambda _: Visitor("Ada", role, "ada")))
     with TestClient(web) as client, client.websocket_connect("/ws/editing") as socket:
         yield Page(socket)
 
@@ -343,7 +344,7 @@ def test_a_message_that_cannot_be_understood_is_refused_in_one_line(message, wor
 
 
 def test_those_who_may_not_act_are_refused():
-    with pytest.raises(WebSocketDisconnect) as refusal, page(may_act=False) as browser:
+    with pytest.raises(WebSocketDisconnect) as refusal, page(role=Role.JUDGE) as browser:
         browser.until("done")
     assert refusal.value.code == 4403
 
