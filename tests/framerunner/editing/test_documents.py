@@ -522,3 +522,26 @@ def test_links_lead_to_files_of_the_folder_only(tmp_path):
     assert outside.read_text() == "name: secret"
     assert (folder / "hover.yaml").read_text() == "#" + HOVER
     assert not (tmp_path / "new.json").exists()
+
+
+def test_a_pupil_sees_and_changes_own_files_only_until_the_log_in_ends(tmp_path):
+    for name in ("lesson_1_ada.yaml", "lesson_1_bo.yaml", "hover.yaml"):
+        (tmp_path / name).write_text(HOVER)
+    visitors = [Visitor("Ada", Role.PUPIL, "ada")]
+    with served(tmp_path, visitor=lambda: visitors[-1]) as server:
+        assert server.http.get("/api/edit/files").json()["files"] == ["lesson_1_ada.yaml"]
+        made = server.http.post("/api/edit/files", json={"name": "mine", "source": "empty"}).json()
+        assert made == {"file": "mine-ada.yaml"}
+        for name in ("lesson_1_bo.yaml", "hover.yaml"):
+            export = server.http.get("/api/edit/export", params={"file": name, "kind": "scxml"})
+            assert (export.status_code, "not yours" in export.json()["detail"]) == (403, True)
+            with pytest.raises(WebSocketDisconnect) as refused, server.window(name):
+                pass
+            assert (refused.value.code, "not yours" in refused.value.reason) == (4403, True)
+        with server.window("lesson_1_ada.yaml") as window:
+            window.type(0, "#", revision=0)
+            visitors.append(Visitor())
+            with pytest.raises(WebSocketDisconnect) as refused:
+                window.ask("save")
+            assert refused.value.code == 4403
+    assert (tmp_path / "lesson_1_ada.yaml").read_text() == HOVER
