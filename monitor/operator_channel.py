@@ -206,7 +206,7 @@ def register(monitor: Monitor) -> None:
     async def operator(websocket: WebSocket) -> None:
         visitor = monitor.access.visitor(websocket)
         if not visitor.may_fly:
-            await refuse(websocket, "only those who logged in may operate a flight")
+            await refuse(websocket, "only judges and organisers may operate a flight; log in at /login")
             return
         if desk is None:
             await refuse(websocket, "this monitor was started without --operator-socket")

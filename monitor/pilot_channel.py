@@ -31,6 +31,7 @@ _MAX_QUEUE = 200  # messages to a browser; one that is so slow is disconnected
 _MAX_REASON_BYTES = 120  # WebSockets allow 123
 _CLOSE_S = 2.0
 _MAX_ORDERS = 8  # of one browser at the same time
+_ALWAYS = frozenset({"hold", "land", "stop_motors"})  # these bring a drone down, and are never refused
 _AXES = ("forward", "right", "up", "yaw")
 _MAX_SYSTEM = 255
 _NOBODY = ("", None, False)
@@ -50,16 +51,23 @@ def register(monitor: Monitor) -> None:
     async def pilot(websocket: WebSocket) -> None:
         visitor = monitor.access.visitor(websocket)
         if not visitor.may_fly:
-            await refuse(websocket, "only those who logged in may fly")
+            await refuse(websocket, "only judges and organisers may fly; log in at /login")
             return
         await websocket.accept()
-        await _Connection(websocket, desk, visitor.name or UNNAMED, visitor.may_judge).serve()
+
+        def may_fly() -> bool:
+            return monitor.access.visitor(websocket).may_fly
+
+        await _Connection(websocket, desk, visitor.name or UNNAMED, may_fly, visitor.may_judge).serve()
 
 
 class _Connection:
     """One browser's WebSocket."""
 
-    def __init__(self, websocket: WebSocket, desk: PilotDesk, name: str, may_judge: bool) -> None:
+    def __init__(
+        self, websocket: WebSocket, desk: PilotDesk, name: str, may_fly: Callable[[], bool], may_judge: bool
+    ) -> None:
+        self._may_fly = may_fly
         self._websocket = websocket
         self._desk = desk
         self._outbox: asyncio.Queue[JsonMessage] = asyncio.Queue(_MAX_QUEUE)
@@ -100,8 +108,11 @@ class _Connection:
 
     def _take(self, message: Sticks | Order) -> None:
         if isinstance(message, Sticks):
-            self._desk.sticks(self._browser, message)
-        elif len(self._orders) >= _MAX_ORDERS and message.what not in {"hold", "land", "stop_motors"}:
+            if self._may_fly():  # else it falls silent, and the drone holds
+                self._desk.sticks(self._browser, message)
+        elif message.what not in _ALWAYS and not self._may_fly():
+            self._reply(message.what, False, "you are logged out; log in again at /login")
+        elif len(self._orders) >= _MAX_ORDERS and message.what not in _ALWAYS:
             self._reply(message.what, False, "too many orders at once; wait for an answer")
         else:
             task = asyncio.create_task(self._carry_out(message))

@@ -15,6 +15,8 @@ if TYPE_CHECKING:  # slow to import
     from fastapi import APIRouter
     from starlette.requests import HTTPConnection
 
+    from monitor.access import Visitor
+
 
 class Referee(Protocol):
     """Judges a flight by its states; `scenarios.referee.Referee` is one."""
@@ -78,8 +80,8 @@ class RunNotReadError(RunError):
 class Extension(Protocol):
     """Addresses of the server that another room adds, such as the editor's flights."""
 
-    def router(self, may_act: Callable[[HTTPConnection], bool]) -> APIRouter:
-        """The addresses; `may_act` says whether a visitor may change something: fly, start, stop."""
+    def router(self, who: Callable[[HTTPConnection], Visitor]) -> APIRouter:
+        """The addresses; `who` tells who has sent a request or opened a WebSocket, and what they may do."""
         ...
 
     async def run(self) -> None:

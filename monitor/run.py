@@ -27,7 +27,7 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
     Args:
         equipment: the link to the drones and what else the monitor needs.
         settings: where it listens and stores.
-        say: takes lines for people: URLs, and judges' links.
+        say: takes lines for people: URLs, and links to log in.
 
     Raises:
         MonitorError: a setting cannot be used, or the port is taken.
@@ -51,11 +51,11 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
             urls = certificate.urls(urls, port)
         qr_codes = settings.qr_codes and bool(reachable) and is_for_others(host)
 
-        def invite(secret: str) -> None:
+        def invite(role: str, secret: str) -> None:
             link = f"{urls[0]}login?token={secret}"
-            say(f"judges log in at {link}")
+            say(f"{role}s log in at {link}")
             if qr_codes:
-                say(f"one judge's phone reads it here; the next judge gets another\n{terminal_code(link)}")
+                say(f"one {role}'s phone reads it here; the next one gets another\n{terminal_code(link)}")
 
         def started() -> None:
             for url in urls:

@@ -19,7 +19,7 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-from monitor.access import Access, SessionFile, session_path
+from monitor.access import Access, Role, Secrets, SessionFile, session_path
 from monitor.addresses import Places
 from monitor.connections import Connections, Gate
 from monitor.fleet import Fleet
@@ -28,6 +28,8 @@ from monitor.ports import Equipment
 from monitor.security import Guard
 from monitor.settings import BACKLOG, MonitorSettings
 from monitor.tls import OnlyTls, TlsDoor
+from monitor.visitors.peers import is_own_connection
+from monitor.visitors.pupils import PupilBook
 
 Job = Callable[[], Coroutine[Any, Any, None]]
 
@@ -104,16 +106,21 @@ class _Server(uvicorn.Server):
 
 
 def assemble(
-    equipment: Equipment, settings: MonitorSettings, place: tuple[str, int], invite: Callable[[str], None]
+    equipment: Equipment,
+    settings: MonitorSettings,
+    place: tuple[str, int],
+    invite: Callable[[Role, str], None],
 ) -> Monitor:
-    """Make the monitor, to listen on `place`; `invite` is called with the secret of each one-time link."""
+    """Make the monitor, to listen on `place`; `invite` is told role and secret of each one-time link."""
     local_only = ip_address(place[0]).is_loopback and not settings.trusted_proxies
-    cookie = f"framerunner-judge-{place[1]}"  # browsers share cookies between ports
+    cookie = f"framerunner-login-{place[1]}"  # browsers share cookies between ports
     # A port that the system chose is another one after a restart.
     path = session_path(settings.database) if settings.port != 0 else None
+    pupils = None if settings.class_file is None else PupilBook(settings.class_file, settings.class_code)
     access = Access(
-        settings.password,
-        all_may_fly=local_only,
+        Secrets(settings.organiser_password, settings.judge_password, settings.class_code),
+        pupils=pupils,
+        is_user=is_own_connection if local_only else lambda _: False,
         cookie=cookie,
         hear_invitation=invite,
         kept=SessionFile(path, cookie) if path is not None else None,

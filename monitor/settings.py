@@ -9,6 +9,7 @@ from errors import UserError
 from monitor.addresses import is_address_or_network
 
 SHORTEST_PASSWORD = 8
+SHORTEST_CODE = 6
 BACKLOG = 100  # connections accepted at the same time; must be well below the limit of open files
 
 
@@ -33,13 +34,16 @@ class ConnectionLimits:
 
 @dataclass(frozen=True, slots=True)
 class MonitorSettings:
-    """Where the monitor listens, where it stores, and who may judge.
+    """Where the monitor listens, where it stores, and with what people log in.
 
     Attributes:
         bind: address or name of the interface to listen on.
         port: TCP port; 0 lets the system choose one.
         database: SQLAlchemy URL of the competition's tables.
-        password: with which judges log in; None: they get one-time links.
+        organiser_password: with which organisers log in; None: they get one-time links.
+        judge_password: likewise of judges.
+        class_code: code word with which pupils join; None: they cannot.
+        class_file: where the pupils are kept; None: nobody can join.
         trusted_proxies: addresses or networks whose X-Forwarded-For and X-Forwarded-Proto are used.
         limits: of connections.
         qr_codes: print addresses as QR codes too.
@@ -51,13 +55,16 @@ class MonitorSettings:
     bind: str = "127.0.0.1"
     port: int = 8080
     database: str = "sqlite:///framerunner.db"
-    password: str | None = field(default=None, repr=False)
+    organiser_password: str | None = field(default=None, repr=False)
     trusted_proxies: tuple[str, ...] = ()
     limits: ConnectionLimits = ConnectionLimits()
     qr_codes: bool = False
     operator_socket: Path | None = None
     certificate: Path | None = None
     key: Path | None = None
+    judge_password: str | None = field(default=None, repr=False)
+    class_code: str | None = field(default=None, repr=False)
+    class_file: Path | None = None
 
     @property
     def scheme(self) -> str:
@@ -70,11 +77,7 @@ class MonitorSettings:
             raise MonitorError("monitor: --bind is empty; give an address such as 127.0.0.1 or 0.0.0.0")
         if not 0 <= self.port <= 65535:
             raise MonitorError(f"monitor: --port {self.port}: must be from 0 to 65535")
-        if self.password is not None and len(self.password) < SHORTEST_PASSWORD:
-            raise MonitorError(
-                f"monitor: FRAMERUNNER_JUDGE_PASSWORD has {len(self.password)} characters; "
-                f"use at least {SHORTEST_PASSWORD}, or unset it for one-time links"
-            )
+        self._check_secrets()
         if self.key is not None and self.certificate is None:
             raise MonitorError(f"monitor: --key {self.key}: give its certificate too, by --certificate")
         for proxy in self.trusted_proxies:
@@ -83,3 +86,22 @@ class MonitorSettings:
                     f"monitor: --trusted-proxy '{proxy[:60]}': must be an address or a network in numbers, "
                     "such as 127.0.0.1 or 10.0.0.0/24"
                 )
+
+    def _check_secrets(self) -> None:
+        given = {
+            "FRAMERUNNER_ORGANISER_PASSWORD": (self.organiser_password, SHORTEST_PASSWORD, "one-time links"),
+            "FRAMERUNNER_JUDGE_PASSWORD": (self.judge_password, SHORTEST_PASSWORD, "one-time links"),
+            "FRAMERUNNER_CLASS_CODE": (self.class_code, SHORTEST_CODE, "a monitor without pupils"),
+        }
+        users: dict[str, str] = {}
+        for variable, (secret, shortest, otherwise) in given.items():
+            if secret is None:
+                continue
+            if len(secret) < shortest:
+                raise MonitorError(
+                    f"monitor: {variable} has {len(secret)} characters; "
+                    f"use at least {shortest}, or unset it for {otherwise}"
+                )
+            other = users.setdefault(secret.strip().casefold(), variable)
+            if other != variable:
+                raise MonitorError(f"monitor: {variable} is the same as {other}; give each role its own")

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from monitor.ports import Equipment
     from scenarios.models import Scenario
 
-PASSWORD_VARIABLE = "FRAMERUNNER_JUDGE_PASSWORD"
 MISSIONS = Path("missions")
+PUPILS_FILE = "course-pupils.json"  # in the folder of missions
 DATABASE = "sqlite:///framerunner.db"
 _OPEN_FILES = 4096
 _NICENESS = 5  # beside a flight, which the monitor must not slow down
@@ -76,9 +76,10 @@ def monitor(
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.
 
-    It connects like a ground station and finds camera and referee by itself. Judges log in with the password
-    in FRAMERUNNER_JUDGE_PASSWORD or, without one, with the link that is printed; viewers need none. Stop it
-    with Ctrl-C.
+    It connects like a ground station and finds camera and referee by itself. Viewers need no log-in.
+    Organisers and judges log in with the passwords in FRAMERUNNER_ORGANISER_PASSWORD and
+    FRAMERUNNER_JUDGE_PASSWORD or, without one, with the link that is printed; pupils with the code word in
+    FRAMERUNNER_CLASS_CODE. Stop it with Ctrl-C.
 
     **Examples**
 
@@ -91,7 +92,6 @@ def monitor(
         framerunner monitor --drone serial:///dev/ttyUSB0:57600 --scenario test-case-1
     """
     check_range("--port", port, 0, 65535)
-
     from framerunner.child_process import until_standard_input_ends
     from monitor.run import serve
     from monitor.settings import MonitorSettings
@@ -101,17 +101,18 @@ def monitor(
     parse_url(drone)
     flown = None if scenario is None else load_scenario(scenario)
     given = equipment(drone, flown, runs, camera_host, missions=missions, pilot=pilot)
-    password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()
     settings = MonitorSettings(
-        *(bind, port, database, password, trusted_proxy),
-        qr_codes=qr_codes,
+        *(bind, port, database, _secret("ORGANISER_PASSWORD"), trusted_proxy),
+        judge_password=_secret("JUDGE_PASSWORD"),
+        class_code=_secret("CLASS_CODE"),
+        class_file=missions / PUPILS_FILE,
+        qr_codes=_shows_qr_codes(),
         operator_socket=operator_socket,
         certificate=certificate,
         key=key,
     )
     _allow_many_files()
-    if lifeline:
-        os.nice(_NICENESS)
+    os.nice(_NICENESS if lifeline else 0)
     work = serve(given, settings, say)
     asyncio.run(until_standard_input_ends(work) if lifeline else work)
     return 0
@@ -143,6 +144,7 @@ def equipment(
     from framerunner.flying.plan import FlightPlan
     from framerunner.monitoring.run_library import RunFolders
     from monitor.ports import Equipment
+    from monitor.visitors.pupils import PupilBook
     from offboard.pilot import Pilot
     from offboard.pilot_file import read_pilot
     from scenarios.loader import list_scenarios, load_scenario
@@ -166,9 +168,14 @@ def equipment(
         extensions=(
             EditingDoor(editing),
             DocumentsDoor(EditorDesk(missions, pilot_class)),
-            CourseDoor(missions, pilot),
+            CourseDoor(missions, pilot, PupilBook(missions / PUPILS_FILE, None)),
         ),
     )
+
+
+def _secret(what: str) -> str | None:
+    """What the environment says of a secret; None: nothing."""
+    return os.environ.get(f"FRAMERUNNER_{what}") or None
 
 
 def _allow_many_files() -> None:

@@ -7,17 +7,18 @@ that it has half written is left out when the file is read.
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from errors import SettingError
+from errors.folders import append_in_folder, read_in_folder
+from monitor.competition.views import csv_text
 
-EventKind = Literal["opened", "flown", "passed"]
-MAX_LEARNER = 40  # characters of a name
-_KINDS = ("opened", "flown", "passed")
+EventKind = Literal["opened", "flown", "passed", "reset"]
+MAX_LEARNER = 60  # characters of a name
+_KINDS = get_args(EventKind)
 _MAX_FILE_BYTES = 50_000_000
 
 
@@ -28,8 +29,9 @@ class CourseEvent:
     Attributes:
         time_s: Unix time.
         learner: name.
-        lesson: name of the lesson.
-        kind: the lesson was opened, a mission flown in it, or flown so that it passes.
+        lesson: name of the lesson; "" of a reset: all lessons.
+        kind: the lesson was opened, a mission flown in it, flown so that it passes, or a teacher has let the
+            learner begin anew.
         reason: the referee's sentence on the flight; empty: there was none.
     """
 
@@ -71,26 +73,23 @@ class CourseProgress:
         Raises:
             SettingError: the name cannot be used, or the file cannot be written.
         """
-        if not event.learner or learner_name(event.learner) != event.learner:
-            raise SettingError(f"learner {event.learner!r}: use 1 to {MAX_LEARNER} printable characters")
+        if checked_name(event.learner) != event.learner:
+            raise _wrong_name(event.learner)
         line = json.dumps(asdict(event), ensure_ascii=False) + "\n"
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            handle = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
-            try:
-                os.write(handle, line.encode("utf-8", "replace"))
-            finally:
-                os.close(handle)
+            append_in_folder(self._path, line.encode("utf-8", "replace"))
         except OSError as error:
             raise SettingError(f"{self._path}: cannot be written ({error.strerror})") from None
 
     def events(self) -> Iterator[CourseEvent]:
         """All events, in the order in which they were written; lines that are damaged are left out."""
         try:
-            with self._path.open("rb") as file:
-                content = file.read(_MAX_FILE_BYTES)
+            content = read_in_folder(self._path, _MAX_FILE_BYTES)
         except FileNotFoundError:
             return
+        except OSError as error:
+            raise SettingError(f"{self._path}: cannot be read ({error.strerror})") from None
         for line in content.splitlines():
             event = _read(line)
             if event is not None:
@@ -101,6 +100,11 @@ class CourseProgress:
         opened: dict[tuple[str, str], float] = {}
         found: dict[str, dict[str, LessonProgress]] = {}
         for event in self.events():
+            if event.kind == "reset":
+                for lesson in lessons if event.lesson == "" else (event.lesson,):
+                    found.get(event.learner, {}).pop(lesson, None)
+                    opened.pop((event.learner, lesson), None)
+                continue
             if event.lesson not in lessons:
                 continue
             row = found.setdefault(event.learner, {})
@@ -114,6 +118,31 @@ class CourseProgress:
                 before.flights + flown, passed_after_s, event.reason if flown else before.last_reason
             )
         return found
+
+
+def progress_csv(table: Mapping[str, Mapping[str, LessonProgress]], lessons: Sequence[str]) -> str:
+    """The table of a class for a spreadsheet: a row for each learner and lesson."""
+    columns = ("pupil", "lesson", "flights", "passed", "passed_after_min", "last_flight")
+    rows: list[tuple[object, ...]] = []
+    for learner, row in table.items():
+        for lesson, done in ((each, row[each]) for each in lessons if each in row):
+            minutes = None if done.passed_after_s is None else round(done.passed_after_s / 60.0, 1)
+            rows.append((learner, lesson, done.flights, minutes is not None, minutes, done.last_reason))
+    return csv_text(columns, rows)
+
+
+def checked_name(text: str) -> str:
+    """A name as it is kept, of a learner. Raises `SettingError` if there is none or it is too long."""
+    line = learner_name(text)
+    if not line or len(" ".join(text.split())) > MAX_LEARNER:
+        raise _wrong_name(text)
+    return line
+
+
+def _wrong_name(text: str) -> SettingError:
+    if not text.strip():
+        return SettingError("nobody has given a name in this browser; open the lesson from the page Course")
+    return SettingError(f"learner {text[:60]!r}: use 1 to {MAX_LEARNER} printable characters")
 
 
 def learner_name(text: str) -> str:

@@ -270,6 +270,28 @@ class Refused(StrictModel):
     run: str = ""
 
 
+class Waiting(StrictModel):
+    """A flight or batch waits until others are over.
+
+    Attributes:
+        run: by which it can be stopped, or the batch cancelled.
+        place: in the line, from 1.
+        seconds: until its turn, as far as those before it tell; null: not known.
+    """
+
+    kind: Literal["waiting"] = "waiting"
+    tag: int
+    run: str
+    place: int
+    seconds: int | None
+
+
+class Ready(StrictModel):
+    """A worker takes another batch."""
+
+    kind: Literal["ready"] = "ready"
+
+
 class Done(StrictModel):
     """A request was carried out."""
 
@@ -367,7 +389,7 @@ class Live(StrictModel):
 
 
 FromWorker = Annotated[
-    Started | Now | Changed | Refused | Done | Ended | BatchStarted | Flight | BatchEnded,
+    Started | Now | Changed | Refused | Done | Ended | BatchStarted | Flight | BatchEnded | Ready,
     Field(discriminator="kind"),
 ]
 FROM_WORKER: TypeAdapter[FromWorker] = TypeAdapter(FromWorker)

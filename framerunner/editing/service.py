@@ -6,6 +6,7 @@ import asyncio
 import logging
 import os
 import secrets
+import time
 from collections import OrderedDict
 from collections.abc import Coroutine
 from dataclasses import dataclass, field
@@ -15,11 +16,15 @@ from typing import Protocol
 from pydantic import BaseModel, ValidationError
 
 from framerunner.editing import messages
+from framerunner.editing.line import Line
 from framerunner.editing.live import LiveFlight, LiveSettings
 from framerunner.editing.session_runs import forget_old
 from framerunner.editing.words import Language, Said, say
+from framerunner.editing.worker_pool import WorkerPool
 from framerunner.editing.worker_process import WorkerProcess
 
+_MAX_OWN_RUNS = 4  # flights under control of one page
+_MAX_WAITING = 300
 _SPARE_S = 2.0  # after a start, until a worker is made ready for the next one
 _KEPT_JOBS = 8  # that are over, for pages that are opened again
 _MAX_KEPT_LINES = messages.MAX_COUNT + 10
@@ -33,8 +38,9 @@ class EditingSettings:
     Attributes:
         pilot: a contestant's Python file, which workers execute; None: missions use `Pilot` itself.
         keep: folder for the run folders of flights, for replays; None: they are not kept.
-        max_runs: flights under control at the same time.
-        max_batches: batches at the same time.
+        max_runs: flights under control at the same time; more wait.
+        max_batches: batches at the same time; more wait.
+        batch_s: that a batch is expected to take before any has ended.
         jobs: flights of a batch at the same time.
         processor_s: processor time of one flight.
         memory_bytes: of each process, beyond that of the libraries.
@@ -45,8 +51,9 @@ class EditingSettings:
 
     pilot: Path | None = None
     keep: Path | None = None
-    max_runs: int = 4
+    max_runs: int = 8
     max_batches: int = 1
+    batch_s: float = 60.0
     jobs: int = field(default_factory=lambda: max(1, (os.cpu_count() or 2) - 1))
     processor_s: float = 60.0
     memory_bytes: int = 512 << 20
@@ -78,6 +85,7 @@ class _Job:
         self.language = language  # of who started it
         self.worker = worker
         self.is_batch = is_batch
+        self.task: BaseModel | None = None
         self.watchers: set[Watcher] = set()
         self.asked: dict[int, tuple[Watcher, int]] = {}
         self.kept: list[str] = []
@@ -114,7 +122,11 @@ class EditingService:
         self._jobs: OrderedDict[str, _Job] = OrderedDict()
         self._tasks: set[asyncio.Task[None]] = set()
         self._pages: set[Watcher] = set()
-        self._spare: WorkerProcess | None = None
+        self._workers = WorkerPool(settings.max_batches, self._keep)
+        self._lines = {
+            True: Line[_Job](settings.max_batches, settings.batch_s, time.monotonic),
+            False: Line[_Job](settings.max_runs, None, time.monotonic),
+        }  # of batches, and of flights under control
         self._closed = False
         self._live = None if settings.live is None else LiveFlight(settings.live, self._tell_pages)
 
@@ -139,22 +151,24 @@ class EditingService:
             _refuse(watcher, request.tag, Said("flight.unknown", name=name))
         elif isinstance(request, messages.Watch):
             self._watch(job, request, watcher)
-        elif isinstance(request, messages.Cancel):
-            job.cancelled = True
-            job.worker.kill()
+        elif isinstance(request, messages.Cancel) or (
+            isinstance(request, messages.Stop) and job in self._lines[job.is_batch]
+        ):
             _put(watcher, messages.Done(tag=request.tag))
+            self._cancel(job)
         elif job.over or job.is_batch:
             why = Said("flight.is_batch" if job.is_batch else "flight.over")
             _refuse(watcher, request.tag, why, run=name)
+        elif job in self._lines[job.is_batch]:
+            _refuse(watcher, request.tag, Said("flight.waits"), run=name)
         else:
             job.worker.send(request.model_copy(update={"tag": job.ask(watcher, request.tag)}))
 
     def leave(self, watcher: Watcher) -> None:
         """Forget a watcher that disconnected; what nobody watches any more is ended after a while."""
         self._pages.discard(watcher)
-        if not self._pages and self._spare is not None:
-            self._keep(self._spare.end())
-            self._spare = None
+        if not self._pages:
+            self._workers.end_spare()
         for job in self._jobs.values():
             if watcher in job.watchers:
                 job.watchers.discard(watcher)
@@ -163,12 +177,9 @@ class EditingService:
     async def close(self) -> None:
         """End everything."""
         self._closed = True
-        if self._spare is not None:
-            self._keep(self._spare.end())
-            self._spare = None
-        for job in self._jobs.values():
-            job.cancelled = True
-            job.worker.kill()
+        self._workers.close()
+        for job in list(self._jobs.values()):
+            self._cancel(job)
         if self._live is not None:
             await self._live.close()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -194,7 +205,7 @@ class EditingService:
 
     async def _start(self, request: messages.Start | messages.StartBatch, watcher: Watcher) -> None:
         is_batch = isinstance(request, messages.StartBatch)
-        refusal = self._no_room(is_batch=is_batch)
+        refusal = self._no_room(watcher, is_batch=is_batch)
         if refusal is not None:
             _refuse(watcher, request.tag, refusal)
             return
@@ -214,42 +225,56 @@ class EditingService:
             )
         else:
             task = messages.RunTask.model_validate({**common, "run": name, "start": start})
-        spare, self._spare = self._spare, None
-        worker = spare if spare is not None and spare.usable else WorkerProcess()
-        job = self._jobs[name] = _Job(name, worker, is_batch=is_batch, language=request.language)
+        job = self._jobs[name] = _Job(name, WorkerProcess(), is_batch=is_batch, language=request.language)
+        job.task = task
         job.watchers.add(watcher)
         job.ask(watcher, request.tag)
-        self._keep(self._follow(job, task))
-        asyncio.get_running_loop().call_later(_SPARE_S, self._prepare)
+        self._lines[is_batch].enter(job)
+        self._advance(is_batch=is_batch)
+
+    def _advance(self, *, is_batch: bool) -> None:
+        """Begin what need not wait any more, and tell the others how long they have to."""
+        line = self._lines[is_batch]
+        for job in () if self._closed else line.begin():
+            job.worker = self._workers.take()
+            self._keep(self._follow(job))
+            asyncio.get_running_loop().call_later(_SPARE_S, self._prepare)
+        for job, place, seconds in line.waiting():
+            for watcher, tag in job.asked.values():
+                _put(watcher, messages.Waiting(tag=tag, run=job.name, place=place, seconds=seconds))
+
+    def _cancel(self, job: _Job) -> None:
+        """End a job, or take it out of its line."""
+        job.cancelled = True
+        if job not in self._lines[job.is_batch]:
+            job.worker.kill()
+            return
+        for watcher, tag in job.asked.values():
+            _refuse(watcher, tag, Said("flight.cancelled"))
+        job.over = True
+        del self._jobs[job.name]
+        self._lines[job.is_batch].leave(job)
+        self._advance(is_batch=job.is_batch)
 
     def _prepare(self) -> None:
         """Start a worker for the next task, unless there is one or nobody is connected."""
-        if self._spare is None and self._pages and not self._closed:
-            self._spare = WorkerProcess()
-            self._keep(self._start_spare(self._spare))
-
-    async def _start_spare(self, spare: WorkerProcess) -> None:
-        try:
-            await spare.start()
-        except OSError as error:
-            logger.warning("a worker of the editor cannot be started: %s", error)
-            return
-        if spare is not self._spare and not any(spare is job.worker for job in self._jobs.values()):
-            await spare.end()  # all pages have gone meanwhile
+        if self._pages:
+            self._workers.prepare()
 
     def _keep(self, work: Coroutine[None, None, None]) -> None:
         task = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _no_room(self, *, is_batch: bool) -> Said | None:
-        """Why no more can be started; None if it can."""
-        running = [job for job in self._jobs.values() if not job.over and job.is_batch is is_batch]
-        if is_batch and len(running) >= self._settings.max_batches:
-            return Said("flight.others")
-        if not is_batch and len(running) >= self._settings.max_runs:
-            return Said("flight.too_many", count=len(running))
-        return None
+    def _no_room(self, watcher: Watcher, *, is_batch: bool) -> Said | None:
+        """Why no more can be started; None if it can. A page has one batch: it does not fill the line."""
+        own = [job for job in self._jobs.values() if not job.over and watcher in job.watchers]
+        if is_batch and any(job.is_batch for job in own):
+            return Said("flight.yours")
+        if not is_batch and len(own) >= _MAX_OWN_RUNS:
+            return Said("flight.too_many", count=_MAX_OWN_RUNS)
+        waiting = len(self._lines[is_batch])
+        return Said("flight.full", count=waiting) if waiting >= _MAX_WAITING else None
 
     def _watch(self, job: _Job, request: messages.Watch, watcher: Watcher) -> None:
         job.watchers.add(watcher)
@@ -260,25 +285,32 @@ class EditingService:
         else:
             job.worker.send(request.model_copy(update={"tag": job.ask(watcher, request.tag)}))
 
-    async def _follow(self, job: _Job, task: BaseModel) -> None:
+    async def _follow(self, job: _Job) -> None:
         """Pass on what a worker tells until it ends, and say how it ended if it did not."""
         how: Said | None = None
+        is_ready = False
+        assert job.task is not None
         try:
             try:
                 await job.worker.start()
             except OSError as error:
                 how = Said("flight.not_started", reason=error.strerror or error)
                 return
-            job.worker.send(task)
+            job.worker.send(job.task)
             try:
                 if not job.cancelled:
-                    await self._pass_on(job)
+                    is_ready = await self._pass_on(job)
             except TimeoutError:
                 how = Said("flight.silent", seconds=self._settings.silent_s)
                 job.worker.kill()
-            how = await job.worker.ended() or how
+            if is_ready:
+                self._workers.give_back(job.worker)
+            else:
+                how = await job.worker.ended() or how
         finally:
-            job.worker.kill()
+            if not is_ready:
+                job.worker.kill()
+            self._lines[job.is_batch].leave(job, counts=not (job.refused or job.cancelled))
             if self._settings.keep is not None:
                 await asyncio.to_thread(forget_old, self._settings.keep)
             if job.refused:
@@ -286,19 +318,23 @@ class EditingService:
             elif not job.over:
                 self._end(job, how)
             self._forget_old()
+            self._advance(is_batch=job.is_batch)
 
-    async def _pass_on(self, job: _Job) -> None:
+    async def _pass_on(self, job: _Job) -> bool:
+        """Pass on until the worker has ended; True: until it can take another batch."""
         lines = job.worker.lines()
         while True:
             async with asyncio.timeout(self._settings.silent_s if job.is_batch else None):
                 line = await anext(lines, None)
             if line is None:
-                return
+                return False
             try:
                 message = messages.FROM_WORKER.validate_json(line)
             except ValidationError:
                 logger.error("a worker of the editor told %.200r", line)
                 continue
+            if isinstance(message, messages.Ready):
+                return True
             self._take(job, message)
 
     def _take(self, job: _Job, message: messages.FromWorker) -> None:
@@ -353,8 +389,7 @@ class EditingService:
     def _end_unwatched_later(self, job: _Job) -> None:
         def end() -> None:
             if not job.watchers and not job.over:
-                job.cancelled = True
-                job.worker.kill()
+                self._cancel(job)
 
         if not job.watchers and not job.over:
             asyncio.get_running_loop().call_later(self._settings.unwatched_s, end)

@@ -63,7 +63,7 @@ from framerunner.editing import messages
 from framerunner.editing.places import lesson_names, level_names, scenario_names
 from framerunner.editing.service import EditingService, EditingSettings
 from framerunner.editing.words import Language, Said, language_of, say
-from monitor.access import refuse
+from monitor.access import Visitor, refuse
 from monitor.pilot_channel import Allowance
 from scenarios.result import first_error
 
@@ -82,8 +82,8 @@ class EditingDoor:
     def __init__(self, settings: EditingSettings | None = None) -> None:
         self._service = EditingService(settings or EditingSettings())
 
-    def router(self, may_act: Callable[[HTTPConnection], bool]) -> APIRouter:
-        """The addresses; `may_act` says who may start flights."""
+    def router(self, who: Callable[[HTTPConnection], Visitor]) -> APIRouter:
+        """The addresses; `who` tells who may start flights."""
         router = APIRouter()
 
         @router.get("/api/editing/choices")
@@ -99,11 +99,11 @@ class EditingDoor:
         @router.websocket("/ws/editing")
         async def editing(websocket: WebSocket) -> None:
             language = language_of(websocket)
-            if not may_act(websocket):
+            if not who(websocket).may_learn:
                 await refuse(websocket, say(Said("access.fly"), language))
                 return
             await websocket.accept()
-            await _Connection(websocket, self._service, language).serve()
+            await _Connection(websocket, self._service, language, lambda: who(websocket)).serve()
 
         return router
 
@@ -118,8 +118,15 @@ class EditingDoor:
 class _Connection:
     """One browser's WebSocket; a watcher of the service."""
 
-    def __init__(self, websocket: WebSocket, service: EditingService, language: Language) -> None:
+    def __init__(
+        self,
+        websocket: WebSocket,
+        service: EditingService,
+        language: Language,
+        visitor: Callable[[], Visitor],
+    ) -> None:
         self.language = language
+        self._visitor = visitor
         self._websocket = websocket
         self._service = service
         self._outbox: deque[str] = deque()
@@ -168,6 +175,12 @@ class _Connection:
             request = messages.REQUEST.validate_json(text)
         except ValidationError as error:
             self.put(messages.Refused(tag=_tag_in(text), text=first_error(error)).model_dump_json())
+            return
+        visitor, is_live = self._visitor(), isinstance(request, messages.StartLive | messages.StopLive)
+        if not (visitor.may_teach if is_live else visitor.may_learn):
+            # A flight in the simulator is seen on all pages, and is a try of the contest.
+            why = Said("access.live" if is_live and visitor.may_learn else "access.fly")
+            self.put(messages.Refused(tag=request.tag, text=say(why, self.language)).model_dump_json())
             return
         await self._service.do(request.model_copy(update={"language": self.language}), self)
 

@@ -17,11 +17,16 @@ Language = Literal["en", "es"]
 _ENGLISH: Mapping[str, str] = {
     "plain": "{text}",
     # Who may do what.
-    "access.edit": "only those who logged in may edit",
-    "access.fly": "only those who logged in may start flights",
-    "access.course": "only those who logged in may take part",
+    "access.edit": "only pupils and organisers may edit; log in at /login",
+    "access.own": "this file is not yours; open your own lesson from the page Course",
+    "access.fly": "only pupils and organisers may start flights; log in at /login",
+    "access.live": "only organisers may start a flight in the simulator, which all see; use the tab Fly",
+    "access.course": "only pupils and organisers may take part; log in at /login",
+    "access.learner": "you are logged in as {name}; log out to take part with another name",
+    "access.teach": "only organisers may do this; log in at /login",
     # Files.
     "desk.not_here": "'{name}' is no mission file of this folder; choose one from the list",
+    "desk.not_read": "{name}: cannot be read ({reason}); choose a mission file of this folder",
     "desk.too_many_open": "{limit} missions are open; close some pages first",
     "desk.source": "unknown source '{name}'; use empty, example or a mission of the package",
     "desk.taken": "{name} is there already; choose another name",
@@ -42,13 +47,14 @@ _ENGLISH: Mapping[str, str] = {
     "typed.elsewhere": (
         "the text was changed in another window at the same time; what you typed last is left out"
     ),
-    "typed.beyond": "typed text: {place} is after the end of the text; load the page again",
     # Flights.
     "flight.unknown": "'{name}': there is no such flight or batch; start it again",
     "flight.is_batch": "it is a batch; cancel it",
     "flight.over": "the flight is over",
-    "flight.others": "other flights are being flown; wait until they are over, or cancel them",
-    "flight.too_many": "no more than {count} can be under control at the same time; stop one first",
+    "flight.waits": "the flight waits for its turn; stop it, or wait",
+    "flight.yours": "your flights are not over yet; wait until they are, or cancel them",
+    "flight.too_many": "no more than {count} of a page can be under control at the same time; stop one first",
+    "flight.full": "{count} others wait for their turn; try again in some minutes",
     "flight.cancelled": "cancelled",
     "flight.silent": "nothing was flown for {seconds:g} s",
     "flight.not_started": "it cannot be started ({reason})",
@@ -70,14 +76,20 @@ _ENGLISH: Mapping[str, str] = {
     # Lessons.
     "lesson.too_long": "the flight was not over after {seconds:g} s",
     "lesson.no_result": "the flight had no result",
+    "lesson.one_check": "{name}'s mission is being checked or waits for it already; wait for that",
 }
 
 _SPANISH: Mapping[str, str] = {
     "plain": "{text}",
-    "access.edit": "solo pueden editar quienes han iniciado sesión",
-    "access.fly": "solo pueden iniciar vuelos quienes han iniciado sesión",
-    "access.course": "solo pueden participar quienes han iniciado sesión",
+    "access.edit": "solo pueden editar alumnos y organizadores; inicia sesión en /login",
+    "access.own": "este archivo no es tuyo; abre tu lección desde la página Curso",
+    "access.fly": "solo pueden iniciar vuelos alumnos y organizadores; inicia sesión en /login",
+    "access.live": "solo los organizadores vuelan en el simulador, que todos ven; usa la pestaña Volar",
+    "access.course": "solo pueden participar alumnos y organizadores; inicia sesión en /login",
+    "access.learner": "has iniciado sesión como {name}; ciérrala para participar con otro nombre",
+    "access.teach": "solo pueden hacerlo los organizadores; inicia sesión en /login",
     "desk.not_here": "'{name}' no es un archivo de misión de esta carpeta; elige uno de la lista",
+    "desk.not_read": "{name}: no se puede leer ({reason}); elige un archivo de misión de esta carpeta",
     "desk.too_many_open": "hay {limit} misiones abiertas; cierra antes alguna página",
     "desk.source": "origen desconocido '{name}'; usa empty, example o una misión del paquete",
     "desk.taken": "{name} ya existe; elige otro nombre",
@@ -101,12 +113,13 @@ _SPANISH: Mapping[str, str] = {
     "typed.elsewhere": (
         "el texto se cambió a la vez en otra ventana; lo último que escribiste no se ha incluido"
     ),
-    "typed.beyond": "texto escrito: {place} está después del final del texto; carga la página de nuevo",
     "flight.unknown": "'{name}': no hay tal vuelo ni serie; empieza de nuevo",
     "flight.is_batch": "es una serie de vuelos; cancélala",
     "flight.over": "el vuelo ha terminado",
-    "flight.others": "se están volando otros vuelos; espera a que terminen, o cancélalos",
-    "flight.too_many": "no se pueden controlar más de {count} a la vez; para antes uno",
+    "flight.waits": "el vuelo espera su turno; páralo, o espera",
+    "flight.yours": "tus vuelos no han terminado; espera a que terminen, o cancélalos",
+    "flight.too_many": "una página no puede controlar más de {count} a la vez; para antes uno",
+    "flight.full": "{count} esperan ya su turno; prueba otra vez en unos minutos",
     "flight.cancelled": "cancelado",
     "flight.silent": "no se voló nada durante {seconds:g} s",
     "flight.not_started": "no se puede iniciar ({reason})",
@@ -128,6 +141,7 @@ _SPANISH: Mapping[str, str] = {
     "live.none_here": "este programa no vuela ningún simulador",
     "lesson.too_long": "el vuelo no había terminado tras {seconds:g} s",
     "lesson.no_result": "el vuelo no tuvo resultado",
+    "lesson.one_check": "la misión de {name} ya se comprueba o espera su turno; espera a que termine",
 }
 
 TABLES: Mapping[Language, Mapping[str, str]] = {

@@ -1,8 +1,9 @@
-"""One flight or one batch in a process of its own: `python -m framerunner.editing.worker`.
+"""One flight, or batches, in a process of its own: `python -m framerunner.editing.worker`.
 
-The first line of standard input is a task, each further line of a single flight an order; standard output
-has a message a line. A mission that computes without end or takes all memory ends only this process, and when
-the server ends, standard input ends and this process with it.
+A line of standard input is a task, each further line of a single flight an order; standard output has a
+message a line. Batches are flown one after the other, each in a child that has the libraries already: to
+import them takes longer than a pupil's flight. A mission that computes without end or takes all memory ends
+only this process, and when the server ends, standard input ends and this process with it.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ import asyncio
 import os
 import sys
 import threading
+import traceback
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TextIO
 
@@ -38,18 +41,50 @@ Tell = Callable[[BaseModel], None]
 
 
 def main() -> int:
-    """Do the task that the first line of standard input names; returns 0, also if it is refused."""
+    """Do the tasks that lines of standard input name: batches, or one flight; returns 0, also if refused."""
     import cv2
 
     output = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a contestant's file prints is no message
     os.nice(_NICENESS)
     cv2.setNumThreads(1)
-    line = sys.stdin.readline()
-    if not line:  # it was not needed
-        return 0
-    task = messages.TASK.validate_json(line)
     tell = _teller(output)
+    while line := sys.stdin.readline():  # until it is not needed any more
+        task = messages.TASK.validate_json(line)
+        if isinstance(task, messages.RunTask):
+            _carry_out(task, tell)
+            return 0  # orders may follow that come too late
+        code = _in_child(partial(_carry_out, task, tell))
+        if code:
+            return code
+        tell(messages.Ready())
+    return 0
+
+
+def _in_child(do: Callable[[], None]) -> int:
+    """Do something in a process that has all libraries already; its exit code.
+
+    Limits and whatever goes wrong are that process's alone; a signal that ends it ends this one, too.
+    """
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            end_with_standard_input(lambda: None)
+            do()
+            code = 0
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            sys.stderr.flush()
+            os._exit(code)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if code < 0:
+        os.kill(os.getpid(), -code)
+    return code
+
+
+def _carry_out(task: messages.RunTask | messages.BatchTask, tell: Tell) -> None:
     flights = 1 if isinstance(task, messages.RunTask) else task.start.count + len(task.start.scenarios)
     limit_resources(task.memory_bytes, round(task.processor_s) * flights + _SPARE_S)
     tag = task.start.tag
@@ -57,13 +92,11 @@ def main() -> int:
         pilot = None if task.pilot is None else read_pilot(Path(task.pilot))
         mission = mission_from_text(task.start.text, pilot)
         if isinstance(task, messages.BatchTask):
-            end_with_standard_input(lambda: None)
             fly_batch(task, mission, tell)
         else:
             _ControlledRun(task, mission, pilot, tell).fly(sys.stdin)
     except UserError as error:
         tell(refusal(tag, error, task.start.language))
-    return 0
 
 
 def refusal(tag: int, error: UserError, language: Language, run: str = "") -> messages.Refused:

@@ -1,6 +1,6 @@
 """The contest over HTTP at `/api/competition`, and the WebSocket `/ws/competition` that reports changes.
 
-Everybody may read, judges may write.
+Everybody may read; judges may write on tries, organisers on all.
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ from monitor.competition.validation import (
 from monitor.competition.views import RankingStateView, RankingView, StateView, ranking_csv, tries_csv
 
 if TYPE_CHECKING:
-    from monitor.access import Access
+    from collections.abc import Callable
+
+    from monitor.access import Visitor
     from monitor.server import Monitor
 
 MAX_BODY_BYTES = 65_536
@@ -57,10 +59,11 @@ def register(monitor: Monitor) -> None:
     for error in (RefusedError, DatabaseError, SQLAlchemyError):
         monitor.web.add_exception_handler(error, _on_error)
     _add_channel(monitor.web, service)
-    judges = _Judges(service, monitor.access)
     monitor.web.include_router(_reading_routes(service))
-    monitor.web.include_router(_organising_routes(service, judges))
-    monitor.web.include_router(_judging_routes(service, judges))
+    monitor.web.include_router(
+        _organising_routes(service, _Writers(service, monitor.access.require_organiser))
+    )
+    monitor.web.include_router(_judging_routes(service, _Writers(service, monitor.access.require_judge)))
 
 
 def json_response(value: BaseModel | list[Any] | dict[str, Any]) -> Response:
@@ -128,16 +131,16 @@ def _reading_routes(service: CompetitionService) -> APIRouter:
     return routes
 
 
-class _Judges:
-    """Reads judges' requests. All others are refused before the body is read."""
+class _Writers:
+    """Reads the requests of those whom `require` lets in. All others are refused before the body is read."""
 
-    def __init__(self, service: CompetitionService, access: Access) -> None:
+    def __init__(self, service: CompetitionService, require: Callable[[Request], Visitor]) -> None:
         self._service = service
-        self._access = access
+        self._require = require
 
     async def read(self, request: Request, model: type[Form]) -> tuple[Form, Entry]:
         """Return the form, and who sent it now."""
-        judge = self._access.require_judge(request)
+        judge = self._require(request)
         if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
             raise HTTPException(415, "the body must be JSON; send Content-Type: application/json")
         body = await request.body()
@@ -146,19 +149,19 @@ class _Judges:
         return read_form(model, body), self._service.entry(judge.name)
 
 
-def _organising_routes(service: CompetitionService, judges: _Judges) -> APIRouter:
+def _organising_routes(service: CompetitionService, organisers: _Writers) -> APIRouter:
     """Teams, calls and the queue, the draw, the rule."""
     routes = APIRouter(prefix="/api/competition")
 
     @routes.post("/teams")
     async def add_team(request: Request) -> Response:
-        form, entry = await judges.read(request, TeamForm)
+        form, entry = await organisers.read(request, TeamForm)
         team = await service.change(lambda store: store.add_team(form.name, form.members, entry))
         return json_response({"team": team})
 
     @routes.post("/teams/{team_id}")
     async def change_team(request: Request, team_id: str) -> Response:
-        form, entry = await judges.read(request, TeamChangeForm)
+        form, entry = await organisers.read(request, TeamChangeForm)
         number = _id("team", team_id)
         values = (form.name, form.members, form.withdrawn)
         await service.change(lambda store: store.change_team(number, *values, entry))
@@ -166,7 +169,7 @@ def _organising_routes(service: CompetitionService, judges: _Judges) -> APIRoute
 
     @routes.post("/next")
     async def call(request: Request) -> Response:
-        form, entry = await judges.read(request, NextForm)
+        form, entry = await organisers.read(request, NextForm)
         if form.scenario:
             await service.frames(form.scenario)
         await service.change(lambda store: store.call(form.team, form.scenario, entry))
@@ -174,33 +177,33 @@ def _organising_routes(service: CompetitionService, judges: _Judges) -> APIRoute
 
     @routes.post("/next/undo")
     async def take_back(request: Request) -> Response:
-        form, entry = await judges.read(request, UndoForm)
+        form, entry = await organisers.read(request, UndoForm)
         await service.change(lambda store: store.take_back(form.call, entry))
         return json_response({"call": form.call})
 
     @routes.post("/queue")
     async def set_queue(request: Request) -> Response:
-        form, entry = await judges.read(request, QueueForm)
+        form, entry = await organisers.read(request, QueueForm)
         teams = service.shuffled(form.teams) if form.shuffle else form.teams
         await service.change(lambda store: store.set_queue(form.seen, teams, entry))
         return json_response({"teams": teams})
 
     @routes.post("/draw")
     async def draw(request: Request) -> Response:
-        form, entry = await judges.read(request, DrawForm)
+        form, entry = await organisers.read(request, DrawForm)
         count = form.count or (await service.board()).rule.scenarios
         return json_response({"round": await service.draw(form.pool, count, entry)})
 
     @routes.post("/settings")
     async def set_rule(request: Request) -> Response:
-        form, entry = await judges.read(request, SettingsForm)
+        form, entry = await organisers.read(request, SettingsForm)
         await service.change(lambda store: store.set_rule(Rule(**form.model_dump()), entry))
         return json_response(form)
 
     return routes
 
 
-def _judging_routes(service: CompetitionService, judges: _Judges) -> APIRouter:
+def _judging_routes(service: CompetitionService, judges: _Writers) -> APIRouter:
     """Judges' entries on a try."""
     routes = APIRouter(prefix="/api/competition")
 

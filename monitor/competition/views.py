@@ -264,7 +264,7 @@ def ranking_csv(ranking: RankingView) -> str:
         for flown in row.cells:
             values += [f"{flown.counted_s:.2f}", flown.state, flown.attempt]
         rows.append(values)
-    return _csv(columns, rows)
+    return csv_text(columns, rows)
 
 
 def tries_csv(board: Board) -> str:
@@ -281,10 +281,11 @@ def tries_csv(board: Board) -> str:
                 *(each.ended.isoformat() if each.ended is not None else "", each.reason),
             ]
         )
-    return _csv(_TRY_COLUMNS, rows)
+    return csv_text(_TRY_COLUMNS, rows)
 
 
-def _csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table for a spreadsheet, whose texts it takes for no formulas."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\r\n")
     writer.writerow([_safe(column) for column in columns])

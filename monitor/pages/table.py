@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
+from monitor.access import Role
 from monitor.pages.shell import render
 from monitor.urls import is_for_others
 
@@ -46,8 +47,27 @@ class Page:
 PAGES = (
     Page("/", "Live", "live"),
     Page("/chart", "Statechart", "chart"),
-    Page("/course", "Course", "course", lambda _monitor, _request, visitor: {"mayAct": visitor.may_fly}),
-    Page("/edit", "Editor", "edit", lambda _monitor, _request, visitor: {"mayEdit": visitor.may_fly}),
+    Page(
+        "/course",
+        "Course",
+        "course",
+        lambda monitor, _request, visitor: {
+            "mayAct": visitor.may_learn,
+            "mayTeach": visitor.may_teach,
+            "pupil": visitor.name if visitor.role is Role.PUPIL else "",
+            "word": monitor.access.code_word(visitor),
+        },
+    ),
+    Page(
+        "/edit",
+        "Editor",
+        "edit",
+        lambda _monitor, _request, visitor: {
+            "mayEdit": visitor.may_learn,
+            "mayTeach": visitor.may_teach,
+            "pupil": visitor.name if visitor.role is Role.PUPIL else "",
+        },
+    ),
     Page(
         "/pilot",
         "Pilot",
@@ -66,7 +86,7 @@ PAGES = (
         "/competition",
         "Competition",
         "competition",
-        lambda _monitor, _request, visitor: {"judge": visitor.may_judge},
+        lambda _monitor, _request, visitor: {"judge": visitor.may_organise, "mayCorrect": visitor.may_judge},
     ),
     Page(
         "/competition/try/{try_id:int}",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,8 @@ from offboard.authoring.messages import EditError
 from offboard.authoring.text import Change
 from offboard.authoring.work import Work
 from offboard.mission import MAX_FILE_BYTES
+
+_MAX_KEPT = 20_000_000  # characters of edits that can be undone
 
 _STEPS: Mapping[type, Callable[[Work, Any], None]] = {
     edits.AddState: state_edits.add_state,
@@ -71,7 +74,20 @@ def _replace_text(document: Document, edit: edits.ReplaceText) -> Edited:
         edit.text.encode("utf-8")
     except UnicodeEncodeError:
         raise EditError("edit.half_pair") from None
-    change = document.content.change(edit.start, edit.end, edit.text)
+    return _changed(document, document.content.changes([(edit.start, edit.end, edit.text)])[0])
+
+
+def _typed(document: Document, typed: Sequence[tuple[int, int, str]]) -> Edited:
+    try:
+        change = document.content.typed(typed)
+    except IndexError as error:
+        raise EditError("edit.beyond", place=error.args[0]) from None
+    except UnicodeError:
+        raise EditError("edit.half_pair") from None
+    return _changed(document, change)
+
+
+def _changed(document: Document, change: Change) -> Edited:
     changed = Document(document.content.changed(change), document.path)
     _refuse_too_long(changed)
     return Edited(changed, (change,) if change.removed != change.inserted else ())
@@ -88,6 +104,11 @@ class _Step:
 
     changes: tuple[Change, ...]
     layout: Layout
+
+    @property
+    def size(self) -> int:
+        """Characters that it keeps."""
+        return sum(len(each.removed) + len(each.inserted) for each in self.changes)
 
 
 class EditSession:
@@ -106,8 +127,9 @@ class EditSession:
     def __init__(self, document: Document, layout: Layout | None = None) -> None:
         self.document = document
         self.layout = Layout() if layout is None else layout
-        self._done: list[_Step] = []
+        self._done: deque[_Step] = deque()
         self._undone: list[_Step] = []
+        self._kept = 0  # characters in the steps that can be undone
 
     @property
     def can_undo(self) -> bool:
@@ -119,29 +141,51 @@ class EditSession:
         """Whether there is an edit that was taken back."""
         return bool(self._undone)
 
-    def apply(self, edit: edits.Edit, *, goes_on: bool = False) -> tuple[Change, ...]:
-        """Apply an edit and return the changes of the text. Raises `EditError`; nothing is changed then.
-
-        Args:
-            edit: what to do.
-            goes_on: it is undone together with the edit before, as one letter of a typed word is.
-        """
+    def apply(self, edit: edits.Edit) -> tuple[Change, ...]:
+        """Apply an edit and return the changes of the text. Raises `EditError`; nothing is changed then."""
         edited = apply(self.document, edit)
         if edited.changes:
-            before = self._done.pop() if goes_on and self._done else _Step((), self.layout)
-            self._done.append(_Step((*before.changes, *edited.changes), before.layout))
-            self._undone.clear()
-            self.layout = follow(self.layout, self.document, edit, edited.document)
-            self.document = edited.document
+            layout = follow(self.layout, self.document, edit, edited.document)
+            self._do(_Step(edited.changes, self.layout), edited.document, layout)
         return edited.changes
+
+    def type(
+        self, typed: Sequence[tuple[int, int, str]], goes_on: Callable[[Change], bool] = lambda _: False
+    ) -> tuple[Change, ...]:
+        """Apply typed changes, see `MissionText.typed`, as one. Raises `EditError`; nothing is changed then.
+
+        Args:
+            typed: what was typed.
+            goes_on: whether the change is letters beside those of the step before, with which it is undone.
+        """
+        edited = _typed(self.document, typed)
+        if edited.changes:
+            (change,) = edited.changes
+            step = _Step((change,), self.layout)
+            if goes_on(change) and self._done:
+                before = self._done.pop()
+                self._kept -= before.size
+                step = _Step((before.changes[0].with_letters(change),), before.layout)
+            self._do(step, edited.document, self.layout)
+        return edited.changes
+
+    def _do(self, step: _Step, document: Document, layout: Layout) -> None:
+        self._undone.clear()
+        self._remember(step)
+        self.document, self.layout = document, layout
+
+    def _remember(self, step: _Step) -> None:
+        """Keep a step that can be undone, and forget the oldest ones of a long session."""
+        self._done.append(step)
+        self._kept += step.size
+        while self._kept > _MAX_KEPT and len(self._done) > 1:
+            self._kept -= self._done.popleft().size
 
     def place(self, places: Mapping[str, StateBox | None]) -> None:
         """Move states in the diagram, by their full ids; None forgets a place. It is undone as edits are."""
         layout = with_places(self.layout, places)
         if layout != self.layout:
-            self._done.append(_Step((), self.layout))
-            self._undone.clear()
-            self.layout = layout
+            self._do(_Step((), self.layout), self.document, layout)
 
     def settle(self, places: Mapping[str, StateBox | None]) -> None:
         """Note where a page has drawn states that nobody placed; it is no step of its own."""
@@ -155,6 +199,7 @@ class EditSession:
         if not self._done:
             raise EditError("edit.no_undo")
         step = self._done.pop()
+        self._kept -= step.size
         self._undone.append(_Step(step.changes, self.layout))
         return self._change(tuple(change.inverse for change in reversed(step.changes)), step.layout)
 
@@ -163,7 +208,7 @@ class EditSession:
         if not self._undone:
             raise EditError("edit.no_redo")
         step = self._undone.pop()
-        self._done.append(_Step(step.changes, self.layout))
+        self._remember(_Step(step.changes, self.layout))
         return self._change(step.changes, step.layout)
 
     def _change(self, changes: tuple[Change, ...], layout: Layout) -> tuple[Change, ...]:

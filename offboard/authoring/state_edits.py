@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from offboard.authoring.blocks import Owner
+from collections import defaultdict
+
+from offboard.authoring.blocks import Owner, Patch
 from offboard.authoring.edits import (
     AddState,
     AddTemplate,
@@ -18,7 +20,7 @@ from offboard.authoring.edits import (
 )
 from offboard.authoring.messages import EditError, EditMessage
 from offboard.authoring.outline import TEMPLATE, StateOutline
-from offboard.authoring.references import instances, prefix_change, references, relative
+from offboard.authoring.references import Reference, instances, prefix_change, references, relative
 from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, Work, keys_before
 from offboard.authoring.yaml_writer import Value, style_of
 from offboard.chart.problems import cut
@@ -330,26 +332,28 @@ def _remove_with_key(work: Work, node: MapNode, key: str, state: StateOutline) -
 
 def _delete_references(work: Work, state: StateOutline) -> None:
     gone = _ids(work, state)
-    for reference in sorted(references(work.document).values(), key=lambda each: -each.index):
+    leading: dict[str, list[Reference]] = defaultdict(list)
+    for reference in sorted(references(work.document).values(), key=lambda each: each.index):
         inside = f"{reference.state}.".startswith(f"{state.path}.")
         targets = {target for _, target in reference.leads}
         if not inside and all(f"{t}.".startswith(tuple(f"{each}." for each in gone)) for t in targets):
-            delete_reference(work, reference.state, reference.event, reference.index)
+            leading[reference.state].append(reference)
+    while any(leading.values()):  # one of each state at a time: the text is read anew after each step
+        last = [each.pop() for each in leading.values() if each]
+        work.patch(*(deleted_reference(work, each.state, each.event, each.index) for each in last))
 
 
-def delete_reference(work: Work, path: str, event: str, index: int) -> None:
-    """Delete a transition as written."""
+def deleted_reference(work: Work, path: str, event: str, index: int) -> Patch:
+    """What deletes a transition as written."""
     state = work.state(path)
     assert isinstance(state.node, MapNode)
     if event != "tick":
-        work.patch(work.blocks.remove_entry(state.node, "then" if event == "done" else "resume"))
-        return
+        return work.blocks.remove_entry(state.node, "then" if event == "done" else "resume")
     node = state.node.items["transitions"]
     assert not isinstance(node, (Scalar, MapNode))
     if len(node.items) == 1:
-        work.patch(work.blocks.remove_entry(state.node, "transitions"))
-    else:
-        work.patch(work.blocks.remove_item(node, index))
+        return work.blocks.remove_entry(state.node, "transitions")
+    return work.blocks.remove_item(node, index)
 
 
 def set_actions(work: Work, edit: SetActions) -> None:

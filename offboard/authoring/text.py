@@ -7,13 +7,16 @@ text, line by line, so that a file that is opened and saved is the same to the b
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _BYTE_ORDER_MARK = "\ufeff"
+_WIDE = re.compile("[\U00010000-\U0010ffff]")  # two units of UTF-16
+_MAX_CHANGES = 20  # that an edit makes; more are one, so that applying and telling them takes linear time
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +39,17 @@ class Change:
     def inverse(self) -> Change:
         """What takes this change back."""
         return Change(self.start, self.inserted, self.removed, self.inserted_ends, self.removed_ends)
+
+    def with_letters(self, then: Change) -> Change:
+        """This change of letters and the next one, of letters beside them; both add, or both delete."""
+        if self.inserted:
+            return Change(self.start, "", self.inserted + then.inserted)
+        first, second = (self, then) if then.start == self.start else (then, self)
+        return Change(then.start, first.removed + second.removed, "")
+
+
+# Offsets of the first character and of the one after the last, and the text that is put there.
+Part = tuple[int, int, str]
 
 
 @dataclass(frozen=True)
@@ -73,13 +87,86 @@ class MissionText:
         most = Counter(self.line_ends).most_common(1)
         return most[0][0] if most else "\n"
 
-    def change(self, start: int, end: int, new: str) -> Change:
-        """The change that puts a text in the place of the characters from `start` to `end`."""
-        new = _LINE_END.sub("\n", new)
-        first = self.text.count("\n", 0, start)
-        count = self.text.count("\n", start, end)
-        removed_ends = self.line_ends[first : first + count]
-        return Change(start, self.text[start:end], new, removed_ends, (self.usual_end,) * new.count("\n"))
+    def changes(self, parts: Sequence[Part]) -> tuple[Change, ...]:
+        """The changes that put texts in the place of parts of this text; one change for all if they are many.
+
+        Args:
+            parts: from the last to the first, apart from each other; their offsets are those of this text.
+
+        Returns:
+            The changes, in order; each is made for the text after those before it.
+        """
+        if len(parts) > _MAX_CHANGES:
+            return (self._joined(parts[::-1]),)
+        return tuple(self._joined((part,)) for part in parts)
+
+    def _joined(self, parts: Sequence[Part]) -> Change:
+        """One change for all parts, given from the first to the last; line ends between them are kept."""
+        begin, end = parts[0][0], parts[-1][1]
+        first = line = self.text.count("\n", 0, begin)
+        texts: list[str] = []
+        ends: list[str] = []
+        place = begin
+        for start, stop, text in parts:
+            count = self.text.count("\n", place, start)
+            new = _LINE_END.sub("\n", text)
+            texts += (self.text[place:start], new)
+            ends += self.line_ends[line : line + count]
+            ends += (self.usual_end,) * new.count("\n")
+            line += count + self.text.count("\n", start, stop)
+            place = stop
+        removed_ends = self.line_ends[first:line]
+        return Change(begin, self.text[begin:end], "".join(texts), removed_ends, tuple(ends))
+
+    def typed(self, changes: Sequence[tuple[int, int, str]]) -> Change:
+        """The one change that does what typed ones do. Their number times the length of the text is copied.
+
+        Args:
+            changes: each made for the text after those before it: first character and number of those
+                that are replaced, counted as JavaScript does, and what replaces them.
+
+        Raises:
+            IndexError: with a place after the end of the text.
+            UnicodeError: half of a character is left.
+        """
+        # The bytes between which JavaScript counts; a line end is one character, also if the file has two.
+        marks = self._marks("".join(new for _, _, new in changes))
+        usual = marks[self.usual_end]
+        before = self._marked(marks).encode("utf-16-le")
+        after = bytearray(before)
+        kept = rest = len(before)  # at the start and at the end
+        for first, removed, new in changes:
+            start, end = 2 * first, 2 * (first + removed)
+            if end > len(after):
+                raise IndexError(first + removed)
+            kept, rest = min(kept, start), min(rest, len(after) - end)
+            after[start:end] = _LINE_END.sub(usual, new).encode("utf-16-le")
+        if not changes:
+            return Change(0, "", "")
+        old = before[kept : len(before) - rest].decode("utf-16-le")
+        put = after[kept : len(after) - rest].decode("utf-16-le")
+        ends = {mark: end for end, mark in marks.items()}
+        any_mark = re.compile("|".join(map(re.escape, ends)))
+
+        def ends_in(text: str) -> tuple[str, ...]:
+            return tuple(ends[each] for each in any_mark.findall(text))
+
+        start = len(before[:kept].decode("utf-16-le"))
+        removed_text, inserted = (any_mark.sub("\n", each) for each in (old, put))
+        return Change(start, removed_text, inserted, ends_in(old), ends_in(put))
+
+    def _marks(self, more: str) -> dict[str, str]:
+        """For each line end that the file has, a character that is not in the text nor in another one."""
+        kinds = list(dict.fromkeys((self.usual_end, *self.line_ends)))
+        used = set(self.text) | set(more) if len(kinds) > 1 else set()
+        free = (chr(code) for code in range(0xE000, 0xF8FF) if chr(code) not in used)
+        return {kinds[0]: "\n", **dict(zip(kinds[1:], free, strict=False))}
+
+    def _marked(self, marks: dict[str, str]) -> str:
+        if len(marks) == 1:
+            return self.text
+        ends = (*(marks[end] for end in self.line_ends), "")
+        return "".join(line + end for line, end in zip(self.text.split("\n"), ends, strict=True))
 
     def changed(self, change: Change) -> MissionText:
         """The text after a change that was made for it."""
@@ -138,8 +225,19 @@ class Positions:
 
     def to_utf16(self, offset: int) -> int:
         """The same offset as JavaScript counts it: characters beyond U+FFFF count two."""
-        return offset + sum(character > "\uffff" for character in self._text[:offset])
+        return offset + bisect_left(self._wide, offset)
 
     def from_utf16(self, offset: int) -> int:
         """An offset counted as JavaScript does, in characters."""
-        return len(self._text.encode("utf-16-le")[: 2 * offset].decode("utf-16-le", "ignore"))
+        offset = min(offset, self.to_utf16(len(self._text)))
+        return offset - bisect_left(self._wide_utf16, offset)
+
+    @cached_property
+    def _wide(self) -> list[int]:
+        """Offsets of the characters beyond U+FFFF."""
+        return [] if self._text.isascii() else [found.start() for found in _WIDE.finditer(self._text)]
+
+    @cached_property
+    def _wide_utf16(self) -> list[int]:
+        """The same as JavaScript counts them."""
+        return [offset + count for count, offset in enumerate(self._wide)]

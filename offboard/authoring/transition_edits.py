@@ -17,7 +17,7 @@ from offboard.authoring.edits import (
 )
 from offboard.authoring.messages import EditError
 from offboard.authoring.outline import Event, StateOutline
-from offboard.authoring.state_edits import delete_reference
+from offboard.authoring.state_edits import deleted_reference
 from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, TRANSITION_ORDER, Work, keys_before
 from offboard.authoring.yaml_writer import Value
 from offboard.chart.yaml_nodes import ListNode, MapNode, Scalar
@@ -61,7 +61,7 @@ def _add_single(work: Work, state: StateOutline, edit: AddTransition, to: str) -
 def delete_transition(work: Work, edit: DeleteTransition) -> None:
     """Delete a transition."""
     state, transition = work.transition(edit.transition)
-    delete_reference(work, state.path, transition.event, transition.index)
+    work.patch(deleted_reference(work, state.path, transition.event, transition.index))
 
 
 def redirect_transition(work: Work, edit: RedirectTransition) -> None:
@@ -83,7 +83,7 @@ def set_source(work: Work, edit: SetSource) -> None:
     actions = tuple(each.text for each in transition.actions)
     to, event = edit.to, transition.event
     add_transition(work, AddTransition(state=edit.state, to=to, when=when, actions=actions, event=event))
-    delete_reference(work, state.path, event, transition.index)
+    work.patch(deleted_reference(work, state.path, event, transition.index))
 
 
 def move_transition(work: Work, edit: MoveTransition) -> None:
@@ -137,7 +137,7 @@ def set_event(work: Work, edit: SetEvent) -> None:
     to = transition.to.text.strip()
     if edit.event != "tick" and state.text(_KEYS[edit.event]):
         raise EditError("edit.event_taken", state=state.path, event=edit.event)
-    delete_reference(work, state.path, transition.event, transition.index)
+    work.patch(deleted_reference(work, state.path, transition.event, transition.index))
     state = work.state(state.path)
     if edit.event != "tick":
         work.set_text(state, _KEYS[edit.event], to)

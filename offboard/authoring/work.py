@@ -54,8 +54,8 @@ class Work:
     def patch(self, *patches: Patch) -> None:
         """Replace parts of the text; the offsets of all patches are those before this step."""
         content = self.document.content
-        for start, end, new in sorted(patches, key=lambda patch: patch[:2], reverse=True):
-            change = content.change(start, end, new)
+        parts = sorted(patches, key=lambda patch: patch[:2], reverse=True)
+        for change in content.changes(parts):
             if change.removed != change.inserted:
                 self.changes.append(change)
                 content = content.changed(change)

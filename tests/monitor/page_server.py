@@ -110,7 +110,7 @@ class FakeMonitor:
 
     async def _page(self, request):
         page = SERVED[request.path]
-        html = render_page(page, Visitor("", may_judge=False, may_fly=False), "fake", page.title, {})
+        html = render_page(page, Visitor(), "fake", page.title, {})
         headers = {"Content-Security-Policy": CONTENT_POLICY}
         return web.Response(body=html.body, content_type="text/html", charset="utf-8", headers=headers)
 

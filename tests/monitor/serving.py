@@ -67,7 +67,9 @@ class Served:
     @property
     def invitation(self):
         """Secret of the newest one-time link."""
-        return next(line for line in reversed(self.lines) if "token=" in line).partition("token=")[2]
+        return next(line for line in reversed(self.lines) if "organisers log in" in line).partition("token=")[
+            2
+        ]
 
 
 @contextlib.asynccontextmanager
@@ -89,7 +91,7 @@ async def serving(monkeypatch, *modules, bind="127.0.0.1", port=0, password=None
         lines.append(line)
         up.set()
 
-    settings = MonitorSettings(bind, port, "sqlite://", password, **more)
+    settings = MonitorSettings(bind, port, "sqlite://", password, **{"judge_password": "only judges", **more})
     task = asyncio.create_task(serve(equipment(), settings, say))
     waiting = asyncio.create_task(up.wait())
     try:

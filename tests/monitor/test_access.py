@@ -6,22 +6,20 @@ from starlette.requests import HTTPConnection
 from monitor.access import (
     MAX_NAME_LENGTH,
     SESSION_S,
-    TRIES_A_MINUTE,
     Access,
     LoginRefusedError,
+    Role,
+    Secrets,
     SessionFile,
     Visitor,
     session_path,
 )
+from monitor.visitors.login_limit import ALL_ADDRESSES, LONGEST_WAIT_S, ONE_ADDRESS, LoginLimit
+from monitor.visitors.pupils import PupilBook
 from tests.monitor.serving import browser, serving
 
 SAMPLE = "tests.monitor.sample_page"
 PASSWORD = "correct horse"
-
-
-@pytest.fixture(autouse=True)
-def _no_waiting(monkeypatch):
-    monkeypatch.setattr("monitor.access.FAILURE_DELAY_S", 0.0)
 
 
 class Clock:
@@ -30,20 +28,88 @@ class Clock:
     def __call__(self):
         return self.now_s
 
+    async def wait(self, seconds):
+        self.now_s += seconds
+
 
 def connection(access, session_id):
     headers = [(b"cookie", f"{access.cookie}={session_id}".encode())]
     return HTTPConnection({"type": "http", "headers": headers})
 
 
+def judges(**more):
+    return Access(Secrets(judge=PASSWORD), **more)
+
+
 async def test_a_password_opens_a_session_that_ends():
     clock = Clock()
-    access = Access(PASSWORD, all_may_fly=False, clock=clock)
-    session_id = await access.log_in("Ada", PASSWORD, "10.0.0.1")
+    access = judges(clock=clock)
+    session_id, _ = await access.log_in("Ada", PASSWORD, "10.0.0.1")
     judge = connection(access, session_id)
-    assert access.visitor(judge) == Visitor("Ada", may_judge=True, may_fly=True)
+    assert access.visitor(judge) == Visitor("Ada", Role.JUDGE)
     clock.now_s = SESSION_S
-    assert access.visitor(judge) == Visitor("", may_judge=False, may_fly=False)
+    assert access.visitor(judge) == Visitor()
+
+
+RIGHTS = ("may_learn", "may_fly", "may_judge", "may_organise", "may_teach")
+
+
+@pytest.mark.parametrize(
+    ("visitor", "rights"),
+    [
+        (Visitor(), ()),
+        (Visitor("Ada", Role.PUPIL, "ada"), ("may_learn",)),
+        (Visitor("Bo", Role.JUDGE), ("may_fly", "may_judge")),
+        (Visitor("Cy", Role.ORGANISER), RIGHTS),
+        (Visitor(role=Role.ORGANISER), ("may_learn", "may_fly", "may_teach")),  # this machine's user
+    ],
+)
+def test_what_a_role_may_do(visitor, rights):
+    assert tuple(right for right in RIGHTS if getattr(visitor, right)) == rights
+
+
+def test_a_pupil_edits_own_files_only():
+    pupil = Visitor("Ada", Role.PUPIL, "ada")
+    assert all(pupil.may_edit(file) for file in ("lesson_1_ada.yaml", "mine-ada.yaml"))
+    others = (
+        "lesson_1_bo.yaml",
+        "lesson_1_b_ada.yaml",
+        "lesson_1_ada_b.yaml",
+        "mine.yaml",
+        "mine-b_ada.yaml",
+    )
+    assert not any(pupil.may_edit(file) for file in (*others, "x/lesson_1_ada.yaml", "", "a-b-ada.yaml"))
+
+
+async def test_a_pupil_joins_with_the_class_s_word_and_goes_on_with_the_own_one(tmp_path):
+    book = PupilBook(tmp_path / "class" / "pupils.json", "our class")
+    access = Access(Secrets(class_code="our class"), pupils=book)
+    _, ada = await access.log_in("Ada", "Our Class ", "10.0.0.1")
+    _, other = await access.log_in("A-da!", "our class", "10.0.0.1")
+    assert (ada.role, ada.key, other.name) == (Role.PUPIL, "ada", "A-da!")
+    assert len({ada.key, other.key, (await access.log_in("ada!", "our class", "a"))[1].key}) == 3
+    word = access.code_word(ada)
+    with pytest.raises(
+        LoginRefusedError, match=r"Ada has joined already\. If that is you, give your own code word"
+    ):
+        await access.log_in("ADA", "our class", "10.0.0.2")
+    for wrong in ("", "our clas", access.code_word(other)):
+        with pytest.raises(LoginRefusedError, match="not the password or code word"):
+            await access.log_in("Ada", wrong, "10.0.0.2")
+    again = Access(
+        Secrets(class_code="our class"), pupils=PupilBook(tmp_path / "class/pupils.json", "our class")
+    )
+    assert (await again.log_in("ada", word, "10.0.0.2"))[1] == ada
+    assert (tmp_path / "class" / "pupils.json").stat().st_mode & 0o077 == 0
+
+
+async def test_a_file_of_pupils_that_cannot_be_read_is_left_as_it_is(tmp_path):
+    path = tmp_path / "pupils.json"
+    path.write_text('{"pupils": [{"name": "Ada"}]}')
+    access = Access(Secrets(class_code="our class"), pupils=PupilBook(path, "our class"))
+    with pytest.raises(LoginRefusedError, match=r"pupils\.json cannot be read"):
+        await access.log_in("Bo", "our class", "10.0.0.1")
+    assert path.read_text() == '{"pupils": [{"name": "Ada"}]}'
 
 
 async def test_a_restart_keeps_judges_logged_in_until_their_session_ends(tmp_path):
@@ -53,16 +119,16 @@ async def test_a_restart_keeps_judges_logged_in_until_their_session_ends(tmp_pat
     def start(password=PASSWORD, cookie="judge-8080"):
         # The clock starts at 0 each time, as a machine's does; Unix time goes on.
         kept = SessionFile(path, cookie, wall)
-        return Access(password, all_may_fly=False, clock=Clock(), cookie=cookie, kept=kept)
+        return Access(Secrets(judge=password), clock=Clock(), cookie=cookie, kept=kept)
 
     before = start()
-    ada = await before.log_in("Ada", PASSWORD, "10.0.0.1")
-    bob = await before.log_in("Bob", PASSWORD, "10.0.0.1")
+    ada, _ = await before.log_in("Ada", PASSWORD, "10.0.0.1")
+    bob, _ = await before.log_in("Bob", PASSWORD, "10.0.0.1")
     before.log_out(connection(before, bob))
     assert ada not in path.read_text()
     assert path.stat().st_mode & 0o077 == 0
     after = start()
-    assert after.visitor(connection(after, ada)) == Visitor("Ada", may_judge=True, may_fly=True)
+    assert after.visitor(connection(after, ada)) == Visitor("Ada", Role.JUDGE)
     assert not after.visitor(connection(after, bob)).may_judge
     other = start(cookie="judge-8081")
     await other.log_in("Eve", PASSWORD, "10.0.0.1")
@@ -79,17 +145,29 @@ async def test_a_restart_keeps_judges_logged_in_until_their_session_ends(tmp_pat
 async def test_an_invalid_file_of_sessions_is_ignored_and_replaced(tmp_path, content):
     path = tmp_path / "contest.db.sessions"
     path.write_text(content)
-    access = Access(PASSWORD, all_may_fly=False, cookie="judge", kept=SessionFile(path, "judge"))
-    session_id = await access.log_in("Ada", PASSWORD, "10.0.0.1")
-    again = Access(PASSWORD, all_may_fly=False, cookie="judge", kept=SessionFile(path, "judge"))
+    access = judges(cookie="judge", kept=SessionFile(path, "judge"))
+    session_id, _ = await access.log_in("Ada", PASSWORD, "10.0.0.1")
+    again = judges(cookie="judge", kept=SessionFile(path, "judge"))
     assert again.visitor(connection(again, session_id)).may_judge
 
 
 async def test_judges_can_log_in_when_sessions_cannot_be_written(tmp_path):
     kept = SessionFile(tmp_path / "missing" / "contest.db.sessions", "judge")
-    access = Access(PASSWORD, all_may_fly=False, cookie="judge", kept=kept)
-    session_id = await access.log_in("Ada", PASSWORD, "10.0.0.1")
+    access = judges(cookie="judge", kept=kept)
+    session_id, _ = await access.log_in("Ada", PASSWORD, "10.0.0.1")
     assert access.visitor(connection(access, session_id)).may_judge
+
+
+async def test_many_log_ins_of_one_pupil_end_nobody_else_s(tmp_path):
+    book = PupilBook(tmp_path / "pupils.json", "our class")
+    access = Access(Secrets(judge=PASSWORD, class_code="our class"), pupils=book)
+    judge, _ = await access.log_in("Bo", PASSWORD, "a")
+    first, ada = await access.log_in("Ada", "our class", "a")
+    for _ in range(30):
+        newest, _ = await access.log_in("Ada", book.find("Ada").word, "a")
+    assert access.visitor(connection(access, judge)).may_judge
+    assert access.visitor(connection(access, newest)) == ada
+    assert access.visitor(connection(access, first)) == Visitor()
 
 
 @pytest.mark.parametrize(
@@ -106,37 +184,66 @@ def test_sessions_are_stored_beside_the_database(database, path):
     assert session_path(database) == (None if path is None else Path(path))
 
 
-async def test_tries_are_limited_for_each_address():
+async def test_wrong_tries_of_an_address_slow_it_down_and_do_not_shut_the_right_password_out():
     clock = Clock()
-    access = Access(PASSWORD, all_may_fly=False, clock=clock)
-    for _ in range(TRIES_A_MINUTE):
+    access = judges(clock=clock, limit=LoginLimit(clock, clock.wait))
+    for _ in range(3 * ONE_ADDRESS.at_once):
         with pytest.raises(LoginRefusedError, match="not the password"):
             await access.log_in("Eve", "guess", "2001:db8::1")
-    with pytest.raises(LoginRefusedError, match="wait a minute") as refused:
-        await access.log_in("Eve", PASSWORD, "2001:db8::2")  # a neighbour of its own
-    assert refused.value.status == 429
+    assert clock.now_s == pytest.approx(2 * ONE_ADDRESS.at_once * ONE_ADDRESS.period_s)
+    before_s = clock.now_s
     assert await access.log_in("Ada", PASSWORD, "10.0.0.1")
+    assert clock.now_s == before_s
+    assert await access.log_in("Eve", PASSWORD, "2001:db8::2")  # a neighbour waits for its turn
+    assert clock.now_s <= before_s + ONE_ADDRESS.period_s
+    for _ in range(100):  # a class behind one address; what is right does not count
+        await access.log_in("Ada", PASSWORD, "10.0.0.1")
+    assert clock.now_s <= before_s + ONE_ADDRESS.period_s
+
+
+async def test_tries_of_all_addresses_are_limited_and_a_one_time_link_is_not():
+    clock, links = Clock(), {}
+
+    async def wait_for_others(_seconds):  # they all try at the same moment
+        pass
+
+    access = judges(
+        clock=clock,
+        limit=LoginLimit(clock, wait_for_others),
+        hear_invitation=lambda role, secret: links.update({role: secret}),
+    )
+    access.invite()
+    refused = 0
+    for number in range(1000):
+        with pytest.raises(LoginRefusedError) as error:
+            await access.log_in("Eve", "guess", f"10.1.{number // 250}.{number % 250}")
+        refused += error.value.status == 429
+    assert 1000 - refused == ALL_ADDRESSES.at_once + LONGEST_WAIT_S / ALL_ADDRESSES.period_s
+    _, visitor = await access.log_in("Ada", links[Role.ORGANISER], "10.2.0.1")
+    assert visitor.may_organise
     clock.now_s = 60.0
-    assert await access.log_in("Eve", PASSWORD, "2001:db8::2")
+    assert await access.log_in("Bo", PASSWORD, "10.2.0.1")
 
 
-async def test_a_one_time_link_is_valid_once_and_is_replaced():
+async def test_a_one_time_link_is_valid_once_for_its_role_and_is_replaced():
     links = []
-    access = Access(None, all_may_fly=True, hear_invitation=links.append)
+    access = Access(Secrets(), hear_invitation=lambda role, secret: links.append((role, secret)))
     with pytest.raises(LoginRefusedError):
         await access.log_in("Eve", "", "a")  # before there is any
     access.invite()
-    await access.log_in("Ada", links[0], "a")
+    (_, for_judges), (_, for_organisers) = links
+    assert (await access.log_in("Ada", for_judges, "a"))[1] == Visitor("Ada", Role.JUDGE)
     with pytest.raises(LoginRefusedError, match="used before"):
-        await access.log_in("Bob", links[0], "b")
-    await access.log_in("Bob", links[1], "b")
-    assert len(set(links)) == 3
-    assert min(len(link) for link in links) >= 43  # 256 bits
+        await access.log_in("Bob", for_judges, "b")
+    assert (await access.log_in("Bob", links[2][1], "b"))[1] == Visitor("Bob", Role.JUDGE)
+    assert (await access.log_in("Cy", for_organisers, "c"))[1] == Visitor("Cy", Role.ORGANISER)
+    assert [role for role, _ in links] == ["judge", "organiser", "judge", "judge", "organiser"]
+    assert min(len(secret) for _, secret in links) >= 43  # 256 bits
 
 
 @pytest.mark.parametrize("name", ["", "  ", "x" * (MAX_NAME_LENGTH + 1), "a\nb", "a\u202eb", "a\x00b"])
 async def test_a_name_that_cannot_be_read_is_refused(name):
-    access = Access(PASSWORD, all_may_fly=True)
+    access = judges()
     with pytest.raises(LoginRefusedError) as refused:
         await access.log_in(name, PASSWORD, "a")
     assert refused.value.status == 400
@@ -152,7 +259,7 @@ async def test_a_judge_logs_in_and_out_by_the_form(monkeypatch):
             assert "only judges" in (await answer.json())["detail"]
         async with client.post(url + "login", data={"name": "Ada", "secret": "wrong password"}) as answer:
             assert answer.status == 403
-            assert "This is not the password." in await answer.text()
+            assert "This is not the password or code word" in await answer.text()
         form = {"name": "Ada <b>", "secret": PASSWORD}
         async with client.post(url + "login", data=form, allow_redirects=False) as answer:
             assert answer.status == 303
@@ -170,7 +277,7 @@ async def test_a_judge_logs_in_and_out_by_the_form(monkeypatch):
 
 
 async def test_a_one_time_link_works_by_the_form_and_only_once(monkeypatch):
-    async with serving(monkeypatch, SAMPLE) as served:
+    async with serving(monkeypatch, SAMPLE, judge_password=None) as served:
         secret = served.invitation
         async with browser() as preview, preview.get(f"{served.url}login?token={secret}") as answer:
             assert secret in await answer.text()  # looking at it does not use it

@@ -16,12 +16,12 @@ class Adder:
     def __init__(self):
         self.ended = False
 
-    def router(self, may_act):
+    def router(self, who):
         router = APIRouter()
 
         @router.get("/api/added")
         def added(request: Request) -> bool:
-            return may_act(request)
+            return who(request).may_teach
 
         return router
 

@@ -288,7 +288,7 @@ async def test_that_a_second_flight_was_refused_is_told_on_the_page(tmp_path, op
 
 
 async def test_a_viewer_operates_nothing_and_one_who_logged_in_does(tmp_path, open_window):
-    settings = {"trusted_proxies": ("127.0.0.1",), "password": "long enough"}
+    settings = {"trusted_proxies": ("127.0.0.1",), "organiser_password": "long enough"}
     operator = Operator(needs_go=False)
     async with (
         monitor(tmp_path, **settings) as (url, _),
@@ -296,7 +296,7 @@ async def test_a_viewer_operates_nothing_and_one_who_logged_in_does(tmp_path, op
         aiohttp.ClientSession() as web,
     ):
         window = await open_window(url)
-        await expect(window.link).to_contain_text("only those who logged in may operate a flight")
+        await expect(window.link).to_contain_text("only judges and organisers may operate a flight")
         await expect(window.land).to_be_disabled()
         async with web.ws_connect(f"{url}ws/operator") as socket:
             message = await socket.receive()

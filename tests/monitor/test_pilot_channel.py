@@ -13,14 +13,14 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from monitor import pilot_channel
-from monitor.access import Visitor
+from monitor.access import Role, Visitor
 from monitor.pilot_channel import Allowance, PilotMessageError, read_message
 from monitor.pilot_seat import NEUTRAL, Order
 from monitor.vehicle.commands import Sticks
 from tests.monitor.pilot_fakes import FakeFleet
 
 CENTRED = {"kind": "sticks", "forward": 0, "right": 0, "up": 0, "yaw": 0}
-PILOT = Visitor("Ana", may_judge=False, may_fly=True)
+PILOT = Visitor("Ana", Role.JUDGE)
 
 
 @contextmanager
@@ -58,7 +58,7 @@ def closing_of(socket):
 
 
 def test_a_visitor_who_may_not_fly_is_refused_with_a_reason():
-    with connected(Visitor("", may_judge=False, may_fly=False)) as (socket, fleet):
+    with connected(Visitor()) as (socket, fleet):
         closed = closing_of(socket)
     assert closed.code == 4403 and "log" in closed.reason
     assert fleet.orders == [] and fleet.sent == []

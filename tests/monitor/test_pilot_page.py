@@ -307,7 +307,7 @@ async def test_the_drone_holds_when_the_window_is_closed_and_the_others_are_told
 
 
 async def test_a_visitor_who_may_not_fly_is_told_to_log_in(monitor, monkeypatch):
-    nobody = Visitor("", may_judge=False, may_fly=False)
+    nobody = Visitor()
     monkeypatch.setattr(Access, "visitor", lambda _self, _connection: nobody)
     pilot = await monitor()
     words = pilot.page.locator(".p-refused")

@@ -169,7 +169,7 @@ async def test_a_taken_port_is_reported_in_one_line(monkeypatch):
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        (MonitorSettings(password="short"), "FRAMERUNNER_JUDGE_PASSWORD has 5 characters"),
+        (MonitorSettings(judge_password="short"), "FRAMERUNNER_JUDGE_PASSWORD has 5 characters"),
         (MonitorSettings(port=70000), "--port 70000: must be from 0 to 65535"),
         (MonitorSettings(bind=" "), "--bind is empty"),
         (

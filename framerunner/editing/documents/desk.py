@@ -6,13 +6,14 @@ import asyncio
 import contextlib
 import re
 import time
-from collections import OrderedDict
+from collections import OrderedDict, defaultdict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+from errors.folders import resolved_in_folder
 from framerunner.editing.documents.open_document import OpenDocument, write_problem
 from framerunner.editing.words import Language, Said, SaidError
 from offboard.mission import MISSIONS, list_missions, new_mission
@@ -105,7 +106,7 @@ class EditorDesk:
         self.folder = folder
         self._pilot_class = pilot_class
         self._open: dict[str, SharedDocument] = {}
-        self._opening = asyncio.Lock()
+        self._opening: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
         self._threads = ThreadPoolExecutor(_THREADS, "editor")
 
     async def work(self, what: Callable[[], T]) -> T:
@@ -115,7 +116,7 @@ class EditorDesk:
     def files(self) -> list[str]:
         """Names of the YAML files in the folder, sorted."""
         try:
-            names = [each.name for each in self.folder.iterdir() if each.is_file()]
+            names = [each.name for each in self.folder.iterdir() if _can_be_opened(each)]
         except OSError:
             return []
         return sorted(name for name in names if _FILE.fullmatch(name))[:_MAX_LISTED]
@@ -124,10 +125,10 @@ class EditorDesk:
         """A file's document; call its `leave` at the end. Raises `DeskError` or `MissionError`."""
         if not _FILE.fullmatch(name):
             raise DeskError("desk.not_here", name=name[:80])
-        async with self._opening:
+        async with self._opening[name]:  # of this file only: others are not held up
             shared = self._open.get(name)
             if shared is not None and shared.users == 0 and await self.work(shared.opened.is_outdated):
-                del self._open[name]
+                self._open.pop(name, None)
                 shared = None
             if shared is None:
                 await self._forget()
@@ -135,20 +136,23 @@ class EditorDesk:
                     raise DeskError("desk.too_many_open", limit=_MAX_OPEN)
                 path = self.folder / name
                 opened = await self.work(lambda: OpenDocument.open(path, self._pilot_class))
-                shared = self._open[name] = SharedDocument(opened)
+                shared = SharedDocument(opened)
+            self._open[name] = shared
             shared.users += 1
         return shared
 
     async def keep(self) -> None:
         """Write the journals of all documents, warn their pages if that fails, close those left long ago."""
-        for shared in list(self._open.values()):
+
+        async def keep(shared: SharedDocument) -> None:
             async with shared.lock:
                 problem = await self.work(shared.opened.keep)
             if problem is not None:
                 for viewer in shared.viewers:
                     viewer.warn(problem)
-        async with self._opening:
-            await self._forget()
+
+        await asyncio.gather(*(keep(shared) for shared in self._open.values()))
+        await self._forget()
 
     async def _forget(self) -> None:
         for name, shared in list(self._open.items()):
@@ -156,14 +160,16 @@ class EditorDesk:
             if is_full or not shared.lingers():
                 async with shared.lock:
                     await self.work(shared.opened.keep)
-                del self._open[name]
+                if shared.users == 0 and self._open.get(name) is shared:  # nobody has opened it meanwhile
+                    del self._open[name]
 
-    def create(self, name: str, source: str) -> str:
+    def create(self, name: str, source: str, owner: str = "") -> str:
         """Make a mission file.
 
         Args:
             name: of the mission.
             source: "empty", "example", or a mission of the package to copy.
+            owner: key of the pupil whose it is; "": nobody's.
 
         Returns:
             The file's name. Raises `DeskError`.
@@ -178,12 +184,12 @@ class EditorDesk:
             text = re.sub(rf"(?m)^name: {source}$", f"name: {name}", text, count=1)
         else:
             raise DeskError("desk.source", name=source[:80])
-        return self.write(name, text)
+        return self.write(name, text, owner)
 
-    def write(self, name: str, text: str) -> str:
-        """Make a mission file with a text; return its name. Raises `DeskError`."""
+    def write(self, name: str, text: str, owner: str = "") -> str:
+        """Make a mission file with a text, see `create`; return its name. Raises `DeskError`."""
         _check_name(name)
-        path = self.folder / f"{name}.yaml"
+        path = self.folder / (f"{name}-{owner}.yaml" if owner else f"{name}.yaml")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with path.open("x", encoding="utf-8", newline="") as file:
@@ -199,6 +205,12 @@ class EditorDesk:
         except OSError as error:
             raise DeskError("desk.not_written", name=path.name, **write_problem(error)) from None
         return path.name
+
+
+def _can_be_opened(path: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return resolved_in_folder(path).is_file()
+    return False
 
 
 def _check_name(name: str) -> None:

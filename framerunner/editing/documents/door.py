@@ -24,7 +24,6 @@ from framerunner.editing.documents.messages import (
     PageMessageError,
     SaveMessage,
     StepMessage,
-    TypedChange,
     TypeMessage,
     catalogue_message,
     changed_message,
@@ -35,9 +34,9 @@ from framerunner.editing.documents.messages import (
 )
 from framerunner.editing.documents.open_document import OpenDocument
 from framerunner.editing.words import Language, Said, SaidError, language_of, reason, say
-from monitor.access import refuse
-from offboard.authoring import Change, Edit, EditError, export_scxml, import_scxml, mermaid_of, parse_edit
-from offboard.mission import MAX_FILE_BYTES, list_missions
+from monitor.access import REFUSED_CODE, Visitor, refuse
+from offboard.authoring import Change, export_scxml, import_scxml, mermaid_of, parse_edit
+from offboard.mission import list_missions
 
 _Text = Annotated[str, Body(max_length=100)]
 _Scxml = Annotated[str, Body(max_length=1_000_000)]
@@ -60,26 +59,29 @@ class DocumentsDoor:
     def __init__(self, desk: EditorDesk) -> None:
         self._desk = desk
 
-    def router(self, may_act: Callable[[HTTPConnection], bool]) -> APIRouter:
-        """The addresses; `may_act` says who may edit."""
+    def router(self, who: Callable[[HTTPConnection], Visitor]) -> APIRouter:
+        """The addresses; `who` tells who asks, and which files they may edit."""
         router, desk = APIRouter(), self._desk
 
-        def demand(request: Request) -> None:
-            if not may_act(request):
-                raise HTTPException(403, say(Said("access.edit"), language_of(request)))
+        def demand(request: Request, file: str | None = None) -> Visitor:
+            visitor = who(request)
+            if not (visitor.may_learn if file is None else visitor.may_edit(file)):
+                raise HTTPException(403, say(_refusal(visitor), language_of(request)))
+            return visitor
 
         _add_files(router, desk, demand)
 
         @router.get("/api/edit/export")
         async def export(request: Request, file: str, kind: Literal["scxml", "mermaid"]) -> Response:
-            demand(request)
+            demand(request, file)
             return await _export(desk, file, kind, language_of(request))
 
         @router.websocket("/ws/edit")
         async def edit(websocket: WebSocket, file: str, client: str = "") -> None:
             language = language_of(websocket)
-            if not may_act(websocket):
-                await refuse(websocket, say(Said("access.edit"), language))
+            visitor = who(websocket)
+            if not visitor.may_edit(file):
+                await refuse(websocket, say(_refusal(visitor), language))
                 return
             try:
                 shared = await desk.open(file)
@@ -89,7 +91,8 @@ class DocumentsDoor:
             try:
                 shared.opened.speaks_spanish |= language == "es"
                 await websocket.accept()
-                await _Window(websocket, desk, shared, client[:_MAX_CLIENT]).serve()
+                window = _Window(websocket, desk, shared, client[:_MAX_CLIENT])
+                await window.serve(lambda: who(websocket).may_edit(file))
             finally:
                 shared.leave()
 
@@ -105,23 +108,28 @@ class DocumentsDoor:
             await self._desk.keep()
 
 
-def _add_files(router: APIRouter, desk: EditorDesk, demand: Callable[[Request], None]) -> None:
+def _refusal(visitor: Visitor) -> Said:
+    return Said("access.own" if visitor.may_learn else "access.edit")
+
+
+def _add_files(router: APIRouter, desk: EditorDesk, demand: Callable[[Request], Visitor]) -> None:
     """Add the addresses of the folder's files; `demand` refuses those who may not edit."""
 
     @router.get("/api/edit/files")
     async def files(request: Request) -> dict[str, object]:
-        demand(request)
-        return {"files": await desk.work(desk.files), "missions": list_missions()}
+        visitor = demand(request)
+        files = [each for each in await desk.work(desk.files) if visitor.may_edit(each)]
+        return {"files": files, "missions": list_missions()}
 
     @router.post("/api/edit/files")
     async def create(request: Request, name: _Text, source: _Text) -> dict[str, str]:
-        demand(request)
-        return await made(request, lambda: desk.create(name, source))
+        owner = demand(request).key
+        return await made(request, lambda: desk.create(name, source, owner))
 
     @router.post("/api/edit/import")
     async def import_(request: Request, name: _Text, scxml: _Scxml) -> dict[str, str]:
-        demand(request)
-        return await made(request, lambda: desk.write(name, import_scxml(scxml.encode(), name)))
+        owner = demand(request).key
+        return await made(request, lambda: desk.write(name, import_scxml(scxml.encode(), name), owner))
 
     async def made(request: Request, make: Callable[[], str]) -> dict[str, str]:
         try:
@@ -173,14 +181,17 @@ class _Window:
         self._outbox: asyncio.Queue[str] = asyncio.Queue(_MAX_QUEUE)
         self._is_slow = asyncio.Event()
 
-    async def serve(self) -> None:
-        """Receive and send until the page leaves."""
+    async def serve(self, may_edit: Callable[[], bool]) -> None:
+        """Receive and send until the page leaves, or its person may not edit any more."""
         shared = self._shared
         async with shared.lock:
             self.put(await self._desk.work(self._first))
             shared.viewers.append(self)
         self._tell_others()
-        tasks = [asyncio.create_task(each) for each in (self._receive(), self._send(), self._is_slow.wait())]
+        tasks = [
+            asyncio.create_task(each)
+            for each in (self._receive(may_edit), self._send(), self._is_slow.wait())
+        ]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -216,10 +227,13 @@ class _Window:
         while True:
             await self._websocket.send_text(await self._outbox.get())
 
-    async def _receive(self) -> None:
+    async def _receive(self, may_edit: Callable[[], bool]) -> None:
         while True:
             received = await self._websocket.receive()
             if received["type"] == "websocket.disconnect":
+                return
+            if not may_edit():
+                await self._websocket.close(REFUSED_CODE, say(Said("access.edit"), self.language))
                 return
             try:
                 message = read_message(received.get("text") or received.get("bytes") or "")
@@ -300,22 +314,4 @@ def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[Change]:
 def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[Change]:
     if message.revision != opened.revision:
         raise SaidError("typed.elsewhere")
-    changes: list[Change] = []
-    try:
-        for typed in message.changes:
-            changes += opened.apply(_replacement(opened, typed))
-    except UserError:
-        opened.take_back(changes)
-        raise
-    return changes
-
-
-def _replacement(opened: OpenDocument, typed: TypedChange) -> Edit:
-    text, positions = opened.document.text, opened.document.positions
-    last = typed.start + typed.removed
-    if len(typed.inserted) > MAX_FILE_BYTES:
-        raise EditError("edit.too_large")
-    if last > positions.to_utf16(len(text)):
-        raise SaidError("typed.beyond", place=last)
-    start, end = positions.from_utf16(typed.start), positions.from_utf16(last)
-    return parse_edit({"kind": "replace_text", "start": start, "end": end, "text": typed.inserted})
+    return opened.type([(each.start, each.removed, each.inserted) for each in message.changes])

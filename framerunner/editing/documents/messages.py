@@ -150,12 +150,11 @@ def _fields(each: Node | Edge | Finding) -> dict[str, object]:
 def _state(opened: OpenDocument) -> dict[str, object]:
     document = opened.document
     positions = document.positions
-    wide = not document.text.isascii()
 
     def at(span: Span | None) -> list[int] | None:
         if span is None:
             return None
-        return [positions.to_utf16(each) if wide else each for each in (span.start, span.end)]
+        return [positions.to_utf16(each) for each in (span.start, span.end)]
 
     drawn = diagram(document)
     problems = reported_problems(document, opened.pilot_class)

@@ -10,6 +10,7 @@ from pathlib import Path
 from secrets import token_urlsafe
 
 from errors import UserError, is_disk_full
+from errors.folders import read_in_folder, resolved_in_folder
 from framerunner.editing.words import Said, SaidError
 from offboard.authoring import (
     Change,
@@ -22,9 +23,11 @@ from offboard.authoring import (
     StateBox,
     known_places,
     layout_path,
-    read_layout,
+    parse_layout,
     write_layout,
 )
+from offboard.authoring.layout import MAX_LAYOUT_BYTES
+from offboard.mission import MAX_FILE_BYTES
 from offboard.pilot import Pilot
 
 _JOURNAL_SUFFIX = ".unsaved"
@@ -86,10 +89,18 @@ class OpenDocument:
 
     @classmethod
     def open(cls, path: Path, pilot_class: type[Pilot] = Pilot) -> OpenDocument:
-        """Open a file. Raises `MissionError` if it cannot be read."""
-        document = Document.open(path)
+        """Open a file. Raises `MissionError` or `SaidError` if it cannot be read."""
         try:
-            layout, problem = read_layout(path), ""
+            document = Document.from_bytes(read_in_folder(path, MAX_FILE_BYTES), path)
+        except OSError as error:
+            raise SaidError("desk.not_read", name=path.name, reason=_words(error)) from None
+        side = layout_path(path)
+        try:
+            layout, problem = parse_layout(read_in_folder(side, MAX_LAYOUT_BYTES), side.name), ""
+        except FileNotFoundError:
+            layout, problem = Layout(), ""
+        except OSError as error:
+            layout, problem = Layout(), f"{side.name}: cannot be read: {_words(error)}"
         except LayoutError as error:
             layout, problem = Layout(), str(error)
         session = EditSession(document, layout)
@@ -99,7 +110,7 @@ class OpenDocument:
 
     def _restore(self) -> None:
         try:
-            kept = self.journal.read_bytes()
+            kept = read_in_folder(self.journal, MAX_FILE_BYTES)
             text = Document.from_bytes(kept, self.path).text
         except (OSError, UserError):
             return
@@ -129,25 +140,24 @@ class OpenDocument:
         return self.path.with_name(f".{self.path.name}{_JOURNAL_SUFFIX}")
 
     def apply(self, edit: Edit) -> tuple[Change, ...]:
-        """Apply an edit; see `EditSession.apply`.
+        """Apply an edit of the diagram; see `EditSession.apply`."""
+        return self._changed(self.session.apply(edit))
+
+    def type(self, typed: Sequence[tuple[int, int, str]]) -> tuple[Change, ...]:
+        """Apply typed changes; see `EditSession.type`.
 
         Letters typed one after the other are undone together, a line at most; deleted ones likewise.
         """
-        typed = _typed(self.document.text, edit) if isinstance(edit, ReplaceText) else None
-        goes_on = typed is not None and self._typed is not None and typed.follows(self._typed)
-        changes = self._changed(self.session.apply(edit, goes_on=goes_on))
-        self._typed = typed
-        return changes
+        before, letters = self._typed, None
 
-    def take_back(self, changes: Sequence[Change]) -> None:
-        """Make the text as it was before its last changes."""
-        for change in reversed(changes):
-            inverse = change.inverse
-            self.apply(
-                ReplaceText(
-                    start=inverse.start, end=inverse.start + len(inverse.removed), text=inverse.inserted
-                )
-            )
+        def goes_on(change: Change) -> bool:
+            nonlocal letters
+            letters = _letters(change)
+            return letters is not None and before is not None and letters.follows(before)
+
+        changes = self._changed(self.session.type(typed, goes_on))
+        self._typed = letters
+        return changes
 
     def undo(self) -> tuple[Change, ...]:
         """Take the last edit or move of boxes back; see `EditSession.undo`."""
@@ -191,14 +201,17 @@ class OpenDocument:
 
     def _write_layout(self) -> None:
         try:
+            resolved_in_folder(layout_path(self.path))
             write_layout(self.path, known_places(self.layout, self.document))
         except LayoutError as error:
             raise SaidError("places.not_written", reason=error) from None
+        except OSError as error:
+            raise SaidError("places.not_written", reason=_words(error)) from None
 
     def is_outdated(self) -> bool:
         """Whether the file has another text, and nothing here is to be saved."""
         try:
-            return self.is_saved and self.path.read_bytes() != self._saved
+            return self.is_saved and read_in_folder(self.path, MAX_FILE_BYTES) != self._saved
         except OSError:
             return False
 
@@ -212,16 +225,12 @@ class OpenDocument:
         """
         if self._is_kept:
             return None
-        part = self.journal.with_suffix(".part")
         try:
             if self.is_saved:
                 self.journal.unlink(missing_ok=True)
             else:
-                part.write_bytes(self.document.data)
-                os.replace(part, self.journal)
+                _replace(resolved_in_folder(self.journal), self.document.data)
         except OSError as error:
-            with contextlib.suppress(OSError):
-                part.unlink(missing_ok=True)
             known, self._journal_fails = self._journal_fails, True
             return None if known else Said("journal.not_written", reason=_words(error))
         self._is_kept, self._journal_fails = True, False
@@ -240,18 +249,12 @@ class OpenDocument:
             SaveRefusedError: it cannot be written, or another program has changed it.
         """
         name = self.path.name
-        file = Path(os.path.realpath(self.path))  # a link stays one
-        part = file.with_name(f".{file.name}.part")
         try:
-            if not force and file.exists() and file.read_bytes() != self._saved:
+            file = resolved_in_folder(self.path)  # a link stays one
+            if not force and file.exists() and read_in_folder(file, MAX_FILE_BYTES) != self._saved:
                 raise SaveRefusedError("desk.changed", name=name)
-            part.write_bytes(self.document.data)
-            if file.exists():
-                part.chmod(file.stat().st_mode & 0o777)
-            os.replace(part, file)
+            _replace(file, self.document.data)
         except OSError as error:
-            with contextlib.suppress(OSError):
-                part.unlink(missing_ok=True)
             raise SaveRefusedError("desk.not_written", name=name, **write_problem(error)) from None
         self._saved = self.document.data
         self._is_kept = True
@@ -271,13 +274,29 @@ def write_problem(error: OSError) -> dict[str, object]:
     return {"reason": _words(error), "advice": Said(advice)}
 
 
+def _replace(file: Path, data: bytes) -> None:
+    """Write a file completely or not at all; it keeps its permissions. Raises OSError."""
+    part = file.with_name(f".{file.name}.part")
+    part.unlink(missing_ok=True)  # of a program that was killed
+    try:
+        with part.open("xb") as target:
+            target.write(data)
+        if file.exists():
+            part.chmod(file.stat().st_mode & 0o777)
+        os.replace(part, file)
+    except OSError:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise
+
+
 def _words(error: OSError) -> str:
     return (error.strerror or str(error)).lower()
 
 
-def _typed(text: str, edit: ReplaceText) -> _Typed | None:
-    """What was typed with an edit of a text: letters of one line, added or deleted; None if it was more."""
-    is_addition, is_deletion = edit.start == edit.end, edit.text == ""
-    if is_addition == is_deletion or "\n" in edit.text or "\n" in text[edit.start : edit.end]:
+def _letters(change: Change) -> _Typed | None:
+    """What was typed: letters of one line, added or deleted; None if it was more."""
+    if bool(change.removed) == bool(change.inserted) or "\n" in change.removed + change.inserted:
         return None
-    return _Typed(edit.start, edit.end, edit.start + len(edit.text), is_deletion)
+    end, cursor = change.start + len(change.removed), change.start + len(change.inserted)
+    return _Typed(change.start, end, cursor, is_deletion=not change.inserted)

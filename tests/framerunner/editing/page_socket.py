@@ -11,6 +11,9 @@ from starlette.testclient import TestClient
 
 from framerunner.editing.documents.desk import EditorDesk
 from framerunner.editing.documents.door import DocumentsDoor
+from monitor.access import Role, Visitor
+
+ORGANISER = Visitor(role=Role.ORGANISER)
 
 
 class Socket:
@@ -44,10 +47,12 @@ class Socket:
 
 
 @contextmanager
-def served(folder, *, may_act=True):
+def served(folder, *, visitor=ORGANISER):
     """A client of a server with the documents' door."""
     web = FastAPI()
-    web.include_router(DocumentsDoor(EditorDesk(folder)).router(lambda _: may_act))
+    web.include_router(
+        DocumentsDoor(EditorDesk(folder)).router(lambda _: visitor() if callable(visitor) else visitor)
+    )
     with TestClient(web) as client:
 
         @contextmanager

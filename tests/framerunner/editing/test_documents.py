@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import resource
 import time
 from contextlib import contextmanager
@@ -15,8 +16,9 @@ from framerunner.editing import words
 from framerunner.editing.documents.desk import DeskError, EditorDesk
 from framerunner.editing.documents.messages import catalogue_message, document_message
 from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
+from monitor.access import Role, Visitor
 from offboard.authoring import read_layout
-from offboard.authoring.edits import AddState, ReplaceText
+from offboard.authoring.edits import AddState
 from offboard.authoring.messages import EDIT_ENGLISH, EDIT_SPANISH
 from offboard.chart.messages import ENGLISH
 from offboard.mission import MISSIONS, list_missions
@@ -141,7 +143,7 @@ def test_a_link_to_a_mission_stays_a_link(path):
 
 
 def test_only_those_who_may_act_reach_the_documents(path):
-    with served(path.parent, may_act=False) as server:
+    with served(path.parent, visitor=Visitor("Bo", Role.JUDGE)) as server:
         for answer in (
             server.http.get("/api/edit/files"),
             server.http.post("/api/edit/files", json={"name": "x", "source": "empty"}),
@@ -253,11 +255,11 @@ def test_two_windows_share_a_document(path):
 
 def test_typed_letters_are_undone_together_a_line_at_most(path):
     opened = OpenDocument.open(path)
-    end = len(HOVER)
+    end = len(HOVER.encode("utf-16-le")) // 2
     for letter in "# ab\n# c":
-        opened.apply(ReplaceText(start=end, end=end, text=letter))
+        opened.type([(end, 0, letter)])
         end += 1
-    opened.apply(ReplaceText(start=0, end=0, text="#"))
+    opened.type([(0, 0, "#")])
     texts = []
     while opened.session.can_undo:
         opened.undo()
@@ -269,9 +271,9 @@ def test_deleted_letters_are_undone_together(path):
     opened = OpenDocument.open(path)
     end = HOVER.index("\n")
     for number in range(5):  # backwards
-        opened.apply(ReplaceText(start=end - number - 1, end=end - number, text=""))
+        opened.type([(end - number - 1, 1, "")])
     for _ in range(3):  # forwards
-        opened.apply(ReplaceText(start=0, end=1, text=""))
+        opened.type([(0, 1, "")])
     opened.undo()
     assert opened.document.text == HOVER.replace("hover", "", 1)
     opened.undo()
@@ -464,3 +466,82 @@ def test_a_contestants_names_are_offered_and_checked(path):
         assert ("my_answer" in values) is (pilot_class is kind)
         found = [each["code"] for each in document_message(opened)["findings"]]
         assert found.count("name.unknown") == errors
+
+
+def test_a_message_of_many_changes_takes_linear_time(tmp_path):
+    text = HOVER + "".join(f"# é {line}\n" for line in range(20_000))
+    (tmp_path / "long.yaml").write_text(text)
+    changes = [{"start": number, "removed": 0, "inserted": "#"} for number in range(5500)]
+    with served(tmp_path) as server, server.window("long.yaml") as window:
+        started_s = time.process_time()
+        answer = window.ask("type", revision=0, changes=changes)
+        assert "refused" not in answer
+        assert time.process_time() - started_s < 4.0  # it was more than a minute
+        assert not window.ask("undo")["can_undo"]  # one step
+
+
+def test_a_pipe_stops_nothing_and_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    os.mkfifo(tmp_path / "hover.layout.json")
+    os.mkfifo(tmp_path / ".hover.yaml.unsaved")
+    (tmp_path / "hover.yaml").write_text(HOVER)
+    with served(tmp_path) as server:
+        assert server.http.get("/api/edit/files").json()["files"] == ["hover.yaml"]
+        with pytest.raises(WebSocketDisconnect) as refused, server.window("pipe.yaml"):
+            pass
+        assert "it is no regular file" in refused.value.reason
+        with server.window("hover.yaml") as window:
+            assert "hover.layout.json: cannot be read: it is no regular file" in window.document["problem"]
+            window.type(0, "#", revision=0)
+            assert "refused" not in window.ask("save")
+
+
+def test_links_lead_to_files_of_the_folder_only(tmp_path):
+    folder = tmp_path / "missions"
+    folder.mkdir()
+    outside = tmp_path / "secret.yaml"
+    outside.write_text("name: secret")
+    (folder / "secret.yaml").symlink_to(outside)
+    (folder / "hover.yaml").write_text(HOVER)
+    (folder / "again.yaml").symlink_to("hover.yaml")
+    (folder / ".hover.yaml.unsaved").symlink_to(outside)
+    (folder / ".hover.yaml.part").symlink_to(outside)
+    (folder / "hover.layout.json").symlink_to(tmp_path / "new.json")
+    with served(folder) as server:
+        assert server.http.get("/api/edit/files").json()["files"] == ["again.yaml", "hover.yaml"]
+        with pytest.raises(WebSocketDisconnect) as refused, server.window("secret.yaml"):
+            pass
+        assert "leads out of this folder" in refused.value.reason
+        with server.window("again.yaml") as window:
+            assert window.document["text"] == HOVER
+        with server.window("hover.yaml") as window:
+            assert window.document["text"] == HOVER  # and not what the journal's link leads to
+            assert "leads out" in window.ask("layout", places={"up": {"x": 1, "y": 1}})["refused"]
+            window.type(0, "#", revision=0)
+            window.ask("save")
+    assert outside.read_text() == "name: secret"
+    assert (folder / "hover.yaml").read_text() == "#" + HOVER
+    assert not (tmp_path / "new.json").exists()
+
+
+def test_a_pupil_sees_and_changes_own_files_only_until_the_log_in_ends(tmp_path):
+    for name in ("lesson_1_ada.yaml", "lesson_1_bo.yaml", "hover.yaml"):
+        (tmp_path / name).write_text(HOVER)
+    visitors = [Visitor("Ada", Role.PUPIL, "ada")]
+    with served(tmp_path, visitor=lambda: visitors[-1]) as server:
+        assert server.http.get("/api/edit/files").json()["files"] == ["lesson_1_ada.yaml"]
+        made = server.http.post("/api/edit/files", json={"name": "mine", "source": "empty"}).json()
+        assert made == {"file": "mine-ada.yaml"}
+        for name in ("lesson_1_bo.yaml", "hover.yaml"):
+            export = server.http.get("/api/edit/export", params={"file": name, "kind": "scxml"})
+            assert (export.status_code, "not yours" in export.json()["detail"]) == (403, True)
+            with pytest.raises(WebSocketDisconnect) as refused, server.window(name):
+                pass
+            assert (refused.value.code, "not yours" in refused.value.reason) == (4403, True)
+        with server.window("lesson_1_ada.yaml") as window:
+            window.type(0, "#", revision=0)
+            visitors.append(Visitor())
+            with pytest.raises(WebSocketDisconnect) as refused:
+                window.ask("save")
+            assert refused.value.code == 4403
+    assert (tmp_path / "lesson_1_ada.yaml").read_text() == HOVER

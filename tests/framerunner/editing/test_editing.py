@@ -16,10 +16,12 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from framerunner.course.lessons import find_lesson
+from framerunner.editing.line import Line
 from framerunner.editing.service import EditingSettings
 from framerunner.editing.web import EditingDoor
 from framerunner.evaluation.runner import fly_task
 from framerunner.flying.plan import FlightPlan
+from monitor.access import Role, Visitor
 from offboard.mission import MISSIONS, load_mission
 from scenarios.loader import load_scenario
 
@@ -98,7 +100,7 @@ class Page:
 
 
 @contextlib.contextmanager
-def page(*, may_act=True, **settings):
+def page(*, role=Role.ORGANISER, **settings):
     """A page that is connected to a server."""
     door = EditingDoor(EditingSettings(**{"jobs": 2, **settings}))
 
@@ -110,7 +112,7 @@ def page(*, may_act=True, **settings):
         await asyncio.gather(running, return_exceptions=True)
 
     web = FastAPI(lifespan=lifespan)
-    web.include_router(door.router(lambda _: may_act))
+    web.include_router(door.router(lambda _: Visitor("Ada", role, "ada")))
     with TestClient(web) as client, client.websocket_connect("/ws/editing") as socket:
         yield Page(socket)
 
@@ -278,7 +280,7 @@ def test_a_batch_is_cancelled_with_all_its_processes_and_keeps_its_results():
         browser.until("flight")
         flying = [pid for pid in workers() if started_by(pid)]
         assert len(flying) == 1
-        assert browser.answer("start_batch", text=PAPER)["text"].startswith("other flights are being flown")
+        assert browser.answer("start_batch", text=PAPER)["text"].startswith("your flights are not over yet")
         browser.ask("cancel", batch=batch)
         ended = browser.until("batch_ended")
         flown = [each["scenario"] for each in browser.seen if each["kind"] == "flight"]
@@ -315,10 +317,46 @@ def test_a_worker_that_dies_is_told():
         assert "the flight ended its process" in browser.until("ended")["text"]
 
 
-def test_only_so_many_flights_are_under_control():
+def test_flights_under_control_wait_for_their_turn_and_can_leave_the_line():
     with page(max_runs=1) as browser:
-        browser.answer("start", text=HOVER, paused=True)
-        assert browser.answer("start", text=HOVER)["text"].startswith("no more than 1 can be under")
+        first = browser.answer("start", text=HOVER, paused=True)["run"]
+        second = browser.ask("start", text=HOVER, paused=True)
+        assert browser.until("waiting")["place"] == 1
+        third = browser.ask("start", text=HOVER, paused=True)
+        waiting = browser.until("waiting", holds=lambda message: message["tag"] == third)
+        assert (waiting["place"], waiting["seconds"]) == (2, None)
+        refused = browser.answer("pause", run=waiting["run"])
+        assert refused["text"].startswith("the flight waits for its turn")
+        browser.ask("stop", run=waiting["run"])
+        refused = browser.until("refused", holds=lambda message: message["tag"] == third)
+        assert refused["text"] == "cancelled"
+        browser.ask("stop", run=first)
+        browser.until("started", holds=lambda message: message["tag"] == second)
+        for _ in range(3):
+            browser.ask("start", text=HOVER, paused=True)
+        assert browser.answer("start", text=HOVER)["text"].startswith("no more than 4 of a page")
+
+
+def test_a_pupil_starts_no_flight_in_the_simulator():
+    with page(role=Role.PUPIL) as browser:
+        for request in ({"text": HOVER, "scenario": "test-case-1"}, {}):
+            refused = browser.answer("start_live" if request else "stop_live", **request)
+            assert refused["text"].startswith("only organisers may start a flight in the simulator")
+
+
+def test_a_line_expects_turns_by_the_durations_of_those_before():
+    now_s = 0.0
+    line = Line(2, 10.0, lambda: now_s)
+    for each in "abcde":
+        line.enter(each)
+    assert list(line.begin()) == ["a", "b"]
+    now_s = 4.0
+    assert list(line.waiting()) == [("c", 1, 6), ("d", 2, 6), ("e", 3, 16)]
+    now_s = 5.0
+    line.leave("a")  # sooner than expected
+    line.leave("d")
+    assert list(line.begin()) == ["c"]
+    assert list(line.waiting()) == [("e", 1, 4)]
 
 
 @pytest.mark.parametrize(
@@ -343,7 +381,7 @@ def test_a_message_that_cannot_be_understood_is_refused_in_one_line(message, wor
 
 
 def test_those_who_may_not_act_are_refused():
-    with pytest.raises(WebSocketDisconnect) as refusal, page(may_act=False) as browser:
+    with pytest.raises(WebSocketDisconnect) as refusal, page(role=Role.JUDGE) as browser:
         browser.until("done")
     assert refusal.value.code == 4403
 

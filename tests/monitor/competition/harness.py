@@ -13,6 +13,7 @@ from scenarios.models import Frame, Scenario
 from scenarios.result import RefereeReport
 
 PASSWORD = "only for these tests"
+JUDGE_PASSWORD = "of the judges only"
 COLOURS = ("red", "green", "blue")
 MODULES = (
     "monitor.competition.api",
@@ -106,10 +107,10 @@ class Contest:
         async with self.http.post("/login", data={"name": name, "secret": PASSWORD}) as answer:
             assert answer.url.path != "/login"
 
-    async def judge(self, name):
+    async def judge(self, name, secret=JUDGE_PASSWORD):
         """Another judge with a separate session."""
         session = aiohttp.ClientSession(self.url, cookie_jar=aiohttp.CookieJar(unsafe=True))
-        async with session.post("/login", data={"name": name, "secret": PASSWORD}) as answer:
+        async with session.post("/login", data={"name": name, "secret": secret}) as answer:
             assert answer.url.path != "/login"
         return session
 
@@ -139,9 +140,10 @@ async def contest(database, monkeypatch, port=0):
     monkeypatch.setattr("monitor.server.Fleet", FakeFleet)
     monkeypatch.setattr(server, "MODULES", MODULES)
     said = []
-    serving = asyncio.create_task(
-        run.serve(EQUIPMENT, MonitorSettings(port=port, database=database, password=PASSWORD), said.append)
+    settings = MonitorSettings(
+        port=port, database=database, organiser_password=PASSWORD, judge_password=JUDGE_PASSWORD
     )
+    serving = asyncio.create_task(run.serve(EQUIPMENT, settings, said.append))
     try:
         async with asyncio.timeout(30):
             while not any(line.startswith("monitor: ") for line in said):

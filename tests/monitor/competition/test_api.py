@@ -23,6 +23,9 @@ POSTS = {
 }
 
 
+JUDGING, LAST = ("tries/1/judgement", "tries/1/team"), ("tries/1/team",)
+
+
 @pytest.fixture
 async def running(tmp_path, monkeypatch):
     async with contest(f"sqlite:///{tmp_path}/contest.db", monkeypatch) as running:
@@ -39,12 +42,24 @@ async def test_a_viewer_may_read_everything_and_change_nothing(running):
         assert (await running.get(path))[0] == 200
     for path, form in POSTS.items():
         status, answer = await running.post(path, form)
-        assert (status, answer) == (403, {"detail": "only judges may do this; log in at /login"}), path
+        who = "judges and organisers" if path in JUDGING else "organisers"
+        assert (status, answer) == (403, {"detail": f"only {who} may do this; log in at /login"}), path
         assert (await running.post(path, None, data=b"rubbish"))[0] == 403, path
     assert (await running.get("state"))[1] == before
 
 
-async def test_a_judge_may_do_all_of_it(running):
+async def test_a_judge_corrects_tries_and_organises_nothing(running):
+    await running.log_in()
+    await running.post("teams", {"name": "Falken"})
+    await running.fly("k", 1)
+    judge = await running.judge("Bob")
+    for path, form in POSTS.items():
+        status, answer = await running.post(path, {**form, "seen": int(path in LAST)}, session=judge)
+        assert status == (200 if path in JUDGING else 403), (path, answer)
+    await judge.close()
+
+
+async def test_an_organiser_may_do_all_of_it(running):
     await running.log_in("Ada")
     await running.post("teams", {"name": "Falken"})
     await running.fly("k", 1)

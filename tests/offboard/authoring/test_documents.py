@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
 from random import Random
 
 import pytest
@@ -113,11 +115,48 @@ def test_a_change_and_its_inverse(written, data):
     text = MissionText.of(written)
     start = data.draw(st.integers(0, len(text.text)))
     end = data.draw(st.integers(start, len(text.text)))
-    change = text.change(start, end, data.draw(st.text(alphabet="x\r\n", max_size=5)))
+    (change,) = text.changes([(start, end, data.draw(st.text(alphabet="x\r\n", max_size=5)))])
     changed = text.changed(change)
     assert len(changed.line_ends) == changed.text.count("\n")
     assert changed.changed(change.inverse) == text
     assert text.written == written
+
+
+@given(st.text(alphabet="ab\r\n😀", max_size=30), st.data())
+def test_typed_changes_are_one_change_that_keeps_the_line_ends_of_other_lines(written, data):
+    text = one = MissionText.of(written)
+    typed = []
+    for _ in range(data.draw(st.integers(0, 6))):
+        positions = Positions(one.text)
+        start = data.draw(st.integers(0, len(one.text)))
+        end = data.draw(st.integers(start, len(one.text)))
+        new = data.draw(st.text(alphabet="x\r\n😀", max_size=5))
+        first = positions.to_utf16(start)
+        typed.append((first, positions.to_utf16(end) - first, new))
+        (change,) = one.changes([(start, end, new)])
+        # A line's usual end is that of the text before all that was typed.
+        one = one.changed(replace(change, inserted_ends=(text.usual_end,) * change.inserted.count("\n")))
+    change = text.typed(typed)
+    assert text.changed(change) == one
+    assert one.changed(change.inverse) == text
+
+
+def test_many_parts_are_one_change():
+    text = MissionText.of("a\r\nb\n" * 30)
+    parts = [(4 * line, 4 * line + 1, "xy") for line in reversed(range(30))]
+    (change,) = text.changes(parts)
+    assert text.changed(change).written == "xy\r\nb\n" * 30
+
+
+def test_what_is_kept_to_be_undone_is_limited(monkeypatch):
+    monkeypatch.setattr(sys.modules["offboard.authoring.apply"], "_MAX_KEPT", 100)
+    session = EditSession(Document.from_text(""))
+    for number in range(50):
+        session.type([(number * 10, 0, "0123456789")])
+    for _ in range(10):
+        session.undo()
+    assert not session.can_undo
+    assert len(session.document.text) == 400
 
 
 def test_offsets_as_javascript_counts_them():

@@ -95,7 +95,7 @@ class Desk {
       each.judged ? seconds(each.result.counted_s) : running ? `${each.result.try_time_s.toFixed(1)} s` : "–");
     if (running) this.#clocks.set(each.id, counts);
     const open = !running && (!each.judged || each.team === null);
-    const words = this.judge ? (open ? "Judge" : "Correct") : "Look";
+    const words = pageData().mayCorrect ? (open ? "Judge" : "Correct") : "Look";
     const team = each.team === null ? make("span", { class: "tag warn" }, "no team") : nameOf(each.team_name);
     return make("tr", { "data-try": String(each.id), "data-state": each.state, "data-open": String(open) },
       make("td", {}, `${each.id}`, make("span", { class: "when" }, moment(each.started))),

@@ -1,6 +1,6 @@
 /** The course: the lessons with a pupil's progress, and for teachers the table of the class. */
 import "./course.css";
-import { askCourse, inLanguage, learner, loadLessons, setLearner } from "../lib/course.js";
+import { askCourse, inLanguage, learner, loadLessons, loginAddress, setLearner } from "../lib/course.js";
 import { make, number, setText } from "../lib/dom.js";
 import { changeLanguage, translator } from "../lib/language.js";
 import { translateHeader } from "../lib/navigation.js";
@@ -11,17 +11,21 @@ const word = translator({
     course: "Course", name: "Your name", language: "Español", start: "Begin", again: "Go on", done: "passed", minutes: "about {minutes} {minutes:minute|minutes}",
     need_name: "Write your name first.", class: "The class", pupil: "Pupil", flights: "{flights} {flights:flight|flights}", after: "passed after {minutes} min, {flights} {flights:flight|flights}",
     log_in: "Log in to take part.", nobody: "Nobody has begun yet.",
+    you: "You are {name}. In another browser log in with your name and your own code word:", word: "Code word", reset: "Begin anew",
+    reset_hint: "Forget what {name} has done in all lessons; the missions stay", reset_sure: "Forget what {name} has done in all lessons? The missions stay.", save_class: "Save as CSV",
   },
   es: {
     course: "Curso", name: "Tu nombre", language: "English", start: "Empezar", again: "Seguir", done: "conseguida", minutes: "unos {minutes} {minutes:minuto|minutos}",
     need_name: "Escribe antes tu nombre.", class: "La clase", pupil: "Alumno", flights: "{flights} {flights:vuelo|vuelos}", after: "conseguida tras {minutes} min, {flights} {flights:vuelo|vuelos}",
     log_in: "Inicia sesión para participar.", nobody: "Nadie ha empezado aún.",
+    you: "Eres {name}. En otro navegador inicia sesión con tu nombre y tu propia palabra clave:", word: "Palabra clave", reset: "Empezar de nuevo",
+    reset_hint: "Olvidar lo que {name} ha hecho en todas las lecciones; las misiones se quedan", reset_sure: "¿Olvidar lo que {name} ha hecho en todas las lecciones? Las misiones se quedan.", save_class: "Guardar como CSV",
   },
 });
 const REFRESH_MS = 5000;
 
 const root = pageRoot("course");
-const { mayAct } = pageData();
+const { mayAct, mayTeach, pupil, word: ownWord } = pageData();
 translateHeader();
 
 const input = /** @type {HTMLInputElement} */ (make("input", { id: "learner", type: "text", maxlength: "40", autocomplete: "name" }));
@@ -37,13 +41,20 @@ const list = make("ol", { class: "c-lessons" });
 const table = make("table", { class: "c-class" });
 root.append(
   make("div", { class: "c-head" }, make("h1", {}, word("course")), other),
-  ...(mayAct ? [make("label", { class: "c-name", for: "learner" }, word("name"), input)] : [make("p", { class: "hint" }, word("log_in"))]),
+  whoTakesPart(),
   problem, list,
-  ...(mayAct ? [make("h2", {}, word("class")), table] : []));
+  ...(mayTeach ? [make("h2", {}, word("class")), table, make("p", {}, make("a", { href: "/api/course/class.csv", download: true }, word("save_class")))] : []));
+
+/** The field for the name; of a pupil who has logged in, what is needed in another browser. */
+function whoTakesPart() {
+  if (pupil) return make("p", { class: "c-name" }, word("you", { name: pupil }), " ", make("code", {}, ownWord));
+  if (mayAct) return make("label", { class: "c-name", for: "learner" }, word("name"), input);
+  return make("p", { class: "hint" }, make("a", { href: loginAddress() }, word("log_in")));
+}
 
 /** @type {import("../lib/course.js").Lesson[]} */
 let lessons = [];
-/** @type {{name: string, lessons: Object<string, {flights: number, passed_after_s: number|null, last_reason: string}>}[]} */
+/** @type {{name: string, word: string, lessons: Object<string, {flights: number, passed_after_s: number|null, last_reason: string}>}[]} */
 let learners = [];
 
 function tell(text) {
@@ -76,7 +87,7 @@ function showProgress() {
 }
 
 function showClass() {
-  const head = make("tr", {}, make("th", {}, word("pupil")), ...lessons.map(({ number: each, title }) => make("th", {}, `${each}. ${inLanguage(title)}`)));
+  const head = make("tr", {}, make("th", {}, word("pupil")), make("th", {}, word("word")), ...lessons.map(({ number: each, title }) => make("th", {}, `${each}. ${inLanguage(title)}`)));
   const cell = (done) => {
     if (!done) return make("td", {}, "");
     const { flights, passed_after_s, last_reason } = done;
@@ -84,15 +95,27 @@ function showClass() {
       : `✓ ${word("after", { minutes: number(passed_after_s / 60, 1), flights: String(flights) })}`;
     return make("td", { title: last_reason, "data-passed": String(passed_after_s !== null) }, text);
   };
-  const rows = learners.map((each) => make("tr", {}, make("th", { scope: "row" }, each.name), ...lessons.map(({ name }) => cell(each.lessons[name]))));
-  table.replaceChildren(head, ...(rows.length > 0 ? rows : [make("tr", {}, make("td", { colspan: "6", class: "hint" }, word("nobody")))]));
+  const rows = learners.map((each) => make("tr", {}, make("th", { scope: "row" }, each.name), make("td", {}, make("code", {}, each.word)),
+    ...lessons.map(({ name }) => cell(each.lessons[name])), make("td", {}, reset(each.name))));
+  table.replaceChildren(head, ...(rows.length > 0 ? rows : [make("tr", {}, make("td", { colspan: "7", class: "hint" }, word("nobody")))]));
+}
+
+/** @param {string} name of a pupil who begins anew */
+function reset(name) {
+  const button = make("button", { type: "button", title: word("reset_hint", { name }) }, word("reset"));
+  button.addEventListener("click", async () => {
+    if (!confirm(word("reset_sure", { name }))) return;
+    tell((await askCourse("reset", { learner: name, lesson: "" })).detail ?? "");
+    await refresh();
+  });
+  return button;
 }
 
 async function refresh() {
   if (mayAct) {
     const answer = await fetch("/api/course/class");
     if (answer.ok) learners = (await answer.json()).learners;
-    showClass();
+    if (mayTeach) showClass();
   }
   if (document.activeElement?.closest(".c-lessons") === null || list.childElementCount === 0) showProgress();
 }

@@ -45,7 +45,7 @@ export class Flights {
 
   #hear(message) {
     const answer = this.#waiting.get(message.tag);
-    if (answer && message.tag) {
+    if (answer && message.tag && message.kind !== "waiting") {
       this.#waiting.delete(message.tag);
       answer(message);
     }

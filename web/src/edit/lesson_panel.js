@@ -1,8 +1,8 @@
 /** The lesson beside the chart: what to do, and whether the mission does it. */
-import { askCourse, inLanguage, learner, loadLessons } from "../lib/course.js";
+import { askCourse, checkLesson, inLanguage, learner, loadLessons } from "../lib/course.js";
 import { make, setText } from "../lib/dom.js";
 import { button } from "./fields.js";
-import { word } from "./words.js";
+import { waitingWords, word } from "./words.js";
 
 export class LessonPanel {
   #root;
@@ -10,6 +10,7 @@ export class LessonPanel {
   #listener;
   /** @type {import("../lib/course.js").Lesson|null} */
   #next = null;
+  #isChecking = false;
   #line = make("p", { role: "status", class: "e-lesson-line" }, word("check_hint"));
 
   /**
@@ -51,6 +52,17 @@ export class LessonPanel {
   }
 
   async #check() {
+    if (!learner()) {
+      this.#line.replaceChildren(word("whose"), " ", make("a", { href: "/course" }, word("next_lesson")));
+      return;
+    }
+    if (this.#isChecking) return;
+    this.#isChecking = true;
+    await this.#checkNow();
+    this.#isChecking = false;
+  }
+
+  async #checkNow() {
     this.#line.removeAttribute("data-passed");
     setText(this.#line, word("checking"));
     const text = await this.#listener.text();
@@ -59,9 +71,9 @@ export class LessonPanel {
       setText(this.#line, word("mistake", { mistake }));
       return;
     }
-    const told = await askCourse("check", { learner: learner(), lesson: this.#name, text });
-    if (told.detail) {
-      setText(this.#line, told.detail);
+    const told = await checkLesson({ learner: learner(), lesson: this.#name, text }, (place) => setText(this.#line, waitingWords(place)));
+    if (told.detail !== undefined) {
+      setText(this.#line, told.detail || word("lost_connection"));
       return;
     }
     this.#line.setAttribute("data-passed", String(told.passed));

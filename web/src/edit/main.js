@@ -1,5 +1,6 @@
 /** The mission editor: diagram and text of one mission, each following the other. */
 import "./edit.css";
+import { loginAddress } from "../lib/course.js";
 import { isTyping, make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 import { DiagramView } from "./diagram_view.js";
@@ -40,7 +41,7 @@ async function chooseFile() {
   const told = await answer.json();
   if (!answer.ok) {
     problem.hidden = false;
-    problem.textContent = told.detail;
+    problem.replaceChildren(word("may_not"), " ", make("a", { href: loginAddress() }, word("log_in")));
     return;
   }
   const link = (name) => make("li", {}, make("a", { href: `/edit?file=${encodeURIComponent(name)}` }, name));
@@ -141,6 +142,7 @@ function edit(name) {
       text.setReadOnly(connection !== "open"); // what is typed without a connection would be lost
       if (connection === "open") tell("");
       else tell(connection === "refused" ? reason : word("away"));
+      if (connection === "refused" && !pageData().mayEdit) line.append(" ", make("a", { href: loginAddress() }, word("log_in")));
     },
     refused: (reason, code) => {
       refusal = code;

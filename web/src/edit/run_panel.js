@@ -6,7 +6,7 @@ import { FIRST_SCENARIO, loadChoices, options, scenarioFields } from "./scenario
 import { drawStrip } from "./state_strip.js";
 import { TopView } from "./top_view.js";
 import { contactsOf, hitWords, shortVerdict, verdictWords } from "./verdict.js";
-import { word } from "./words.js";
+import { waitingWords, word } from "./words.js";
 
 /** @typedef {import("./flights.js").Now} Now @typedef {import("./flights.js").Flight} Flight */
 
@@ -17,6 +17,7 @@ export class RunPanel {
   #root;
   #listener;
   #flights;
+  #waits = ""; // id of a flight or batch whose turn it is not yet
   #run = "";
   #batch = "";
   #scenario = FIRST_SCENARIO;
@@ -112,6 +113,7 @@ export class RunPanel {
 
   #setRun(run) {
     this.#run = run;
+    this.#waits = "";
     this.#pause.toggleAttribute("disabled", !run);
     this.#stop.toggleAttribute("disabled", !run);
     if (run) return;
@@ -132,6 +134,7 @@ export class RunPanel {
     setText(this.#line, word("starting"));
     const text = await this.#text();
     if (!text) return;
+    if (this.#waits) return;
     if (this.#run) await this.#flights.ask({ do: "stop", run: this.#run });
     this.#counts = {};
     this.#spans = [];
@@ -144,7 +147,10 @@ export class RunPanel {
       this.#setRun(answer.run);
       this.#layout = answer.layout;
       this.#view.setWorld(answer.layout);
-    } else setText(this.#line, answer.text);
+    } else {
+      this.#setRun("");
+      setText(this.#line, answer.text);
+    }
   }
 
   /** Let one tick pass; a flight that is not yet there begins with a pause. */
@@ -153,6 +159,7 @@ export class RunPanel {
   }
 
   #stopFlight() {
+    if (this.#waits) return this.#flights.ask({ do: "cancel", batch: this.#waits });
     this.#isStopped = true;
     return this.#order({ do: "stop" });
   }
@@ -192,6 +199,7 @@ export class RunPanel {
     this.#rows = [];
     this.#table.replaceChildren();
     const answer = await this.#flights.ask({ do: "start_batch", text, level: this.#level, count: BATCH, first_seed: 1 });
+    if (this.#waits) this.#setRun("");
     if (answer.kind === "batch_started") {
       this.#batch = answer.batch;
       setText(this.#line, word("flying_many", { count: String(answer.count) }));
@@ -210,6 +218,7 @@ export class RunPanel {
 
   #hear(message) {
     if (message.kind === "live") this.#listener.live(message);
+    else if (message.kind === "waiting") this.#wait(message);
     if (message.kind === "now" && message.run === this.#run) this.#showNow(message);
     else if (message.kind === "ended" && message.run === this.#run) {
       this.#setRun("");
@@ -218,6 +227,13 @@ export class RunPanel {
       this.#listener.lost(message.lost_in);
     } else if (message.kind === "flight" && message.batch === this.#batch) this.#showFlight(message);
     else if (message.kind === "batch_ended" && message.batch === this.#batch && message.text) setText(this.#line, message.text);
+  }
+
+  /** Others fly before. @param {import("../lib/course.js").Place & {run: string}} waiting */
+  #wait(waiting) {
+    this.#waits = waiting.run;
+    this.#stop.toggleAttribute("disabled", false);
+    setText(this.#line, waitingWords(waiting));
   }
 
   /** @param {{text: string, result: import("./verdict.js").Result|null, spans: {state: string, from_s: number, to_s: number}[]}} ended */

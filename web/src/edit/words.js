@@ -19,6 +19,9 @@ const WORDS = {
     empty: "an empty chart", example: "an example with comments", a_copy: "a copy of {name}", open: "Open a mission", no_files: "There are no missions in this folder yet.",
     overwrite: "Another program has changed the file. Save anyway?", text: "Text", diagram: "Diagram", add_transition: "Add a transition", new_name: "name",
     export: "Export", import_scxml: "or import an SCXML file", search: "Search",
+    waiting: "Place {place} in the line: it flies when others have flown.", waiting_for: "Place {place} in the line: it flies in about {seconds} s.",
+    whose: "This browser does not know whose lesson this is: write your name on the page Course and go on with the lesson there.",
+    log_in: "Log in", may_not: "Only pupils and organisers may edit.",
     lesson: "Lesson", check_lesson: "Check the lesson", next_one: "Next lesson", checking: "flying …", passed: "Passed!", not_yet: "Not yet.", next_lesson: "All lessons",
     check_hint: "When you are ready, check your chart here.", mistake: "There is a mistake in the mission: {mistake}", hints: "Hints",
     templates: "Templates", template_name: "Name of the template", use_template: "New state that uses {name}",
@@ -59,6 +62,9 @@ const WORDS = {
     empty: "un diagrama vacío", example: "un ejemplo con comentarios", a_copy: "una copia de {name}", open: "Abrir una misión", no_files: "Aún no hay misiones en esta carpeta.",
     overwrite: "Otro programa ha cambiado el archivo. ¿Guardar de todos modos?", text: "Texto", diagram: "Diagrama", add_transition: "Añadir una transición", new_name: "nombre",
     export: "Exportar", import_scxml: "o importar un archivo SCXML", search: "Buscar",
+    waiting: "Puesto {place} en la cola: vuela cuando hayan volado otros.", waiting_for: "Puesto {place} en la cola: vuela en unos {seconds} s.",
+    whose: "Este navegador no sabe de quién es la lección: escribe tu nombre en la página Curso y sigue allí con la lección.",
+    log_in: "Iniciar sesión", may_not: "Solo pueden editar alumnos y organizadores.",
     lesson: "Lección", check_lesson: "Comprobar la lección", next_one: "Siguiente lección", checking: "volando …", passed: "¡Conseguido!", not_yet: "Aún no.", next_lesson: "Todas las lecciones",
     check_hint: "Cuando termines, comprueba aquí tu diagrama.", mistake: "Hay un error en la misión: {mistake}", hints: "Pistas",
     templates: "Plantillas", template_name: "Nombre de la plantilla", use_template: "Estado nuevo que usa {name}",
@@ -86,3 +92,8 @@ const WORDS = {
 
 /** A text of the editor. */
 export const word = translator(WORDS);
+
+/** How long a flight has to wait for others. @param {import("../lib/course.js").Place} waiting */
+export function waitingWords({ place, seconds }) {
+  return word(seconds === null ? "waiting" : "waiting_for", { place: String(place), seconds: String(seconds) });
+}

@@ -1,5 +1,6 @@
 /** What the course's pages share: the lessons, and the pupil's name. */
 import { language } from "./language.js";
+import { pageData } from "./page_data.js";
 
 const KEPT = "framerunner-learner";
 
@@ -9,8 +10,15 @@ const KEPT = "framerunner-learner";
  *   hints: Words[], introduces: string[]}} Lesson
  */
 
-/** @returns {string} the pupil's name; empty: not known */
-export const learner = () => localStorage.getItem(KEPT) ?? "";
+/**
+ * @typedef {{place: number, seconds: number|null}} Place in the line of what waits to be flown; seconds until its turn
+ */
+
+/** @returns {string} the pupil's name: the one who logged in, else what was written in this browser; empty: not known */
+export const learner = () => pageData().pupil || (localStorage.getItem(KEPT) ?? "");
+
+/** The address of the log-in, which comes back to this page. */
+export const loginAddress = () => `/login?next=${encodeURIComponent(location.pathname + location.search)}`;
 
 /** @param {string} name */
 export const setLearner = (name) => localStorage.setItem(KEPT, name);
@@ -24,11 +32,44 @@ export async function loadLessons() {
   return answer.ok ? (await answer.json()).lessons : [];
 }
 
-/** Ask the course for something. @param {string} what @param {object} content @returns {Promise<any>} `detail` says why not */
-export async function askCourse(what, content) {
-  const answer = await fetch(`/api/course/${what}?language=${language()}`, {
+/** @param {string} what @param {object} content */
+function post(what, content) {
+  return fetch(`/api/course/${what}?language=${language()}`, {
     method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(content),
   });
-  const told = await answer.json();
-  return answer.ok ? told : { detail: typeof told.detail === "string" ? told.detail : answer.statusText };
+}
+
+/** Ask the course for something. @param {string} what @param {object} content @returns {Promise<any>} `detail` says why not */
+export async function askCourse(what, content) {
+  const answer = await post(what, content);
+  return answer.ok ? answer.json() : refusal(answer);
+}
+
+/**
+ * Have a mission of a lesson flown, after those that others have asked for.
+ * @param {object} content
+ * @param {(place: Place) => void} waits told the place in the line whenever it changes
+ * @returns {Promise<any>} `detail` says why it was not flown
+ */
+export async function checkLesson(content, waits) {
+  const answer = await post("check", content);
+  if (!answer.ok) return refusal(answer);
+  let rest = "";
+  const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+  for (;;) {
+    const { value, done } = await reader.read().catch(() => ({ value: "", done: true }));
+    const lines = (rest + (value ?? "")).split("\n");
+    rest = lines.pop() ?? "";
+    for (const told of lines.map((line) => JSON.parse(line))) {
+      if (told.place === undefined) return told;
+      waits(told);
+    }
+    if (done) return { detail: "" };
+  }
+}
+
+/** @param {Response} answer @returns {Promise<{detail: string}>} */
+async function refusal(answer) {
+  const { detail } = await answer.json().catch(() => ({}));
+  return { detail: typeof detail === "string" ? detail : answer.statusText };
 }

@@ -1,0 +1,143 @@
+"""The pupils of a class: their names, the parts of the names of their files, and their own code words."""
+
+from __future__ import annotations
+
+import contextlib
+import hmac
+import json
+import os
+import re
+import secrets
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from errors import UserError
+from errors.folders import read_in_folder
+
+MAX_PUPILS = 300
+_MAX_FILE_BYTES = 1_000_000
+_CONSONANTS, _VOWELS = "bdfgklmnprstvz", "aeiou"
+
+
+class PupilError(UserError):
+    """Somebody cannot join the class; the message is one line for people."""
+
+
+class Pupil(BaseModel):
+    """A pupil.
+
+    Attributes:
+        name: as written at the first log-in.
+        key: part of the names of the pupil's files; no other pupil has it.
+        word: with which the pupil goes on in another browser.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    name: Annotated[str, Field(min_length=1, max_length=60)]
+    key: Annotated[str, Field(pattern=r"^[a-z0-9_]{1,200}$")]
+    word: Annotated[str, Field(min_length=1, max_length=60)]
+
+
+class _FileContent(BaseModel):
+    pupils: list[Pupil] = []
+
+
+class PupilBook:
+    """The pupils of a class, kept in a file that only its owner can read.
+
+    Args:
+        path: of the file; it is made when the first pupil joins.
+        code: the code word with which a class joins; None: nobody can.
+    """
+
+    def __init__(self, path: Path, code: str | None) -> None:
+        self._path = path
+        self._code = code
+
+    def all(self) -> tuple[Pupil, ...]:
+        """The pupils, in the order in which they joined. Raises `PupilError` if the file cannot be read."""
+        try:
+            data = json.loads(read_in_folder(self._path, _MAX_FILE_BYTES))
+            return tuple(_FileContent.model_validate(data).pupils)
+        except FileNotFoundError:
+            return ()
+        except (OSError, ValueError, RecursionError, ValidationError):
+            raise PupilError(
+                f"{self._path.name} cannot be read, so nobody can join; the teacher mends or removes it"
+            ) from None
+
+    def find(self, name: str) -> Pupil | None:
+        """The pupil with a name; capitals do not matter."""
+        return next((each for each in self.all() if each.name.casefold() == name.casefold()), None)
+
+    def log_in(self, name: str, word: str) -> Pupil | None:
+        """The pupil who has given this name and code word; a new name joins with the code word of the class.
+
+        Returns:
+            None if the code word is wrong.
+
+        Raises:
+            PupilError: the name is another pupil's, the class is full, or its file cannot be used.
+        """
+        if self._code is None:
+            return None
+        name = " ".join(name.split())
+        pupil, is_of_class = self.find(name), _is_same(word, self._code)
+        if pupil is not None:
+            if _is_same(word, pupil.word):
+                return pupil
+            if is_of_class:
+                raise PupilError(
+                    f"{pupil.name} has joined already. If that is you, give your own code word, which stands "
+                    "on your page Course, and your teacher's; else use another name"
+                )
+            return None
+        return self._join(name) if is_of_class else None
+
+    def _join(self, name: str) -> Pupil:
+        pupils = self.all()
+        if len(pupils) >= MAX_PUPILS:
+            raise PupilError(
+                f"{MAX_PUPILS} pupils have joined; the teacher removes some from {self._path.name}"
+            )
+        taken = {each.key for each in pupils}
+        key = first = file_key(name)
+        number = 2
+        while key in taken:
+            key, number = f"{first}_{number}", number + 1
+        pupil = Pupil(name=name, key=key, word=_new_word())
+        content = _FileContent(pupils=[*pupils, pupil]).model_dump_json(indent=1)
+        part = self._path.with_name(f".{self._path.name}.part")
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            part.unlink(missing_ok=True)
+            with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+                file.write(content)
+            part.replace(self._path)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            raise PupilError(
+                f"{self._path.name} cannot be written ({error.strerror}); tell the teacher"
+            ) from None
+        return pupil
+
+
+def file_key(name: str) -> str:
+    """A name as part of a file's name; names that are much alike may have the same."""
+    plain = re.sub(r"[^a-z0-9]+", "_", name.casefold()).strip("_")
+    return plain or "".join(f"{ord(each):x}" for each in name)[:40]
+
+
+def _is_same(word: str, other: str) -> bool:
+    """Whether two code words are the same; capitals and blanks around them do not matter."""
+    return hmac.compare_digest(word.strip().casefold().encode(), other.strip().casefold().encode())
+
+
+def _new_word() -> str:
+    """A code word that is easy to write down, one of some 10**9."""
+    syllables = [secrets.choice(_CONSONANTS) + secrets.choice(_VOWELS) for _ in range(4)]
+    return f"{syllables[0]}{syllables[1]}-{syllables[2]}{syllables[3]}-{secrets.randbelow(90) + 10}"
