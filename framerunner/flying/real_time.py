@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from errors.files import read_text
 from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.plan import FlightPlan
@@ -104,7 +105,7 @@ async def fly_in_real_time(
         plan, safety, system_id = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)
-        source = records.folder.mission.read_text(encoding="utf-8")
+        source = read_text(records.folder.mission)
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         drone = _drone(plan, vehicle, records, stack, safety, settings=settings, system_id=system_id)
         drone.use_companion(companion)

@@ -13,6 +13,7 @@ from math import isfinite
 from pathlib import Path
 
 from errors import SettingError
+from errors.files import TextError, read_text
 from framerunner.preflight.fence_upload import MAX_ITEMS, FenceItem, upload_fence
 from framerunner.preflight.parameters import ParameterValue, set_parameter
 from framerunner.preflight.session import VehicleSession
@@ -85,18 +86,13 @@ def load_kept(path: Path) -> KeptState:
         SettingError: there is none, it is too large, or a line is not understood or cannot be sent.
     """
     try:
-        with path.open("rb") as file:
-            data = file.read(_MAX_FILE_BYTES + 1)
-        if len(data) > _MAX_FILE_BYTES:
-            raise SettingError(f"{OPTION} {path}: has more than {_MAX_FILE_BYTES} bytes; use a copy")
-        text = data.decode()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "no text"
-        raise SettingError(f"{OPTION} {path}: cannot be read ({reason})") from None
+        text = read_text(path, _MAX_FILE_BYTES)
+    except TextError as error:
+        raise SettingError(f"{OPTION} {path}: {error}") from None
     uid, count = "", None
     items: list[FenceItem] = []
     parameters: list[ParameterValue] = []
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(text.split("\n"), 1):
         kind, _, rest = line.partition("\t")
         try:
             if kind == _UID:

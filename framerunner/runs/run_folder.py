@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 import sys
 from collections.abc import Callable
@@ -10,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 
 from errors import SettingError, write_advice
+from errors.files import replace_file
 from framerunner.extras import install_advice
 from framerunner.runs import PlotError
 from framerunner.runs.track import Track
@@ -88,13 +88,7 @@ class RunFolder:
         Raises:
             OSError: it cannot be written.
         """
-        part = self.result.with_suffix(".part")
-        try:
-            part.write_text(result.text(), encoding="utf-8")
-            os.replace(part, self.result)
-        except OSError:
-            part.unlink(missing_ok=True)
-            raise
+        replace_file(self.result, result.text())
 
     def remove_if_empty(self) -> None:
         """Remove empty files, and the folder if no result, log or recording remains.

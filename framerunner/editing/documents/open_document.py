@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from secrets import token_urlsafe
 
 from errors import UserError, is_disk_full
+from errors.files import replace_file
 from framerunner.editing.words import Said, SaidError
 from offboard.authoring import (
     Change,
@@ -212,16 +212,12 @@ class OpenDocument:
         """
         if self._is_kept:
             return None
-        part = self.journal.with_suffix(".part")
         try:
             if self.is_saved:
                 self.journal.unlink(missing_ok=True)
             else:
-                part.write_bytes(self.document.data)
-                os.replace(part, self.journal)
+                replace_file(self.journal, self.document.data)
         except OSError as error:
-            with contextlib.suppress(OSError):
-                part.unlink(missing_ok=True)
             known, self._journal_fails = self._journal_fails, True
             return None if known else Said("journal.not_written", reason=_words(error))
         self._is_kept, self._journal_fails = True, False
@@ -240,18 +236,11 @@ class OpenDocument:
             SaveRefusedError: it cannot be written, or another program has changed it.
         """
         name = self.path.name
-        file = Path(os.path.realpath(self.path))  # a link stays one
-        part = file.with_name(f".{file.name}.part")
         try:
-            if not force and file.exists() and file.read_bytes() != self._saved:
+            if not force and self.path.exists() and self.path.read_bytes() != self._saved:
                 raise SaveRefusedError("desk.changed", name=name)
-            part.write_bytes(self.document.data)
-            if file.exists():
-                part.chmod(file.stat().st_mode & 0o777)
-            os.replace(part, file)
+            replace_file(self.path, self.document.data)
         except OSError as error:
-            with contextlib.suppress(OSError):
-                part.unlink(missing_ok=True)
             raise SaveRefusedError("desk.not_written", name=name, **write_problem(error)) from None
         self._saved = self.document.data
         self._is_kept = True
