@@ -76,8 +76,11 @@ class CourseProgress:
         line = json.dumps(asdict(event), ensure_ascii=False) + "\n"
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            handle = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+            handle = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o600)
             try:
+                size = os.fstat(handle).st_size
+                if size and os.pread(handle, 1, size - 1) != b"\n":  # a line that a full disk took in part
+                    line = "\n" + line
                 os.write(handle, line.encode("utf-8", "replace"))
             finally:
                 os.close(handle)

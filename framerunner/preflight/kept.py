@@ -83,7 +83,8 @@ def load_kept(path: Path) -> KeptState:
     """Read a file for return, of this program or of QGroundControl.
 
     Raises:
-        SettingError: there is none, it is too large, or a line is not understood or cannot be sent.
+        SettingError: there is none, it is too large, a line is not understood or cannot be sent, or lines are
+            of several vehicles or of another component than the autopilot.
     """
     try:
         text = read_text(path, _MAX_FILE_BYTES)
@@ -92,6 +93,7 @@ def load_kept(path: Path) -> KeptState:
     uid, count = "", None
     items: list[FenceItem] = []
     parameters: list[ParameterValue] = []
+    vehicles: set[tuple[str, ...]] = set()
     for number, line in enumerate(text.split("\n"), 1):
         kind, _, rest = line.partition("\t")
         try:
@@ -103,11 +105,18 @@ def load_kept(path: Path) -> KeptState:
                 items.append(_parsed_item(rest))
             elif line.strip() and not line.startswith("#"):
                 parameters.append(_parsed(line))
+                vehicles.add(tuple(line.split("\t")[:2]))
         except ValueError:
             raise SettingError(
                 f"{OPTION} {path}: line {number} is not understood, or a number is too large; a parameter is "
                 "vehicle, component, name, value and type, separated by tabs"
             ) from None
+    if len(vehicles) > 1 or any(component != str(AUTOPILOT_COMPONENT_ID) for _, component in vehicles):
+        found = ", ".join(" ".join(each) for each in sorted(vehicles))
+        raise SettingError(
+            f"{OPTION} {path}: has parameters of vehicle and component {found}; use a copy with those of one "
+            f"vehicle's autopilot, component {AUTOPILOT_COMPONENT_ID}"
+        )
     if count is None and not parameters:
         raise SettingError(f"{OPTION} {path}: holds no parameters and no fence")
     if len(items) != (count or 0) or len(items) > MAX_ITEMS:

@@ -84,8 +84,13 @@ def layout_text(layout: Layout) -> str:
 
 
 def write_layout(mission: str | Path, layout: Layout) -> Path:
-    """Write the side file of a mission file. Raises `LayoutError` if it cannot be written."""
+    """Write the side file of a mission file.
+
+    Raises:
+        LayoutError: it cannot be written, or what is there is not understood, which is left as it is.
+    """
     path = layout_path(mission)
+    read_layout(mission)
     try:
         replace_file(path, layout_text(layout))
     except OSError as error:

@@ -2,6 +2,7 @@ import os
 
 import pytest
 
+from errors import SettingError
 from errors.files import TextError, decode_text, read_text, replace_file
 from framerunner.mocap.poses import Axes, parse_line, read_poses
 from framerunner.preflight.kept import load_kept
@@ -72,6 +73,14 @@ def test_texts_of_windows_editors_mean_the_same(tmp_path, name):
     path.write_text(TEXTS[name], encoding="utf-16")
     with pytest.raises(Exception, match="is UTF-16 text, or no text; save it as UTF-8"):
         read(path)
+
+
+@pytest.mark.parametrize("line", ["2\t1\tCOM_OBL_RC_ACT\t5\t6", "1\t100\tCAM_MODE\t1\t6"])
+def test_parameters_of_several_vehicles_or_of_a_camera_are_not_returned_to_one(tmp_path, line):
+    path = tmp_path / "old.params"
+    path.write_text(TEXTS["old.params"] + line + "\n")
+    with pytest.raises(SettingError, match="use a copy with those of one vehicle's autopilot, component 1"):
+        load_kept(path)
 
 
 def test_a_pose_that_is_sent_may_begin_with_a_mark():
