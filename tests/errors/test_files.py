@@ -4,6 +4,7 @@ import pytest
 
 from errors import SettingError
 from errors.files import TextError, decode_text, read_text, replace_file
+from framerunner.commands.sim import _read_key
 from framerunner.mocap.poses import Axes, parse_line, read_poses
 from framerunner.preflight.kept import load_kept
 from offboard.mission import load_mission
@@ -51,6 +52,7 @@ TEXTS = {
     "pilot.py": "from offboard.pilot import Pilot\n\n\nclass Mine(Pilot):\n    careful_m_s = 0.2\n",
     "poses.csv": "time_s, x, y, z, qw, qx, qy, qz\n0, 0, 0, 1, 1, 0, 0, 0\n0.1, 0, 0, 1, 1, 0, 0, 0\n",
     "poses.jsonl": '{"time_s": 0, "x": 0, "y": 0, "z": 1, "qw": 1, "qx": 0, "qy": 0, "qz": 0}\n',
+    "key.txt": "correct horse\n",
     "old.params": "# vehicle-uid\tabc\n1\t1\tCOM_OBL_RC_ACT\t4\t6\n",
 }
 READERS = {
@@ -59,6 +61,7 @@ READERS = {
     "pilot.py": lambda path: read_pilot(path).text,
     "poses.csv": lambda path: read_poses(path, Axes.FLU, None),
     "poses.jsonl": lambda path: read_poses(path, Axes.FLU, None),
+    "key.txt": lambda path: _read_key(path).secret,
     "old.params": load_kept,
 }
 
