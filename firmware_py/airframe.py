@@ -16,6 +16,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 from errors import UserError
+from errors.files import TextError, decode_text, read_text
 
 GRAVITY_M_S2 = 9.80665
 
@@ -239,16 +240,16 @@ def load_airframe(name_or_path: str) -> Airframe:
         if not path.is_file():
             raise AirframeError(f"airframe: no file '{name_or_path}'")
         try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise AirframeError(f"airframe: cannot read '{name_or_path}': {error}") from error
+            text = read_text(path)
+        except TextError as error:
+            raise AirframeError(f"airframe '{name_or_path}': {error}") from None
     else:
         known = sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
         if name_or_path not in known:
             raise AirframeError(
                 f"airframe: no '{name_or_path}'; there are {', '.join(known)}, or give a file"
             )
-        text = (folder / f"{name_or_path}.yaml").read_text(encoding="utf-8")
+        text = decode_text((folder / f"{name_or_path}.yaml").read_bytes())
     return _read(name_or_path, text)
 
 

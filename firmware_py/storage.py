@@ -13,6 +13,7 @@ from typing import Protocol
 Path = tuple[str, ...]
 
 _MAX_NAME = 120  # bytes; a listing must hold one name in 239 bytes
+LOG_SUFFIX = ".ulg"  # of flight logs; what else is in their folder is the user's
 _MAX_DEPTH = 8
 _ALIAS: Path = ("fs", "microsd")  # the root on PX4's boards
 _FORBIDDEN = frozenset(chr(code) for code in (*range(32), 127)) | {"\\", "/"}

@@ -5,10 +5,8 @@ from __future__ import annotations
 import hmac
 import json
 import logging
-import os
 import re
 import secrets
-import tempfile
 import time
 import unicodedata
 from collections.abc import Callable, Mapping
@@ -23,6 +21,7 @@ from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket
 
 from errors import UserError
+from errors.files import replace_file
 from monitor.visitors.login_limit import LoginLimit
 from monitor.visitors.pupils import PupilBook, PupilError
 
@@ -170,14 +169,7 @@ class SessionFile:
         """Replace this monitor's sessions, atomically."""
         content = _SessionFileContent(cookies={**self._alive(), self.cookie: dict(sessions)})
         try:
-            handle, temporary = tempfile.mkstemp(dir=self.path.parent, prefix=self.path.name)  # mode 0600
-            try:
-                with os.fdopen(handle, "w", encoding="utf-8") as file:
-                    file.write(content.model_dump_json())
-                Path(temporary).replace(self.path)
-            except OSError:
-                Path(temporary).unlink(missing_ok=True)
-                raise
+            replace_file(self.path, content.model_dump_json(), new_mode=0o600)
         except OSError as error:
             _log.warning("log-ins are not kept in %s: %s", self.path, error.strerror)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import yaml
 from statemachine import StateChart
 
+from errors.files import TextError, TextFault, read_text
 from offboard.chart.check import check, is_finish
 from offboard.chart.messages import Message
 from offboard.chart.native import load_chart, native_document
@@ -43,6 +44,13 @@ __all__ = [
 MAX_FILE_BYTES = 1_000_000
 MISSIONS = Path(__file__).parent / "missions"
 TEMPLATES = Path(__file__).parent / "templates"
+_FAULTS: dict[TextFault, str] = {
+    "missing": "file.unreadable",
+    "unreadable": "file.unreadable",
+    "too_large": "file.too_large",
+    "utf16": "file.utf16",
+    "not_utf8": "file.not_utf8",
+}
 
 
 @dataclass(frozen=True)
@@ -218,15 +226,14 @@ def _find(name: str, folder: Path, place: Place) -> Path:
 
 def _read_text(path: Path, label: str) -> str:
     try:
-        with path.open("rb") as file:  # a file may grow, or have no size, such as a device
-            data = file.read(MAX_FILE_BYTES + 1)
-        if len(data) > MAX_FILE_BYTES:
-            raise mission_error(Place(label), Message("file.too_large"))
-        return data.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None)
-        message = Message("file.unreadable", reason=reason) if reason else Message("file.not_utf8")
-        raise mission_error(Place(label), message) from None
+        return read_text(path, MAX_FILE_BYTES)
+    except TextError as error:
+        raise unreadable(label, error) from None
+
+
+def unreadable(label: str, error: TextError) -> MissionError:
+    """The error for a mission file that is no text, by its name in messages."""
+    return mission_error(Place(label, error.line), Message(_FAULTS[error.fault], reason=error.reason))
 
 
 def mermaid(mission: Mission, active: str | None = None) -> str:

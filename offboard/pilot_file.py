@@ -20,10 +20,10 @@ from typing import get_type_hints
 
 from statemachine import StateChart
 
+from errors.files import TextError, read_text
 from offboard.chart.problems import MissionError, Place, mission_error
 from offboard.pilot import Pilot
 
-MAX_FILE_BYTES = 1_000_000
 _INSTANCE_NAMES = (
     "final_states history_values initial_state model prepare_event resume state state_field tick"
 )
@@ -120,13 +120,10 @@ def read_pilot(path: str | Path) -> PilotFile:
     """
     path = Path(path)
     try:
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise mission_error(Place(str(path)), "is larger than 1 MB; a pilot is a page or two")
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise mission_error(Place(str(path)), "is not UTF-8 text; name the Python file") from None
-    except OSError as error:
-        raise mission_error(Place(str(path)), f"cannot be read: {error.strerror}") from None
+        text = read_text(path)
+    except TextError as error:
+        words = f"cannot be read: {error.reason}" if error.reason else f"{error}; give a pilot's Python file"
+        raise mission_error(Place(str(path)), words) from None
     pilot = PilotFile(path.name, text)
     pilot.pilot_class()
     return pilot

@@ -19,6 +19,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from errors import UserError
+from errors.files import TextError, decode_text, read_bytes
 from scenarios.part import field_path
 from scenarios.yaml_tree import Path as FieldPath
 from scenarios.yaml_tree import YamlError, YamlTree, parse_yaml
@@ -82,9 +83,9 @@ class FileKind(Generic[Model]):
         entry = self._folder() / f"{text}.yaml"
         return self.parse(entry.read_bytes(), entry.name)
 
-    def load_path(self, path: Path) -> Model:
-        """Load a file that is not installed."""
-        return self.parse(self._read(path, []), _shorten(str(path)))
+    def read(self, path: Path) -> bytes:
+        """The content of a file that is not installed."""
+        return self._read(path, [])
 
     def unknown(self, name: str, nearest: Sequence[str] = (), others: str = "") -> UserError:
         """Make the error for a name that `load` does not find.
@@ -126,13 +127,12 @@ class FileKind(Generic[Model]):
                 raise error(f"{name}: is not a regular file; give a {kind} file")
             if status.st_size > MAX_BYTES:
                 raise error(f"{name}: {status.st_size} bytes is too large for a {kind}; {MAX_BYTES} at most")
-            with path.open("rb") as file:
-                return file.read(MAX_BYTES + 1)
+            return read_bytes(path, MAX_BYTES)
         except FileNotFoundError:
             others = f" or one of: {', '.join(known)}" if known else ""
             raise error(f"{name}: no such file; give a path{others}") from None
-        except (OSError, ValueError) as failure:
-            reason = failure.strerror if isinstance(failure, OSError) else str(failure)
+        except (OSError, ValueError, TextError) as failure:
+            reason = getattr(failure, "strerror", None) or getattr(failure, "reason", None) or str(failure)
             raise error(f"{name}: cannot be read: {reason}") from None
 
     def _tree(self, content: bytes | str, source: str) -> YamlTree:
@@ -140,10 +140,10 @@ class FileKind(Generic[Model]):
         if len(content) > MAX_BYTES:
             raise error(f"{source}: {len(content)} bytes is too large for a {kind}; {MAX_BYTES} at most")
         try:
-            tree = parse_yaml(content if isinstance(content, str) else content.decode("utf-8-sig"))
-        except UnicodeDecodeError as failure:
-            line = failure.object.count(b"\n", 0, failure.start) + 1
-            raise error(f"{source}:{line}: not UTF-8 text; save the file as UTF-8") from None
+            tree = parse_yaml(content if isinstance(content, str) else decode_text(content))
+        except TextError as failure:
+            words = "not UTF-8 text; save the file as UTF-8" if failure.fault == "not_utf8" else str(failure)
+            raise error(f"{source}:{failure.line or 1}: {words}") from None
         except YamlError as failure:
             where = f"{failure.line}" if failure.column is None else f"{failure.line}:{failure.column}"
             raise error(f"{source}:{where}: {' '.join(str(failure).split())}") from None

@@ -50,7 +50,9 @@ class ServedDrone:
         self._settings = settings
         self._keeper: ParameterKeeper | None = None
         if settings.parameters is not None:
-            self._keeper = open_parameters(simulation.autopilot.parameters, settings.parameters, notice)
+            self._keeper = open_parameters(
+                simulation.autopilot.parameters, settings.parameters, notice, settings.instance + 1
+            )
         storage = open_storage(settings.storage, settings.instance)
         camera = simulation.scenario.camera
         model = CameraModel(camera.width_px, camera.height_px, camera.horizontal_fov_rad, camera.rate_hz)

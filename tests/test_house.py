@@ -244,6 +244,33 @@ def test_what_is_imported_exists():
     assert missing == []
 
 
+def reads_text(call):
+    """Whether a call reads a file as text: `path.read_text()`, or `open` with an encoding."""
+    function = call.func.attr if isinstance(call.func, ast.Attribute) else ast.unparse(call.func)
+    if function != "open":
+        return function == "read_text" and isinstance(call.func, ast.Attribute)
+    modes = {each.value for each in call.args if isinstance(each, ast.Constant)} & {
+        "w",
+        "x",
+        "a",
+        "wb",
+        "xb",
+        "ab",
+    }
+    return any(each.arg == "encoding" for each in call.keywords) and not modes
+
+
+def test_texts_are_read_by_the_one_reader():
+    """`errors/files.py` knows byte order marks, line ends and UTF-16; /proc's files have none of these."""
+    found = {
+        f"{name_of(path)}: {ast.unparse(node)}"
+        for path in MODULES
+        for node in ast.walk(parsed(path))
+        if isinstance(node, ast.Call) and reads_text(node)
+    }
+    assert {each for each in found if "'/proc/" not in each and "os.devnull" not in each} == set()
+
+
 def test_errors_for_people_are_user_errors():
     """The command line prints a UserError; any other error ends in a traceback."""
     strays = [

@@ -45,7 +45,7 @@ class SigningKey:
         Raises:
             ValueError: the text is empty or no key.
         """
-        text = text.strip()
+        text = text.removeprefix("\ufeff").strip()
         if not text:
             raise ValueError("it is empty; it must hold 64 hexadecimal digits or a passphrase")
         if len(text) == 2 * KEY_BYTES:

@@ -11,6 +11,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from errors import UserError
+from errors.files import decode_text
 
 
 class ParameterError(UserError):
@@ -112,7 +113,7 @@ def _declare(name: str, group: str, fields: dict[str, Any]) -> Parameter:
 
 
 def _load() -> tuple[Parameter, ...]:
-    text = resources.files(__package__).joinpath("declarations.yaml").read_text(encoding="utf-8")
+    text = decode_text(resources.files(__package__).joinpath("declarations.yaml").read_bytes())
     groups = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # eight times as fast
     declared = [_declare(name, group, each) for group, rows in groups.items() for name, each in rows.items()]
     return tuple(sorted(declared, key=lambda each: each.name))

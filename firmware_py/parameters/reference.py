@@ -10,7 +10,9 @@ _HEAD = """# Parameters
 
 The drone's parameters, under PX4's names, with PX4's units, defaults and meanings (v1.17, as its SITL has
 them). `framerunner sim --parameters FILE` keeps changed values in a file that QGroundControl reads and
-writes too.
+writes too, also in one that was exported from a real drone: only values that change are replaced. Comments,
+parameters that this drone does not have, and lines of other vehicles and components stay as they are, and
+are not used; which those are is printed. An instance is vehicle 1 plus its number.
 
 PX4 takes any value of the right type; here a value outside its range is refused with a message, and the old
 one is kept. So some ranges are wider than those PX4 advises: small arenas are flown slowly. An airframe may

@@ -8,10 +8,11 @@ from __future__ import annotations
 import errno
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.telemetry.connection import FOLLOWED_PX4_VERSION, OWN_VERSION, packed_version
-from firmware_py.storage import Path, Storage
+from firmware_py.storage import LOG_SUFFIX, Path, Storage
 from firmware_py.types import WARNING, StatusText
 from firmware_py.ulog import messages
 from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged, Sample
@@ -107,13 +108,25 @@ class UlogRecorder:
             self._recorded = autopilot
             autopilot.parameters.on_change(self._log_parameter)
         time_us = autopilot.state.time_us
-        self.path = self._name_log(time_us)
+        self.path = self._unused(self._name_log(time_us))
         self._size = 0
         self._nav = ()
         self._due_us = self._flush_us = time_us
         for group in self._groups:
             group.next_us = time_us
         self._buffer = bytearray(self._definitions(autopilot, time_us))
+
+    def _unused(self, path: Path) -> Path:
+        """The path, or one with a number: a log of an earlier flight, or a user's file, is never replaced."""
+        *folder, name = path
+        stem, _, suffix = name.rpartition(".")
+        for number in count(2):
+            try:
+                self._storage.entry(path)
+            except OSError:
+                break
+            path = (*folder, f"{stem}_{number}.{suffix}")
+        return path
 
     def _definitions(self, autopilot: Autopilot, time_us: int) -> bytes:
         """Everything before the data."""
@@ -206,7 +219,7 @@ class UlogRecorder:
             where = (*_LOG_FOLDER, folder.name)
             for log in self._storage.entries(where):
                 path = (*where, log.name)
-                if path != current and not log.is_folder:
+                if path != current and not log.is_folder and log.name.endswith(LOG_SUFFIX):
                     self._storage.remove(path)
                     return True
         return False

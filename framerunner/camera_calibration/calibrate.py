@@ -12,12 +12,13 @@ from rich.console import Console
 from rich.table import Table
 
 from errors import SettingError, write_advice
-from framerunner.camera_calibration.calibration_file import save_calibration
+from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.camera_calibration.collect import Collection, collect
 from vision.calibration.board import Board, CalibrationReport
 
 _SHADES = " ░▒▓█"
 _WELL_COVERED = 12  # corners in a cell
+_FOREIGN = (".yaml", ".yml", ".xml", ".json")  # a calibration of ROS or OpenCV
 
 
 def write_board(board: Board, path: Path) -> None:
@@ -41,10 +42,16 @@ def calibrate(
     """Calibrate a camera, print how good it is, and write the file.
 
     Raises:
-        CalibrationError: the images do not tell enough.
+        CalibrationError: the images do not tell enough, or the file is no calibration to write to.
         CameraError: a source cannot be opened or has failed.
         SettingError: the file cannot be written.
     """
+    if out.exists():
+        load_calibration(out, to_write=True)
+    if len(sources) == 1 and sources[0].lower().endswith(_FOREIGN):
+        save_calibration(load_calibration(Path(sources[0])), out)
+        print(f"written to {out}; use it with `framerunner fly --calibration {out}`")
+        return
     collection = asyncio.run(collect(board, sources, wanted, say))
     say(
         f"{collection.images} images: {len(collection.views)} different views; {collection.similar} like "

@@ -35,7 +35,7 @@ def learn(pairs: Sequence[str], calibration: Path, ask: Callable[[str], None]) -
         SettingError: the pairs are not such, or the file cannot be written.
     """
     sources = dict(_pair(each) for each in pairs)
-    known = load_calibration(calibration)
+    known = load_calibration(calibration, to_write=True)
     swatches = {colour: swatch_of(_image(colour, source, ask)) for colour, source in sources.items()}
     matrix = learn_colours(swatches)
     for colour in PRIMARIES:

@@ -96,4 +96,4 @@ def _report_of(state: DroneState) -> MotionReport:
 def _calibration(path: Path, simulated: Scenario | None) -> Calibration:
     if simulated is not None and not path.exists():
         return true_calibration(simulated.camera)
-    return load_calibration(path)
+    return load_calibration(path, to_write=True)

@@ -98,7 +98,11 @@ def board(
 @calibration.default
 def calibrate(
     sources: Annotated[
-        list[str], Parameter(help="images, folders of images, a video, or the URL or device of a camera")
+        list[str],
+        Parameter(
+            help="images, folders of images, a video, the URL or device of a camera, or a calibration file "
+            "of ROS or OpenCV, which is converted"
+        ),
     ],
     /,
     *,
@@ -122,6 +126,8 @@ def calibrate(
         framerunner camera calibrate photos/ --out camera.yaml
 
         framerunner camera calibrate rtsp://10.0.0.2/1 --views 25
+
+        framerunner camera calibrate ost.yaml --out camera.yaml
     """
     check_range("--views", views, 8, 60)
 
@@ -266,7 +272,7 @@ def extrinsics(
         from framerunner.camera_calibration.calibration_file import load_calibration
         from framerunner.camera_calibration.live_mounting import measure_live
 
-        known = load_calibration(calibration)
+        known = load_calibration(calibration, to_write=True)
         where = (known, place_of(known, place_m, None))
         search, stamped = asyncio.run(measure_live(drone, camera, *where, limit_s=float(seconds), say=say))
     finish(search, known, calibration, say, stamped=stamped)

@@ -122,7 +122,7 @@ def import_(
 ) -> int:
     """Print or write the mission that an SCXML file describes, and say what the checker finds in it.
 
-    What a mission cannot express is refused, one line for each.
+    What a mission cannot express or the checker refuses is told, one line for each, and nothing is written.
 
     **Examples**
 
@@ -136,8 +136,17 @@ def import_(
 
     pilot_class = Pilot if pilot is None else read_pilot(pilot).pilot_class()
     text = import_scxml(_read(file), file.stem)
+    findings = check_document(Document.from_text(text, out or file.with_suffix(".yaml")), pilot_class)
+    errors = [found.message for found in findings if found.severity == "error"]
+    if errors:
+        advice = (
+            "correct it there"
+            if pilot is not None
+            else "correct it there, or give --pilot for names of your own"
+        )
+        raise SettingError("\n".join((*errors, f"{file}: nothing was written; {advice}")))
     _print_or_write(text, out)
-    for found in check_document(Document.from_text(text, out or file.with_suffix(".yaml")), pilot_class):
+    for found in findings:
         say(f"{found.file}:{found.line}: {found.severity}: {found.message}")
     return 0
 

@@ -109,6 +109,8 @@ def random(
     if out is None:
         print(dump_yaml(drawn), end="")
         return 0
+    if out.is_file():
+        raise SettingError(f"--out {out}: is there already and is left as it is; choose another")
     try:
         out.write_text(dump_yaml(drawn), encoding="utf-8")
     except OSError as error:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 from cyclopts import Parameter
 
 from errors import SettingError
+from errors.files import TextError, read_text
 from framerunner.commands import Faults, Sensors, WholeNumber, check_range, say, with_faults, with_sensors
 from framerunner.commands.ardupilot import ardupilot_server
 from framerunner.commands.px4 import px4_server
@@ -334,13 +335,10 @@ def _read_key(path: Path | None) -> SigningKey | None:
     from wire.signing import SigningKey
 
     try:
-        return SigningKey.from_text(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise SettingError(
-            f"--signing-key {path}: must be text, 64 hexadecimal digits or a passphrase"
-        ) from None
-    except OSError as error:
-        raise SettingError(f"--signing-key {path}: cannot be read ({error.strerror})") from error
+        return SigningKey.from_text(read_text(path))
+    except TextError as error:
+        advice = "it must hold 64 hexadecimal digits or a passphrase"
+        raise SettingError(f"--signing-key {path}: {error}; {advice}") from None
     except ValueError as error:
         raise SettingError(f"--signing-key {path}: {error}") from None
 

@@ -14,6 +14,7 @@ from typing import Literal, get_args
 from pydantic import Field
 
 from errors import UserError
+from errors.files import decode_text, read_text
 from offboard.mission import MISSIONS
 from scenarios.loader import parse_scenario
 from scenarios.models import Scenario
@@ -105,9 +106,9 @@ def _folder() -> Traversable:
 def _load(number: int, folder: Traversable) -> Lesson:
     text = _TEXTS.parse((folder / "lesson.yaml").read_bytes(), f"{folder.name}/lesson.yaml")
     if text.solution is None:
-        solution = (folder / "solution.yaml").read_text(encoding="utf-8")
+        solution = decode_text((folder / "solution.yaml").read_bytes())
     else:
-        solution = (MISSIONS / f"{text.solution}.yaml").read_text(encoding="utf-8")
-    start = (folder / "start.yaml").read_text(encoding="utf-8")
+        solution = read_text(MISSIONS / f"{text.solution}.yaml")
+    start = decode_text((folder / "start.yaml").read_bytes())
     scenario = parse_scenario((folder / "scenario.yaml").read_bytes(), f"{folder.name}/scenario.yaml")
     return Lesson(number, folder.name, text, scenario, start, solution)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from errors import SettingError
-from errors.folders import append_in_folder, read_in_folder
+from errors.files import append_in_folder, read_in_folder
 from monitor.competition.views import csv_text
 
 EventKind = Literal["opened", "flown", "passed", "reset"]

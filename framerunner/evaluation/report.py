@@ -21,6 +21,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from errors.files import TextError, read_text
 from framerunner.evaluation.compare import Comparison
 from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import Summary, crossing_offsets_m, mean_seconds_in_state
@@ -191,8 +192,8 @@ def _traceback(folder: EvaluationFolder, row: Row) -> str:
     if row.verdict is not Verdict.ERROR:
         return ""
     try:
-        return folder.error_file(row.scenario).read_text(encoding="utf-8")
-    except OSError:
+        return read_text(folder.error_file(row.scenario))
+    except TextError:
         return ""
 
 

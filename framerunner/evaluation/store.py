@@ -6,6 +6,7 @@ import errno
 import fcntl
 import json
 import os
+import re
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from errors import SettingError, write_advice
+from errors.files import replace_file
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
 from framerunner.runs.track import Track
@@ -29,6 +31,7 @@ RESULTS, REPORT = "results.csv", "report.html"
 _ESTIMATES = TypeAdapter(tuple[FrameEstimate, ...])
 _FOLDERS = ("scenarios", "tracks", "errors")
 _FILES = (IDENTITY, FLIGHTS, RESULTS, REPORT)
+_PART = re.compile(r"^\.?(.+)\.part$")  # what a killed program left of `replace_file`
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,14 +86,14 @@ class EvaluationFolder:
     def track(self, name: str) -> Track:
         """The track of a flight that failed; empty if it is not known."""
         try:
-            return _track_from_dict(json.loads(self._track_file(name).read_text(encoding="utf-8")))
+            return _track_from_dict(json.loads(self._track_file(name).read_bytes()))
         except (OSError, ValueError, KeyError, TypeError):
             return Track()
 
     def write(self, name: str, text: str) -> None:
         """Write a file of the folder completely or not at all; raises `SettingError`."""
         with _writing(self.path):
-            _replace(self.path / name, text)
+            replace_file(self.path / name, text)
 
     def _track_file(self, name: str) -> Path:
         return self.path / "tracks" / f"{name}.json"
@@ -123,7 +126,7 @@ def open_folder(path: Path, identity: Identity, *, again: bool = False) -> Itera
             if is_new:
                 _clear(path)
                 data = {"format": FORMAT, **identity.as_data()}
-                _replace(path / IDENTITY, json.dumps(data, indent=2) + "\n")
+                replace_file(path / IDENTITY, json.dumps(data, indent=2) + "\n")
             for name in _FOLDERS:
                 (path / name).mkdir(exist_ok=True)
             done = _repair(path / FLIGHTS, identity)
@@ -144,7 +147,7 @@ def read_folder(path: Path, option: str) -> EvaluationFolder:
 
 def _check(path: Path, identity: Identity, again: bool) -> bool:
     """Whether the folder is to be cleared first; raises `SettingError` if it belongs to something else."""
-    found = {each.name.removesuffix(".part") for each in path.iterdir()}
+    found = {_PART.sub(r"\1", each.name) for each in path.iterdir()}
     existing = _identity(path, "--out")
     if existing is None:
         if found <= {LOCK, IDENTITY}:
@@ -165,7 +168,7 @@ def _check(path: Path, identity: Identity, again: bool) -> bool:
 
 def _identity(path: Path, option: str) -> Identity | None:
     try:
-        data: dict[str, Any] = json.loads((path / IDENTITY).read_text(encoding="utf-8"))
+        data: dict[str, Any] = json.loads((path / IDENTITY).read_bytes())
         if data.pop("format") != FORMAT:
             raise SettingError(f"{option} {path}: was made by another version of framerunner; choose another")
         if set(data) | {"autopilot"} != {each.name for each in fields(Identity)}:
@@ -188,7 +191,7 @@ def _repair(file: Path, identity: Identity) -> set[str]:
     """Remove incomplete lines, whose flights will be flown again; returns the scenarios that are done."""
     rows, is_complete = _read_rows(file, identity)
     if not is_complete:
-        _replace(file, "".join(row.to_json() + "\n" for row in rows.values()))
+        replace_file(file, "".join(row.to_json() + "\n" for row in rows.values()))
     return set(rows)
 
 
@@ -197,28 +200,19 @@ def _read_rows(file: Path, identity: Identity) -> tuple[dict[str, Row], bool]:
     rows: dict[str, Row] = {}
     is_complete = True
     try:
-        with file.open("r", encoding="utf-8", errors="replace") as lines:
+        with file.open("rb") as lines:
             for line in lines:
                 try:
                     row = Row.model_validate_json(line)
                 except ValueError:
                     is_complete = False
                     continue
-                is_complete = is_complete and line.endswith("\n")
+                is_complete = is_complete and line.endswith(b"\n")
                 if row.scenario in identity.scenarios:
                     rows[row.scenario] = row
     except FileNotFoundError:
         pass
     return rows, is_complete
-
-
-def _replace(path: Path, text: str) -> None:
-    part = path.with_name(path.name + ".part")
-    with part.open("w", encoding="utf-8", newline="") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(part, path)
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from errors import SettingError
+from errors.files import read_text
 from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.plan import FlightPlan
@@ -111,7 +112,7 @@ async def fly_in_real_time(
         plan, safety, system_id = await _safety(plan, settings, records, stack)
         companion = Companion()
         stack.push_async_callback(companion.close)
-        source = records.folder.mission.read_text(encoding="utf-8")
+        source = read_text(records.folder.mission)
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         drone = _drone(
             plan, vehicle, records, stack, safety, settings=settings, system_id=system_id, guard=guard

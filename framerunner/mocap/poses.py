@@ -10,14 +10,15 @@ import csv
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
+from io import StringIO
 from itertools import pairwise
 from math import cos, hypot, nan, radians, sin, sqrt
 from pathlib import Path
-from typing import TextIO
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from errors import UserError
+from errors.files import TextError, decode_text, read_text
 from geometry.axes import flip_quaternion, flip_vector
 from geometry.rotations import multiply, normalized
 from geometry.vectors import Quaternion, Vec3
@@ -26,6 +27,8 @@ _HALF = sqrt(0.5)
 _ENU_TO_NED: Quaternion = (0.0, _HALF, _HALF, 0.0)  # half a turn about (1, 1, 0)
 _FRD_TO_FLU: Quaternion = (0.0, 1.0, 0.0, 0.0)  # half a turn about x
 _NORM_TOLERANCE = 0.02
+_MAX_FILE_BYTES = 1 << 28  # of an hour at 500 Hz
+_COLUMNS = ("time_s", "x", "y", "z", "qw", "qx", "qy", "qz")
 
 
 class PoseError(UserError):
@@ -150,9 +153,11 @@ def parse_line(line: str | bytes) -> PoseRecord:
         PoseError: it is none.
     """
     try:
-        return PoseRecord.model_validate_json(line)
+        return PoseRecord.model_validate_json(decode_text(line) if isinstance(line, bytes) else line)
     except ValidationError as error:
         raise PoseError(_words(error)) from None
+    except TextError as error:
+        raise PoseError(str(error)) from None
 
 
 def read_poses(path: Path, axes: Axes, name: str | None) -> list[Pose]:
@@ -165,19 +170,19 @@ def read_poses(path: Path, axes: Axes, name: str | None) -> list[Pose]:
     if path.exists() and not path.is_file():  # a device may never end
         raise PoseError(f"{path}: is not a regular file; give a .csv or .jsonl file of poses")
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            for number, raw in _raw(file, is_csv=path.suffix.lower() == ".csv"):  # noqa: B007 - errors name it
-                record = _record(raw)
-                if record.time_s is None:
-                    raise PoseError("time_s: missing; a file needs it in every line")
-                if name is None or record.name == name:
-                    poses.append(record.pose(axes))
+        text = read_text(path, _MAX_FILE_BYTES)
+        for number, raw in _raw(text, is_csv=path.suffix.lower() == ".csv"):  # noqa: B007 - errors name it
+            record = _record(raw)
+            if record.time_s is None:
+                raise PoseError("time_s: missing; a file needs it in every line")
+            if name is None or record.name == name:
+                poses.append(record.pose(axes))
     except ValidationError as error:
         raise PoseError(f"{path}, line {number}: {_words(error)}") from None
     except PoseError as error:
-        raise PoseError(f"{path}, line {number}: {error}") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise PoseError(f"{path}: cannot be read ({error}); give a .csv or .jsonl file of poses") from None
+        raise PoseError(f"{path}, line {number or 1}: {error}") from None
+    except (TextError, csv.Error) as error:
+        raise PoseError(f"{path}: {error}; give a .csv or .jsonl file of poses") from None
     if not poses:
         of_body = "" if name is None else f" of a body named {name}"
         raise PoseError(f"{path}: there is no pose{of_body} in it")
@@ -189,14 +194,18 @@ def read_poses(path: Path, axes: Axes, name: str | None) -> list[Pose]:
     return poses
 
 
-def _raw(file: TextIO, *, is_csv: bool) -> Iterator[tuple[int, str | dict[str, str | None]]]:
+def _raw(text: str, *, is_csv: bool) -> Iterator[tuple[int, str | dict[str, str | None]]]:
     """Line numbers with lines of JSON or rows of CSV."""
     if is_csv:
-        rows = csv.DictReader(file)
+        rows = csv.DictReader(StringIO(text))
+        rows.fieldnames = [name.strip() for name in rows.fieldnames or ()]
+        missing = [name for name in _COLUMNS if name not in rows.fieldnames]
         for row in rows:
-            yield rows.line_num, {key: value or None for key, value in row.items() if key}
+            if missing:
+                raise PoseError(f"there is no column {missing[0]}; name the columns {','.join(_COLUMNS)}")
+            yield rows.line_num, {key: (value or "").strip() or None for key, value in row.items() if key}
         return
-    for number, line in enumerate(file, start=1):
+    for number, line in enumerate(text.split("\n"), start=1):
         if line.strip():
             yield number, line
 

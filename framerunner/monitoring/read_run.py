@@ -19,6 +19,7 @@ from typing import Any
 
 import cv2
 
+from errors.files import TextError, read_text
 from framerunner.child_process import end_with_standard_input, limit_resources
 from framerunner.flying.navigation_reporter import navigation_json
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
@@ -98,9 +99,8 @@ def read_run(folder: Path, target: Path, pilot: PilotFile | None = None) -> None
 def _load_mission(path: Path, pilot: PilotFile | None) -> tuple[Mission | None, str]:
     """A mission and the text of its file; None if there is none that loads with no other Python file."""
     try:
-        source = path.read_text(encoding="utf-8")
-        return (load_mission(path, pilot) if len(source) < _MEGABYTE else None), source
-    except (OSError, ValueError, MissionError):
+        return load_mission(path, pilot), read_text(path)
+    except (TextError, MissionError):
         return None, ""
 
 

@@ -227,7 +227,7 @@ def _result(path: Path) -> FlightResult | None:
         return None
     if path.is_symlink() or not path.is_file() or path.stat().st_size > MAX_RESULT_BYTES:
         raise ValueError("not a result of this program")
-    result = json.loads(path.read_text(encoding="utf-8"))
+    result = json.loads(path.read_bytes())
     if not isinstance(result, dict):
         raise ValueError("not an object")
     return FlightResult.from_outside(result)
@@ -314,8 +314,8 @@ def _unpack(folder: Path, mark: Mark, readers: Readers, pilot: Path | None = Non
         reason = lines[-1][:300] if lines and code == 2 else "it is damaged"
         raise RunError(f"run '{folder.name}': cannot be shown: {reason}")
     try:
-        recording = json.loads((Path(target.name) / RECORDING).read_text(encoding="utf-8"))
-        spans = json.loads((Path(target.name) / SPANS).read_text(encoding="utf-8"))
+        recording = json.loads((Path(target.name) / RECORDING).read_bytes())
+        spans = json.loads((Path(target.name) / SPANS).read_bytes())
     except (OSError, ValueError):
         raise RunError(f"run '{folder.name}': no room to unpack it") from None
     return _Unpacked(mark, target, recording, [(int(start), int(length)) for start, length in spans])

@@ -13,6 +13,7 @@ from math import isfinite
 from pathlib import Path
 
 from errors import SettingError
+from errors.files import TextError, read_text
 from framerunner.preflight.fence_upload import MAX_ITEMS, FenceItem, upload_fence
 from framerunner.preflight.parameters import ParameterValue, set_parameter
 from framerunner.preflight.session import VehicleSession
@@ -82,21 +83,18 @@ def load_kept(path: Path) -> KeptState:
     """Read a file for return, of this program or of QGroundControl.
 
     Raises:
-        SettingError: there is none, it is too large, or a line is not understood or cannot be sent.
+        SettingError: there is none, it is too large, a line is not understood or cannot be sent, or lines are
+            of several vehicles or of another component than the autopilot.
     """
     try:
-        with path.open("rb") as file:
-            data = file.read(_MAX_FILE_BYTES + 1)
-        if len(data) > _MAX_FILE_BYTES:
-            raise SettingError(f"{OPTION} {path}: has more than {_MAX_FILE_BYTES} bytes; use a copy")
-        text = data.decode()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "no text"
-        raise SettingError(f"{OPTION} {path}: cannot be read ({reason})") from None
+        text = read_text(path, _MAX_FILE_BYTES)
+    except TextError as error:
+        raise SettingError(f"{OPTION} {path}: {error}") from None
     uid, count = "", None
     items: list[FenceItem] = []
     parameters: list[ParameterValue] = []
-    for number, line in enumerate(text.splitlines(), 1):
+    vehicles: set[tuple[str, ...]] = set()
+    for number, line in enumerate(text.split("\n"), 1):
         kind, _, rest = line.partition("\t")
         try:
             if kind == _UID:
@@ -107,11 +105,18 @@ def load_kept(path: Path) -> KeptState:
                 items.append(_parsed_item(rest))
             elif line.strip() and not line.startswith("#"):
                 parameters.append(_parsed(line))
+                vehicles.add(tuple(line.split("\t")[:2]))
         except ValueError:
             raise SettingError(
                 f"{OPTION} {path}: line {number} is not understood, or a number is too large; a parameter is "
                 "vehicle, component, name, value and type, separated by tabs"
             ) from None
+    if len(vehicles) > 1 or any(component != str(AUTOPILOT_COMPONENT_ID) for _, component in vehicles):
+        found = ", ".join(" ".join(each) for each in sorted(vehicles))
+        raise SettingError(
+            f"{OPTION} {path}: has parameters of vehicle and component {found}; use a copy with those of one "
+            f"vehicle's autopilot, component {AUTOPILOT_COMPONENT_ID}"
+        )
     if count is None and not parameters:
         raise SettingError(f"{OPTION} {path}: holds no parameters and no fence")
     if len(items) != (count or 0) or len(items) > MAX_ITEMS:

@@ -15,6 +15,7 @@ from pathlib import Path
 import cv2
 from mcap.writer import CompressionType, Writer
 
+from errors.files import read_text
 from framerunner.recording import messages, schemas
 from framerunner.recording.events import RecordingError
 from offboard.app import Moment
@@ -155,7 +156,7 @@ class FlightRecording:
         about = {"version": version, "scenario": self._scenario.name, "mission": mission.name}
         self._writer.add_metadata(METADATA, {**about, "seed": "" if seed is None else str(seed)})
         self._attach("scenario.yaml", "application/yaml", dump_yaml(self._scenario), 0)
-        self._attach("mission.yaml", "application/yaml", mission.path.read_text(encoding="utf-8"), 0)
+        self._attach("mission.yaml", "application/yaml", read_text(mission.path), 0)
         if isinstance(mission.pilot, PilotFile):
             self._attach("pilot.py", "text/x-python", mission.pilot.text, 0)
         register = self._writer.register_schema

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 import sys
 from collections.abc import Callable
@@ -11,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from errors import SettingError, write_advice
+from errors.files import replace_file
 from framerunner.extras import install_advice
 from framerunner.runs import PlotError
 from framerunner.runs.track import Track
@@ -93,13 +93,13 @@ class RunFolder:
         Raises:
             OSError: it cannot be written.
         """
-        _write_whole(self.result, result.text())
+        replace_file(self.result, result.text())
         self.unfinished.unlink(missing_ok=True)
 
     def keep_unfinished(self, result: FlightResult) -> None:
         """Keep what `result.json` is to be if this program is ended now; it does not matter if that fails."""
         with suppress(OSError):
-            _write_whole(self.unfinished, result.text())
+            replace_file(self.unfinished, result.text())
 
     def end_unfinished(self, why: str) -> bool:
         """Make what was kept the result, with the reason in it; whether there was something."""
@@ -161,16 +161,6 @@ def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:
         command = shlex.join(["framerunner", "replay", str(folder.path)])
         lines.append(f"see it again: {command}")
     return lines
-
-
-def _write_whole(path: Path, text: str) -> None:
-    part = path.with_suffix(".part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise
 
 
 def _try(path: Path, write: Callable[[], None]) -> None:

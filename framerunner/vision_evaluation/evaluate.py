@@ -81,9 +81,13 @@ def write_dataset(settings: VisionSettings) -> None:
     """Write the images as PNG files, and what is in them as JSON.
 
     Raises:
-        SettingError: the folder cannot be written to.
+        SettingError: the folder cannot be written to, or has files in it.
     """
     _make_folder(settings.out)
+    if any(settings.out.iterdir()):
+        raise SettingError(
+            f"{settings.out}: has files in it, which are left as they are; choose a new folder"
+        )
     labels = []
     for number, labelled in enumerate(_shown(settings)):
         name = f"{number:06d}.png"

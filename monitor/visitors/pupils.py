@@ -14,7 +14,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from errors import UserError
-from errors.folders import read_in_folder
+from errors.files import read_in_folder
 
 MAX_PUPILS = 300
 _MAX_FILE_BYTES = 1_000_000

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from errors.files import TextError, decode_text, read_bytes
 from offboard.authoring.outline import Outline
 from offboard.authoring.text import MissionText, Positions
 from offboard.chart.messages import Message
@@ -14,7 +15,7 @@ from offboard.chart.problems import MissionError, Place, ProblemList, mission_er
 from offboard.chart.read import parse_mission_yaml, read_mission_file, read_nodes
 from offboard.chart.spec import MissionFile, expand, merge_extended
 from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
-from offboard.mission import MAX_FILE_BYTES, read_base
+from offboard.mission import MAX_FILE_BYTES, read_base, unreadable
 
 
 @dataclass(frozen=True)
@@ -40,19 +41,18 @@ class Document:
         if len(data) > MAX_FILE_BYTES:
             raise mission_error(Place(Path(path).name), Message("file.too_large"))
         try:
-            return cls(MissionText.of(data.decode("utf-8")), Path(path))
-        except UnicodeDecodeError:
-            raise mission_error(Place(Path(path).name), Message("file.not_utf8")) from None
+            decode_text(data)
+        except TextError as error:
+            raise unreadable(Path(path).name, error) from None
+        return cls(MissionText.of(data.decode("utf-8")), Path(path))  # with its mark and line ends
 
     @classmethod
     def open(cls, path: str | Path) -> Document:
         """Read a file. Raises `MissionError` if it cannot be read, is too large or is not UTF-8."""
         try:
-            with Path(path).open("rb") as file:  # a file may have no end, such as a device
-                return cls.from_bytes(file.read(MAX_FILE_BYTES + 1), path)
-        except OSError as error:
-            message = Message("file.unreadable", reason=error.strerror or str(error))
-            raise mission_error(Place(Path(path).name), message) from None
+            return cls.from_bytes(read_bytes(path, MAX_FILE_BYTES), path)
+        except TextError as error:
+            raise unreadable(Path(path).name, error) from None
 
     @property
     def data(self) -> bytes:

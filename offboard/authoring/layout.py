@@ -5,9 +5,7 @@ The mission itself has no positions. A state without a place in the file is plac
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
@@ -15,11 +13,13 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError
 
 from errors import UserError
+from errors.files import TextError, read_text, replace_file
 from offboard.authoring.document import Document
 from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState, StrictModel
 from offboard.authoring.references import chart_ids, instances, prefix_change
 
 MAX_LAYOUT_BYTES = 1_000_000
+_ADVICE = "correct it, or delete the file and the states are placed anew"
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 Size = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
 
@@ -52,29 +52,25 @@ def layout_path(mission: str | Path) -> Path:
     return Path(mission).with_suffix(".layout.json")
 
 
-def parse_layout(text: str | bytes, name: str = "layout") -> Layout:
+def parse_layout(text: str, name: str = "layout") -> Layout:
     """A layout from its file's content. Raises `LayoutError`."""
-    if len(text) > MAX_LAYOUT_BYTES:
-        raise LayoutError(f"{name}: is larger than 1 MB; delete it, and the states are placed anew")
     try:
         return Layout.model_validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"]) or "file"
-        advice = "correct it, or delete the file and the states are placed anew"
-        raise LayoutError(f"{name}: {where}: {first['msg'][:200]}; {advice}") from None
+        raise LayoutError(f"{name}: {where}: {first['msg'][:200]}; {_ADVICE}") from None
 
 
 def read_layout(mission: str | Path) -> Layout:
     """The layout of a mission file; an empty one if it has none. Raises `LayoutError`."""
     path = layout_path(mission)
     try:
-        with path.open("rb") as file:
-            return parse_layout(file.read(MAX_LAYOUT_BYTES + 1), path.name)
-    except FileNotFoundError:
-        return Layout()
-    except OSError as error:
-        raise LayoutError(f"{path.name}: cannot be read: {error.strerror}") from None
+        return parse_layout(read_text(path, MAX_LAYOUT_BYTES), path.name)
+    except TextError as error:
+        if error.fault == "missing":
+            return Layout()
+        raise LayoutError(f"{path.name}: {error}; {_ADVICE}") from None
 
 
 def layout_text(layout: Layout) -> str:
@@ -88,16 +84,16 @@ def layout_text(layout: Layout) -> str:
 
 
 def write_layout(mission: str | Path, layout: Layout) -> Path:
-    """Write the side file of a mission file. Raises `LayoutError` if it cannot be written."""
+    """Write the side file of a mission file.
+
+    Raises:
+        LayoutError: it cannot be written, or what is there is not understood, which is left as it is.
+    """
     path = layout_path(mission)
-    file = Path(os.path.realpath(path))  # a link stays one
-    part = file.with_name(f".{file.name}.part")
+    read_layout(mission)
     try:
-        part.write_text(layout_text(layout), encoding="utf-8", newline="\n")
-        os.replace(part, file)  # so nobody reads half of it, and a failure leaves the old one
+        replace_file(path, layout_text(layout))
     except OSError as error:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
         raise LayoutError(f"{path.name}: cannot be written: {error.strerror}") from None
     return path
 

@@ -15,6 +15,7 @@ from offboard.authoring.messages import EditError
 from offboard.authoring.scxml_export import NAMESPACE, SCXML
 from offboard.authoring.xml_tree import Element, XmlError, parse_xml
 from offboard.authoring.yaml_writer import Style, Value
+from offboard.chart.expressions import ExpressionError, check_form
 from offboard.chart.native import RESUME, TICK
 from offboard.chart.problems import MAX_REPORTED, cut
 from offboard.chart.spec import MAX_STATES, look_up
@@ -270,7 +271,7 @@ class _Importer:
 
     def _tick(self, state: _State, element: Element, target: str) -> Value:
         written: dict[str, Value] = {}
-        condition = _python(element.attributes.get("cond", ""))
+        condition = self._expression(element, element.attributes.get("cond", ""))
         if condition:
             written["when"] = condition
         if element.attributes.get("type", "external") == "internal" and state.states:
@@ -303,12 +304,23 @@ class _Importer:
             self._check_attributes(child)
             if child.name == "assign":
                 location = child.attributes.get("location", "").strip()
-                found.append(f"{location} = {_python(child.attributes.get('expr') or child.text)}")
+                found.append(
+                    f"{location} = {self._expression(child, child.attributes.get('expr') or child.text)}"
+                )
                 continue
             for statement in re.split(r"[;\n]", child.text):
                 if statement.strip():
                     found.append(self._statement(child, statement))
         return found
+
+    def _expression(self, element: Element, text: str) -> str:
+        expression = _python(text)
+        try:
+            if expression:
+                check_form(expression)
+        except ExpressionError as error:
+            self._refuse(element, f"'{cut(expression)}': {error}")
+        return expression
 
     def _statement(self, element: Element, statement: str) -> str:
         statement = " ".join(statement.split())
@@ -316,7 +328,7 @@ class _Importer:
         if call is not None:
             return call.group(1)
         if assignment is not None:
-            return f"{assignment.group(1)} = {_python(assignment.group(2))}"
+            return f"{assignment.group(1)} = {self._expression(element, assignment.group(2))}"
         text = f"'{cut(statement)}' is no primitive such as hover() and no assignment"
         self._refuse(element, f"<script>: {text}")
         return ""

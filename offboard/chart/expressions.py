@@ -118,12 +118,7 @@ def _checked(text: str, vocabulary: Vocabulary) -> ast.Expression:
                 vocabulary.type_of(path_of(node.func))
                 name = ".".join(path_of(node.func))
                 raise ExpressionError(Message("expression.parentheses", name=name), _offset(text, node))
-        if not isinstance(node, _ALLOWED):
-            code = _REASONS.get(type(node), "expression.kind")
-            message = Message(code, kind=type(node).__name__)
-            raise ExpressionError(message, _offset(text, _around(tree, node)))
-        if isinstance(node, ast.Constant) and not isinstance(node.value, (bool, int, float, str)):
-            raise ExpressionError(Message("expression.constant", value=node.value), _offset(text, node))
+    check_form(text)
     for node in _name_nodes(tree):
         try:
             vocabulary.type_of(path_of(node))
@@ -134,6 +129,18 @@ def _checked(text: str, vocabulary: Vocabulary) -> ast.Expression:
     except (ValueError, SyntaxError) as error:
         raise ExpressionError(as_message(str(error))) from None
     return tree
+
+
+def check_form(text: str) -> None:
+    """Check that an expression has only what a mission can express. Raises `ExpressionError`."""
+    tree = _parsed(text)
+    for node in ast.walk(tree):
+        if not isinstance(node, _ALLOWED):
+            code = _REASONS.get(type(node), "expression.kind")
+            message = Message(code, kind=type(node).__name__)
+            raise ExpressionError(message, _offset(text, _around(tree, node)))
+        if isinstance(node, ast.Constant) and not isinstance(node.value, (bool, int, float, str)):
+            raise ExpressionError(Message("expression.constant", value=node.value), _offset(text, node))
 
 
 @contextmanager

@@ -56,7 +56,8 @@ ENGLISH: Mapping[str, str] = {
     # The file.
     "file.too_large": "is larger than 1 MB; a mission is a page or two",
     "file.unreadable": "cannot be read: {reason}",
-    "file.not_utf8": "cannot be read: is not UTF-8 text",
+    "file.not_utf8": "cannot be read: is not UTF-8 text; save it as UTF-8",
+    "file.utf16": "cannot be read: is UTF-16 text, or no text; save it as UTF-8",
     "file.missing": "mission file '{name}' does not exist",
     "file.irregular": "mission file '{name}' is not a regular file",
     "file.unknown": "unknown mission '{name}'; {advice}",

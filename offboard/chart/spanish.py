@@ -11,7 +11,8 @@ SPANISH: Mapping[str, str] = {
     # The file.
     "file.too_large": "ocupa más de 1 MB; una misión es una página o dos",
     "file.unreadable": "no se puede leer: {reason}",
-    "file.not_utf8": "no se puede leer: no es texto UTF-8",
+    "file.not_utf8": "no se puede leer: no es texto UTF-8; guárdalo como UTF-8",
+    "file.utf16": "no se puede leer: es texto UTF-16, o no es texto; guárdalo como UTF-8",
     "file.missing": "el archivo de misión '{name}' no existe",
     "file.irregular": "el archivo de misión '{name}' no es un archivo normal",
     "file.unknown": "misión desconocida '{name}'; {advice}",

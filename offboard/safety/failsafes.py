@@ -13,6 +13,7 @@ from typing import Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, model_validator
 
+from errors.files import read_text
 from offboard.safety.check import Check, Outcome
 from offboard.safety.fence import FlightFence
 from offboard.safety.rules import AbortAction
@@ -118,7 +119,7 @@ class FailsafeRow(BaseModel):
 @cache
 def failsafe_rows(autopilot: str = "px4", abort: AbortAction = "land") -> tuple[FailsafeRow, ...]:
     """The table of an autopilot, for flights that end so when they are aborted; empty if there is none."""
-    rows = yaml.safe_load(TABLE.read_text(encoding="utf-8")).get(autopilot, ())
+    rows = yaml.safe_load(TABLE.read_bytes()).get(autopilot, ())
     return tuple(FailsafeRow.model_validate(row).strict(abort) for row in rows)
 
 
@@ -206,4 +207,4 @@ def _check(row: FailsafeRow, value: float | None, fence: FlightFence) -> Check:
 if __name__ == "__main__":
     for autopilot, name in DOCUMENTS.items():
         document = Path(name)
-        document.write_text(with_table(document.read_text(encoding="utf-8"), autopilot), encoding="utf-8")
+        document.write_text(with_table(read_text(document), autopilot), encoding="utf-8")

@@ -92,7 +92,7 @@ class IdleCheck:
     def _opened(self) -> list[int]:
         self._files = files = []  # so that `close` has those before a thread that has ended
         for thread in Path(f"/proc/{self._process_id}/task").iterdir():
-            if (thread / "comm").read_text().strip() in self._names:
+            if (thread / "comm").read_bytes().decode().strip() in self._names:
                 files.append(os.open(thread / "stat", os.O_RDONLY))
         return files
 

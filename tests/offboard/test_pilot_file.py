@@ -128,7 +128,6 @@ BAD_TEXTS = [
     ("class Stop(BaseException): pass\nraise Stop(7)\n", "my_pilot.py:2: cannot be imported: Stop: 7"),
     ("raise KeyboardInterrupt\n", "my_pilot.py:1: cannot be imported: KeyboardInterrupt"),
     ("\n\n\nraise ValueError('two\\nlines')\n", "my_pilot.py:4: cannot be imported: ValueError: two lines"),
-    ("x = '\\0'\n".replace("\\0", "\0"), "my_pilot.py: Python syntax: "),
     (
         GOOD.replace("gains: Gains", "gains: Wings"),
         "a type in class MyPilot is unknown: NameError: name 'Win",
@@ -166,6 +165,8 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path):
     path = tmp_path / "latin.py"
     path.write_bytes(b"# \xe9\n")
     assert "is not UTF-8 text" in refusal(path)
+    path.write_text("x = 1\n", encoding="utf-16")
+    assert "is UTF-16 text, or no text; save it as UTF-8" in refusal(path)
     path.write_text("#" * 1_000_001, encoding="utf-8")
     assert "larger than 1 MB" in refusal(path)
 

@@ -21,6 +21,9 @@ def test_it_writes_a_file_that_can_be_flown(tmp_path, capsys):
     assert captured.out == ""
     assert str(path) in captured.err
     assert load_scenario(path) == random_scenario(load_level("calm"), 17)
+    assert run([*DRAW, "18", "--out", str(path)]) == 2
+    assert "is there already and is left as it is" in capsys.readouterr().err
+    assert load_scenario(path) == random_scenario(load_level("calm"), 17)
 
 
 def test_help_shows_how(capsys):

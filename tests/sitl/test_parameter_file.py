@@ -87,7 +87,7 @@ def test_a_wrong_line_is_named(path, line, complaint):
 
 def test_what_is_no_text_or_no_file_is_refused(path):
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ParameterFileError, match="is not a text"):
+    with pytest.raises(ParameterFileError, match="is UTF-16 text, or no text; save it as UTF-8"):
         load_parameters(path, Parameters())
     with pytest.raises(ParameterFileError, match="cannot be read"):
         load_parameters(path.parent, Parameters())
@@ -95,7 +95,7 @@ def test_what_is_no_text_or_no_file_is_refused(path):
 
 def test_a_file_that_cannot_be_written_leaves_what_was_there(path):
     path.mkdir()
-    with pytest.raises(ParameterFileError, match="cannot be written"):
+    with pytest.raises(ParameterFileError, match=r"cannot be read \(Is a directory\)"):
         keep(path, Parameters({"MIS_TAKEOFF_ALT": 1.5}))
     assert [each.name for each in path.parent.iterdir()] == [path.name]
 
@@ -152,8 +152,76 @@ async def test_saving_is_done_on_request_and_a_failure_is_said(path):
     await asyncio.sleep(0)
     assert parameters.save()
     await keeper.close()
-    (notice,) = notices
-    assert notice.startswith(f"parameters are not saved: {path}: cannot be written")
+    assert notices == [f"parameters are not saved: {path}: cannot be read (Is a directory)"]
+
+
+async def test_after_a_failure_the_next_save_has_all_that_was_set(path, monkeypatch):
+    monkeypatch.setattr(parameter_file, "SAVE_DELAY_S", 0.0)
+    path.write_text("MIS_TAKEOFF_ALT 4\n")
+    parameters, failed = Parameters(), asyncio.Event()
+    loop = asyncio.get_running_loop()
+    keeper = open_parameters(parameters, path, lambda _: loop.call_soon_threadsafe(failed.set))
+    keeper.start()
+    path.write_text("no parameters\n\0")
+    parameters.set("MIS_TAKEOFF_ALT", 6.0)
+    async with asyncio.timeout(10):
+        await failed.wait()
+    path.write_text("MIS_TAKEOFF_ALT 4\n")
+    parameters.set("RTL_RETURN_ALT", 20.0)
+    await keeper.close()
+    assert path.read_text() == "MIS_TAKEOFF_ALT 6\nRTL_RETURN_ALT\t20\n"
+
+
+EXPORT = (
+    "\ufeff# Onboard parameters of my drone\r\n"
+    "1\t1\tCAL_ACC0_XOFF\t0.031\t9\r\n"
+    "1\t1\tMPC_XY_CRUISE\t4.000000000000000000\t9\t# slow\r\n"
+    "\r\n"
+    "2\t1\tMPC_XY_CRUISE\t7\t9\r\n"
+    "1\t100\tMPC_XY_CRUISE\t9\t9\r\n"
+    "1\t1\tMAV_SYS_ID\t7\t6\r\n"
+    "1\t1\tRTL_RETURN_ALT\t20\t9"
+).encode()
+
+
+def test_a_real_drones_export_keeps_all_lines_but_the_values_that_changed(path):
+    path.write_bytes(EXPORT)
+    parameters = Parameters(load_parameters(path, Parameters()).values)
+    assert parameters.changed() == {"MPC_XY_CRUISE": 4.0, "RTL_RETURN_ALT": 20.0}
+    keep(path, parameters)
+    assert path.read_bytes() == EXPORT
+    parameters.set("MPC_XY_CRUISE", 2.5)
+    parameters.set("RTL_RETURN_ALT", parameters.declaration("RTL_RETURN_ALT").default)
+    parameters.set("COM_OBL_RC_ACT", 4)
+    keep(path, parameters)
+    wanted = EXPORT.replace(b"4.000000000000000000", b"2.5").replace(b"ALT\t20\t9", b"ALT\t30\t9\r\n")
+    assert path.read_bytes() == wanted + b"1\t1\tCOM_OBL_RC_ACT\t4\t6\r\n"
+    assert load_parameters(path, Parameters()).values == {
+        "MPC_XY_CRUISE": 2.5,
+        "RTL_RETURN_ALT": 30.0,
+        "COM_OBL_RC_ACT": 4,
+    }
+
+
+def test_lines_of_other_vehicles_are_named_and_not_those_of_this_one(path):
+    path.write_bytes(EXPORT)
+    loaded = load_parameters(path, Parameters(), system_id=2)
+    assert loaded.values == {"MPC_XY_CRUISE": 7.0}
+    assert loaded.notice() == (
+        "lines of other vehicles and components left out: 1 1, 1 100; this drone is 2 1, by --instance 1"
+    )
+
+
+async def test_what_a_user_edits_meanwhile_stays(path):
+    path.write_text("MIS_TAKEOFF_ALT 4\nRTL_RETURN_ALT 20\n")
+    parameters = Parameters()
+    keeper = open_parameters(parameters, path, pytest.fail)
+    keeper.start()
+    await asyncio.sleep(0)
+    path.write_text("MIS_TAKEOFF_ALT 9 # by hand\nRTL_RETURN_ALT 20\n")
+    parameters.set("RTL_RETURN_ALT", 25.0)
+    await keeper.close()
+    assert path.read_text() == "MIS_TAKEOFF_ALT 9 # by hand\nRTL_RETURN_ALT 25\n"
 
 
 def test_opening_takes_over_what_is_there_and_says_what_is_not(path):

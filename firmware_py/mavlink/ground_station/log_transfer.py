@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from firmware_py.mavlink.service import Service
-from firmware_py.storage import Path, Storage
+from firmware_py.storage import LOG_SUFFIX, Path, Storage
 from wire.dialect import Message, mavlink
 from wire.exchange import Exchange
 from wire.link import Link
@@ -168,6 +168,6 @@ class LogTransferService(Service):
                 logs += [
                     _Log((*folder, entry.name), entry.size, entry.modified_unix_s)
                     for entry in self._storage.entries(folder)
-                    if not entry.is_folder
+                    if not entry.is_folder and entry.name.endswith(LOG_SUFFIX)
                 ]
         return logs[:_MAX_LOGS]

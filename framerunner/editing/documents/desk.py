@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from errors.folders import resolved_in_folder
+from errors.files import read_text, resolved_in_folder
 from framerunner.editing.documents.open_document import OpenDocument, write_problem
 from framerunner.editing.words import Language, Said, SaidError
 from offboard.mission import MISSIONS, list_missions, new_mission
@@ -180,7 +180,7 @@ class EditorDesk:
         elif source == "example":
             (text,) = new_mission(name, self.folder, python=False).texts.values()
         elif source in list_missions():
-            text = (MISSIONS / f"{source}.yaml").read_text(encoding="utf-8")
+            text = read_text(MISSIONS / f"{source}.yaml")
             text = re.sub(rf"(?m)^name: {source}$", f"name: {name}", text, count=1)
         else:
             raise DeskError("desk.source", name=source[:80])

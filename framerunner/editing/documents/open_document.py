@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from secrets import token_urlsafe
 
 from errors import UserError, is_disk_full
-from errors.folders import read_in_folder, resolved_in_folder
+from errors.files import TextError, decode_text, read_in_folder, replace_file, resolved_in_folder
 from framerunner.editing.words import Said, SaidError
 from offboard.authoring import (
     Change,
@@ -96,11 +95,14 @@ class OpenDocument:
             raise SaidError("desk.not_read", name=path.name, reason=_words(error)) from None
         side = layout_path(path)
         try:
-            layout, problem = parse_layout(read_in_folder(side, MAX_LAYOUT_BYTES), side.name), ""
+            text = decode_text(read_in_folder(side, MAX_LAYOUT_BYTES))
+            layout, problem = parse_layout(text, side.name), ""
         except FileNotFoundError:
             layout, problem = Layout(), ""
         except OSError as error:
             layout, problem = Layout(), f"{side.name}: cannot be read: {_words(error)}"
+        except TextError as error:
+            layout, problem = Layout(), f"{side.name}: {error}"
         except LayoutError as error:
             layout, problem = Layout(), str(error)
         session = EditSession(document, layout)
@@ -229,7 +231,7 @@ class OpenDocument:
             if self.is_saved:
                 self.journal.unlink(missing_ok=True)
             else:
-                _replace(resolved_in_folder(self.journal), self.document.data)
+                replace_file(resolved_in_folder(self.journal), self.document.data)
         except OSError as error:
             known, self._journal_fails = self._journal_fails, True
             return None if known else Said("journal.not_written", reason=_words(error))
@@ -253,7 +255,7 @@ class OpenDocument:
             file = resolved_in_folder(self.path)  # a link stays one
             if not force and file.exists() and read_in_folder(file, MAX_FILE_BYTES) != self._saved:
                 raise SaveRefusedError("desk.changed", name=name)
-            _replace(file, self.document.data)
+            replace_file(file, self.document.data)
         except OSError as error:
             raise SaveRefusedError("desk.not_written", name=name, **write_problem(error)) from None
         self._saved = self.document.data
@@ -272,22 +274,6 @@ def write_problem(error: OSError) -> dict[str, object]:
     """Reason and advice of a file that cannot be written, for `desk.not_written`."""
     advice = "advice.space" if is_disk_full(error) else "advice.again"
     return {"reason": _words(error), "advice": Said(advice)}
-
-
-def _replace(file: Path, data: bytes) -> None:
-    """Write a file completely or not at all; it keeps its permissions. Raises OSError."""
-    part = file.with_name(f".{file.name}.part")
-    part.unlink(missing_ok=True)  # of a program that was killed
-    try:
-        with part.open("xb") as target:
-            target.write(data)
-        if file.exists():
-            part.chmod(file.stat().st_mode & 0o777)
-        os.replace(part, file)
-    except OSError:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
-        raise
 
 
 def _words(error: OSError) -> str:

@@ -245,13 +245,28 @@ def test_the_oldest_log_is_removed_and_a_full_storage_ends_logging_with_a_text()
     old = ("log", "2026-01-01", "00_00_00.ulg")
     storage.create(old)
     storage.write(old, 0, bytes(40_000))
+    note = ("log", "2025", "note.txt")
+    storage.make_folder(note[:-1])
+    storage.create(note)
     flight = Flight(storage).take_off(1.0).run(2.5)
     with pytest.raises(FileNotFoundError):
         storage.entry(old)
+    assert storage.entry(note)
     flight.run(4.0)
     assert flight.recorder.path is None
     assert any("Logging stopped" in text.text for text in flight.autopilot.take_texts())
     assert storage.entry(PATH).size <= 60_000
+
+
+def test_a_log_that_is_there_is_not_replaced():
+    storage = MemoryStorage()
+    for depth in (1, 2):
+        storage.make_folder(PATH[:depth])
+    storage.create(PATH)
+    storage.write(PATH, 0, b"of an earlier flight")
+    flight = Flight(storage).take_off(1.0).run(2.5)
+    assert storage.read(PATH, 0, 100) == b"of an earlier flight"
+    assert flight.recorder.path == (*PATH[:2], "13_33_20_2.ulg")
 
 
 def test_nothing_is_written_when_logging_is_off():

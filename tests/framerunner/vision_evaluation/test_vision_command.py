@@ -38,6 +38,9 @@ def test_the_data_set_has_what_is_in_each_image(tmp_path):
         assert len(entry["frames"]) == 5
         for frame in entry["frames"]:
             assert len(frame["corners_px"]) in (0, 4)
+    before = (tmp_path / "labels.json").read_bytes()
+    assert run(["vision", "dataset", str(tmp_path), *options]) == 2
+    assert (tmp_path / "labels.json").read_bytes() == before
 
 
 @pytest.mark.parametrize(

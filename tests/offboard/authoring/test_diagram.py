@@ -108,6 +108,13 @@ def test_positions_are_beside_the_mission_and_follow_it(tmp_path):
     assert write_layout(path, layout) == layout_path(path) == tmp_path / "mission.layout.json"
     assert read_layout(path) == layout
     assert path.read_bytes() == document.data
+    later = layout_path(path).read_text().replace('"version": 1', '"version": 2')
+    layout_path(path).write_text(later)
+    with pytest.raises(LayoutError, match="version: "):
+        write_layout(path, Layout())
+    assert layout_path(path).read_text() == later
+    layout_path(path).unlink()
+    write_layout(path, layout)
     assert len(layout_path(path).read_text().splitlines()) == len(boxes) + 8
 
     rename = parse_edit({"kind": "rename_state", "state": "@cross_frame.turning", "name": "rotating"})

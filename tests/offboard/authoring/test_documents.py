@@ -51,8 +51,10 @@ def test_any_text_is_a_document_and_is_saved_to_the_byte(text):
 
 
 def test_what_is_no_text_is_refused_in_one_line(tmp_path):
-    with pytest.raises(MissionError, match=r"m\.yaml: cannot be read: is not UTF-8 text"):
+    with pytest.raises(MissionError, match=r"m\.yaml: cannot be read: is UTF-16 text, or no text"):
         Document.from_bytes(b"\xff\xfe\x00", "m.yaml")
+    with pytest.raises(MissionError, match=r"m\.yaml:2: cannot be read: is not UTF-8 text"):
+        Document.from_bytes(b"name: a\n# \xe9", "m.yaml")
     with pytest.raises(MissionError, match="is larger than 1 MB"):
         Document.from_bytes(b"#" * 1_000_001, "m.yaml")
     with pytest.raises(MissionError, match=r"none\.yaml: cannot be read: No such file"):

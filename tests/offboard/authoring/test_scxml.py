@@ -142,6 +142,12 @@ REFUSED = [
         "hides those of <state> 'a'",
     ),
     ("", "there is no <state>"),
+    (
+        "<state id='a'><transition event='tick' cond=\"In('a') &amp;&amp; true\" target='a'/></state>",
+        "line 2: 'In('a') and True': calls are not possible",
+    ),
+    ("<state id='a'><onentry><script>goal_m = f(1)</script></onentry></state>", "calls are not possible"),
+    ("<state id='a'><onentry><assign location='goal_m' expr='x[0]'/></onentry></state>", "line 2: 'x[0]': "),
 ]
 
 
@@ -193,3 +199,16 @@ def test_the_commands(tmp_path, capsys, monkeypatch):
     assert run(["mission", "import", "e.scxml", "--out", "e.yaml"]) == 2
     assert "is there already" in capsys.readouterr().err
     assert run(["mission", "import", "none.scxml"]) == 2
+
+
+def test_nothing_is_written_of_what_the_checker_refuses(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    action = "<onentry><script>hoover()</script></onentry>"
+    (tmp_path / "e.scxml").write_text(f"{HEAD}><state id='a'>{action}</state></scxml>")
+    assert run(["mission", "import", "e.scxml", "--out", "e.yaml"]) == 2
+    assert run(["mission", "import", "e.scxml"]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "unknown action 'hoover'; did you mean 'hover'?" in said.err
+    assert "e.scxml: nothing was written; correct it there, or give --pilot" in said.err
+    assert not (tmp_path / "e.yaml").exists()

@@ -1,0 +1,141 @@
+"""Calibrations of other programs: ROS's camera_info, and OpenCV's FileStorage (YAML, XML, JSON).
+
+They have OpenCV's conventions too: whole numbers are pixel centres, and the distortion is k1, k2, p1, p2, k3.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
+
+import cv2
+import yaml
+from pydantic import ValidationError
+
+from vision.calibration.model import Calibration, CalibrationError
+
+_Field: TypeAlias = "str | Sequence[float]"  # a matrix row by row; a number is a list of one
+
+_OPENCV = re.compile(r"\s*%YAML:1\.0|.*?(?:opencv[-_]matrix|<opencv_storage>)", re.DOTALL)
+_ROS = re.compile(r"^(?:camera_matrix|distortion_model)\s*:", re.MULTILINE)
+_MATRIX = ("cameramatrix", "intrinsicmatrix", "k", "mtx")
+_DISTORTION = ("distortioncoefficients", "distcoeffs", "distortion", "d", "dist")
+_LENSES = ("plumb_bob", "rational_polynomial", "brown-conrady")
+_COEFFICIENTS = 5
+_RADIAL = 4  # without k3
+
+
+def foreign_format(text: str) -> str:
+    """Name of the format if a text is a calibration of another program, else empty."""
+    if _OPENCV.match(text):
+        return "OpenCV's FileStorage"
+    return "ROS's camera_info" if _ROS.search(text) else ""
+
+
+def read_foreign(text: str, source: str) -> Calibration:
+    """The calibration in a text of which `foreign_format` knows the format.
+
+    Args:
+        text: of the file.
+        source: its name in messages.
+
+    Raises:
+        CalibrationError: it is not readable, something is missing, or the lens is of another kind.
+    """
+    kind = foreign_format(text)
+    try:
+        fields = _opencv_fields(text) if _OPENCV.match(text) else _ros_fields(text)
+        return _calibration(fields)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        where = ".".join(map(str, fault["loc"]))
+        raise CalibrationError(
+            f"{source}: {kind}: {where}: {fault['msg']} (got {fault['input']!r:.60})"
+        ) from None
+    except (cv2.error, SystemError):  # SystemError: of its constructor
+        raise CalibrationError(f"{source}: {kind}: cannot be read; it is damaged") from None
+    except (ValueError, TypeError, AttributeError, RecursionError, yaml.YAMLError) as error:
+        reason = str(error).strip().splitlines() or ["it is damaged"]
+        raise CalibrationError(f"{source}: {kind}: {reason[0]:.200}") from None
+
+
+def _opencv_fields(text: str) -> dict[str, _Field]:
+    storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+    try:
+        root = storage.root()
+        found: dict[str, _Field] = {}
+        for name in root.keys():  # noqa: SIM118 - OpenCV's node is no mapping
+            node = root.getNode(name)
+            if node.isInt() or node.isReal():
+                found[name] = [node.real()]
+            elif node.isString():
+                found[name] = node.string()
+            elif node.isSeq():
+                found[name] = [node.at(number).real() for number in range(node.size())]
+            elif node.isMap() and node.mat() is not None:
+                found[name] = [float(each) for each in node.mat().ravel()]
+        return found
+    finally:
+        storage.release()
+
+
+def _ros_fields(text: str) -> dict[str, _Field]:
+    found: dict[str, _Field] = {}
+    for name, value in yaml.safe_load(text).items():
+        if isinstance(value, Mapping) and isinstance(value.get("data"), list):
+            found[name] = [float(each) for each in value["data"]]
+        elif isinstance(value, int | float):
+            found[name] = [float(value)]
+        elif isinstance(value, str):
+            found[name] = value
+    return found
+
+
+def _calibration(fields: Mapping[str, _Field]) -> Calibration:
+    plain = {re.sub(r"[^a-z]", "", name.lower()): value for name, value in fields.items()}
+    lens = fields.get("distortion_model", _LENSES[0])
+    if lens not in _LENSES or _numbers(plain, ("fisheyemodel",), [0.0])[0]:
+        known = "plumb_bob or rational_polynomial"
+        raise ValueError(
+            f"the lens is {lens if lens not in _LENSES else 'fisheye'}; only {known} is understood"
+        )
+    size = _numbers(plain, ("imagesize",), [])
+    width, height = (
+        size
+        if len(size) == 2
+        else (
+            _numbers(plain, ("imagewidth", "width"), None, "image_width")[0],
+            _numbers(plain, ("imageheight", "height"), None, "image_height")[0],
+        )
+    )
+    matrix = _numbers(plain, _MATRIX, None, "camera_matrix")
+    if len(matrix) != 9 or [matrix[each] for each in (1, 3, 6, 7, 8)] != [0, 0, 0, 0, 1]:
+        raise ValueError("camera_matrix: must be fx 0 cx, 0 fy cy, 0 0 1")
+    distortion = _numbers(plain, _DISTORTION, None, "distortion_coefficients")
+    if len(distortion) < _RADIAL or any(distortion[_COEFFICIENTS:]):
+        raise ValueError(
+            f"distortion_coefficients: has {len(distortion)}; must be k1, k2, p1, p2, k3, and all others 0"
+        )
+    return Calibration.model_validate(
+        {
+            "width_px": width,
+            "height_px": height,
+            "fx_px": matrix[0],
+            "fy_px": matrix[4],
+            "cx_px": matrix[2],
+            "cy_px": matrix[5],
+            "distortion": (*distortion[:_COEFFICIENTS], 0.0)[:_COEFFICIENTS],
+        }
+    )
+
+
+def _numbers(
+    fields: Mapping[str, _Field], names: Sequence[str], default: Sequence[float] | None, shown: str = ""
+) -> Sequence[float]:
+    value = next((fields[name] for name in names if name in fields), default)
+    if value is None:
+        raise ValueError(f"{shown} is missing; add it")
+    if isinstance(value, str):
+        raise ValueError(f"{shown or names[0]} is '{value}'; must be a number")
+    return value
