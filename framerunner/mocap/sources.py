@@ -71,13 +71,13 @@ class PoseSource(Protocol):
 class SourceClock:
     """Converts a source's time stamps into this program's time, and leaves out poses with wrong ones.
 
-    The usual difference between arrival and time stamp stands for a way without queues, whose length cannot be
-    measured from here: a pose counts as taken when it would have arrived by it. What remains is the constant
-    delay of the motion capture.
+    The usual difference between arrival and time stamp stands for a way without queues, whose length cannot
+    be measured from here: a pose counts as taken when it would have arrived by it. What remains is the
+    constant delay of the motion capture.
 
-    The usual difference stays between the least and a low quantile of those of the last `_SPAN_S`. So a single
-    one does not change it, and a step of the source's clock does after that time. Until then the poses are as
-    late as those from a queue, which come faster than their stamps and never change it.
+    The usual difference stays between the least and a low quantile of those of the last `_SPAN_S`. So a
+    single one does not change it, and a step of the source's clock does after that time. Until then the poses
+    are as late as those from a queue, which come faster than their stamps and never change it.
     """
 
     def __init__(self) -> None:
@@ -158,7 +158,7 @@ class UdpSource:
     def poll(self, now_s: float) -> list[TimedPose]:
         """Those that have arrived; a line that is no pose is counted."""
         found = []
-        while data := self._socket.read():
+        for data, _ in self._socket.read_all():
             for line in data.splitlines():
                 if not line.strip():
                     continue

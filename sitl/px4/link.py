@@ -44,7 +44,7 @@ class _Candidate:
     def read(self) -> bool:
         """Read what has arrived; whether the connection is still open."""
         try:
-            for _ in self.reader.feed(self.stream.read()):
+            for _ in self.reader.feed(self.stream.read() or b""):
                 pass  # there was no HIL_SENSOR that it could answer
         except OSError:
             return False

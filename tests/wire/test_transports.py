@@ -99,7 +99,7 @@ def test_what_is_not_read_waits_up_to_a_limit_and_is_then_lost_whole():
     assert len(client._unsent) <= MAX_UNSENT_BYTES
     received = bytearray()
     while (data := server.read()) or client.has_unsent():
-        received += data
+        received += data or b""
         client.flush()
     assert received == packet * (len(received) // len(packet))
     client.close()
@@ -114,17 +114,17 @@ def test_what_is_not_read_waits_up_to_a_limit_and_is_then_lost_whole():
 def test_one_client_after_the_other():
     server = OneClient(listen_tcp(("127.0.0.1", 0)))
     place = server._listener.getsockname()
-    assert server.read() == b""
+    assert server.read() is None
     server.write(b"to nobody")
     first, second = connect_tcp(place), connect_tcp(place)
-    assert server.read() == b""  # lets the first in
+    assert server.read() is None  # lets the first in
     first.write(b"a")
     second.write(b"b")
-    assert (server.read(), server.read()) == (b"a", b"")
+    assert (server.read(), server.read()) == (b"a", None)
     server.write(b"c")
     assert first.read() == b"c"
     first.close()
-    assert (server.read(), server.read(), server.read()) == (b"", b"", b"b")
+    assert (server.read(), server.read(), server.read()) == (None, None, b"b")
     second.close()
     server.close()
 
@@ -135,11 +135,26 @@ def test_of_a_flood_of_datagrams_so_many_are_read_at_once():
     first, other = connect_udp(place), connect_udp(place)
     assert listening.read_all() == []
     first.write(b"a")
-    for number in range(MAX_DATAGRAMS_AT_ONCE):
+    other.write(b"")  # is a datagram, too
+    for number in range(1, MAX_DATAGRAMS_AT_ONCE):
         other.write(bytes([number]))
     read = listening.read_all()
-    assert read[:2] == [(b"a", first._socket.getsockname()), (b"\0", other._socket.getsockname())]
+    assert read[:2] == [(b"a", first._socket.getsockname()), (b"", other._socket.getsockname())]
     assert len(read) == MAX_DATAGRAMS_AT_ONCE
     assert [data for data, _ in listening.read_all()] == [bytes([MAX_DATAGRAMS_AT_ONCE - 1])]
     for each in (listening, first, other):
+        each.close()
+
+
+def test_a_datagram_behind_the_refusal_of_one_that_was_sent_is_read():
+    listening = bind_udp(("127.0.0.1", 0), "")
+    place = listening._socket.getsockname()
+    client = connect_udp(place)
+    mine = client._socket.getsockname()
+    listening.close()
+    client.write(b"to nobody")  # refused, which the next call reports
+    again = bind_udp(place, "")
+    again.write(b"a", mine)
+    assert (client.read(), client.read()) == (b"a", None)
+    for each in (client, again):
         each.close()

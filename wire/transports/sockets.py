@@ -1,9 +1,10 @@
 """UDP, TCP and serial lines as transports of bytes that never block.
 
 A thread waits for them with `select.poll`, an asyncio loop with `add_reader`; both by `fileno`, which may
-change with each `read`. `read` returns b"" when nothing was received and raises `OSError` when the link is
-closed. A write that cannot be sent is dropped as a whole without an error, as on a radio. Functions that open
-something raise `LinkError`: one line with what cannot be opened, why, and what to do.
+change with each `read`. `read` returns None when nothing was received, which an empty datagram (b"") is not,
+and raises `OSError` when the link is closed. A write that cannot be sent is dropped as a whole without an
+error, as on a radio. Functions that open something raise `LinkError`: one line with what cannot be opened,
+why, and what to do.
 """
 
 from __future__ import annotations
@@ -40,18 +41,23 @@ class UdpSocket:
         """The descriptor to wait for."""
         return self._socket.fileno()
 
-    def read(self) -> bytes:
-        """The next datagram."""
-        try:
-            data, self.peer = self._socket.recvfrom(_READ_BYTES)
-        except (BlockingIOError, ConnectionRefusedError):  # refused: nothing listens there yet
-            return b""
-        return data
+    def read(self) -> bytes | None:
+        """The next datagram, which may be empty."""
+        for _ in range(MAX_DATAGRAMS_AT_ONCE):
+            try:
+                data, self.peer = self._socket.recvfrom(_READ_BYTES)
+            except BlockingIOError:
+                return None
+            except ConnectionRefusedError:  # of something that was sent; datagrams may wait behind it
+                continue
+            return data
+        return None
 
     def read_all(self) -> list[tuple[bytes, Address]]:
         """The datagrams that wait, with their senders, the oldest first; `MAX_DATAGRAMS_AT_ONCE` at most."""
         found: list[tuple[bytes, Address]] = []
-        while len(found) < MAX_DATAGRAMS_AT_ONCE and (data := self.read()) and self.peer is not None:
+        while len(found) < MAX_DATAGRAMS_AT_ONCE and (data := self.read()) is not None:
+            assert self.peer is not None, "it has sent the datagram"
             found.append((data, self.peer))
         return found
 
@@ -92,14 +98,14 @@ class Stream:
         """The descriptor to wait for."""
         return self._descriptor
 
-    def read(self) -> bytes:
+    def read(self) -> bytes | None:
         """The next bytes; unsent bytes are sent first."""
         if self._unsent:
             self.flush()
         try:
             data = os.read(self._descriptor, _READ_BYTES)
         except BlockingIOError:
-            return b""
+            return None
         if not data:
             why = "the serial line is gone" if self.peer is None else "the other side closed the connection"
             raise ConnectionResetError(errno.ECONNRESET, why)
@@ -141,7 +147,7 @@ class OneClient:
         """The descriptor to wait for: the client's or, without one, the listener's."""
         return (self._client or self._listener).fileno()
 
-    def read(self) -> bytes:
+    def read(self) -> bytes | None:
         """The client's next bytes; accepts the next client when that has closed the connection."""
         try:
             if self._client is not None:
@@ -154,7 +160,7 @@ class OneClient:
             if self._client is not None:
                 self._client.close()
             self._client = None
-        return b""
+        return None
 
     def write(self, data: bytes) -> None:
         """Send bytes to the client."""

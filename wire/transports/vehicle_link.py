@@ -51,7 +51,7 @@ class VehicleLink:
             data = transport.read()
         except OSError as error:
             raise LinkError(f"{self.url} failed: {error.strerror or error}") from None
-        messages = self._reader.feed(data)
+        messages = self._reader.feed(data) if data else []
         if transport.peer is not None:
             for message in messages:
                 self._peers[message.get_srcSystem()] = transport.peer
