@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 PASSWORD_VARIABLE = "FRAMERUNNER_JUDGE_PASSWORD"
 MISSIONS = Path("missions")
-DATABASE = "sqlite:///framerunner.db"
+DATABASE_FILE = Path("framerunner.db")
+DATABASE = f"sqlite:///{DATABASE_FILE}"
 _OPEN_FILES = 4096
 _NICENESS = 5  # beside a flight, which the monitor must not slow down
 # The doctor has 247, the virtual camera 246, MAVSDK 245, other ground stations 255.
