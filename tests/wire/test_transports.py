@@ -13,7 +13,7 @@ from wire.transports.sockets import (
     connect_udp,
     listen_tcp,
 )
-from wire.transports.urls import LinkError, LinkUrl, UrlRules, host_and_port, is_loopback, parse_url
+from wire.transports.urls import LinkError, LinkUrl, UrlRules, host_and_port, in_url, is_loopback, parse_url
 
 
 @pytest.mark.parametrize(
@@ -67,9 +67,23 @@ def test_a_program_has_rules_for_what_it_accepts():
 def test_hosts_with_and_without_port():
     assert host_and_port("station", 14550) == ("station", 14550)
     assert host_and_port("10.0.0.1:14999", 14550) == ("10.0.0.1", 14999)
+    assert host_and_port("::1", 14550) == host_and_port("[::1]", 14550) == ("::1", 14550)
+    assert host_and_port("[fe80::1%eth0]:14999", 14550) == ("fe80::1%eth0", 14999)
     for bad in ("a:", ":5", "a:b", "a:70000", "a:0"):
         with pytest.raises(LinkError):
             host_and_port(bad, 14550)
+
+
+def test_hosts_in_urls():
+    assert in_url("10.0.0.1", 8100) == "10.0.0.1:8100"
+    assert in_url("::1", 8100) == "[::1]:8100"
+    assert in_url("fe80::1%eth0", 8100) == "[fe80::1%25eth0]:8100"
+
+
+@pytest.mark.parametrize("url", ["udpin://[::1]:1", "udpin://::1:1", "udpout://[::1]:1", "tcpout://[::1]:1"])
+def test_ipv6_is_refused_because_mavsdk_does_not_know_it(url):
+    with pytest.raises(LinkError, match=r"links go by IPv4; give an IPv4 address instead of \[?::1"):
+        parse_url(url)
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import cast
 
-from wire.transports.urls import LinkError, LinkUrl
+from wire.transports.urls import LinkError, LinkUrl, in_url
 
 Address = tuple[str, int]
 
@@ -183,7 +183,7 @@ def bind_udp(place: Address, advice: str, *, gives_way: bool = False) -> UdpSock
         gives_way: whether a program that binds the same address later, as MAVSDK does (SO_REUSEADDR),
             receives instead of this one.
     """
-    with _explained(f"UDP {_name(place)} cannot be opened", advice):
+    with _explained(f"UDP {in_url(*place)} cannot be opened", advice):
         family, address = _local(place, socket.SOCK_DGRAM)
         opened = socket.socket(family, socket.SOCK_DGRAM)
         try:
@@ -200,7 +200,7 @@ def connect_udp(place: Address) -> UdpSocket:
     """A UDP socket that sends to one address and receives only from there."""
     address = resolved_ipv4(place)
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    with _explained(f"UDP {_name(place)} cannot be sent to", "check host and network"):
+    with _explained(f"UDP {in_url(*place)} cannot be sent to", "check host and network"):
         try:
             opened.connect(address)
         except OSError:
@@ -211,7 +211,7 @@ def connect_udp(place: Address) -> UdpSocket:
 
 def resolved_ipv4(place: Address, what: str = "UDP") -> Address:
     """Look up the address of a name once: `sendto` would look it up, blocking, for every packet."""
-    with _explained(f"{what} {_name(place)} cannot be sent to", "give a host's name or an IPv4 address"):
+    with _explained(f"{what} {in_url(*place)} cannot be sent to", "give a host's name or an IPv4 address"):
         found = socket.getaddrinfo(*place, family=socket.AF_INET, type=socket.SOCK_DGRAM)
     return cast(Address, found[0][4])
 
@@ -223,7 +223,7 @@ def listen_tcp(place: Address, advice: str = "choose another port") -> socket.so
         place: the local address.
         advice: what to do when the port is taken.
     """
-    with _explained(f"TCP {_name(place)} cannot be listened on", advice):
+    with _explained(f"TCP {in_url(*place)} cannot be listened on", advice):
         family, address = _local(place, socket.SOCK_STREAM)
         listener = socket.create_server(address, family=family)
     listener.setblocking(False)
@@ -232,7 +232,7 @@ def listen_tcp(place: Address, advice: str = "choose another port") -> socket.so
 
 def connect_tcp(place: Address) -> Stream:
     """Connect to a TCP server; waits five seconds at most."""
-    with _explained(f"TCP {_name(place)} cannot be connected to", "is the server running?"):
+    with _explained(f"TCP {in_url(*place)} cannot be connected to", "is the server running?"):
         connection = socket.create_connection(place, _CONNECT_S)
         return Stream.of(connection, connection.getpeername())
 
@@ -291,10 +291,6 @@ def _local(place: Address, kind: socket.SocketKind) -> tuple[socket.AddressFamil
     found = socket.getaddrinfo(*place, type=kind, flags=socket.AI_PASSIVE)
     family, _, _, _, address = min(found, key=lambda each: each[0] != socket.AF_INET)
     return family, cast(Address, address)
-
-
-def _name(place: Address) -> str:
-    return f"{place[0]}:{place[1]}"
 
 
 @contextmanager
