@@ -20,6 +20,9 @@ from scenarios.models import Scenario
 from scenarios.result import FlightResult
 
 
+_RESERVED_BYTES = 1 << 16  # more than a result has
+
+
 class RunFolder:
     """`<out>/<time>-<scenario>/`, made when a flight begins.
 
@@ -55,6 +58,7 @@ class RunFolder:
             ) from None
         self.path = path
         self.result = path / "result.json"
+        self._part = self.result.with_suffix(".part")
         self.track = path / "track.png"
         self.tlog = path / "flight.tlog"
         self.video = path / "video.avi"
@@ -68,6 +72,8 @@ class RunFolder:
     def write_plan(self, scenario: Scenario, mission: Mission) -> None:
         """Write what is to be flown, so that the flight can be judged, replayed and flown again.
 
+        Room for the result is reserved: recordings and videos may fill the disk during the flight.
+
         Raises:
             SettingError: it cannot be written.
         """
@@ -77,6 +83,7 @@ class RunFolder:
             self.mission.write_bytes(source)
             if isinstance(mission.pilot, PilotFile):
                 self.pilot.write_text(mission.pilot.text, encoding="utf-8")
+            self._part.write_bytes(bytes(_RESERVED_BYTES))
         except OSError as error:
             raise SettingError(
                 f"--out {self.path.parent}: cannot be written to ({error.strerror}); {write_advice(error)}"
@@ -88,12 +95,14 @@ class RunFolder:
         Raises:
             OSError: it cannot be written.
         """
-        part = self.result.with_suffix(".part")
+        data = result.text().encode()
         try:
-            part.write_text(result.text(), encoding="utf-8")
-            os.replace(part, self.result)
+            with self._part.open("r+b" if self._part.exists() else "wb") as file:
+                file.write(data)  # into the room that is reserved
+                file.truncate()
+            os.replace(self._part, self.result)
         except OSError:
-            part.unlink(missing_ok=True)
+            self._part.unlink(missing_ok=True)
             raise
 
     def remove_if_empty(self) -> None:
@@ -101,6 +110,7 @@ class RunFolder:
 
         If the flight was stopped before its first tick, all is removed, also `out` if it was made for it.
         """
+        self._part.unlink(missing_ok=True)
         for path in self.path.iterdir():
             if path.is_dir():  # of PX4, with its log
                 continue
@@ -115,10 +125,10 @@ class RunFolder:
                     self.path.parent.rmdir()
 
 
-def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: FlightResult) -> None:
+def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: FlightResult) -> bool:
     """Write `result.json` and `track.png`; report on standard error what could not be written.
 
-    The scenario must have its frames where they were in this flight.
+    The scenario must have its frames where they were in this flight. Returns whether `result.json` is there.
     """
 
     def plot() -> None:
@@ -128,6 +138,7 @@ def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: F
 
     _try(folder.result, lambda: folder.write_result(result))
     _try(folder.track, plot)
+    return folder.result.exists()
 
 
 def warn(problem: str) -> None:
