@@ -19,7 +19,6 @@ from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 from scenarios.result import FlightResult
 
-
 _RESERVED_BYTES = 1 << 16  # more than a result has
 
 
