@@ -65,6 +65,9 @@ def _reserve_file(mark: Path, user: str) -> tuple[str, Callable[[], None]]:
         other = os.pread(descriptor, _MAX_HOLDER_BYTES, 0).decode(errors="replace").strip()
         os.close(descriptor)
         return other or "another monitor", lambda: None
+    except OSError as error:  # this file system knows no locks
+        os.close(descriptor)
+        raise OSError(error.errno, error.strerror, str(mark)) from None
     os.ftruncate(descriptor, 0)
     os.pwrite(descriptor, f"{user}\n".encode()[:_MAX_HOLDER_BYTES], 0)
     return "", lambda: os.close(descriptor)
