@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import ifaddr
 import segno
 
-from wire.transports.urls import is_loopback
+from wire.transports.urls import in_url, is_loopback
 
 # Networks within this machine, of containers and virtual machines: no phone is in them.
 _VIRTUAL = ("docker", "br-", "veth", "virbr", "lxc", "lxdbr", "cni", "podman", "vmnet", "vboxnet")
@@ -24,7 +24,7 @@ _PLAIN = "\x1b[0m"
 
 def url_of(host: str, port: int, scheme: str = "http") -> str:
     """URL of the monitor's first page."""
-    return f"{scheme}://[{host}]:{port}/" if ":" in host else f"{scheme}://{host}:{port}/"
+    return f"{scheme}://{in_url(host, port)}/"
 
 
 def urls_for_people(host: str, port: int, scheme: str = "http") -> list[str]:

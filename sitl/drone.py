@@ -19,6 +19,7 @@ from sitl.streaming.drone_video import DroneVideo
 from sitl.streaming.streams import video_streams
 from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink
+from wire.transports.urls import in_url
 
 
 class ServedDrone:
@@ -152,6 +153,6 @@ class ServedDrone:
         assert settings.onboard.remote is not None
         assert settings.ground.remote is not None
         ports = f"{settings.onboard.remote[1]} and {settings.ground.remote[1]}"
-        page = f"http://{settings.bind}:{settings.http_port}/"
+        page = f"http://{in_url(settings.bind, settings.http_port)}/"
         rtp = "" if settings.video_rtp is None else f" and as RTP to UDP {settings.video_rtp[1]}"
         return f"{scenario.airframe} in {scenario.name}: MAVLink to UDP {ports}, video on {page}{rtp}"

@@ -10,7 +10,7 @@ from firmware_py.mavlink.telemetry.profiles import GROUND, NORMAL, ONBOARD
 from sitl.links import UdpAddresses
 from wire.link import LinkProfile
 from wire.signing import SigningKey
-from wire.transports.sockets import Address
+from wire.transports.sockets import Address, resolved_ipv4
 from wire.transports.urls import MAX_PORT, LinkError, LinkUrl, UrlRules, host_and_port, is_loopback, parse_url
 
 _LAST_ONBOARD_PORT = 14549  # PX4 sends all instances beyond the tenth there
@@ -135,11 +135,18 @@ class ServerSettings:
         return self.signing_key is None and not all(link.trusted for link in links)
 
     def check(self, count: int) -> None:
-        """Check the ports of all drones.
+        """Check the address that is listened on and the ports of all drones.
 
         Raises:
-            LinkError: one is too large.
+            LinkError: there is no such IPv4 address, or a port is too large.
         """
+        try:
+            resolved_ipv4((self.bind, self.http_port))
+        except LinkError:
+            raise LinkError(
+                f"--bind {self.bind}: is no IPv4 address, by which MAVLink is sent; give one of this "
+                "machine, such as 127.0.0.1, or 0.0.0.0 for all networks"
+            ) from None
         for by in range(count):
             drone = self.shifted(by)
             ports = [addresses.remote for _, addresses in drone.default_links]

@@ -24,6 +24,7 @@ from errors import UserError
 from wire.finite_json import finite
 from wire.mjpeg import STREAM_HEADERS, STREAM_START, write_part
 from wire.simulator_api import VIDEO_PATH
+from wire.transports.urls import in_url
 
 if TYPE_CHECKING:
     from aiohttp import web
@@ -110,8 +111,7 @@ class VideoServer:
     @property
     def url(self) -> str:
         """Address of the page."""
-        host = f"[{self._host}]" if ":" in self._host else self._host
-        return f"http://{host}:{self._port}/"
+        return f"http://{in_url(self._host, self._port)}/"
 
     def add_json(self, path: str, provider: JsonProvider) -> None:
         """Serve a JSON document at a path that begins with "/".

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import webbrowser
 from pathlib import Path
@@ -50,7 +51,7 @@ def edit(
         framerunner edit my_mission.yaml --pilot my_pilot.py
     """
     check_range("--port", port, 0, 65535)
-    from framerunner.commands.monitor import DATABASE, equipment
+    from framerunner.commands.monitor import equipment
     from framerunner.editing.documents.desk import EditorDesk
     from monitor.run import serve
     from monitor.settings import MonitorSettings
@@ -65,7 +66,7 @@ def edit(
             say(f"made: {folder / EditorDesk(folder).create(mission.stem, source)}")
         path = f"edit?file={quote(mission.name)}"
     given = equipment(url, None, Path("runs"), missions=folder, pilot=pilot)
-    settings = MonitorSettings("127.0.0.1", port, DATABASE)
+    settings = MonitorSettings("127.0.0.1", port, _database())
 
     def hear(words: str) -> None:
         say(words)
@@ -77,6 +78,18 @@ def edit(
 
     asyncio.run(serve(given, settings, hear))
     return 0
+
+
+def _database() -> str:
+    """The contest's, or one in memory if a monitor uses that: an editor is useful without it."""
+    from framerunner.commands.monitor import DATABASE, DATABASE_FILE
+    from monitor.competition.sole_user import user_of
+
+    with contextlib.suppress(OSError):  # opening the database tells why
+        if user := user_of(DATABASE_FILE):
+            say(f"{user} uses {DATABASE_FILE}: teams and tries in this editor are not kept")
+            return "sqlite://"
+    return DATABASE
 
 
 def _drone_url(given: str | None) -> str:

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 MISSIONS = Path("missions")
 PUPILS_FILE = "course-pupils.json"  # in the folder of missions
-DATABASE = "sqlite:///framerunner.db"
+DATABASE_FILE = Path("framerunner.db")
+DATABASE = f"sqlite:///{DATABASE_FILE}"
 _OPEN_FILES = 4096
 _NICENESS = 5  # beside a flight, which the monitor must not slow down
 # The doctor has 247, the virtual camera 246, MAVSDK 245, other ground stations 255.

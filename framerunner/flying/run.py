@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from offboard.link.process_guard import ProcessGuard
 
 _INTERRUPTED_CODE = 130
+_NOT_KEPT_CODE = 2  # there is a warning why
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,10 @@ class FlightSettings:
 
 
 async def fly_once(settings: FlightSettings) -> int:
-    """Fly, judge, write; returns 0 if completed, 1 if flown but not completed, 130 after Ctrl-C.
+    """Fly, judge, write.
+
+    Returns:
+        0 if completed, 1 if flown but not completed, 2 if the result could not be written, 130 after Ctrl-C.
 
     Raises:
         DroneError: the drone cannot be reached or made ready.
@@ -95,7 +99,7 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
                 raise
             records.stop_keeping()
             result = records.complete(flown.result)
-            write_outcome(folder, flown.layout, flown.track, result)
+            is_kept = write_outcome(folder, flown.layout, flown.track, result)
             records.finish(flown.result, flown.track)
         if recording is not None:
             warn(recording.problem)
@@ -109,6 +113,8 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
     print("\n".join(lines), flush=True)
     if flown.outcome.interrupted:
         return _INTERRUPTED_CODE
+    if not is_kept:
+        return _NOT_KEPT_CODE
     if is_dry:
         return 1 if flown.outcome.ended == "aborted" else 0
     return 0 if result.completed else 1

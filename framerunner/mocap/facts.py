@@ -79,7 +79,7 @@ class Facts:
         dropouts: how often the source stopped.
         worst_ratio: largest innovation ratio of position and height.
         converts_stamps: the vehicle has got enough answers to TIMESYNC to convert time stamps.
-        faults: lines of the source that were no poses.
+        faults: lines of the source that were left out.
         fault: what was wrong with the last of them.
         settings: how poses are sent.
         has_velocity: the source gives velocities.

@@ -73,7 +73,7 @@ def _sent(facts: Facts) -> Iterator[Finding]:
         yield good("poses", words)
     if facts.faults:
         yield note(
-            "source", f"{facts.faults} lines were no poses; the last: {facts.fault}", "correct the sender"
+            "source", f"{facts.faults} lines were left out; the last: {facts.fault}", "correct the sender"
         )
 
 

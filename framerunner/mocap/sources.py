@@ -6,7 +6,7 @@ import socket
 import sys
 from collections import deque
 from dataclasses import dataclass
-from math import cos, isnan, radians
+from math import cos, inf, isnan, radians
 from pathlib import Path
 from random import Random
 from subprocess import DEVNULL, PIPE, Popen, TimeoutExpired
@@ -22,8 +22,12 @@ from wire.transports.sockets import UdpSocket, bind_udp
 from wire.transports.urls import UrlRules, parse_url
 
 _METRES = 111_319.5e-7  # a unit of latitude, 1e-7 degrees
-_OFFSET_SPAN_S = 10.0
-_JUMP_S = 1.0
+_SPAN_S = 0.4  # in which a step of the source's clock is followed
+_LOW = 0.2  # share of the differences that may be wrong without an effect
+_QUEUED = 0.3  # poses that come faster than their stamps by more than this share come from a queue
+_GAP_S = 0.2  # a longer time without poses counts as this long
+MAX_LATE_S = 0.1  # of a pose that is used
+_MAX_DIFFERENCES = 400
 _END_S = 2.0
 _STREAM = UrlRules("bad source '{}'", "udpin://0.0.0.0:9870, poses.csv, sitl, optitrack://192.168.1.5")
 
@@ -65,29 +69,39 @@ class PoseSource(Protocol):
 
 
 class SourceClock:
-    """Converts a source's time stamps into this program's time.
+    """Converts a source's time stamps into this program's time, and leaves out poses with wrong ones.
 
-    The smallest difference between arrival and time stamp within ten seconds stands for a way without queues,
-    whose length cannot be measured from here: a pose counts as taken when it would have arrived by it. What
-    remains is the constant delay of the motion capture.
+    The usual difference between arrival and time stamp stands for a way without queues, whose length cannot
+    be measured from here: a pose counts as taken when it would have arrived by it. What remains is the
+    constant delay of the motion capture.
+
+    The usual difference stays between the least and a low quantile of those of the last `_SPAN_S`. So a
+    single one does not change it, and a step of the source's clock does after that time. Until then the poses
+    are as late as those from a queue, which come faster than their stamps and never change it.
     """
 
     def __init__(self) -> None:
-        self._least: deque[tuple[float, float]] = deque()  # arrival and difference, differences rising
+        self._differences: deque[tuple[float, float]] = deque(maxlen=_MAX_DIFFERENCES)  # by `_heard_s`
+        self._usual_s = inf
+        self._heard_s = self._arrived_s = 0.0  # time in which poses came; the last arrival
 
-    def taken_s(self, stamp_s: float, now_s: float) -> float:
-        """When a pose was taken; without a time stamp (NaN) it is when it arrives."""
+    def taken_s(self, stamp_s: float, now_s: float) -> float | None:
+        """When a pose was taken, None: it is unknown; without a time stamp (NaN) it is when it arrives."""
         if isnan(stamp_s):
             return now_s
         difference_s = now_s - stamp_s
-        if self._least and abs(difference_s - self._least[0][1]) > _JUMP_S:
-            self._least.clear()  # the source has been started again
-        while self._least and self._least[-1][1] >= difference_s:
-            self._least.pop()
-        self._least.append((now_s, difference_s))
-        while self._least[0][0] < now_s - _OFFSET_SPAN_S:
-            self._least.popleft()
-        return stamp_s + self._least[0][1]
+        self._heard_s += min(now_s - self._arrived_s, _GAP_S)
+        self._arrived_s = now_s
+        self._differences.append((self._heard_s, difference_s))
+        while self._differences[0][0] < self._heard_s - _SPAN_S:
+            self._differences.popleft()
+        oldest_s, before_s = self._differences[0]
+        if before_s - difference_s <= _QUEUED * (self._heard_s - oldest_s):
+            self._usual_s = max(self._usual_s, min(each for _, each in self._differences))
+        ordered = sorted(each for _, each in self._differences)
+        self._usual_s = min(self._usual_s, ordered[int(_LOW * len(ordered))])
+        late_s = difference_s - self._usual_s
+        return now_s - max(late_s, 0.0) if late_s <= MAX_LATE_S else None
 
 
 class FileSource:
@@ -144,7 +158,7 @@ class UdpSource:
     def poll(self, now_s: float) -> list[TimedPose]:
         """Those that have arrived; a line that is no pose is counted."""
         found = []
-        while data := self._socket.read():
+        for data, _ in self._socket.read_all():
             for line in data.splitlines():
                 if not line.strip():
                     continue
@@ -152,10 +166,18 @@ class UdpSource:
                     record = parse_line(line)
                     if self._is_wanted(record.name):
                         pose = record.pose(self._axes)
-                        found.append(TimedPose(pose, self._clock.taken_s(pose.time_s, now_s)))
+                        found.append(TimedPose(pose, self._taken_s(pose.time_s, now_s)))
                 except PoseError as error:
                     self.fault, self.faults = str(error), self.faults + 1
         return found
+
+    def _taken_s(self, stamp_s: float, now_s: float) -> float:
+        taken_s = self._clock.taken_s(stamp_s, now_s)
+        if taken_s is None:
+            raise PoseError(
+                f"time_s: {stamp_s:g} is more than {MAX_LATE_S:g} s behind its arrival, by the poses before"
+            )
+        return taken_s
 
     def _is_wanted(self, name: str | None) -> bool:
         if self._any_name and self._name is None:

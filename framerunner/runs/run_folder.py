@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from collections.abc import Callable
@@ -22,6 +23,8 @@ from scenarios.result import FlightResult, ResultError
 
 UNFINISHED = "the program was ended in flight"
 """Why a flight ended whose result was not written in order."""
+
+_RESERVED_BYTES = 1 << 16  # more than a result has
 
 
 class RunFolder:
@@ -59,6 +62,7 @@ class RunFolder:
             ) from None
         self.path = path
         self.result = path / "result.json"
+        self._part = self.result.with_suffix(".part")
         self.track = path / "track.png"
         self.tlog = path / "flight.tlog"
         self.video = path / "video.avi"
@@ -73,6 +77,8 @@ class RunFolder:
     def write_plan(self, scenario: Scenario, mission: Mission) -> None:
         """Write what is to be flown, so that the flight can be judged, replayed and flown again.
 
+        Room for the result is reserved: recordings and videos may fill the disk during the flight.
+
         Raises:
             SettingError: it cannot be written.
         """
@@ -82,6 +88,7 @@ class RunFolder:
             self.mission.write_bytes(source)
             if isinstance(mission.pilot, PilotFile):
                 self.pilot.write_text(mission.pilot.text, encoding="utf-8")
+            self._part.write_bytes(bytes(_RESERVED_BYTES))
         except OSError as error:
             raise SettingError(
                 f"--out {self.path.parent}: cannot be written to ({error.strerror}); {write_advice(error)}"
@@ -93,7 +100,15 @@ class RunFolder:
         Raises:
             OSError: it cannot be written.
         """
-        replace_file(self.result, result.text())
+        data = result.text().encode()
+        try:
+            with self._part.open("r+b" if self._part.exists() else "wb") as file:
+                file.write(data)  # into the room that is reserved
+                file.truncate()
+            os.replace(self._part, self.result)
+        except OSError:
+            self._part.unlink(missing_ok=True)
+            raise
         self.unfinished.unlink(missing_ok=True)
 
     def keep_unfinished(self, result: FlightResult) -> None:
@@ -116,6 +131,7 @@ class RunFolder:
 
         If the flight was stopped before its first tick, all is removed, also `out` if it was made for it.
         """
+        self._part.unlink(missing_ok=True)
         self.unfinished.unlink(missing_ok=True)
         for path in self.path.iterdir():
             if path.is_dir():  # of PX4, with its log
@@ -131,10 +147,10 @@ class RunFolder:
                     self.path.parent.rmdir()
 
 
-def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: FlightResult) -> None:
+def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: FlightResult) -> bool:
     """Write `result.json` and `track.png`; report on standard error what could not be written.
 
-    The scenario must have its frames where they were in this flight.
+    The scenario must have its frames where they were in this flight. Returns whether `result.json` is there.
     """
 
     def plot() -> None:
@@ -144,6 +160,7 @@ def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: F
 
     _try(folder.result, lambda: folder.write_result(result))
     _try(folder.track, plot)
+    return folder.result.exists()
 
 
 def warn(problem: str) -> None:

@@ -36,6 +36,7 @@ from monitor.competition.validation import (
     shown,
 )
 from monitor.competition.views import RankingStateView, RankingView, StateView, ranking_csv, tries_csv
+from monitor.urls import url_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -52,7 +53,10 @@ _TRY_AGAIN_LATER = 1013  # status code of a WebSocket
 
 def register(monitor: Monitor) -> None:
     """Add the contest to a monitor: its database, its interface and its live channel."""
-    service = CompetitionService(monitor.settings.database, monitor.equipment)
+    settings = monitor.settings
+    service = CompetitionService(
+        settings.database, monitor.equipment, f"the monitor at {url_of(*monitor.place, settings.scheme)}"
+    )
     monitor.fleet.on_try(service.on_try_event)
     monitor.jobs.append(service.run)
     monitor.web.state.competition = service

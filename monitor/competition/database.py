@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from sqlite3 import Connection
 from typing import Any
@@ -13,6 +13,7 @@ from sqlalchemy.exc import ArgumentError, IntegrityError, NoSuchModuleError, SQL
 from sqlalchemy.orm import Session, sessionmaker
 from sqlalchemy.pool import StaticPool
 
+from monitor.competition.sole_user import reserve
 from monitor.competition.tables import PREFIX, SCHEMA_VERSION, Schema, Table, migrate
 from monitor.settings import MonitorError
 
@@ -28,12 +29,13 @@ class Database:
 
     Args:
         url: any of SQLAlchemy's, such as "sqlite:///framerunner.db".
+        sole_user: who uses it alone, for people; None: others may use it meanwhile.
 
     Raises:
-        DatabaseError: it cannot be used.
+        DatabaseError: it cannot be used, or another sole user does.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, sole_user: str | None = None) -> None:
         parsed = _parse(url)
         self.shown_url = parsed.render_as_string(hide_password=True)
         try:
@@ -46,11 +48,14 @@ class Database:
         except (ArgumentError, NoSuchModuleError, SQLAlchemyError, TypeError, ValueError) as error:
             raise DatabaseError(f"database {self.shown_url}: {_one_line(error)}; {_EXAMPLES}") from error
         self._sessions = sessionmaker(self._engine, expire_on_commit=False)
+        self._release: Callable[[], None] = lambda: None
         try:
             with self._explained():
+                if sole_user is not None:
+                    self._reserve(parsed, sole_user)
                 self._prepare()
         except DatabaseError:
-            self._engine.dispose()
+            self.close()
             raise
 
     @contextmanager
@@ -66,7 +71,21 @@ class Database:
 
     def close(self) -> None:
         """Close all connections."""
+        self._release()
         self._engine.dispose()
+
+    def _reserve(self, url: URL, user: str) -> None:
+        try:
+            other, self._release = reserve(url, self._engine, user)
+        except OSError as error:
+            raise DatabaseError(
+                f"database {self.shown_url}: {error.filename} cannot be written "
+                f"({(error.strerror or str(error)).lower()}); does its folder exist, and may you write there?"
+            ) from error
+        if other:
+            raise DatabaseError(
+                f"database {self.shown_url}: {other} uses it; stop that one, or name another with --database"
+            )
 
     def _prepare(self) -> None:
         """Create the tables, or bring older ones up to date: all or nothing."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import re
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -45,6 +46,7 @@ class CompetitionService:
     Args:
         url: of the database.
         equipment: with the scenarios.
+        user: who this is, for the people of another monitor on the same database.
         now: the wall clock, UTC.
         random: draws the scenarios.
 
@@ -57,10 +59,11 @@ class CompetitionService:
         self,
         url: str,
         equipment: Equipment,
+        user: str = "another monitor",
         now: Callable[[], datetime] = lambda: datetime.now(UTC),
         random: Random | None = None,
     ) -> None:
-        self._url = url
+        self._url, self._user = url, f"{user} (process {os.getpid()})"
         self._equipment = equipment
         self._now = now
         self._random = random or SystemRandom()
@@ -149,7 +152,7 @@ class CompetitionService:
         """
         loop = asyncio.get_running_loop()
         try:
-            database = await loop.run_in_executor(self._worker, Database, self._url)
+            database = await loop.run_in_executor(self._worker, Database, self._url, self._user)
             self._store = Store(database)
             interrupted = await loop.run_in_executor(self._worker, self._store.interrupt)
             if interrupted:

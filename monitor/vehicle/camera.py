@@ -11,7 +11,7 @@ from monitor.vehicle.link_quality import RepeatedRequest
 from wire.dialect import Message, mavlink, request_message
 from wire.simulator_api import VIDEO_PATH
 from wire.status_text import plain
-from wire.transports.urls import LinkError, parse_url
+from wire.transports.urls import LinkError, in_url, parse_url
 
 CAMERAS = range(mavlink.MAV_COMP_ID_CAMERA, mavlink.MAV_COMP_ID_CAMERA6 + 1)
 _MAX_REQUESTS = 8
@@ -95,7 +95,7 @@ def refusal(url: str, host: str, link_host: str = "", confirmed: Collection[str]
         "it names no host": not name,
     }
     problem = next((text for text, there in problems.items() if there), "")
-    if problem or {name, f"{name}:{port}"} & {each.lower() for each in confirmed}:
+    if problem or {name, in_url(name, port or 0)} & {each.lower() for each in confirmed}:
         return problem
     return _more_than_needed(parts) or _other_host(name, host, link_host) or _other_service(parts)
 

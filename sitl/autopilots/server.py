@@ -15,6 +15,7 @@ from sitl.server_settings import ServerSettings
 from sitl.streaming.drone_video import DroneVideo
 from sitl.vehicle import SimulatedVehicle
 from sitl.world import CONTROL_PERIOD_US
+from wire.transports.urls import in_url
 
 FALL_US = 3_000_000
 """For which a drone without its autopilot is simulated on."""
@@ -102,7 +103,7 @@ class AutopilotServer(ABC, Generic[V]):
 
     def _greeting(self) -> str:
         scenario, settings, name = self._simulation.scenario, self._settings, self._simulation.autopilot_name
-        page = f"http://{settings.bind}:{settings.http_port}/"
+        page = f"http://{in_url(settings.bind, settings.http_port)}/"
         return (
             f"{scenario.airframe} with {name} and sensors {scenario.sensors} in {scenario.name}: "
             f"{name}'s MAVLink on UDP {14540 + settings.instance} and 14550, video on {page} "

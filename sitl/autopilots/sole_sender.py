@@ -12,6 +12,7 @@ from typing import Generic, TypeVar
 
 from sitl.autopilots import WARNING
 from wire.transports.sockets import Address
+from wire.transports.urls import in_url
 
 T = TypeVar("T")
 
@@ -99,10 +100,10 @@ class SoleSender(Generic[T]):
             reason = f"it is no {self.sign.words}; end it, or choose another --instance"
         else:
             reason = (
-                f"{self._name} at {connected[0]}:{connected[1]} is connected; end one of the two, or choose "
+                f"{self._name} at {in_url(*connected[:2])} is connected; end one of the two, or choose "
                 "another --instance"
             )
-        sender = f"{other[0]}:{other[1]}"
+        sender = in_url(*other[:2])
         self._notice(f"{WARNING}what {sender} sends to UDP {self._port} is ignored: {reason}")
 
     def _has_gone(self) -> bool:

@@ -17,6 +17,7 @@ from contextlib import suppress
 from sitl.autopilots import WARNING
 from sitl.px4.messages import ActuatorControls, ControlsReader
 from wire.transports.sockets import Address, Stream, listen_tcp
+from wire.transports.urls import in_url
 
 FIRST_PORT = 4560  # of PX4's instance 0
 _SOON_S = 0.004  # for which the event loop waits for an answer; it usually comes in a fraction of this
@@ -36,7 +37,7 @@ class _Candidate:
 
     def __init__(self, connection: socket.socket, peer: Address) -> None:
         self.stream = Stream.of(connection, peer)
-        self.place = f"{peer[0]}:{peer[1]}"
+        self.place = in_url(*peer[:2])
         self.reader = ControlsReader()
         self.since_s = time.monotonic()
         self.is_reported = False
@@ -44,7 +45,7 @@ class _Candidate:
     def read(self) -> bool:
         """Read what has arrived; whether the connection is still open."""
         try:
-            for _ in self.reader.feed(self.stream.read()):
+            for _ in self.reader.feed(self.stream.read() or b""):
                 pass  # there was no HIL_SENSOR that it could answer
         except OSError:
             return False

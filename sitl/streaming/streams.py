@@ -9,7 +9,7 @@ from firmware_py.mavlink.camera.model import VideoEncoding, VideoStream
 from scenarios.models import Camera
 from sitl.server_settings import ServerSettings
 from wire.simulator_api import VIDEO_PATH
-from wire.transports.urls import is_loopback
+from wire.transports.urls import in_url, is_loopback
 
 
 def video_streams(settings: ServerSettings, camera: Camera) -> tuple[VideoStream, ...]:
@@ -20,8 +20,8 @@ def video_streams(settings: ServerSettings, camera: Camera) -> tuple[VideoStream
         camera: of the scenario.
     """
     common = (camera.width_px, camera.height_px, camera.rate_hz, degrees(camera.horizontal_fov_rad))
-    host = _public_address(settings)
-    page = VideoStream(f"http://{host}:{settings.http_port}{VIDEO_PATH}", VideoEncoding.MJPEG_HTTP, *common)
+    place = in_url(_public_address(settings), settings.http_port)
+    page = VideoStream(f"http://{place}{VIDEO_PATH}", VideoEncoding.MJPEG_HTTP, *common)
     if settings.video_rtp is None:
         return (page,)
     return (VideoStream(str(settings.video_rtp[1]), VideoEncoding.H264_RTP, *common), page)

@@ -61,7 +61,7 @@ class FakeSocket:
     def __init__(self):
         self.sent = []
         self.peer = None
-        self.data = b""
+        self.data = None
         self._pipe = os.pipe()
 
     def fileno(self):

@@ -248,6 +248,14 @@ def test_ports_beyond_the_last_are_refused():
         settings.check(3)
 
 
+@pytest.mark.parametrize("bind", ["::1", "::", "fe80::1"])
+def test_an_address_from_which_no_mavlink_could_be_sent_is_refused(bind):
+    with pytest.raises(
+        LinkError, match=f"^--bind {bind}: is no IPv4 address, by which MAVLink is sent; give"
+    ):
+        ServerSettings(bind=bind).check(1)
+
+
 def test_who_listens_on_loopback_only_is_not_open():
     assert not ServerSettings().is_open
     assert ServerSettings(bind="0.0.0.0").is_open

@@ -13,7 +13,7 @@ from wire.transports.sockets import (
     connect_udp,
     listen_tcp,
 )
-from wire.transports.urls import LinkError, LinkUrl, UrlRules, host_and_port, is_loopback, parse_url
+from wire.transports.urls import LinkError, LinkUrl, UrlRules, host_and_port, in_url, is_loopback, parse_url
 
 
 @pytest.mark.parametrize(
@@ -67,9 +67,23 @@ def test_a_program_has_rules_for_what_it_accepts():
 def test_hosts_with_and_without_port():
     assert host_and_port("station", 14550) == ("station", 14550)
     assert host_and_port("10.0.0.1:14999", 14550) == ("10.0.0.1", 14999)
+    assert host_and_port("::1", 14550) == host_and_port("[::1]", 14550) == ("::1", 14550)
+    assert host_and_port("[fe80::1%eth0]:14999", 14550) == ("fe80::1%eth0", 14999)
     for bad in ("a:", ":5", "a:b", "a:70000", "a:0"):
         with pytest.raises(LinkError):
             host_and_port(bad, 14550)
+
+
+def test_hosts_in_urls():
+    assert in_url("10.0.0.1", 8100) == "10.0.0.1:8100"
+    assert in_url("::1", 8100) == "[::1]:8100"
+    assert in_url("fe80::1%eth0", 8100) == "[fe80::1%25eth0]:8100"
+
+
+@pytest.mark.parametrize("url", ["udpin://[::1]:1", "udpin://::1:1", "udpout://[::1]:1", "tcpout://[::1]:1"])
+def test_ipv6_is_refused_because_mavsdk_does_not_know_it(url):
+    with pytest.raises(LinkError, match=r"links go by IPv4; give an IPv4 address instead of \[?::1"):
+        parse_url(url)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +113,7 @@ def test_what_is_not_read_waits_up_to_a_limit_and_is_then_lost_whole():
     assert len(client._unsent) <= MAX_UNSENT_BYTES
     received = bytearray()
     while (data := server.read()) or client.has_unsent():
-        received += data
+        received += data or b""
         client.flush()
     assert received == packet * (len(received) // len(packet))
     client.close()
@@ -114,17 +128,17 @@ def test_what_is_not_read_waits_up_to_a_limit_and_is_then_lost_whole():
 def test_one_client_after_the_other():
     server = OneClient(listen_tcp(("127.0.0.1", 0)))
     place = server._listener.getsockname()
-    assert server.read() == b""
+    assert server.read() is None
     server.write(b"to nobody")
     first, second = connect_tcp(place), connect_tcp(place)
-    assert server.read() == b""  # lets the first in
+    assert server.read() is None  # lets the first in
     first.write(b"a")
     second.write(b"b")
-    assert (server.read(), server.read()) == (b"a", b"")
+    assert (server.read(), server.read()) == (b"a", None)
     server.write(b"c")
     assert first.read() == b"c"
     first.close()
-    assert (server.read(), server.read(), server.read()) == (b"", b"", b"b")
+    assert (server.read(), server.read(), server.read()) == (None, None, b"b")
     second.close()
     server.close()
 
@@ -135,11 +149,26 @@ def test_of_a_flood_of_datagrams_so_many_are_read_at_once():
     first, other = connect_udp(place), connect_udp(place)
     assert listening.read_all() == []
     first.write(b"a")
-    for number in range(MAX_DATAGRAMS_AT_ONCE):
+    other.write(b"")  # is a datagram, too
+    for number in range(1, MAX_DATAGRAMS_AT_ONCE):
         other.write(bytes([number]))
     read = listening.read_all()
-    assert read[:2] == [(b"a", first._socket.getsockname()), (b"\0", other._socket.getsockname())]
+    assert read[:2] == [(b"a", first._socket.getsockname()), (b"", other._socket.getsockname())]
     assert len(read) == MAX_DATAGRAMS_AT_ONCE
     assert [data for data, _ in listening.read_all()] == [bytes([MAX_DATAGRAMS_AT_ONCE - 1])]
     for each in (listening, first, other):
+        each.close()
+
+
+def test_a_datagram_behind_the_refusal_of_one_that_was_sent_is_read():
+    listening = bind_udp(("127.0.0.1", 0), "")
+    place = listening._socket.getsockname()
+    client = connect_udp(place)
+    mine = client._socket.getsockname()
+    listening.close()
+    client.write(b"to nobody")  # refused, which the next call reports
+    again = bind_udp(place, "")
+    again.write(b"a", mine)
+    assert (client.read(), client.read()) == (b"a", None)
+    for each in (client, again):
         each.close()

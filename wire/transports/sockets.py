@@ -1,9 +1,10 @@
 """UDP, TCP and serial lines as transports of bytes that never block.
 
 A thread waits for them with `select.poll`, an asyncio loop with `add_reader`; both by `fileno`, which may
-change with each `read`. `read` returns b"" when nothing was received and raises `OSError` when the link is
-closed. A write that cannot be sent is dropped as a whole without an error, as on a radio. Functions that open
-something raise `LinkError`: one line with what cannot be opened, why, and what to do.
+change with each `read`. `read` returns None when nothing was received, which an empty datagram (b"") is not,
+and raises `OSError` when the link is closed. A write that cannot be sent is dropped as a whole without an
+error, as on a radio. Functions that open something raise `LinkError`: one line with what cannot be opened,
+why, and what to do.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import cast
 
-from wire.transports.urls import LinkError, LinkUrl
+from wire.transports.urls import LinkError, LinkUrl, in_url
 
 Address = tuple[str, int]
 
@@ -40,18 +41,23 @@ class UdpSocket:
         """The descriptor to wait for."""
         return self._socket.fileno()
 
-    def read(self) -> bytes:
-        """The next datagram."""
-        try:
-            data, self.peer = self._socket.recvfrom(_READ_BYTES)
-        except (BlockingIOError, ConnectionRefusedError):  # refused: nothing listens there yet
-            return b""
-        return data
+    def read(self) -> bytes | None:
+        """The next datagram, which may be empty."""
+        for _ in range(MAX_DATAGRAMS_AT_ONCE):
+            try:
+                data, self.peer = self._socket.recvfrom(_READ_BYTES)
+            except BlockingIOError:
+                return None
+            except ConnectionRefusedError:  # of something that was sent; datagrams may wait behind it
+                continue
+            return data
+        return None
 
     def read_all(self) -> list[tuple[bytes, Address]]:
         """The datagrams that wait, with their senders, the oldest first; `MAX_DATAGRAMS_AT_ONCE` at most."""
         found: list[tuple[bytes, Address]] = []
-        while len(found) < MAX_DATAGRAMS_AT_ONCE and (data := self.read()) and self.peer is not None:
+        while len(found) < MAX_DATAGRAMS_AT_ONCE and (data := self.read()) is not None:
+            assert self.peer is not None, "it has sent the datagram"
             found.append((data, self.peer))
         return found
 
@@ -92,14 +98,14 @@ class Stream:
         """The descriptor to wait for."""
         return self._descriptor
 
-    def read(self) -> bytes:
+    def read(self) -> bytes | None:
         """The next bytes; unsent bytes are sent first."""
         if self._unsent:
             self.flush()
         try:
             data = os.read(self._descriptor, _READ_BYTES)
         except BlockingIOError:
-            return b""
+            return None
         if not data:
             why = "the serial line is gone" if self.peer is None else "the other side closed the connection"
             raise ConnectionResetError(errno.ECONNRESET, why)
@@ -141,7 +147,7 @@ class OneClient:
         """The descriptor to wait for: the client's or, without one, the listener's."""
         return (self._client or self._listener).fileno()
 
-    def read(self) -> bytes:
+    def read(self) -> bytes | None:
         """The client's next bytes; accepts the next client when that has closed the connection."""
         try:
             if self._client is not None:
@@ -154,7 +160,7 @@ class OneClient:
             if self._client is not None:
                 self._client.close()
             self._client = None
-        return b""
+        return None
 
     def write(self, data: bytes) -> None:
         """Send bytes to the client."""
@@ -177,7 +183,7 @@ def bind_udp(place: Address, advice: str, *, gives_way: bool = False) -> UdpSock
         gives_way: whether a program that binds the same address later, as MAVSDK does (SO_REUSEADDR),
             receives instead of this one.
     """
-    with _explained(f"UDP {_name(place)} cannot be opened", advice):
+    with _explained(f"UDP {in_url(*place)} cannot be opened", advice):
         family, address = _local(place, socket.SOCK_DGRAM)
         opened = socket.socket(family, socket.SOCK_DGRAM)
         try:
@@ -194,7 +200,7 @@ def connect_udp(place: Address) -> UdpSocket:
     """A UDP socket that sends to one address and receives only from there."""
     address = resolved_ipv4(place)
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    with _explained(f"UDP {_name(place)} cannot be sent to", "check host and network"):
+    with _explained(f"UDP {in_url(*place)} cannot be sent to", "check host and network"):
         try:
             opened.connect(address)
         except OSError:
@@ -205,7 +211,7 @@ def connect_udp(place: Address) -> UdpSocket:
 
 def resolved_ipv4(place: Address, what: str = "UDP") -> Address:
     """Look up the address of a name once: `sendto` would look it up, blocking, for every packet."""
-    with _explained(f"{what} {_name(place)} cannot be sent to", "give a host's name or an IPv4 address"):
+    with _explained(f"{what} {in_url(*place)} cannot be sent to", "give a host's name or an IPv4 address"):
         found = socket.getaddrinfo(*place, family=socket.AF_INET, type=socket.SOCK_DGRAM)
     return cast(Address, found[0][4])
 
@@ -217,7 +223,7 @@ def listen_tcp(place: Address, advice: str = "choose another port") -> socket.so
         place: the local address.
         advice: what to do when the port is taken.
     """
-    with _explained(f"TCP {_name(place)} cannot be listened on", advice):
+    with _explained(f"TCP {in_url(*place)} cannot be listened on", advice):
         family, address = _local(place, socket.SOCK_STREAM)
         listener = socket.create_server(address, family=family)
     listener.setblocking(False)
@@ -226,7 +232,7 @@ def listen_tcp(place: Address, advice: str = "choose another port") -> socket.so
 
 def connect_tcp(place: Address) -> Stream:
     """Connect to a TCP server; waits five seconds at most."""
-    with _explained(f"TCP {_name(place)} cannot be connected to", "is the server running?"):
+    with _explained(f"TCP {in_url(*place)} cannot be connected to", "is the server running?"):
         connection = socket.create_connection(place, _CONNECT_S)
         return Stream.of(connection, connection.getpeername())
 
@@ -285,10 +291,6 @@ def _local(place: Address, kind: socket.SocketKind) -> tuple[socket.AddressFamil
     found = socket.getaddrinfo(*place, type=kind, flags=socket.AI_PASSIVE)
     family, _, _, _, address = min(found, key=lambda each: each[0] != socket.AF_INET)
     return family, cast(Address, address)
-
-
-def _name(place: Address) -> str:
-    return f"{place[0]}:{place[1]}"
 
 
 @contextmanager

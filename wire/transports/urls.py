@@ -79,6 +79,8 @@ def parse_url(text: str, rules: UrlRules = DRONE) -> LinkUrl:
             raise LinkError(f"{subject}: a serial line looks like serial:///dev/ttyUSB0:57600")
     elif not 0 < number <= MAX_PORT:
         raise LinkError(f"{subject}: port {number} must be from 1 to {MAX_PORT}")
+    elif ":" in address:  # MAVSDK knows no IPv6
+        raise LinkError(f"{subject}: links go by IPv4; give an IPv4 address instead of {address}")
     elif scheme in ("udpin", "tcpin") and not rules.listens_on_names and not _is_ip(address):
         raise LinkError(f"{subject}: '{address}' must be an IP address to listen on, such as 0.0.0.0")
     options = parse_qsl(match["options"] or "", keep_blank_values=True)
@@ -86,22 +88,33 @@ def parse_url(text: str, rules: UrlRules = DRONE) -> LinkUrl:
 
 
 def host_and_port(text: str, default_port: int) -> tuple[str, int]:
-    """Split HOST or HOST:PORT.
+    """Split HOST or HOST:PORT; an IPv6 address with a port is in brackets.
 
     Raises:
         LinkError: the port is invalid.
     """
     host, colon, port = text.rpartition(":")
-    if not colon:
-        return (text, default_port)
+    if not colon or _is_ip(_without_brackets(text)):
+        return (_without_brackets(text), default_port)
+    host = _without_brackets(host)
     if not host or not port.isdecimal() or not 0 < int(port) <= MAX_PORT:
         raise LinkError(f"{text}: must be a host, or host:port with a port from 1 to {MAX_PORT}")
     return (host, int(port))
 
 
+def in_url(host: str, port: int) -> str:
+    """Host and port as a URL has them: IPv6 in brackets, with the % of its zone escaped (RFC 6874)."""
+    return f"[{host.replace('%', '%25')}]:{port}" if ":" in host else f"{host}:{port}"
+
+
 def is_loopback(host: str) -> bool:
     """Whether a host is this machine's loopback address, which cannot be reached from outside."""
     return host == "localhost" or (_is_ip(host) and ipaddress.ip_address(host).is_loopback)
+
+
+def _without_brackets(host: str) -> str:
+    inner = host[1:-1]
+    return inner if host == f"[{inner}]" and ":" in inner else host
 
 
 def _is_ip(host: str) -> bool:

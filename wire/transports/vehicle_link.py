@@ -11,7 +11,7 @@ import select
 from wire.dialect import Message, mavlink
 from wire.framing import PacketReader, packed
 from wire.transports.sockets import Address, UdpSocket, open_drone
-from wire.transports.urls import LinkError, parse_url
+from wire.transports.urls import LinkError, in_url, parse_url
 
 
 class VehicleLink:
@@ -51,7 +51,7 @@ class VehicleLink:
             data = transport.read()
         except OSError as error:
             raise LinkError(f"{self.url} failed: {error.strerror or error}") from None
-        messages = self._reader.feed(data)
+        messages = self._reader.feed(data) if data else []
         if transport.peer is not None:
             for message in messages:
                 self._peers[message.get_srcSystem()] = transport.peer
@@ -81,7 +81,7 @@ class VehicleLink:
     def addresses(self, system_id: int, component_id: int) -> tuple[str, ...]:
         """HOST:PORT of all senders of a component's packets, sorted; empty on a link without addresses."""
         found = self._sources.get((system_id, component_id), ())
-        return tuple(f"{host}:{port}" for host, port in sorted((each[0], each[1]) for each in found))
+        return tuple(in_url(host, port) for host, port in sorted((each[0], each[1]) for each in found))
 
     @property
     def host(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import logging
 from collections.abc import Callable, Sequence
@@ -13,7 +14,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Body, HTTPException, Request
 from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, Response
-from starlette.websockets import WebSocket
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from errors import UserError
 from framerunner.editing.documents.desk import EditorDesk, SharedDocument
@@ -45,6 +46,7 @@ _BAD_MESSAGE_CODE = 4400  # as HTTP's
 _MAX_QUEUE = 200
 _MAX_CLIENT = 40  # characters
 _MAX_REASON_BYTES = 120  # WebSockets allow 123
+_GONE = (WebSocketDisconnect, RuntimeError, OSError)  # sending to a page that was closed
 
 logger = logging.getLogger(__name__)
 
@@ -224,8 +226,9 @@ class _Window:
         return _json({**message, "answered": answered, "catalogue": catalogue_message(opened)})
 
     async def _send(self) -> None:
-        while True:
-            await self._websocket.send_text(await self._outbox.get())
+        with contextlib.suppress(*_GONE):
+            while True:
+                await self._websocket.send_text(await self._outbox.get())
 
     async def _receive(self, may_edit: Callable[[], bool]) -> None:
         while True:
@@ -239,7 +242,8 @@ class _Window:
                 message = read_message(received.get("text") or received.get("bytes") or "")
             except PageMessageError as error:
                 why = str(error).encode()[:_MAX_REASON_BYTES].decode(errors="ignore")
-                await self._websocket.close(_BAD_MESSAGE_CODE, why)
+                with contextlib.suppress(*_GONE):
+                    await self._websocket.close(_BAD_MESSAGE_CODE, why)
                 return
             await asyncio.shield(self._take(message))  # what has begun is carried out, whatever the page does
 

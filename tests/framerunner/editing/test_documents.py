@@ -10,10 +10,12 @@ from contextlib import contextmanager
 from string import Formatter
 
 import pytest
+from fastapi import FastAPI
 from starlette.websockets import WebSocketDisconnect
 
 from framerunner.editing import words
 from framerunner.editing.documents.desk import DeskError, EditorDesk
+from framerunner.editing.documents.door import DocumentsDoor
 from framerunner.editing.documents.messages import catalogue_message, document_message
 from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
 from monitor.access import Role, Visitor
@@ -192,6 +194,26 @@ def test_a_message_that_no_page_sends_closes_with_one_line(path, message):
         assert "\n" not in closed.value.reason
         with server.window("hover.yaml") as window:
             assert window.document["text"] == HOVER
+
+
+async def test_a_page_that_was_closed_leaves_no_traceback(path, caplog):
+    web = FastAPI()
+    web.include_router(DocumentsDoor(EditorDesk(path.parent)).router(lambda _: True))
+    came = iter([{"type": "websocket.connect"}])
+
+    async def receive():
+        for message in came:
+            return message
+        return await asyncio.Event().wait()  # the server has not heard yet that the page was closed
+
+    async def send(message):
+        if message["type"] == "websocket.send":
+            raise OSError  # as uvicorn does
+
+    scope = {"type": "websocket", "path": "/ws/edit", "query_string": b"file=hover.yaml", "headers": []}
+    async with asyncio.timeout(10.0):
+        await web(scope, receive, send)
+    assert caplog.records == []
 
 
 def test_a_refused_edit_changes_nothing_and_says_why_in_one_line(path):

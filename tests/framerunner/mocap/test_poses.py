@@ -6,11 +6,21 @@ import socket
 import time
 from math import nan, radians
 from pathlib import Path
+from random import Random
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from framerunner.mocap.poses import Axes, Pose, PoseError, in_ned, parse_line, read_poses, with_forward
-from framerunner.mocap.sources import FileSource, SitlSource, SourceClock, UdpSource, open_source
+from framerunner.mocap.sources import (
+    MAX_LATE_S,
+    FileSource,
+    SitlSource,
+    SourceClock,
+    UdpSource,
+    open_source,
+)
 from geometry.rotations import euler_from_quaternion, quaternion_from_euler, rotation, to_world
 from wire.dialect import mavlink
 from wire.transports.sockets import UdpSocket
@@ -129,8 +139,96 @@ def test_jitter_of_arrival_is_removed_from_time_stamps():
     jitter = (0.002, 0.0, 0.012, 0.001, 0.030)
     taken = [clock.taken_s(100.0 + 0.02 * n, 5.0 + 0.02 * n + late) for n, late in enumerate(jitter)]
     assert taken[1:] == pytest.approx([5.02, 5.04, 5.06, 5.08])
-    assert clock.taken_s(3.0, 6.0) == 6.0  # the source was started again
     assert clock.taken_s(nan, 7.0) == 7.0
+
+
+class Stamped:
+    """Four seconds of poses: when each was taken, its time stamp, and when it arrives, 2 to 10 ms later."""
+
+    def __init__(self, rate_hz, seed):
+        random, count = Random(seed), round(4.0 * rate_hz)
+        self.taken_s = [10.0 + number / rate_hz for number in range(count)]
+        self.stamps_s = [taken_s + 777.0 for taken_s in self.taken_s]
+        self.arrivals_s = [taken_s + random.uniform(0.002, 0.01) for taken_s in self.taken_s]
+
+    def sent(self):
+        """Arrival, time taken by the stamp, and true time of those that a session sends on."""
+        clock, newest_s = SourceClock(), 0.0
+        for arrived_s, stamp_s, taken_s in sorted(
+            zip(self.arrivals_s, self.stamps_s, self.taken_s, strict=True)
+        ):
+            found_s = clock.taken_s(stamp_s, arrived_s)
+            if found_s is not None and found_s > newest_s:
+                newest_s = found_s
+                yield arrived_s, found_s, taken_s
+
+    def check(self, changed_s=12.0, error_s=0.015):
+        """Poses go on within half a second, never with a wrong time, and then with the right one."""
+        sent, before_s = list(self.sent()), self.arrivals_s[0]
+        for arrived_s, found_s, taken_s in sent:
+            settled = arrived_s < changed_s or arrived_s > changed_s + 0.5
+            assert abs(found_s - taken_s) < (error_s if settled else MAX_LATE_S + error_s)
+            assert arrived_s - before_s < 0.5
+            before_s = arrived_s
+        assert sent[-1][2] > self.taken_s[-1] - 0.1
+
+
+RATES_HZ = st.sampled_from((20.0, 50.0, 100.0))
+SEEDS = st.integers(0, 99)
+examples = settings(max_examples=20)
+ERRORS_S = st.floats(-1e6, 1e6) | st.floats(-2.0, 2.0)
+
+
+@examples
+@given(RATES_HZ, ERRORS_S, SEEDS)
+def test_a_step_of_the_sources_clock_is_followed(rate_hz, step_s, seed):
+    poses = Stamped(rate_hz, seed)
+    first = round(2.0 * rate_hz)
+    poses.stamps_s[first:] = [stamp_s + step_s for stamp_s in poses.stamps_s[first:]]
+    poses.check()
+
+
+@examples
+@given(RATES_HZ, ERRORS_S, SEEDS)
+def test_one_wrong_time_stamp_is_left_out_or_changes_nothing(rate_hz, error_s, seed):
+    poses = Stamped(rate_hz, seed)
+    wrong = round(2.0 * rate_hz)
+    poses.stamps_s[wrong] += error_s
+    sent = list(poses.sent())
+    assert all(abs(found_s - taken_s) < 0.015 for _, found_s, taken_s in sent if taken_s != 12.0)
+    poses.check()
+
+
+@examples
+@given(RATES_HZ, st.floats(-0.02, 0.02), SEEDS)
+def test_a_clock_that_runs_fast_or_slowly_is_followed(rate_hz, drift, seed):
+    poses = Stamped(rate_hz, seed)
+    poses.stamps_s = [stamp_s + drift * number / rate_hz for number, stamp_s in enumerate(poses.stamps_s)]
+    poses.check()
+
+
+@examples
+@given(RATES_HZ, st.floats(0.0, 1.5), st.integers(1, 9), SEEDS)
+def test_doubled_swapped_and_delayed_poses_keep_their_times(rate_hz, delay_s, every, seed):
+    poses = Stamped(rate_hz, seed)
+    for number in range(3, len(poses.taken_s) // 2, 10):
+        poses.arrivals_s.append(poses.arrivals_s[number + every % 3] + delay_s * every / 9)
+        for values in (poses.taken_s, poses.stamps_s):
+            values.append(values[number + every % 3])
+        poses.arrivals_s[number] += delay_s
+    assert all(abs(found_s - taken_s) < 0.015 for _, found_s, taken_s in poses.sent())
+    poses.check()
+
+
+@examples
+@given(RATES_HZ, st.floats(0.1, 4.0), st.floats(1.5, 1e3), SEEDS)
+def test_poses_that_a_network_held_back_are_not_taken_for_new_ones(rate_hz, stall_s, pace, seed):
+    poses = Stamped(rate_hz, seed)
+    for number, taken_s in enumerate(poses.taken_s):
+        if taken_s >= 12.0:  # after the stall the queue empties at a multiple of the usual pace
+            due_s = 12.0 + stall_s + (taken_s - 12.0) / pace
+            poses.arrivals_s[number] = max(poses.arrivals_s[number], due_s)
+    assert all(found_s - taken_s < 0.05 for _, found_s, taken_s in poses.sent())
 
 
 def received(name, *lines):
@@ -139,17 +237,25 @@ def received(name, *lines):
     opened.bind(("127.0.0.1", 0))
     source = UdpSource(UdpSocket(opened), "here", Axes.FLU, name)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.sendto("\n".join(lines).encode(), opened.getsockname())
+        for each in lines:
+            sender.sendto(b"", opened.getsockname())  # an empty datagram hides nothing
+            sender.sendto(each.encode(), opened.getsockname())
     found = source.poll(3.0)
     source.close()
     return [each.pose.position_ned_m[0] for each in found], source
 
 
 def test_a_udp_stream():
-    found, source = received(None, line(x=1), "nonsense", line(x=2, time_s=1.02))
+    found, source = received(None, line(x=1), f"nonsense\n{line(x=2, time_s=1.02)}")
     assert found == [1.0, 2.0]
     assert source.faults == 1
     assert source.fault.startswith("line: Invalid JSON")
+
+
+def test_a_pose_with_a_late_time_stamp_is_left_out_and_counted():
+    found, source = received(None, line(x=1), line(x=2, time_s=0.4))
+    assert (found, source.faults) == ([1.0], 1)
+    assert source.fault == "time_s: 0.4 is more than 0.1 s behind its arrival, by the poses before"
 
 
 def test_one_body_is_followed():

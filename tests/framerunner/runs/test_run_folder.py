@@ -1,5 +1,6 @@
 """The folder that a flight leaves."""
 
+import errno
 import json
 import re
 
@@ -9,7 +10,8 @@ from errors import SettingError, UserError
 from framerunner.flying import run
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings
-from framerunner.runs.run_folder import UNFINISHED, RunFolder
+from framerunner.runs.run_folder import UNFINISHED, RunFolder, write_outcome
+from framerunner.runs.track import Track
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
 from scenarios.result import FlightResult
@@ -42,6 +44,19 @@ def test_a_result_is_written_completely_or_not_at_all(tmp_path):
         folder.write_result(result.model_copy(update={"try_time_s": float("nan")}))  # JSON has no NaN
     assert json.loads(folder.result.read_text(encoding="utf-8"))["verdict"] == "clean"
     assert [path.name for path in folder.path.iterdir()] == ["result.json"]
+
+
+def test_a_result_that_cannot_be_written_is_told(tmp_path, capsys, monkeypatch):
+    def full(*_paths):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    folder = RunFolder(tmp_path, "empty")
+    monkeypatch.setattr("os.replace", full)
+    monkeypatch.setattr("framerunner.runs.plots.draw_track", full)
+    scenario = load_scenario("empty")
+    assert not write_outcome(folder, scenario, Track(), FlightResult(verdict="clean", seed=None))
+    assert capsys.readouterr().err.count("No space left on device") == 2
+    assert list(folder.path.iterdir()) == []
 
 
 def test_a_flight_that_did_not_start_leaves_nothing(tmp_path):

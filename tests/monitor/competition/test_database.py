@@ -43,9 +43,33 @@ def test_a_server_that_is_not_there_is_named_without_the_password():
     assert "127.0.0.1" in words and "secret" not in words and "refused" in words.lower()
 
 
+def test_one_monitor_at_a_time_uses_a_database_and_the_other_is_told_which(database_url):
+    first = Database(database_url, "the monitor at http://a:8080/ (process 7)")
+    with pytest.raises(
+        DatabaseError,
+        match=r": the monitor at http://a:8080/ \(process 7\)[^;]* uses it; stop that one, or name another",
+    ):
+        Database(database_url, "the monitor at http://b:8090/ (process 8)")
+    first.close()
+    second = Database(database_url, "the monitor at http://b:8090/ (process 8)")
+    with pytest.raises(DatabaseError, match="b:8090"):
+        Database(database_url, "the monitor at http://a:8080/ (process 7)")
+    second.close()
+
+
+def test_another_name_of_a_file_is_the_same_database(tmp_path):
+    (tmp_path / "y.db").symlink_to(tmp_path / "x.db")
+    first = Database(f"sqlite:///{tmp_path}/x.db", "the first")
+    with pytest.raises(DatabaseError, match="the first uses it"):
+        Database(f"sqlite:///{tmp_path}/y.db", "the second")
+    first.close()
+
+
 def test_a_missing_folder_is_named(tmp_path):
     words = refusal(f"sqlite:///{tmp_path}/missing/x.db")
     assert "missing/x.db" in words and "folder" in words
+    with pytest.raises(DatabaseError, match=r"missing/x.db.* does its folder exist"):
+        Database(f"sqlite:///{tmp_path}/missing/x.db", "the monitor")
 
 
 def test_a_file_that_is_something_else_is_left_alone(tmp_path):

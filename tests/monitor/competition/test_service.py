@@ -48,6 +48,16 @@ async def test_a_bad_database_ends_the_service_with_one_line():
             pass
 
 
+async def test_a_second_monitor_on_a_database_is_refused_and_interrupts_no_try(url):
+    async with serving(url, user="the first") as first:
+        first.on_try_event(event("began", "flying", time_s=0.0))
+        await until(lambda: first.running)
+        with pytest.raises(DatabaseError, match=r"the first \(process \d+\) uses it"):
+            async with serving(url):
+                pass
+        assert [each.state for each in (await first.board()).tries] == ["running"]
+
+
 async def test_requests_wait_until_the_database_is_open_but_not_for_ever(url, monkeypatch):
     service = CompetitionService(url, EQUIPMENT)
     early = asyncio.create_task(service.change(lambda store: store.board().rule))

@@ -76,6 +76,10 @@ def test_video_may_be_fetched_from_confirmed_hosts(confirmed):
     assert refusal("ftp://192.168.1.7:81/stream", "127.0.0.1", "", (confirmed,))
 
 
+def test_a_confirmed_ipv6_host_with_a_port_is_in_brackets():
+    assert refusal("http://[fd00::7]:81/stream?size=1", "127.0.0.1", "", ("[fd00::7]:81",)) == ""
+
+
 def told(uri, number=1):
     return mavlink.MAVLink_video_stream_information_message(
         number, 2, 0, 1, 10.0, 320, 240, 0, 0, 90, b"camera", uri, 0
