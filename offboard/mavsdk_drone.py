@@ -484,7 +484,7 @@ class MavsdkDrone:
             while not condition():
                 if waits and self._ticks.time_us > limit_us:
                     raise TimeoutError
-                await self._ticks.next(0.05)
+                await self._ticks.next(0.05, at_once=True)
 
     def _stop_from_watchdog(self) -> None:
         """On the watchdog's thread: end the native stream and, in offboard, request hold or landing.

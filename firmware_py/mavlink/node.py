@@ -113,8 +113,10 @@ class _Devices:
         return tuple(services)
 
 
-def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
-    """All services of the vehicle, in the order in which they are updated."""
+def _services(
+    autopilot: Autopilot, exchange: Exchange, options: NodeOptions
+) -> tuple[tuple[Service, ...], StreamService]:
+    """All services of the vehicle, in the order in which they are updated; the streams are the first."""
     devices = _Devices.of(autopilot, exchange, options)
     camera, manager = devices.camera, devices.manager
     files = options.firmware_files
@@ -165,7 +167,7 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         merged(service.commands for service in own),
         lambda command: camera is None or not camera.takes_broadcast(command),
     )
-    return (streams, *services, commands, *devices.command_services(exchange))
+    return (streams, *services, commands, *devices.command_services(exchange)), streams
 
 
 class MavlinkNode:
@@ -201,7 +203,7 @@ class MavlinkNode:
         self._exchange = Exchange(options.system_id, frozenset(component_ids), signing, options.boot_unix_us)
         for profile in links:
             self._exchange.add_link(profile)
-        self.services = _services(autopilot, self._exchange, options)
+        self.services, self._streams = _services(autopilot, self._exchange, options)
         self.failed_messages = 0
         self._handlers: dict[int, Mapping[int, Handler]] = {
             component_id: merged(
@@ -264,6 +266,10 @@ class MavlinkNode:
         self._exchange.advance(time_us)
         for update in self._updates:
             update()
+
+    def repeat(self) -> None:
+        """Send all streams again, for who listens only now, while vehicle time stands."""
+        self._streams.repeat()
 
     def take_output(self) -> list[tuple[str, bytes]]:
         """The datagrams to send, each with its link's name; a datagram has one or more whole packets."""

@@ -34,7 +34,8 @@ from sitl.simulation import Simulation
 TICK_US = 50_000
 HEARTBEAT_US = 1_000_000
 POSITION_US = 20_000
-"""Between two position messages; a tick, made by an attitude message, has the last one before it."""
+"""Between two messages of position, or of the landed state; a tick, made by an attitude message, has the last
+one before it."""
 POSITION_PHASE_US = 16_000
 """Off the ticks' grid, for the same reason as the camera's exposures."""
 TELEMETRY_DELAY_US = 4_000
@@ -97,6 +98,7 @@ class LockstepDrone:
         self._sent_position_us = 0
         self._position_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
+        self._landed = True
         self._tick_us = TICK_US
         self._sample: DroneState | None = None
         self._arming = Arming()
@@ -292,6 +294,7 @@ class LockstepDrone:
             self._position_ned_m = single(self._autopilot.state.position_ned_m)
             self._velocity_ned_m_s = single(self._autopilot.state.velocity_ned_m_s)
             self._sent_position_us = now_us
+            self._landed = self._autopilot.status.landed_state is LandedState.ON_GROUND
 
     def _pass(self, limit_us: int, until: Callable[[], bool] = lambda: False) -> bool:
         """Let time pass until a condition holds; False if it does not within the limit."""
@@ -328,7 +331,7 @@ class LockstepDrone:
             self._arming.is_armed(state.time_us),
             self._mode is FlightMode.OFFBOARD,
             self._mode.name,
-            self._autopilot.status.landed_state is LandedState.ON_GROUND,
+            self._landed,
             (state.time_us - self._sent_position_us) * 1e-6,
             alignment.attitude(quaternion_from_euler(roll_rad, pitch_rad, yaw_rad)),
             camera_attitude,
