@@ -113,10 +113,8 @@ class _Devices:
         return tuple(services)
 
 
-def _services(
-    autopilot: Autopilot, exchange: Exchange, options: NodeOptions
-) -> tuple[tuple[Service, ...], StreamService]:
-    """All services of the vehicle, in the order in which they are updated; the streams are the first."""
+def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
+    """All services of the vehicle, in the order in which they are updated."""
     devices = _Devices.of(autopilot, exchange, options)
     camera, manager = devices.camera, devices.manager
     files = options.firmware_files
@@ -167,7 +165,7 @@ def _services(
         merged(service.commands for service in own),
         lambda command: camera is None or not camera.takes_broadcast(command),
     )
-    return (streams, *services, commands, *devices.command_services(exchange)), streams
+    return (streams, *services, commands, *devices.command_services(exchange))
 
 
 class MavlinkNode:
@@ -203,7 +201,7 @@ class MavlinkNode:
         self._exchange = Exchange(options.system_id, frozenset(component_ids), signing, options.boot_unix_us)
         for profile in links:
             self._exchange.add_link(profile)
-        self.services, self._streams = _services(autopilot, self._exchange, options)
+        self.services = _services(autopilot, self._exchange, options)
         self.failed_messages = 0
         self._handlers: dict[int, Mapping[int, Handler]] = {
             component_id: merged(
@@ -268,8 +266,9 @@ class MavlinkNode:
             update()
 
     def repeat(self) -> None:
-        """Send all streams again, for who listens only now, while vehicle time stands."""
-        self._streams.repeat()
+        """Send all streams again while vehicle time stands, for who listens only now."""
+        for service in self.services:
+            service.repeat()
 
     def take_output(self) -> list[tuple[str, bytes]]:
         """The datagrams to send, each with its link's name; a datagram has one or more whole packets."""

@@ -23,12 +23,14 @@ from firmware_py.types import CRITICAL
 from framerunner.flying.faulty_link import FaultyLink
 from framerunner.flying.response import LateResponse
 from geometry.axes import Alignment, Pose
-from geometry.rotations import quaternion_from_euler
+from geometry.rotations import normalized, quaternion_from_euler
 from geometry.vectors import Vec3
 from offboard.arming import Arming
 from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.link.gimbal_feed import GimbalAttitude
 from offboard.safety.caps import CapKeeper
 from scenarios.models import TrueState
+from sitl.payload.gimbal import SimulatedGimbal
 from sitl.simulation import Simulation
 
 TICK_US = 50_000
@@ -38,6 +40,8 @@ POSITION_US = 20_000
 one before it."""
 POSITION_PHASE_US = 16_000
 """Off the ticks' grid, for the same reason as the camera's exposures."""
+GIMBAL_US = 100_000
+"""Between two messages of a gimbal, which come after the attitude of the same time."""
 TELEMETRY_DELAY_US = 4_000
 """From a state to the setpoint that answers it: one control tick, as measured over UDP and MAVSDK."""
 STREAM_BEFORE_OFFBOARD_US = 300_000
@@ -99,6 +103,8 @@ class LockstepDrone:
         self._position_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self._landed = True
+        self._gimbal_us = 0 if simulation.gimbal is not None else _NEVER_US
+        self._gimbal_attitude: GimbalAttitude | None = None
         self._tick_us = TICK_US
         self._sample: DroneState | None = None
         self._arming = Arming()
@@ -121,6 +127,8 @@ class LockstepDrone:
                 f"not ready within {READY_LIMIT_US / 1e6:g} s: "
                 f"pre-arm checks not passed{_vehicle_texts(self._autopilot)}"
             )
+        if not self._sent_position_us:
+            self._receive_position(self._autopilot.state.time_us)
         self._alignment = Alignment(
             self._start_arena, Pose(self._position_ned_m, _received_angle(self._autopilot.state.yaw_rad))
         )
@@ -258,7 +266,8 @@ class LockstepDrone:
         """Let a control tick pass, and more until a time or until the link sends something by itself."""
         simulation, observers, state = self._simulation, self._observers, self._autopilot.state
         link = self._link
-        until_us = min(until_us, self._resend_us, self._heartbeat_us, self._tick_us, self._position_us)
+        due_us = (self._resend_us, self._heartbeat_us, self._tick_us, self._position_us, self._gimbal_us)
+        until_us = min(until_us, *due_us)
         while True:
             simulation.tick()
             truth = simulation.truth
@@ -287,14 +296,24 @@ class LockstepDrone:
             if self._alignment is not None:
                 state = self._reported_state(self._alignment)
                 self._sample = self._link.receive(state) if self._link.active else state
+        if now_us >= self._gimbal_us:
+            self._gimbal_us += GIMBAL_US
+            self._gimbal_attitude = _received_gimbal(self._simulation.gimbal)
         if now_us >= self._position_us:
             self._position_us += POSITION_US
-            if self._link.loses():
-                return
-            self._position_ned_m = single(self._autopilot.state.position_ned_m)
-            self._velocity_ned_m_s = single(self._autopilot.state.velocity_ned_m_s)
+            if not self._link.loses():
+                self._receive_position(now_us)
+
+    def _receive_position(self, now_us: int) -> None:
+        """Take what the vehicle sends between ticks; its position only when it is known."""
+        status, state = self._autopilot.status, self._autopilot.state
+        self._landed = status.landed_state is LandedState.ON_GROUND
+        if status.origin is not None:
+            self._position_ned_m, self._velocity_ned_m_s = (
+                single(state.position_ned_m),
+                single(state.velocity_ned_m_s),
+            )
             self._sent_position_us = now_us
-            self._landed = self._autopilot.status.landed_state is LandedState.ON_GROUND
 
     def _pass(self, limit_us: int, until: Callable[[], bool] = lambda: False) -> bool:
         """Let time pass until a condition holds; False if it does not within the limit."""
@@ -319,10 +338,9 @@ class LockstepDrone:
         yaw_rad = _received_angle(state.yaw_rad)
         pose = alignment.pose(Pose(self._position_ned_m, yaw_rad))
         roll_rad, pitch_rad = _received_angle(state.roll_rad), _received_angle(state.pitch_rad)
-        gimbal, camera_attitude = self._simulation.gimbal, None
-        if gimbal is not None:
-            camera_ned = quaternion_from_euler(0.0, gimbal.pitch_rad, yaw_rad + gimbal.yaw_rad)
-            camera_attitude = alignment.attitude(camera_ned)
+        camera_attitude = None
+        if self._gimbal_attitude is not None:
+            camera_attitude = alignment.attitude(self._gimbal_attitude.ned(yaw_rad))
         return DroneState(
             state.time_us,
             *pose.position_m,
@@ -367,6 +385,14 @@ def single(vector: Vec3) -> Vec3:
     """A vector, shape (3,), rounded to single precision."""
     x, y, z = _THREE.unpack(_THREE.pack(*vector))
     return (x, y, z)
+
+
+def _received_gimbal(gimbal: SimulatedGimbal | None) -> GimbalAttitude | None:
+    """What a gimbal reports of its camera, rounded as on a link."""
+    if gimbal is None:
+        return None
+    w, x, y, z = map(_rounded, quaternion_from_euler(0.0, gimbal.pitch_rad, gimbal.yaw_rad))
+    return GimbalAttitude(normalized((w, x, y, z)), to_north=False)
 
 
 def _received_angle(angle_rad: float) -> float:

@@ -79,7 +79,7 @@ class StreamService(Service):
                     link.schedule.keep(message_id, packet)
 
     def repeat(self) -> None:
-        """Send all streams while time stands: those on the grid of requested ones as they were there."""
+        """Send all streams again; those on the grid of requested ones as they were there."""
         for link in self._exchange.links.values():
             for message_id, latest in link.schedule.again():
                 packet = latest or self._packet(message_id, link)
