@@ -139,7 +139,7 @@ def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
     assert result["judged_by"] == "truth"
     ticked_s = (
         result["wall_time_s"] * result["real_time_factor"]
-    )  # also before motors on and after motors off
+    )  # some before and after the try
     assert result["try_time_s"] < ticked_s < result["try_time_s"] + 6.0
 
     track = folder / "track.png"
