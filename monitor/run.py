@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from monitor.server import Job
 
 
+FIRST_VIEWER = "a browser shows the monitor"  # is said once
 _MAX_UNSENT_BYTES = 1 << 16  # that the kernel buffers for a slow viewer
 
 
@@ -38,6 +39,14 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
         # Importing the libraries takes more than a second, so other tasks of this loop run meanwhile.
         await asyncio.to_thread(_import_server)
         from monitor.server import assemble, make_server  # noqa: PLC0415 - see above
+
+        is_watched = False
+
+        def viewed() -> None:
+            nonlocal is_watched
+            if not is_watched:
+                is_watched = True
+                say(FIRST_VIEWER)
 
         certificate = None
         if settings.certificate is not None:
@@ -72,6 +81,7 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
             monitor.access.invite()
 
         monitor = assemble(equipment, settings, (host, port), invite)
+        monitor.on_viewer = viewed
         tls = None if certificate is None else certificate.context
         server = make_server(monitor.web, settings, started, tls)
         await _run(server, listener, [monitor.fleet.run, *monitor.jobs])

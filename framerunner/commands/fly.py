@@ -69,7 +69,11 @@ _Record = Annotated[bool, Parameter(help="write flight.mcap as well, for `framer
 _Video = Annotated[
     bool, Parameter(help="write video.avi also in lockstep; in real time it is always written")
 ]
-_Monitor = Annotated[bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")]
+_Monitor = Annotated[
+    bool,
+    Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/; it stays open until Ctrl-C"),
+]
+_WaitForViewer = Annotated[bool, Parameter(negative=(), help="with --monitor: fly when a browser shows it")]
 _DroneLimits = Annotated[
     str | None,
     Parameter(
@@ -130,6 +134,7 @@ def fly(
     record: _Record = False,
     video: _Video = False,
     monitor: _Monitor = False,
+    wait_for_viewer: _WaitForViewer = False,
     pilot: _Pilot = None,
     drone_limits: _DroneLimits = None,
     response: _Response = None,
@@ -169,7 +174,12 @@ def fly(
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
     ends, delay = (drone, camera, api, speed, instance, autopilot), delay_of(camera_delay, plan.calibration)
     flown = None if lockstep else RealTimeSettings(*ends, delay, procedure)
-    return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
+    if wait_for_viewer and not monitor:
+        raise SettingError(
+            "--wait-for-viewer: is for a monitor that is opened; add --monitor or leave it out"
+        )
+    shown = (monitor, wait_for_viewer, monitor_link)
+    return _run(FlightSettings(plan, flown, out, record, video, *shown), lifeline=lifeline)
 
 
 def _run(settings: FlightSettings, *, lifeline: bool) -> int:

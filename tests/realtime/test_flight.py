@@ -137,9 +137,7 @@ def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
     assert result["landed_on_base"] is True
     assert result["landing_error_m"] < 0.25
     assert result["judged_by"] == "truth"
-    ticked_s = (
-        result["wall_time_s"] * result["real_time_factor"]
-    )  # some before and after the try
+    ticked_s = result["wall_time_s"] * result["real_time_factor"]  # some before and after the try
     assert result["try_time_s"] < ticked_s < result["try_time_s"] + 6.0
 
     track = folder / "track.png"
