@@ -351,7 +351,8 @@ def _checked_seed(
         return 0 if lockstep or autopilot is not None else None
     if not lockstep and autopilot is None:
         raise SettingError(
-            f"--seed {seed}: only a flight in lockstep repeats; add --lockstep or leave it out"
+            f"--seed {seed}: is for a flight in lockstep, or with --px4 or --ardupilot; add one of them "
+            "or leave it out, which is seed 0"
         )
     if not 0 <= seed < 2**63:
         raise SettingError(f"--seed {seed}: must be from 0 to {2**63 - 1}")

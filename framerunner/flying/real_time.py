@@ -121,7 +121,8 @@ async def fly_in_real_time(
 
         def timing() -> dict[str, Timing]:
             measured = (drone, perception, clock, records.recorder.real_time_factor, settings.speed)
-            fused, repeats = plan.chart.vision == "frames", settings.repeats
+            fused = plan.chart.vision == "frames"
+            repeats = settings.repeats and not records.recorder.paused  # sticks move in wall time
             return {"timing": flight_timing(*measured, fused=fused, repeats=repeats)}
 
         what = (plan, drone, perception, judge, (records.see, reporter.see))
