@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import Callable
+from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -40,14 +41,6 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
         await asyncio.to_thread(_import_server)
         from monitor.server import assemble, make_server  # noqa: PLC0415 - see above
 
-        is_watched = False
-
-        def viewed() -> None:
-            nonlocal is_watched
-            if not is_watched:
-                is_watched = True
-                say(FIRST_VIEWER)
-
         certificate = None
         if settings.certificate is not None:
             from monitor.tls import load_certificate  # noqa: PLC0415 - see above
@@ -81,7 +74,7 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
             monitor.access.invite()
 
         monitor = assemble(equipment, settings, (host, port), invite)
-        monitor.on_viewer = viewed
+        monitor.on_viewer = cache(lambda: say(FIRST_VIEWER))
         tls = None if certificate is None else certificate.context
         server = make_server(monitor.web, settings, started, tls)
         await _run(server, listener, [monitor.fleet.run, *monitor.jobs])

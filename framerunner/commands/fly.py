@@ -115,6 +115,26 @@ class GenuineOptions:
 _OWN = GenuineOptions()
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class MonitorOptions:
+    """Where a flight is shown, as the command line gives it."""
+
+    monitor: _Monitor = False
+    wait_for_viewer: _WaitForViewer = False
+    monitor_link: _MonitorLink = None
+
+    @property
+    def checked(self) -> tuple[bool, bool, str | None]:
+        """All three; SettingError if there is no monitor whose viewer can be waited for."""
+        if self.wait_for_viewer and not self.monitor:
+            raise SettingError("--wait-for-viewer: is for a monitor that is opened; add --monitor as well")
+        return (self.monitor, self.wait_for_viewer, self.monitor_link)
+
+
+_NO_MONITOR = MonitorOptions()
+
+
 def fly(
     scenario: Annotated[str, Parameter(help="name or file of the scenario")] = "test-case-1",
     *,
@@ -133,14 +153,12 @@ def fly(
     fault: Faults = (),
     record: _Record = False,
     video: _Video = False,
-    monitor: _Monitor = False,
-    wait_for_viewer: _WaitForViewer = False,
+    shown: MonitorOptions = _NO_MONITOR,
     pilot: _Pilot = None,
     drone_limits: _DroneLimits = None,
     response: _Response = None,
     hardware: HardwareOptions = NONE,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
-    monitor_link: _MonitorLink = None,
     lifeline: _Lifeline = False,
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
@@ -163,7 +181,7 @@ def fly(
     camera = api.video_url if api is not None and camera is None else camera
     autopilot = _genuine(genuine, drone=drone, lockstep=lockstep)
     _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
-    seed, procedure = _checked_seed(seed, monitor, lockstep, autopilot), hardware_of(hardware, drone)
+    seed, procedure = _checked_seed(seed, shown.monitor, lockstep, autopilot), hardware_of(hardware, drone)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
@@ -174,12 +192,7 @@ def fly(
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
     ends, delay = (drone, camera, api, speed, instance, autopilot), delay_of(camera_delay, plan.calibration)
     flown = None if lockstep else RealTimeSettings(*ends, delay, procedure)
-    if wait_for_viewer and not monitor:
-        raise SettingError(
-            "--wait-for-viewer: is for a monitor that is opened; add --monitor or leave it out"
-        )
-    shown = (monitor, wait_for_viewer, monitor_link)
-    return _run(FlightSettings(plan, flown, out, record, video, *shown), lifeline=lifeline)
+    return _run(FlightSettings(plan, flown, out, record, video, *shown.checked), lifeline=lifeline)
 
 
 def _run(settings: FlightSettings, *, lifeline: bool) -> int:

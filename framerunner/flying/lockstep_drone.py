@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import dataclass
 from math import degrees, isfinite, pi, radians
 from struct import Struct
 
@@ -60,6 +61,25 @@ _THREE = Struct("<3f")
 TruthObserver = Callable[[TrueState], None]
 
 
+@dataclass(slots=True)
+class _Received:
+    """What the vehicle has sent between ticks."""
+
+    position_us: int = 0  # vehicle time of the last position; 0: there is none
+    position_ned_m: Vec3 = (0.0, 0.0, 0.0)
+    velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
+    landed: bool = True
+
+    def update(self, autopilot: Autopilot, now_us: int) -> None:
+        """Receive what is sent now; a position only if the vehicle knows its own."""
+        status, state = autopilot.status, autopilot.state
+        self.landed = status.landed_state is LandedState.ON_GROUND
+        if status.origin is not None:
+            self.position_ned_m = single(state.position_ned_m)
+            self.velocity_ned_m_s = single(state.velocity_ned_m_s)
+            self.position_us = now_us
+
+
 class LockstepDrone:
     """A simulated vehicle whose time advances only while something is awaited of it.
 
@@ -99,10 +119,7 @@ class LockstepDrone:
         self._alignment: Alignment | None = None
         self._heartbeat_us = 0
         self._position_us = POSITION_PHASE_US
-        self._sent_position_us = 0
-        self._position_ned_m: Vec3 = (0.0, 0.0, 0.0)
-        self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
-        self._landed = True
+        self._received = _Received()
         self._gimbal_us = 0 if simulation.gimbal is not None else _NEVER_US
         self._gimbal_attitude: GimbalAttitude | None = None
         self._tick_us = TICK_US
@@ -127,10 +144,11 @@ class LockstepDrone:
                 f"not ready within {READY_LIMIT_US / 1e6:g} s: "
                 f"pre-arm checks not passed{_vehicle_texts(self._autopilot)}"
             )
-        if not self._sent_position_us:
-            self._receive_position(self._autopilot.state.time_us)
+        if not self._received.position_us:
+            self._received.update(self._autopilot, self._autopilot.state.time_us)
         self._alignment = Alignment(
-            self._start_arena, Pose(self._position_ned_m, _received_angle(self._autopilot.state.yaw_rad))
+            self._start_arena,
+            Pose(self._received.position_ned_m, _received_angle(self._autopilot.state.yaw_rad)),
         )
 
     async def ticks(self) -> AsyncIterator[DroneState]:
@@ -302,18 +320,7 @@ class LockstepDrone:
         if now_us >= self._position_us:
             self._position_us += POSITION_US
             if not self._link.loses():
-                self._receive_position(now_us)
-
-    def _receive_position(self, now_us: int) -> None:
-        """Take what the vehicle sends between ticks; its position only when it is known."""
-        status, state = self._autopilot.status, self._autopilot.state
-        self._landed = status.landed_state is LandedState.ON_GROUND
-        if status.origin is not None:
-            self._position_ned_m, self._velocity_ned_m_s = (
-                single(state.position_ned_m),
-                single(state.velocity_ned_m_s),
-            )
-            self._sent_position_us = now_us
+                self._received.update(self._autopilot, now_us)
 
     def _pass(self, limit_us: int, until: Callable[[], bool] = lambda: False) -> bool:
         """Let time pass until a condition holds; False if it does not within the limit."""
@@ -336,7 +343,7 @@ class LockstepDrone:
         """The state as telemetry shows it: heading now, position and mode as of their last messages."""
         state = self._autopilot.state
         yaw_rad = _received_angle(state.yaw_rad)
-        pose = alignment.pose(Pose(self._position_ned_m, yaw_rad))
+        pose = alignment.pose(Pose(self._received.position_ned_m, yaw_rad))
         roll_rad, pitch_rad = _received_angle(state.roll_rad), _received_angle(state.pitch_rad)
         camera_attitude = None
         if self._gimbal_attitude is not None:
@@ -345,12 +352,12 @@ class LockstepDrone:
             state.time_us,
             *pose.position_m,
             pose.yaw_rad,
-            alignment.vector(self._velocity_ned_m_s),
+            alignment.vector(self._received.velocity_ned_m_s),
             self._arming.is_armed(state.time_us),
             self._mode is FlightMode.OFFBOARD,
             self._mode.name,
-            self._landed,
-            (state.time_us - self._sent_position_us) * 1e-6,
+            self._received.landed,
+            (state.time_us - self._received.position_us) * 1e-6,
             alignment.attitude(quaternion_from_euler(roll_rad, pitch_rad, yaw_rad)),
             camera_attitude,
         )
