@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Self, TypeVar
 
 from errors import SettingError
+from monitor.run import FIRST_VIEWER
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 
@@ -167,6 +168,7 @@ class MonitorProcess(ChildProcess):
         for host in camera_hosts:
             arguments += ["--camera-host", host]
         self._open = asyncio.Event()
+        self._viewed = asyncio.Event()
         self._watching: asyncio.Task[None] | None = None
         super().__init__("the monitor", arguments, self._relay)
 
@@ -196,11 +198,16 @@ class MonitorProcess(ChildProcess):
             "stop what listens there, or leave out --monitor and start framerunner monitor --port 8081",
         )
 
+    async def viewed(self) -> None:
+        """Wait until a browser shows it; SettingError with its last line if it ends."""
+        print(
+            "the flight begins when a browser shows the monitor (Ctrl-C stops)", file=sys.stderr, flush=True
+        )
+        await self.guard(asyncio.create_task(self._viewed.wait()))
+
     async def stay(self) -> None:
-        """In a terminal, wait for Ctrl-C, which then ends only this wait."""
-        if not sys.stdin.isatty():
-            return
-        print("the monitor stays open (Ctrl-C ends it)", file=sys.stderr, flush=True)
+        """Wait for Ctrl-C or SIGTERM, which then ends only this wait."""
+        print("the monitor stays open (Ctrl-C or SIGTERM ends it)", file=sys.stderr, flush=True)
         try:
             await self.failed()
         except asyncio.CancelledError:
@@ -215,6 +222,8 @@ class MonitorProcess(ChildProcess):
             print(line, file=sys.stderr, flush=True)
         if "http://" in line:
             self._open.set()
+        if line == FIRST_VIEWER:
+            self._viewed.set()
 
 
 def _free_port() -> int:

@@ -165,6 +165,7 @@ def register(monitor: Monitor) -> None:
         if not channel.enter(viewer):
             await websocket.close(TOO_SLOW_CODE, "too many are watching")
             return
+        monitor.on_viewer()
         sending = asyncio.create_task(_send(websocket, viewer))
         try:
             while True:  # until the browser disconnects; what it sends is ignored

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import Callable
+from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from monitor.server import Job
 
 
+FIRST_VIEWER = "a browser shows the monitor"  # is said once
 _MAX_UNSENT_BYTES = 1 << 16  # that the kernel buffers for a slow viewer
 
 
@@ -72,6 +74,7 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
             monitor.access.invite()
 
         monitor = assemble(equipment, settings, (host, port), invite)
+        monitor.on_viewer = cache(lambda: say(FIRST_VIEWER))
         tls = None if certificate is None else certificate.context
         server = make_server(monitor.web, settings, started, tls)
         await _run(server, listener, [monitor.fleet.run, *monitor.jobs])

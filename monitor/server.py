@@ -66,6 +66,7 @@ class Monitor:
         web: for HTTP routes and WebSockets.
         instance: differs from one start of the monitor to the next.
         jobs: run from start to end of the monitor; `register` may append to them.
+        on_viewer: called when a page begins to show the drones.
     """
 
     settings: MonitorSettings
@@ -76,6 +77,7 @@ class Monitor:
     web: FastAPI
     instance: str = field(default_factory=lambda: token_urlsafe(9))
     jobs: list[Job] = field(default_factory=list)
+    on_viewer: Callable[[], None] = lambda: None
 
     def at_end(self, close: Callable[[], None]) -> None:
         """Call a function when the monitor ends."""

@@ -98,12 +98,18 @@ class CameraPerception:
     that waited in a buffer is old; otherwise from the time that `assume_times` gives it or, without that,
     from the tick after its arrival.
 
+    Args:
+        camera: gives the images.
+        detector: by default the paper's.
+        patient: vehicle time waits for the images, so at the start none is waited for.
+
     Attributes:
         oldest_s: age of the oldest image that was used, seconds.
     """
 
-    def __init__(self, camera: Camera, detector: Detector | None = None) -> None:
+    def __init__(self, camera: Camera, detector: Detector | None = None, *, patient: bool = False) -> None:
         self.oldest_s = 0.0
+        self._patient = patient
         self._camera = camera
         self._detector = detector or new_detector("boxes")
         self._detections = Detections()
@@ -133,6 +139,8 @@ class CameraPerception:
     async def open(self) -> None:
         """Wait for the first image; raises `CameraLostError` if there is none."""
         self._task = asyncio.create_task(self._watch(), name="camera")
+        if self._patient:
+            return
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(FIRST_IMAGE_S):
                 await self._arrived.wait()
@@ -167,6 +175,8 @@ class CameraPerception:
 
         False if it was not within `limit_s` of wall time, or the camera has failed.
         """
+        if image_us < 0:  # there is none yet
+            return True
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(limit_s):
                 while not self._ended and (self._image_us is None or self._image_us < image_us):

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 
 from firmware_py.mavlink.camera.model import CameraModel
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
+from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from geometry.solids import Solid
 from sitl.drone_files import flight_recorder
 from sitl.link_hub import LinkHub
@@ -21,6 +24,10 @@ from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink
 from wire.transports.urls import in_url
 
+_REQUESTED_US = MappingProxyType({mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20_000})
+"""What the program that grants time will request: before that, too, positions are those of lockstep."""
+_REPEAT_S = 0.1  # wall time; while time stands before the first grant, the app finds the drone by that
+
 
 class ServedDrone:
     """Puts one simulation on MAVLink and video; it advances when `tick` is called.
@@ -30,6 +37,7 @@ class ServedDrone:
         settings: of this drone.
         boot_unix_us: time now, microseconds since 1970.
         notice: called with lines for people.
+        grants: how far simulated time may advance; None: without a limit.
 
     Raises:
         StorageFolderError: the folder for its files cannot be used.
@@ -46,9 +54,10 @@ class ServedDrone:
         settings: ServerSettings,
         boot_unix_us: int,
         notice: Callable[[str], None] = lambda line: None,
+        grants: TimeGrants | None = None,
     ) -> None:
         self.simulation = simulation
-        self._settings = settings
+        self._settings, self._grants = settings, grants
         self._keeper: ParameterKeeper | None = None
         if settings.parameters is not None:
             self._keeper = open_parameters(
@@ -80,7 +89,7 @@ class ServedDrone:
         )
         self._notice = simulation.faults.notice = notice
         self._hub = LinkHub(self.node, self._warn, lambda: simulation.faults.link)
-        self._video = DroneVideo(simulation, settings)
+        self._video = DroneVideo(simulation, settings, grants)
 
     async def open_links(self) -> None:
         """Open the links and send at once.
@@ -89,7 +98,9 @@ class ServedDrone:
             LinkError: one cannot be opened.
         """
         for profile, addresses in self._settings.default_links:
-            await self._hub.open_udp(profile, addresses)
+            is_apps = self._grants is not None and profile.name == ONBOARD.name
+            used = replace(profile, requested_us=_REQUESTED_US) if is_apps else profile
+            await self._hub.open_udp(used, addresses)
         if self._settings.payload is not None:
             await self._hub.open_payload(*self._settings.payload)
         self._hub.update(0)
@@ -129,13 +140,33 @@ class ServedDrone:
         if image is not None:
             self._album.show(image, self._video.image_us)
 
-    async def hold(self, grants: TimeGrants) -> None:
+    @property
+    def holds(self) -> bool:
+        """Whether the next tick must wait for the program that grants time.
+
+        Its flight begins, like one in lockstep, when the drone first gets ready; without a grant no time
+        passes after that.
+        """
+        grants = self._grants
+        if grants is None:
+            return False
+        return self.simulation.time_us > grants.until_us or (
+            not grants.used and self.simulation.autopilot.status.ready
+        )
+
+    async def hold(self) -> None:
         """Wait until simulated time may advance."""
+        grants = self._grants
+        assert grants is not None, "time is granted"
 
         def received() -> Velocity | None:
             self._hub.read()  # on a flooded link, a setpoint may still wait
             return self.simulation.autopilot.setpoints.newest_velocity()
 
+        if not grants.used:
+            while not await grants.first(_REPEAT_S):
+                self._hub.repeat()
+            return
         await grants.hold(self.simulation.time_us - CONTROL_PERIOD_US, self._video.image_us, received)
 
     async def close(self) -> None:

@@ -109,6 +109,11 @@ class LinkHub:
         self._node.update(time_us)
         self._flush()
 
+    def repeat(self) -> None:
+        """Send all streams again, while vehicle time stands."""
+        self._node.repeat()
+        self._flush()
+
     def _flush(self) -> None:
         faulty = self._faulty
         for name, data in self._node.take_output():

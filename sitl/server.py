@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from sitl.drone import ServedDrone
 from sitl.fleet import Fleet
 from sitl.pacing.pacer import BURST_TICKS, LagNotices, Pacer
-from sitl.pacing.time_grants import FREE_US, TimeGrants
+from sitl.pacing.time_grants import TimeGrants
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.world import CONTROL_PERIOD_US
@@ -40,13 +40,15 @@ class SimulatorServer:
         self._grants = grants
         boot_unix_us = int(time.time() * 1e6)
         self._drones = [
-            ServedDrone(flown, settings.shifted(number), boot_unix_us, notice)
+            ServedDrone(flown, settings.shifted(number), boot_unix_us, notice, grants)
             for number, flown in enumerate(simulations)
         ]
         self._fleet = Fleet([flown.world for flown in simulations], notice)
 
     async def run(self) -> None:
         """Open the links, then run until cancelled; video starts right after the first packets.
+
+        With grants it starts before: their program gets every image, as in lockstep.
 
         Raises:
             LinkError: a link cannot be opened.
@@ -59,6 +61,8 @@ class SimulatorServer:
             for drone in self._drones:
                 await asyncio.to_thread(drone.simulation.autopilot.prepare)
             video_task = asyncio.create_task(self._open_video())
+            if self._grants is not None:
+                await asyncio.wait({video_task})
             await self._run_paced(video_task)
         finally:
             if video_task is not None:
@@ -90,7 +94,7 @@ class SimulatorServer:
                 video_task.result()  # a busy port ends the simulator
             target_us = pacer.target_us(time.monotonic())
             for _ in range(BURST_TICKS):
-                if simulation.time_us + CONTROL_PERIOD_US > target_us or simulation.time_us > self._until_us:
+                if simulation.time_us + CONTROL_PERIOD_US > target_us or drones[0].holds:
                     break
                 for drone in drones:
                     drone.tick()
@@ -102,11 +106,7 @@ class SimulatorServer:
                 if not ready and all(drone.simulation.autopilot.status.ready for drone in drones):
                     ready = True
                     self._notice("Ready for takeoff!")  # PX4's words, for which scripts wait
-            if self._grants is not None and simulation.time_us > self._until_us:
-                await drones[0].hold(self._grants)
+            if drones[0].holds:
+                await drones[0].hold()
                 continue
             await asyncio.sleep(pacer.wait_s(now_s, simulation.time_us + CONTROL_PERIOD_US))
-
-    @property
-    def _until_us(self) -> int:
-        return FREE_US if self._grants is None else self._grants.until_us

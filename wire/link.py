@@ -29,6 +29,7 @@ class LinkProfile:
     rates_hz: Mapping[int, float]  # by message id, in vehicle time
     bytes_s: float = inf  # capacity; PX4's MAV_0_RATE
     trusted: bool = True  # it cannot be reached from outside: unsigned packets are accepted in spite of a key
+    requested_us: Mapping[int, int] = field(default_factory=dict)  # intervals, as if requested at boot
 
 
 @dataclass(slots=True)
@@ -77,6 +78,8 @@ class _Stream:
     message_id: int
     interval_us: int
     due_us: int = 0
+    requested: bool = False  # its interval was, so it has the grid of such streams
+    latest: Packet | None = None  # that was sent, if it is requested
 
 
 class Schedule:
@@ -120,6 +123,16 @@ class Schedule:
         self.next_due_us = next_due_us
         return ids
 
+    def keep(self, message_id: int, packet: Packet) -> None:
+        """Keep the last packet of a requested stream."""
+        stream = self._streams[message_id]
+        if stream.requested:
+            stream.latest = packet
+
+    def again(self) -> list[tuple[int, Packet | None]]:
+        """All streams, for a vehicle whose time stands; of a requested one its last packet, else None."""
+        return [(stream.message_id, stream.latest) for stream in self._streams.values()]
+
     def interval_us(self, message_id: int) -> int:
         """Interval of a stream; -1 when it is off."""
         stream = self._streams.get(message_id)
@@ -143,7 +156,7 @@ class Schedule:
             self._streams.pop(message_id, None)
             return
         stream = self._streams.setdefault(message_id, _Stream(message_id, interval_us))
-        stream.interval_us = interval_us
+        stream.interval_us, stream.requested = interval_us, True
         phase_us = _REQUESTED_PHASE_US % interval_us
         stream.due_us = ((time_us - phase_us) // interval_us + 1) * interval_us + phase_us
         self.next_due_us = 0
@@ -205,6 +218,8 @@ class Link:
     def __post_init__(self) -> None:
         profile = self.profile
         self.schedule = Schedule(profile.rates_hz)
+        for message_id, interval_us in profile.requested_us.items():
+            self.schedule.set_interval(message_id, interval_us, 0)
         self.budget = Budget(profile.bytes_s, profile.rates_hz) if isfinite(profile.bytes_s) else None
 
     @property

@@ -265,6 +265,11 @@ class MavlinkNode:
         for update in self._updates:
             update()
 
+    def repeat(self) -> None:
+        """Send all streams again while vehicle time stands, for who listens only now."""
+        for service in self.services:
+            service.repeat()
+
     def take_output(self) -> list[tuple[str, bytes]]:
         """The datagrams to send, each with its link's name; a datagram has one or more whole packets."""
         return self._exchange.take_output()

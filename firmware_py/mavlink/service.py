@@ -111,6 +111,9 @@ class Service:
     def update(self) -> None:
         """Send what is due; called at every update of the node."""
 
+    def repeat(self) -> None:
+        """Send again what is sent regularly, while vehicle time stands."""
+
 
 def merged(tables: Iterable[Mapping[int, Entry]]) -> dict[int, Entry]:
     """All tables in one.

@@ -77,7 +77,11 @@ _Record = Annotated[bool, Parameter(help="write flight.mcap as well, for `framer
 _Video = Annotated[
     bool, Parameter(help="write video.avi also in lockstep; in real time it is always written")
 ]
-_Monitor = Annotated[bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")]
+_Monitor = Annotated[
+    bool,
+    Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/; it stays open until Ctrl-C"),
+]
+_WaitForViewer = Annotated[bool, Parameter(negative=(), help="with --monitor: fly when a browser shows it")]
 _DroneLimits = Annotated[
     str | None,
     Parameter(
@@ -119,6 +123,26 @@ class GenuineOptions:
 _OWN = GenuineOptions()
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class MonitorOptions:
+    """Where a flight is shown, as the command line gives it."""
+
+    monitor: _Monitor = False
+    wait_for_viewer: _WaitForViewer = False
+    monitor_link: _MonitorLink = None
+
+    @property
+    def checked(self) -> tuple[bool, bool, str | None]:
+        """All three; SettingError if there is no monitor whose viewer can be waited for."""
+        if self.wait_for_viewer and not self.monitor:
+            raise SettingError("--wait-for-viewer: is for a monitor that is opened; add --monitor as well")
+        return (self.monitor, self.wait_for_viewer, self.monitor_link)
+
+
+_NO_MONITOR = MonitorOptions()
+
+
 def fly(
     scenario: Annotated[str, Parameter(help="name or file of the scenario")] = "test-case-1",
     *,
@@ -137,13 +161,12 @@ def fly(
     fault: Faults = (),
     record: _Record = False,
     video: _Video = False,
-    monitor: _Monitor = False,
+    shown: MonitorOptions = _NO_MONITOR,
     pilot: _Pilot = None,
     drone_limits: _DroneLimits = None,
     response: _Response = None,
     hardware: HardwareOptions = NONE,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
-    monitor_link: _MonitorLink = None,
     lifeline: _Lifeline = False,
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
@@ -165,7 +188,7 @@ def fly(
     api, autopilot = _simulator_api(simulator, drone), _genuine(genuine, drone=drone, lockstep=lockstep)
     camera = api.video_url if api is not None and camera is None else camera
     _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
-    seed, procedure = _checked_seed(seed, monitor, lockstep, autopilot), hardware_of(hardware, drone)
+    seed, procedure = _checked_seed(seed, shown.monitor, lockstep, autopilot), hardware_of(hardware, drone)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
@@ -177,7 +200,7 @@ def fly(
     with _instance(instance, autopilot) as number:
         ends = (drone, camera, api, speed, number, autopilot, delay_of(camera_delay, plan.calibration))
         flown = None if lockstep else RealTimeSettings(*ends, procedure)
-        return _run(FlightSettings(plan, flown, out, record, video, monitor, monitor_link), lifeline=lifeline)
+        return _run(FlightSettings(plan, flown, out, record, video, *shown.checked), lifeline=lifeline)
 
 
 def _instance(given: int | None, autopilot: GenuineAutopilot | None) -> AbstractContextManager[int]:
@@ -358,7 +381,8 @@ def _checked_seed(
         return 0 if lockstep or autopilot is not None else None
     if not lockstep and autopilot is None:
         raise SettingError(
-            f"--seed {seed}: only a flight in lockstep repeats; add --lockstep or leave it out"
+            f"--seed {seed}: is for a flight in lockstep, or with --px4 or --ardupilot; add one of them "
+            "or leave it out, which is seed 0"
         )
     if not 0 <= seed < 2**63:
         raise SettingError(f"--seed {seed}: must be from 0 to {2**63 - 1}")

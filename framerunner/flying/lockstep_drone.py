@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import dataclass
 from math import degrees, isfinite, pi, radians
 from struct import Struct
 
@@ -23,20 +24,25 @@ from firmware_py.types import CRITICAL
 from framerunner.flying.faulty_link import FaultyLink
 from framerunner.flying.response import LateResponse
 from geometry.axes import Alignment, Pose
-from geometry.rotations import quaternion_from_euler
+from geometry.rotations import normalized, quaternion_from_euler
 from geometry.vectors import Vec3
 from offboard.arming import Arming
 from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.link.gimbal_feed import GimbalAttitude
 from offboard.safety.caps import CapKeeper
 from scenarios.models import TrueState
+from sitl.payload.gimbal import SimulatedGimbal
 from sitl.simulation import Simulation
 
 TICK_US = 50_000
 HEARTBEAT_US = 1_000_000
 POSITION_US = 20_000
-"""Between two position messages; a tick, made by an attitude message, has the last one before it."""
+"""Between two messages of position, or of the landed state; a tick, made by an attitude message, has the last
+one before it."""
 POSITION_PHASE_US = 16_000
 """Off the ticks' grid, for the same reason as the camera's exposures."""
+GIMBAL_US = 100_000
+"""Between two messages of a gimbal, which come after the attitude of the same time."""
 TELEMETRY_DELAY_US = 4_000
 """From a state to the setpoint that answers it: one control tick, as measured over UDP and MAVSDK."""
 STREAM_BEFORE_OFFBOARD_US = 300_000
@@ -53,6 +59,25 @@ _ONE = Struct("<f")
 _THREE = Struct("<3f")
 
 TruthObserver = Callable[[TrueState], None]
+
+
+@dataclass(slots=True)
+class _Received:
+    """What the vehicle has sent between ticks."""
+
+    position_us: int = 0  # vehicle time of the last position; 0: there is none
+    position_ned_m: Vec3 = (0.0, 0.0, 0.0)
+    velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
+    landed: bool = True
+
+    def update(self, autopilot: Autopilot, now_us: int) -> None:
+        """Receive what is sent now; a position only if the vehicle knows its own."""
+        status, state = autopilot.status, autopilot.state
+        self.landed = status.landed_state is LandedState.ON_GROUND
+        if status.origin is not None:
+            self.position_ned_m = single(state.position_ned_m)
+            self.velocity_ned_m_s = single(state.velocity_ned_m_s)
+            self.position_us = now_us
 
 
 class LockstepDrone:
@@ -96,9 +121,9 @@ class LockstepDrone:
         self._alignment: Alignment | None = None
         self._heartbeat_us = 0
         self._position_us = POSITION_PHASE_US
-        self._sent_position_us = 0
-        self._position_ned_m: Vec3 = (0.0, 0.0, 0.0)
-        self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
+        self._received = _Received()
+        self._gimbal_us = 0 if simulation.gimbal is not None else _NEVER_US
+        self._gimbal_attitude: GimbalAttitude | None = None
         self._tick_us = TICK_US
         self._sample: DroneState | None = None
         self._arming = Arming()
@@ -121,8 +146,11 @@ class LockstepDrone:
                 f"not ready within {READY_LIMIT_US / 1e6:g} s: "
                 f"pre-arm checks not passed{_vehicle_texts(self._autopilot)}"
             )
+        if not self._received.position_us:
+            self._received.update(self._autopilot, self._autopilot.state.time_us)
         self._alignment = Alignment(
-            self._start_arena, Pose(self._position_ned_m, _received_angle(self._autopilot.state.yaw_rad))
+            self._start_arena,
+            Pose(self._received.position_ned_m, _received_angle(self._autopilot.state.yaw_rad)),
         )
 
     async def ticks(self) -> AsyncIterator[DroneState]:
@@ -258,7 +286,8 @@ class LockstepDrone:
         """Let a control tick pass, and more until a time or until the link sends something by itself."""
         simulation, observers, state = self._simulation, self._observers, self._autopilot.state
         link = self._link
-        until_us = min(until_us, self._resend_us, self._heartbeat_us, self._tick_us, self._position_us)
+        due_us = (self._resend_us, self._heartbeat_us, self._tick_us, self._position_us, self._gimbal_us)
+        until_us = min(until_us, *due_us)
         while True:
             simulation.tick()
             truth = simulation.truth
@@ -287,13 +316,13 @@ class LockstepDrone:
             if self._alignment is not None:
                 state = self._reported_state(self._alignment)
                 self._sample = self._link.receive(state) if self._link.active else state
+        if now_us >= self._gimbal_us:
+            self._gimbal_us += GIMBAL_US
+            self._gimbal_attitude = _received_gimbal(self._simulation.gimbal)
         if now_us >= self._position_us:
             self._position_us += POSITION_US
-            if self._link.loses():
-                return
-            self._position_ned_m = single(self._autopilot.state.position_ned_m)
-            self._velocity_ned_m_s = single(self._autopilot.state.velocity_ned_m_s)
-            self._sent_position_us = now_us
+            if not self._link.loses():
+                self._received.update(self._autopilot, now_us)
 
     def _pass(self, limit_us: int, until: Callable[[], bool] = lambda: False) -> bool:
         """Let time pass until a condition holds; False if it does not within the limit."""
@@ -316,22 +345,21 @@ class LockstepDrone:
         """The state as telemetry shows it: heading now, position and mode as of their last messages."""
         state = self._autopilot.state
         yaw_rad = _received_angle(state.yaw_rad)
-        pose = alignment.pose(Pose(self._position_ned_m, yaw_rad))
+        pose = alignment.pose(Pose(self._received.position_ned_m, yaw_rad))
         roll_rad, pitch_rad = _received_angle(state.roll_rad), _received_angle(state.pitch_rad)
-        gimbal, camera_attitude = self._simulation.gimbal, None
-        if gimbal is not None:
-            camera_ned = quaternion_from_euler(0.0, gimbal.pitch_rad, yaw_rad + gimbal.yaw_rad)
-            camera_attitude = alignment.attitude(camera_ned)
+        camera_attitude = None
+        if self._gimbal_attitude is not None:
+            camera_attitude = alignment.attitude(self._gimbal_attitude.ned(yaw_rad))
         return DroneState(
             state.time_us,
             *pose.position_m,
             pose.yaw_rad,
-            alignment.vector(self._velocity_ned_m_s),
+            alignment.vector(self._received.velocity_ned_m_s),
             self._arming.is_armed(state.time_us),
             self._mode is FlightMode.OFFBOARD,
             self._mode.name,
-            self._autopilot.status.landed_state is LandedState.ON_GROUND,
-            (state.time_us - self._sent_position_us) * 1e-6,
+            self._received.landed,
+            (state.time_us - self._received.position_us) * 1e-6,
             alignment.attitude(quaternion_from_euler(roll_rad, pitch_rad, yaw_rad)),
             camera_attitude,
         )
@@ -366,6 +394,14 @@ def single(vector: Vec3) -> Vec3:
     """A vector, shape (3,), rounded to single precision."""
     x, y, z = _THREE.unpack(_THREE.pack(*vector))
     return (x, y, z)
+
+
+def _received_gimbal(gimbal: SimulatedGimbal | None) -> GimbalAttitude | None:
+    """What a gimbal reports of its camera, rounded as on a link."""
+    if gimbal is None:
+        return None
+    w, x, y, z = map(_rounded, quaternion_from_euler(0.0, gimbal.pitch_rad, gimbal.yaw_rad))
+    return GimbalAttitude(normalized((w, x, y, z)), to_north=False)
 
 
 def _received_angle(angle_rad: float) -> float:

@@ -33,11 +33,7 @@ if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow t
     from framerunner.preflight.settings import HardwareSettings
     from offboard.link.process_guard import ProcessGuard
     from offboard.mavsdk_drone import MavsdkDrone
-    from offboard.perception import CameraPerception
-
-
-CAMERA_LIMIT_S = 5.0  # wall time without an image after which the camera has failed
-PATIENT_CAMERA_LIMIT_S = 60.0  # likewise, when vehicle time waits for this program
+    from offboard.perception import Camera, CameraPerception
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +64,6 @@ class _Endpoints:
     drone_url: str
     camera_url: str
     api: SimulatorApi | None  # of the drone's simulator, or where one may be; None: nowhere
-    image_size_px: tuple[int, int] | None  # width and height, if known before
     sitl: SitlProcess | None = None  # the simulator that was started here
     shared_with: str | None = None  # URL of the monitor, if it receives the drone only through this program
 
@@ -126,7 +121,8 @@ async def fly_in_real_time(
 
         def timing() -> dict[str, Timing]:
             measured = (drone, perception, clock, records.recorder.real_time_factor, settings.speed)
-            fused, repeats = plan.chart.vision == "frames", settings.repeats
+            fused = plan.chart.vision == "frames"
+            repeats = settings.repeats and not records.recorder.paused  # sticks move in wall time
             return {"timing": flight_timing(*measured, fused=fused, repeats=repeats)}
 
         run = partial(_run, shown=shown, camera=camera, vehicle=vehicle, settings=settings)
@@ -226,7 +222,7 @@ async def _vehicle(
     """Those of the running drone, or of a simulator that is started."""
     if settings.drone_url is not None and settings.camera_url is not None:
         api = settings.simulator or SimulatorApi.of_video(settings.camera_url)
-        return _Endpoints(settings.drone_url, settings.camera_url, api, None, shared_with=monitor_url)
+        return _Endpoints(settings.drone_url, settings.camera_url, api, shared_with=monitor_url)
     from framerunner.flying.simulator_process import SitlProcess
 
     # The simulator reads the scenario that was checked here, even if the user's file changes.
@@ -237,10 +233,8 @@ async def _vehicle(
     on_warning = (lambda line: None) if settings.unattended else warn
     started = SitlProcess(*chosen, autopilot=autopilot, storage=storage, on_warning=on_warning)
     sitl = await stack.enter_async_context(started)
-    camera = plan.scenario.camera
-    size_px = (camera.width_px, camera.height_px)
     shared = None if autopilot is None else monitor_url
-    return _Endpoints(sitl.drone_url, sitl.api.video_url, sitl.api, size_px, sitl, shared_with=shared)
+    return _Endpoints(sitl.drone_url, sitl.api.video_url, sitl.api, sitl, shared_with=shared)
 
 
 def _drone(
@@ -317,10 +311,12 @@ async def _camera(
         records.see_frame(replace(frame, time_us=time_us))
         reporter.see_frame(frame)
 
-    own = vehicle.sitl is not None  # its stream ends only with the simulator
-    limit_s, size_px = PATIENT_CAMERA_LIMIT_S if own else CAMERA_LIMIT_S, vehicle.image_size_px
-    opened = open_source(vehicle.camera_url, timeout_s=limit_s, size_px=size_px, reconnects=not own)
-    source = await stack.enter_async_context(opened)
+    source: Camera
+    if vehicle.sitl is not None:
+        source = vehicle.sitl.clock.images
+    else:
+        opened = open_source(vehicle.camera_url, reconnects=True)
+        source = await stack.enter_async_context(opened)
     path = None if settings.unattended else records.folder.video
     camera = RecordingCamera(source, path, plan.scenario.camera.rate_hz, keep)
     stack.callback(camera.close)
@@ -342,7 +338,9 @@ def _perception(
     from offboard.perception import CameraPerception
 
     rendered = isinstance(judge, TruthJudge) and vehicle.has_camera_of_simulator
-    perception = CameraPerception(camera, plan_detector(plan, rendered=rendered))
+    perception = CameraPerception(
+        camera, plan_detector(plan, rendered=rendered), patient=vehicle.sitl is not None
+    )
     perception.assume_times(drone.vehicle_time_us, delay.age_s)
     if vehicle.sitl is not None:
         vehicle.sitl.clock.wait_for_images_of(perception)

@@ -38,6 +38,7 @@ class FlightSettings:
     record: bool = False  # write an MCAP file too
     video: bool = False  # write a video in lockstep too
     monitor: bool = False  # open the Game Monitor
+    wait_for_viewer: bool = False  # until a browser shows the Game Monitor that is opened
     monitor_link: str | None = None  # where a monitor that is open already listens for the simulated drone
 
 
@@ -60,6 +61,8 @@ async def fly_once(settings: FlightSettings) -> int:
     scenario = None if settings.real_time.drone_url is None else settings.plan.scenario
     async with MonitorProcess(scenario, settings.out, _camera_hosts(settings.real_time)) as monitor:
         await monitor.opened()
+        if settings.wait_for_viewer:
+            await monitor.viewed()
         real_time = replace(settings.real_time, monitor_socket=monitor.operator_socket)
         code = await _fly_and_judge(replace(settings, real_time=real_time), monitor.link)
         if code != _INTERRUPTED_CODE:

@@ -1,14 +1,17 @@
 """The simulator as a child process whose time waits for this program at each tick; see `pacing.time_grants`.
 
-What the app receives at a tick is then a function of vehicle time alone, as in lockstep: the image that was
-sent last and the telemetry of that tick. The setpoint that answers it arrives one control period later.
+What the app receives at a tick is then a function of vehicle time alone, as in lockstep: all images until
+then and the telemetry of that tick. The setpoint that answers it arrives one control period later.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
-from collections.abc import Callable
+import time
+from collections import deque
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self
@@ -17,20 +20,24 @@ from errors import SettingError, UserError
 from framerunner.child_process import ChildProcess
 from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate, single
 from offboard.drone import DroneError, VelocityCommand
-from offboard.perception import CameraPerception
+from offboard.perception import IMAGES_KEPT, CameraPerception
 from sitl.autopilots import TITLES, WARNING
 from sitl.autopilots.process import may_use_real_time
-from sitl.pacing.time_grants import FREE_US, Grant, Held, Velocity
+from sitl.pacing.time_grants import FREE_US, Grant, Held, SentImage, Velocity, parse_answer
 from sitl.server_settings import VIDEO_PORT
 from sitl.world import CONTROL_PERIOD_US
+from vision.types import CameraError, CameraFrame
 from wire.simulator_api import SimulatorApi
 
 START_S = 60.0  # on the busiest machine
 ANSWER_S = 20.0  # wall time in which a simulator runs 50 ms, on the busiest machine
 _LAST_LINE_S = 3.0
+_READ_BYTES = 1 << 20  # of the channel at once; an image has some hundred kilobytes
 IMAGE_S = 10.0  # wall time for an image to arrive and be processed, on the busiest machine
 _ANSWER_US = CONTROL_PERIOD_US + TELEMETRY_DELAY_US - 1
 """From a multiple of 50 ms to the last control tick before the one that applies the answer."""
+_TELEMETRY_US = CONTROL_PERIOD_US - 1
+"""From a multiple of 50 ms to the control tick whose telemetry is the app's tick."""
 _GENUINE_ANSWER_US = {"px4": 20_000, "ardupilot": 28_000}
 """Likewise; PX4 sends an attitude each 10 ms, ArduPilot each 20 ms, when it comes to it."""
 
@@ -124,6 +131,35 @@ class SitlProcess(ChildProcess):
             raise SettingError(await self.failed()) from None
 
 
+class SimulatorImages:
+    """All images of the simulator's camera, as they were rendered; a camera of `CameraPerception`."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[CameraFrame] = deque(maxlen=IMAGES_KEPT)  # more are not used, either
+        self._ended = False
+        self._changed = asyncio.Event()
+
+    async def frames(self) -> AsyncIterator[CameraFrame]:
+        """In order of exposure; CameraError when the simulator has ended."""
+        while True:
+            while self._waiting:
+                yield self._waiting.popleft()
+            if self._ended:
+                raise CameraError("the simulator has ended")
+            self._changed.clear()
+            await self._changed.wait()
+
+    def put(self, frame: CameraFrame) -> None:
+        """Add one."""
+        self._waiting.append(frame)
+        self._changed.set()
+
+    def end(self) -> None:
+        """None follows."""
+        self._ended = True
+        self._changed.set()
+
+
 class SimulatorClock:
     """This program's end of the simulator's time grants; DroneError: the simulator has ended.
 
@@ -131,6 +167,9 @@ class SimulatorClock:
         channel: to the simulator.
         answer_us: simulated time from a tick until the telemetry of the tick has been sent.
         answers_take_time: the autopilot answers requests only while simulated time goes on.
+
+    Attributes:
+        images: of the camera.
     """
 
     def __init__(
@@ -145,8 +184,10 @@ class SimulatorClock:
         self.gone = ""  # why the simulator has ended
         self.images_missed = 0  # ticks whose image did not arrive in time
         self.setpoints_missed = 0  # setpoints that did not arrive in time
+        self.images = SimulatorImages()
         self._channel = channel
-        self._reader: asyncio.StreamReader | None = None
+        self._answers: asyncio.Queue[Held | None] = asyncio.Queue()  # None: no other one follows
+        self._listening: asyncio.Task[None] | None = None
         self._writer: asyncio.StreamWriter | None = None
         self._perception: CameraPerception | None = None
 
@@ -156,29 +197,30 @@ class SimulatorClock:
 
     async def up(self) -> None:
         """Wait until the simulator reports that it is up; SettingError if it does not."""
-        self._reader, self._writer = await asyncio.open_connection(sock=self._channel)
+        reader, self._writer = await asyncio.open_connection(sock=self._channel, limit=_READ_BYTES)
         try:
             async with asyncio.timeout(START_S):
-                line = await self._reader.readline()
+                line = await reader.readline()
         except TimeoutError:
             raise SettingError(f"the simulator did not start within {START_S:g} s") from None
         if not line:  # it has ended; `guard` reports its last line
             await asyncio.sleep(START_S)
+        self._listening = asyncio.create_task(self._listen(reader), name="simulator's clock")
 
     async def stop(self) -> int:
         """Stop vehicle time; returns that of the last control tick, microseconds."""
         return (await self._granted(Grant(0))).time_us
 
-    async def advance(self, tick_us: int, command: VelocityCommand | None) -> None:
-        """Grant time up to a tick and the control period after it; then wait for the image.
+    async def advance(self, tick_us: int, command: VelocityCommand | None, *, at_once: bool = False) -> None:
+        """Grant time up to a tick and the control period after it; then wait for the images.
 
         Args:
             tick_us: multiple of 50 ms.
             command: must be received first; None: time does not wait for a command.
+            at_once: up to the tick only, if the autopilot answers while time stands.
         """
-        held = await self._granted(
-            Grant(tick_us + self._answer_us, None if command is None else _sent(command))
-        )
+        until_us = tick_us + (_TELEMETRY_US if at_once and not self.answers_take_time else self._answer_us)
+        held = await self._granted(Grant(until_us, None if command is None else _sent(command)))
         if held.setpoint_missed:
             self.setpoints_missed += 1
         if self._perception is not None and not await self._perception.seen(held.image_us, IMAGE_S):
@@ -191,26 +233,38 @@ class SimulatorClock:
 
     def close(self) -> None:
         """Close the channel."""
+        if self._listening is not None:
+            self._listening.cancel()
         if self._writer is not None:
             self._writer.close()
         else:
             self._channel.close()
 
     async def _granted(self, grant: Grant) -> Held:
-        assert self._reader is not None, "up() comes first"
-        assert self._writer is not None
+        assert self._writer is not None, "up() comes first"
         try:
             self._writer.write(grant.line())
             async with asyncio.timeout(ANSWER_S):
-                line = await self._reader.readline()
+                held = await self._answers.get()
         except TimeoutError:
             raise DroneError(f"the simulator did not answer for {ANSWER_S:g} s") from None
-        except OSError:
-            line = b""
-        if not line:
+        if held is None:
+            self._answers.put_nowait(None)
             await asyncio.sleep(_LAST_LINE_S)  # `guard` has a better reason
             raise DroneError("the simulator has ended")
-        return Held.parse(line)
+        return held
+
+    async def _listen(self, reader: asyncio.StreamReader) -> None:
+        with contextlib.suppress(OSError, asyncio.IncompleteReadError):
+            while line := await reader.readline():
+                answer = parse_answer(line)
+                if isinstance(answer, SentImage):
+                    image = answer.image(await reader.readexactly(answer.size_bytes))
+                    self.images.put(CameraFrame(image, answer.time_us, time.monotonic()))
+                else:
+                    self._answers.put_nowait(answer)
+        self.images.end()
+        self._answers.put_nowait(None)
 
 
 def _sent(command: VelocityCommand) -> Velocity:

@@ -26,18 +26,25 @@ _MAX_WAITING_BYTES = 12 << 20  # of images that wait to be compressed: 50 of 320
 
 
 class FlightRecorder:
-    """Records the latest tick of a flight, and wall time beside vehicle time."""
+    """Records the latest tick of a flight, and wall time beside vehicle time.
+
+    Attributes:
+        latest: tick; None before the first.
+        paused: a pilot has had the sticks.
+    """
 
     def __init__(self) -> None:
         self._first: tuple[float, int] | None = None
         self._last: tuple[float, int] | None = None
         self.latest: Moment | None = None
+        self.paused = False
 
     def see(self, moment: Moment) -> None:
         """Record a tick."""
         self._last = (time.monotonic(), moment.state.time_us)
         self._first = self._first or self._last
         self.latest = moment
+        self.paused = self.paused or moment.paused
 
     @property
     def wall_time_s(self) -> float:

@@ -71,7 +71,7 @@ class Asking:
             while not condition():
                 if waits and self._ticks.time_us > limit_us:
                     raise TimeoutError
-                await self._ticks.next(0.05)
+                await self._ticks.next(0.05, at_once=True)
 
 
 def not_shown(feed: TelemetryFeed, what: str) -> str:

@@ -19,7 +19,7 @@ def reported_state(
 
     Args:
         sample: of the tick.
-        feed: for mode, arming and landing, which have no time stamps.
+        feed: for mode and arming, which have no time stamps.
         alignment: from the vehicle's local axes to the arena's.
         dialect: of the vehicle.
         missed: states at the ticks that were skipped before this one, oldest first.
@@ -36,7 +36,7 @@ def reported_state(
         armed=feed.arming.is_armed(sample.time_us),
         offboard=feed.mode == dialect.modes.offboard,
         mode=feed.mode,
-        landed=feed.landed,
+        landed=sample.landed,
         position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
         attitude_arena=alignment.attitude(sample.attitude_ned),
         camera_attitude_arena=None if camera_ned is None else alignment.attitude(camera_ned),

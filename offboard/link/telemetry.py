@@ -63,6 +63,7 @@ class Sample:
     roll_rad: float = 0.0  # with `yaw_ned_rad` the attitude: Euler angles Z-Y-X, body FRD to NED
     pitch_rad: float = 0.0
     gimbal: GimbalAttitude | None = None  # latest by then
+    landed: bool = True  # latest by then
 
     @property
     def attitude_ned(self) -> Quaternion:
@@ -245,6 +246,7 @@ class TelemetryFeed:
                 radians(euler.roll_deg),
                 radians(euler.pitch_deg),
                 self._gimbal.newest,
+                self.landed,
             )
             self._samples.append(self.sample)
             self.tick_number = tick  # after its sample, for tasks that look at the number
@@ -322,11 +324,15 @@ def _number(value: float | None) -> float:
     return nan if value is None else value
 
 
-async def request_rates(feed: TelemetryFeed, plugin: Any) -> None:  # noqa: ANN401
+async def request_rates(feed: TelemetryFeed, plugin: Any, *, stands: bool = False) -> None:  # noqa: ANN401
     """Request 50 Hz of attitude and position, from MAVSDK's asyncio plugin, if the vehicle sends less.
 
-    A refusal is no error.
+    A refusal is no error. A vehicle whose time stands is asked for what is not known to come often enough.
     """
+    if stands:
+        await plugin.set_rate_position_velocity_ned(WANTED_RATE_HZ)
+        await plugin.set_rate_landed_state(WANTED_RATE_HZ)
+        return
     start_us, attitudes, positions = feed.time_us, feed.attitudes, feed.positions
     await asyncio.sleep(0.5)
     span_s = max((feed.time_us - start_us) / 1e6, 1e-3)
@@ -352,10 +358,11 @@ class VehicleClock(Protocol):
         """Stop time; returns the time of the last telemetry, microseconds."""
         ...
 
-    async def advance(self, tick_us: int, command: VelocityCommand | None) -> None:
+    async def advance(self, tick_us: int, command: VelocityCommand | None, *, at_once: bool = False) -> None:
         """Let time run to a tick of the 50 ms grid, and wait until its image has been processed.
 
-        A command was sent before and must arrive first.
+        A command was sent before and must arrive first. Time goes on a little after the tick, in which a real
+        app would answer it; with `at_once` it does not, if the vehicle answers while its time stands.
         """
 
     def release(self) -> None:
@@ -408,6 +415,7 @@ class TickSource:
         """Let vehicle time wait from now on, if it can."""
         if self._clock is not None and not self.waits:
             self._number = await self._clock.stop() // TICK_US
+            self._feed.take_samples()  # of ticks that nobody waited for
             self.waits = True
 
     async def begin_exchange(self, dialect: Dialect, requests: PendingRequests) -> None:
@@ -432,19 +440,22 @@ class TickSource:
         With an exchange let time pass to a multiple of `ARM_US`, so all such flights begin at the same time.
         """
         if self.exchange is None:
-            await request_rates(self._feed, plugin)
+            await request_rates(self._feed, plugin, stands=self._clock is not None)
             await request_more(plugin)
             return
         end_us = _next_multiple_us(self._number, ARM_US)
         while self._number * TICK_US < end_us and await self.next(TICK_LOST_S):
             pass
 
-    async def next(self, timeout_s: float, command: VelocityCommand | None = None) -> bool:
+    async def next(
+        self, timeout_s: float, command: VelocityCommand | None = None, *, at_once: bool = False
+    ) -> bool:
         """Wait for the next tick; the feed's `sample` belongs to it then. False if there was none.
 
         Args:
             timeout_s: wall time to wait if vehicle time does not wait.
             command: see `VehicleClock.advance`; with one, ticks skipped are counted as late.
+            at_once: likewise.
         """
         clock = self._clock
         if clock is None or not self.waits:
@@ -454,7 +465,7 @@ class TickSource:
             self.in_flight += command is not None
             if self.exchange is not None:
                 await self.exchange.before_tick()
-            await clock.advance(self._number * TICK_US, command)
+            await clock.advance(self._number * TICK_US, command, at_once=at_once)
             if self.exchange is not None:
                 await self.exchange.after_tick()
             if await self._feed.tick(self._number, TICK_LOST_S):

@@ -51,7 +51,7 @@ class AutopilotServer(ABC, Generic[V]):
         self._new_simulation = new_simulation
         self._settings, self._autopilot, self._notice, self._grants = settings, start, notice, grants
         self._simulation = self._new()
-        self._video = DroneVideo(self._simulation, settings)
+        self._video = DroneVideo(self._simulation, settings, grants)
         self._video_is_open = asyncio.Event()  # from then on time passes
 
     async def run(self) -> None:

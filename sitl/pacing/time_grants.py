@@ -1,12 +1,12 @@
-"""Simulated time that waits for the program that started the simulator.
+"""Simulated time that waits for the program that started the simulator, and the camera's images for it.
 
 That program grants time, as in co-simulation (IEEE 1516: time advance request and grant): a grant names the
 last control tick that may run, and the setpoint that must have arrived before time advances. The simulator
 reports when it holds there, and which image it has sent. So on a busy machine simulated time becomes slower,
 and what the program receives at each tick stays the same.
 
-One JSON object a line, over a socket that the simulator inherits. Without a grant, and after the socket has
-closed, time advances freely.
+One JSON object a line, over a socket that the simulator inherits; the raw pixels follow the line of an image.
+After the socket has closed, time advances freely.
 """
 
 from __future__ import annotations
@@ -17,10 +17,16 @@ import socket
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
+import numpy as np
+import numpy.typing as npt
+
+Image = npt.NDArray[np.uint8]
 FREE_US = 1 << 62
 _POLL_S = 0.0005
 # At least 2 s: a setpoint has a socket of its own, and one that was lost is sent again in 0.05 s.
 _POLLS = 4000
+
+_MOST_WAITING_BYTES = 1 << 26  # of images that the program has not read, while time is free
 
 # Forward, right, down in level axes (m/s) and yaw rate (rad/s, clockwise).
 Velocity = tuple[float, float, float, float]
@@ -57,10 +63,33 @@ class Held:
         """As sent."""
         return json.dumps(asdict(self)).encode() + b"\n"
 
-    @staticmethod
-    def parse(line: bytes) -> Held:
-        """The inverse of `line`."""
-        return Held(**json.loads(line))
+
+@dataclass(frozen=True, slots=True)
+class SentImage:
+    """An image of the camera; its pixels follow this line, `size_bytes` of them."""
+
+    time_us: int  # of its exposure
+    height_px: int
+    width_px: int
+
+    @property
+    def size_bytes(self) -> int:
+        """Of the pixels: BGR, row by row."""
+        return self.height_px * self.width_px * 3
+
+    def line(self) -> bytes:
+        """As sent."""
+        return json.dumps({"image": asdict(self)}).encode() + b"\n"
+
+    def image(self, pixels: bytes) -> Image:
+        """The image, shape (height, width, 3), uint8; it cannot be changed."""
+        return np.frombuffer(pixels, np.uint8).reshape(self.height_px, self.width_px, 3)
+
+
+def parse_answer(line: bytes) -> Held | SentImage:
+    """What the simulator has sent."""
+    fields = json.loads(line)
+    return SentImage(**fields["image"]) if "image" in fields else Held(**fields)
 
 
 class TimeGrants:
@@ -71,7 +100,7 @@ class TimeGrants:
 
     Attributes:
         until_us: time of the last control tick that may run; `FREE_US` without a limit.
-        used: time has been granted.
+        used: time has been granted, or never will be.
     """
 
     def __init__(self, channel: socket.socket) -> None:
@@ -103,14 +132,40 @@ class TimeGrants:
         if self._writer is not None:
             self._writer.close()
 
+    async def first(self, timeout_s: float) -> bool:
+        """Wait for the first grant; False if there was none within a wall time."""
+        try:
+            async with asyncio.timeout(timeout_s):
+                await self._granted.wait()
+        except TimeoutError:
+            return False
+        return True
+
+    def send_image(self, image: Image, time_us: int) -> None:
+        """Send an image, BGR, shape (height, width, 3), uint8, and the time of its exposure.
+
+        While time is free, one that the program does not read in time is left out.
+        """
+        writer = self._writer
+        if writer is None:
+            return
+        waiting_bytes = writer.transport.get_write_buffer_size()
+        if self.until_us == FREE_US and waiting_bytes > _MOST_WAITING_BYTES:
+            return
+        height_px, width_px = image.shape[:2]
+        writer.write(SentImage(time_us, height_px, width_px).line() + image.tobytes())
+
     async def hold(self, time_us: int, image_us: int, received: Callable[[], Velocity | None]) -> None:
         """Report where simulated time holds (see `Held`), and wait until it may advance.
 
         `received` returns the velocity setpoint that the autopilot has now.
         """
         self._granted.clear()
+        wanted = self._setpoint
+        # An older one that MAVSDK's thread has sent again may have come after it.
+        missed = self._missed or not (wanted is None or _same(wanted, received()))
         if self._writer is not None:
-            self._writer.write(Held(time_us, image_us, self._missed).line())
+            self._writer.write(Held(time_us, image_us, missed).line())
         await self._granted.wait()
         wanted = self._setpoint
         polls = 0
@@ -126,10 +181,10 @@ class TimeGrants:
                 self.until_us, self._setpoint, self.used = grant.until_us, grant.setpoint, True
                 self._granted.set()
         finally:  # the channel has closed
-            self.until_us, self._setpoint = FREE_US, None
+            self.until_us, self._setpoint, self.used = FREE_US, None, True
             self._granted.set()
 
 
 def _same(wanted: Velocity, received: Velocity | None) -> bool:
-    """Whether two setpoints are equal; both have a link's single precision."""
-    return received is not None and max(abs(a - b) for a, b in zip(wanted, received, strict=True)) < 1e-7
+    """Whether two setpoints are equal; both have a link's single precision, to the last bit."""
+    return wanted == received

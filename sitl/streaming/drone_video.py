@@ -18,6 +18,7 @@ from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
 if TYPE_CHECKING:
     from sitl.camera import CameraFeed
     from sitl.faults.images import FaultyFeed
+    from sitl.pacing.time_grants import TimeGrants
     from sitl.streaming.rtp import RtpSender
     from sitl.video import Image, VideoServer
 
@@ -30,16 +31,19 @@ class DroneVideo:
     Args:
         simulation: of the drone.
         settings: of this drone.
+        grants: the program that grants time gets the images without compression; None: there is none.
 
     Attributes:
         image_us: time of exposure of the image that was sent last; negative before the first.
         sends_rtp: images are sent as RTP, if that was set up.
     """
 
-    def __init__(self, simulation: SimulatedVehicle, settings: ServerSettings) -> None:
+    def __init__(
+        self, simulation: SimulatedVehicle, settings: ServerSettings, grants: TimeGrants | None = None
+    ) -> None:
         self.image_us = -1
         self.sends_rtp = True
-        self._simulation, self._settings = simulation, settings
+        self._simulation, self._settings, self._grants = simulation, settings, grants
         self._camera: CameraFeed | FaultyFeed | None = None
         self._video: VideoServer | None = None
         self._rtp: RtpSender | None = None
@@ -93,6 +97,8 @@ class DroneVideo:
         time_us, image = arrived
         self.image_us = time_us
         self._video.publish(image, time_us)
+        if self._grants is not None:
+            self._grants.send_image(image, time_us)
         if self._rtp is not None and self.sends_rtp:
             self._rtp.send(image, time_us)
         return image

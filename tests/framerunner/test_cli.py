@@ -209,6 +209,10 @@ def test_a_busy_video_port_is_refused_before_anything_is_said(refused):
         assert str(8100 + instance) in refused("sim", "--instance", instance)
 
 
+def test_a_viewer_of_no_monitor_is_not_waited_for(refused):
+    assert "add --monitor" in refused("fly", "--wait-for-viewer")
+
+
 @pytest.mark.parametrize(
     ("given", "named"),
     [

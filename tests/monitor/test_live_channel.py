@@ -5,6 +5,7 @@ import math
 import pytest
 
 from monitor.live_channel import MAX_PENDING, LiveChannel, Viewer, encode
+from monitor.run import FIRST_VIEWER
 from tests.monitor.serving import StubFleet, browser, serving
 
 
@@ -68,6 +69,15 @@ async def test_no_poses_are_made_without_viewers(monkeypatch):
             while seen != served.fleet.ticks:  # the server has noticed that the viewer went
                 seen = served.fleet.ticks
                 await asyncio.sleep(0.2)
+
+
+async def test_the_first_viewer_is_told_once(monkeypatch):
+    async with serving(monkeypatch) as served, browser() as client:
+        assert FIRST_VIEWER not in served.lines
+        for _ in range(2):
+            async with client.ws_connect(served.url + "ws/live") as live:
+                await live.receive_json()
+        assert served.lines.count(FIRST_VIEWER) == 1
 
 
 async def watch(client, url, seconds):

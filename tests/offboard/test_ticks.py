@@ -30,7 +30,7 @@ class Clock:
     async def stop(self):
         return 1_020_000
 
-    async def advance(self, tick_us, command):
+    async def advance(self, tick_us, command, *, at_once=False):
         self.granted.append((tick_us, command))
         if tick_us // 50_000 not in self.lost:
             attitude(self.feed, tick_us)
@@ -53,7 +53,9 @@ async def feed():
 async def test_time_that_waits_gives_every_tick_however_late_it_is_asked_for(feed):
     clock, source = Clock(feed), TickSource(feed)
     source.use_clock(clock)
+    attitude(feed, 1_000_000)  # of a tick that nobody waits for
     await source.begin()
+    assert feed.take_samples()[1] == []
     for number in (21, 22, 23):
         await asyncio.sleep(0.06)
         assert await source.next(1.0, COMMAND)

@@ -8,11 +8,14 @@ from contextlib import contextmanager, suppress
 from urllib.request import urlopen
 
 import cv2
+import numpy as np
 import pytest
 from pymavlink import mavutil
 
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
+from framerunner.recording.events import RecordedImage
+from framerunner.recording.mcap_writer import FlightRecording
 from framerunner.recording.open_recording import recorded_flight
 from offboard.app import Moment
 from offboard.mission import load_mission
@@ -76,10 +79,10 @@ def disturbed(instance, busy, viewers):
 
 @pytest.fixture(scope="module")
 def busy_flight(tmp_path_factory):
-    """Test case 3, three times as fast as real, on a busy machine with viewers: folder and words."""
+    """Test case 1, three times as fast as real, on a busy machine with viewers: folder and words."""
     folder, instance = tmp_path_factory.mktemp("flight"), free_instance()
-    options = ("--mission", "frame_challenge", "--instance", str(instance), "--speed", "3", "--record")
-    with disturbed(instance, busy=3, viewers=5), program(folder, "fly", "test-case-3", *options) as flight:
+    options = ("--instance", str(instance), "--speed", "3", "--record")
+    with disturbed(instance, busy=3, viewers=5), program(folder, "fly", "test-case-1", *options) as flight:
         code = flight.process.wait(300.0)
         assert code == 0, flight.err + flight.out
     assert ports_are_free(instance)
@@ -88,41 +91,40 @@ def busy_flight(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def lockstep_flight():
-    """The same in lockstep: result, and what was seen at each tick."""
-    moments = []
-    plan = FlightPlan(load_scenario("test-case-3"), load_mission("frame_challenge"))
-    return fly_lockstep(plan, observers=(moments.append,)).result, moments
+def lockstep_flight(tmp_path_factory):
+    """The same in lockstep: result, and its recording."""
+    path = tmp_path_factory.mktemp("lockstep") / "flight.mcap"
+    plan = FlightPlan(load_scenario("test-case-1"), load_mission("explorer"))
+    with FlightRecording(path, plan.scenario, plan.chart, None) as recording:
+        flown = fly_lockstep(plan, observers=(recording.see,), on_image=recording.see_image)
+        recording.finish(flown.result, flown.track.time_s)
+    return flown.result, path
 
 
 @pytest.mark.alone
-def test_every_tick_is_that_of_lockstep(busy_flight, lockstep_flight):
+def test_every_tick_and_image_is_that_of_lockstep_to_the_last_bit(busy_flight, lockstep_flight):
     folder, out = busy_flight
-    with recorded_flight(folder) as recorded:
-        flown = in_flight(event for event in recorded.events() if isinstance(event, Moment))
-    wanted = in_flight(lockstep_flight[1])
-
-    assert len(flown) == len(wanted) > 400
-    for is_, should in zip(flown, wanted, strict=True):
-        place = (is_.state.x, is_.state.y, is_.state.z, is_.state.yaw)
-        at = pytest.approx((should.state.x, should.state.y, should.state.z, should.state.yaw), abs=1e-5)
-        assert (is_.mission_state, image_age_us(is_), place) == (
-            should.mission_state,
-            image_age_us(should),
-            at,
-        )
+    (ticks, images_by_time), (wanted_ticks, wanted_images) = map(events, (folder, lockstep_flight[1]))
+    assert len(ticks) == len(wanted_ticks) > 600
+    for tick, wanted in zip(ticks, wanted_ticks, strict=True):
+        assert tick == wanted, f"at {wanted.state.time_us} us"
+    until_us = ticks[-1].state.time_us - 100_000
+    used = {time_us: image for time_us, image in wanted_images.items() if time_us < until_us}
+    assert len(used) > 300
+    for time_us, wanted in used.items():
+        assert np.array_equal(images_by_time[time_us], wanted), f"at {time_us} us"
     timing = json.loads((folder / "result.json").read_text(encoding="utf-8"))["timing"]
     assert (timing["late_ticks"], timing["late_images"], timing["late_setpoints"]) == (0, 0, 0)
     assert timing["kept_up"] == ("did not keep up" not in out)
+    assert timing["kept_up"] or "the flight is the same as on a free machine" in out
 
 
-def in_flight(moments):
-    """Those between motors on and the end of the mission, for which an image was looked at."""
-    return [moment for moment in moments if moment.flight_time_s > 0 and moment.detections.time_us]
-
-
-def image_age_us(moment):
-    return moment.state.time_us - moment.detections.time_us
+def events(recording):
+    """The ticks of a recording, and its images by their times."""
+    with recorded_flight(recording) as recorded:
+        found = list(recorded.events())
+    ticks = [event for event in found if isinstance(event, Moment)]
+    return ticks, {event.time_us: event.image for event in found if isinstance(event, RecordedImage)}
 
 
 @pytest.mark.alone
@@ -135,7 +137,8 @@ def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
     assert result["landed_on_base"] is True
     assert result["landing_error_m"] < 0.25
     assert result["judged_by"] == "truth"
-    assert result["try_time_s"] == pytest.approx(result["wall_time_s"] * result["real_time_factor"], rel=0.1)
+    ticked_s = result["wall_time_s"] * result["real_time_factor"]  # some before and after the try
+    assert result["try_time_s"] < ticked_s < result["try_time_s"] + 6.0
 
     track = folder / "track.png"
     assert track.stat().st_size > 10_000
@@ -148,7 +151,7 @@ def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
 
     assert (result["verdict"], result["try_time_s"], tuple(result["crossing_sides"])) == (
         lockstep.verdict,
-        pytest.approx(lockstep.try_time_s, abs=0.01),
+        lockstep.try_time_s,
         lockstep.crossing_sides,
     )
 

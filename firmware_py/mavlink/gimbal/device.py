@@ -47,6 +47,7 @@ class GimbalComponent(Service):
         self._gimbal = gimbal
         self._heartbeat_due_us = 0
         self._attitude_due_us = 0
+        self._sent: Message | None = None  # the last attitude
         self.commands = {mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message}
 
     def update(self) -> None:
@@ -54,10 +55,16 @@ class GimbalComponent(Service):
         time_us = self._exchange.time_us
         if time_us >= self._attitude_due_us:
             self._attitude_due_us = time_us - time_us % _ATTITUDE_US + _ATTITUDE_US
-            self._exchange.broadcast(self._attitude(), GIMBAL_COMPONENT_ID)
+            self._sent = self._attitude()
+            self._exchange.broadcast(self._sent, GIMBAL_COMPONENT_ID)
         if time_us >= self._heartbeat_due_us:
             self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
             self._exchange.broadcast(self._heartbeat(), GIMBAL_COMPONENT_ID)
+
+    def repeat(self) -> None:
+        """Send the last attitude again."""
+        if self._sent is not None:
+            self._exchange.broadcast(self._sent, GIMBAL_COMPONENT_ID)
 
     def _request_message(self, command: Command) -> CommandResult:
         number = command.params[0]

@@ -67,17 +67,28 @@ class StreamService(Service):
 
     def update(self) -> None:
         """Send what is due on each link; a message for several links is made once."""
-        exchange = self._exchange
-        time_us = exchange.time_us
+        time_us = self._exchange.time_us
         packets: dict[int, Packet | None] = {}
-        for link in exchange.links.values():
+        for link in self._exchange.links.values():
             for message_id in link.due(time_us):
                 if message_id not in packets or message_id == _LINK_NODE_STATUS:
-                    message = self._message(message_id, link)
-                    packets[message_id] = None if message is None else exchange.packet(message)
+                    packets[message_id] = self._packet(message_id, link)
                 packet = packets[message_id]
                 if packet is not None:
                     link.send_stream(packet)
+                    link.schedule.keep(message_id, packet)
+
+    def repeat(self) -> None:
+        """Send all streams again; those on the grid of requested ones as they were there."""
+        for link in self._exchange.links.values():
+            for message_id, latest in link.schedule.again():
+                packet = latest or self._packet(message_id, link)
+                if packet is not None:
+                    link.send_stream(packet)
+
+    def _packet(self, message_id: int, link: Link) -> Packet | None:
+        message = self._message(message_id, link)
+        return None if message is None else self._exchange.packet(message)
 
     def _message(self, message_id: int, link: Link) -> Message | None:
         """The message as it is now; None when it does not exist or has no content yet."""

@@ -1,19 +1,23 @@
-"""Simulated time that waits for grants, in a simulator that serves real sockets."""
+"""Simulated time that waits for grants, and images for who grants it, over real sockets."""
 
 import asyncio
 import socket
 from contextlib import asynccontextmanager, suppress
 
+import numpy as np
 from pymavlink.dialects.v20 import common as mavlink
 
+from framerunner.flying.lockstep_drone import LockstepDrone
 from scenarios.loader import load_scenario
-from sitl.pacing.time_grants import FREE_US, Grant, Held, TimeGrants
+from sitl.camera import CameraFeed
+from sitl.pacing.time_grants import FREE_US, Grant, Held, TimeGrants, parse_answer
 from sitl.server import SimulatorServer
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from tests.processes import free_instance, wait_until
 
 SPEED = 20.0
+START = (0.0, 0.0, 0.0, 0.0)
 LIMIT_S = 20.0
 
 
@@ -25,12 +29,17 @@ class Caller:
         self.reader = reader
         self.writer = writer
         self.port = port
+        self.images = []  # time of exposure and pixels of each
 
     def grant(self, until_us, setpoint=None):
         self.writer.write(Grant(until_us, setpoint).line())
 
     async def held(self):
-        return Held.parse(await asyncio.wait_for(self.reader.readline(), LIMIT_S))
+        async with asyncio.timeout(LIMIT_S):
+            while not isinstance(answer := parse_answer(await self.reader.readline()), Held):
+                image = answer.image(await self.reader.readexactly(answer.size_bytes))
+                self.images.append((answer.time_us, image))
+        return answer
 
     async def stands(self, wall_s=0.3):
         """Whether simulated time stands still."""
@@ -63,13 +72,15 @@ async def serving():
             await task
 
 
-async def test_time_is_free_until_a_grant_and_stops_where_it_says():
+async def test_time_stands_where_a_lockstep_flight_begins_and_then_where_grants_say():
+    lockstep = Simulation(load_scenario("test-case-1"))
+    await LockstepDrone(lockstep, START).ready()
     async with serving() as caller:
-        assert await caller.runs()
+        assert await asyncio.to_thread(wait_until, lambda: caller.simulation.autopilot.status.ready, LIMIT_S)
+        assert await caller.stands()
         caller.grant(0)
         began = await caller.held()
-        assert began.time_us > 0
-        assert await caller.stands()
+        assert began.time_us + 4000 == lockstep.time_us
         for until_us in (began.time_us + 50_000, began.time_us + 51_000, began.time_us + 300_000):
             caller.grant(until_us)
             held = await caller.held()
@@ -80,6 +91,41 @@ async def test_time_is_free_until_a_grant_and_stops_where_it_says():
             assert await caller.stands(0.05)
         caller.grant(FREE_US)
         assert await caller.runs()
+
+
+async def test_the_images_are_those_of_lockstep_from_the_first_one_on():
+    scenario = load_scenario("test-case-1")
+    simulation, feed, seen = Simulation(scenario), CameraFeed(scenario), []
+    async with serving() as caller:
+        caller.grant(1_500_000)
+        held = await caller.held()
+        while simulation.time_us <= held.time_us:
+            simulation.tick()
+            if (arrived := feed.step(simulation.truth)) is not None:
+                seen.append(arrived)
+    assert [time_us for time_us, _ in caller.images] == [time_us for time_us, _ in seen]
+    assert len(seen) == 15
+    for (_, sent), (_, wanted) in zip(caller.images, seen, strict=True):
+        np.testing.assert_array_equal(sent, wanted)
+
+
+async def test_who_listens_only_when_time_stands_hears_all_streams():
+    wanted = {"HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "SYS_STATUS", "EXTENDED_SYS_STATE"}
+    heard = {}
+    async with serving() as caller:
+        assert await asyncio.to_thread(wait_until, lambda: caller.simulation.autopilot.status.ready, LIMIT_S)
+        assert await caller.stands()
+        now_us = caller.simulation.time_us - 4000
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as app:
+            app.bind(("127.0.0.1", caller.port - 40))
+            app.setblocking(False)
+            parser = mavlink.MAVLink(None)
+            async with asyncio.timeout(LIMIT_S):
+                while wanted - heard.keys():
+                    data = await asyncio.get_running_loop().sock_recv(app, 2048)
+                    heard |= {each.get_type(): each for each in parser.parse_buffer(data) or ()}
+    assert heard["ATTITUDE"].time_boot_ms * 1000 == now_us
+    assert heard["LOCAL_POSITION_NED"].time_boot_ms * 1000 == (now_us - 16_000) // 20_000 * 20_000 + 16_000
 
 
 async def test_time_waits_for_the_setpoint_that_was_sent():
