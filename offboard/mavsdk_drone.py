@@ -16,7 +16,6 @@ from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from geometry.axes import Alignment, Pose
 from offboard.drone import DroneError, DroneState, ResponsePrior, VelocityCommand
 from offboard.keep_in_box import Box, confine
-from offboard.link.asking import CONFIRM_S, SHOWN_S, Asking, not_shown
 from offboard.link.autopilots import open_dialect
 from offboard.link.commands import PendingRequests, synchronous
 from offboard.link.companion import Companion
@@ -25,7 +24,8 @@ from offboard.link.dialect import Dialect
 from offboard.link.process_guard import ProcessGuard
 from offboard.link.reported_state import reported_state
 from offboard.link.resets import ResetFeed, followed
-from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, pose_of
+from offboard.link.telemetry import CHECKS, TelemetryFeed, pose_of
+from offboard.link.ticks import CONFIRM_S, SHOWN_S, Asking, TickSource, VehicleClock, not_shown
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog

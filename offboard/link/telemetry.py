@@ -15,21 +15,16 @@ import contextlib
 import json
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from math import nan, radians
-from typing import Any, Protocol
-
-from mavsdk.asyncio import MavsdkError
+from typing import Any
 
 from geometry.axes import Pose
 from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Quaternion, Vec3
 from offboard.arming import Arming
-from offboard.drone import VelocityCommand
-from offboard.link.commands import PendingRequests
-from offboard.link.dialect import Dialect, TickExchange
 from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
 from wire.dialect import AUTOPILOT_COMPONENT_ID
 from wire.mission_tunnel import TEXT_PREFIX
@@ -37,16 +32,11 @@ from wire.status_text import plain
 from wire.vehicle_telemetry import MessageOrder
 
 TICK_US = 50_000
-BEGIN_US = 10_000_000  # vehicle time; the preparation of a vehicle with an exchange begins at a multiple
-ARM_US = 5_000_000  # vehicle time; such a vehicle is armed right after a multiple
-TICK_LOST_S = 0.5  # wall time; a tick whose telemetry has not arrived by then was lost on the link
-_MAX_LOST_IN_A_ROW = 10
 LAG_GROWTH_S = 2e-5  # with each attitude: 1 ms a second, more than clocks differ
 MAX_JITTER_S = 0.05
 SILENT_S = 1.0  # wall time
 TEXTS_KEPT = 8
 TEXT_AGE_S = 8.0
-WANTED_RATE_HZ = 50.0
 SAMPLES_KEPT = 40  # until they are taken: two seconds of ticks
 CHECKS = "pre-arm checks not passed"
 
@@ -297,10 +287,6 @@ def pose_of(feed: TelemetryFeed) -> Pose:
     return Pose(feed.position_ned_m, feed.yaw_ned_rad)
 
 
-def _next_multiple_us(tick_number: int, period_us: int) -> int:
-    return -(-tick_number * TICK_US // period_us) * period_us
-
-
 def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Any, _user: object) -> None:  # noqa: ANN401
     """Take the mode in an autopilot's HEARTBEAT, of `mavlink_direct`."""
     if heartbeat.component_id == AUTOPILOT_COMPONENT_ID:
@@ -322,184 +308,3 @@ def least_lag(before_s: float | None, lag_s: float) -> float:
 def _number(value: float | None) -> float:
     """JSON cannot express values that are not finite; MAVSDK writes null."""
     return nan if value is None else value
-
-
-async def request_rates(feed: TelemetryFeed, plugin: Any, *, stands: bool = False) -> None:  # noqa: ANN401
-    """Request 50 Hz of attitude and position, from MAVSDK's asyncio plugin, if the vehicle sends less.
-
-    A refusal is no error. A vehicle whose time stands is asked for what is not known to come often enough.
-    """
-    if stands:
-        await plugin.set_rate_position_velocity_ned(WANTED_RATE_HZ)
-        await plugin.set_rate_landed_state(WANTED_RATE_HZ)
-        return
-    start_us, attitudes, positions = feed.time_us, feed.attitudes, feed.positions
-    await asyncio.sleep(0.5)
-    span_s = max((feed.time_us - start_us) / 1e6, 1e-3)
-    with contextlib.suppress(MavsdkError):
-        if (feed.attitudes - attitudes) / span_s < 0.9 * WANTED_RATE_HZ:
-            await plugin.set_rate_attitude_euler(WANTED_RATE_HZ)
-        if (feed.positions - positions) / span_s < 0.9 * WANTED_RATE_HZ:
-            await plugin.set_rate_position_velocity_ned(WANTED_RATE_HZ)
-
-
-class VehicleClock(Protocol):
-    """The time of a vehicle that can wait. Its coroutines raise `DroneError` when the vehicle is gone.
-
-    Attributes:
-        answers_take_time: the vehicle answers requests only while its time goes on, as PX4 does.
-        gone: why the vehicle exists no longer; empty: it does.
-    """
-
-    answers_take_time: bool
-    gone: str
-
-    async def stop(self) -> int:
-        """Stop time; returns the time of the last telemetry, microseconds."""
-        ...
-
-    async def advance(self, tick_us: int, command: VelocityCommand | None, *, at_once: bool = False) -> None:
-        """Let time run to a tick of the 50 ms grid, and wait until its image has been processed.
-
-        A command was sent before and must arrive first. Time goes on a little after the tick, in which a real
-        app would answer it; with `at_once` it does not, if the vehicle answers while its time stands.
-        """
-
-    def release(self) -> None:
-        """Let time run freely from now on."""
-
-
-class TickSource:
-    """Waits for ticks.
-
-    A real vehicle's time never waits: an app that is late skips ticks. The time of a simulator that this
-    program has started can wait: then the app gets every tick and its image, on a busy machine too.
-
-    Attributes:
-        late: ticks that were skipped, or lost on the link, in flight.
-        in_flight: ticks in flight, late ones included.
-        waits: vehicle time waits for the app now.
-        exchange: around each tick that is waited for; None: what is sent needs no waiting.
-    """
-
-    def __init__(self, feed: TelemetryFeed) -> None:
-        self.late = 0
-        self.in_flight = 0
-        self.waits = False
-        self.exchange: TickExchange | None = None
-        self._feed = feed
-        self._clock: VehicleClock | None = None
-        self._number = 0
-        self._last_in_flight: int | None = None
-
-    def use_clock(self, clock: VehicleClock) -> None:
-        """Let vehicle time wait for the app, from `begin` to `release`."""
-        self._clock = clock
-
-    @property
-    def time_us(self) -> int:
-        """Vehicle time, microseconds: that of the newest attitude, or of a later tick that was granted."""
-        return max(self._feed.time_us, self._number * TICK_US if self.waits else 0)
-
-    @property
-    def steps(self) -> bool:
-        """Vehicle time can wait, and the vehicle answers only while it goes on; see `SteppedPx4Dialect`."""
-        return self._clock is not None and self._clock.answers_take_time
-
-    @property
-    def gone(self) -> str:
-        """Why the vehicle exists no longer; empty: it does, or that cannot be known."""
-        return "" if self._clock is None else self._clock.gone
-
-    async def begin(self) -> None:
-        """Let vehicle time wait from now on, if it can."""
-        if self._clock is not None and not self.waits:
-            self._number = await self._clock.stop() // TICK_US
-            self._feed.take_samples()  # of ticks that nobody waited for
-            self.waits = True
-
-    async def begin_exchange(self, dialect: Dialect, requests: PendingRequests) -> None:
-        """With an exchange: `begin` at a multiple of `BEGIN_US`; exchange at each tick; request streams."""
-        if dialect.exchange is None:
-            return
-        await self.begin()
-        clock, end_us = self._clock, _next_multiple_us(self._number, BEGIN_US)
-        while clock is not None and self._number * TICK_US < end_us:
-            self._number += 1
-            await clock.advance(self._number * TICK_US, None)
-        self.exchange = dialect.exchange
-        await self.until_done(requests.wait(dialect.request_streams()))
-
-    async def before_arming(
-        self,
-        plugin: Any,  # noqa: ANN401
-        request_more: Callable[[Any], Awaitable[None]],
-    ) -> None:
-        """Request rates and more, from MAVSDK's asyncio plugin.
-
-        With an exchange let time pass to a multiple of `ARM_US`, so all such flights begin at the same time.
-        """
-        if self.exchange is None:
-            await request_rates(self._feed, plugin, stands=self._clock is not None)
-            await request_more(plugin)
-            return
-        end_us = _next_multiple_us(self._number, ARM_US)
-        while self._number * TICK_US < end_us and await self.next(TICK_LOST_S):
-            pass
-
-    async def next(
-        self, timeout_s: float, command: VelocityCommand | None = None, *, at_once: bool = False
-    ) -> bool:
-        """Wait for the next tick; the feed's `sample` belongs to it then. False if there was none.
-
-        Args:
-            timeout_s: wall time to wait if vehicle time does not wait.
-            command: see `VehicleClock.advance`; with one, ticks skipped are counted as late.
-            at_once: likewise.
-        """
-        clock = self._clock
-        if clock is None or not self.waits:
-            return await self._next_free(timeout_s, in_flight=command is not None)
-        for _ in range(_MAX_LOST_IN_A_ROW):
-            self._number += 1
-            self.in_flight += command is not None
-            if self.exchange is not None:
-                await self.exchange.before_tick()
-            await clock.advance(self._number * TICK_US, command, at_once=at_once)
-            if self.exchange is not None:
-                await self.exchange.after_tick()
-            if await self._feed.tick(self._number, TICK_LOST_S):
-                return True
-            self.late += 1
-        return False
-
-    async def until_done(self, work: Awaitable[None]) -> None:
-        """Wait for a request's answer, with vehicle time going on if the answer takes time."""
-        clock = self._clock
-        if clock is None or not self.waits or not clock.answers_take_time:
-            await work
-            return
-        task = asyncio.ensure_future(work)
-        try:
-            while not task.done():
-                await self.next(TICK_LOST_S)
-        except BaseException:
-            task.cancel()
-            raise
-        await task
-
-    def release(self) -> None:
-        """Let vehicle time run freely."""
-        if self._clock is not None and self.waits:
-            self._clock.release()
-        self.waits = False
-
-    async def _next_free(self, timeout_s: float, *, in_flight: bool) -> bool:
-        received = await self._feed.next_tick(timeout_s)
-        number = self._feed.tick_number
-        if received and in_flight:
-            passed = 1 if self._last_in_flight is None else max(1, number - self._last_in_flight)
-            self.in_flight += passed
-            self.late += passed - 1
-        self._last_in_flight = number if in_flight else None
-        return received

@@ -25,9 +25,9 @@ from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flying.plan import FlightPlan
 from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box
-from offboard.link.asking import Asking
 from offboard.link.dialect import Px4Dialect
-from offboard.link.telemetry import TelemetryFeed, TickSource
+from offboard.link.telemetry import TelemetryFeed
+from offboard.link.ticks import Asking, TickSource
 from offboard.link.watchdog import LIMITS
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission

@@ -390,7 +390,7 @@ async def test_a_refused_arming_gives_the_vehicle_s_reason(vehicle):
 
 
 async def test_an_acknowledged_mode_that_does_not_come_is_no_success(vehicle, monkeypatch):
-    monkeypatch.setattr("offboard.link.asking.CONFIRM_S", 0.7)
+    monkeypatch.setattr("offboard.link.ticks.CONFIRM_S", 0.7)
     vehicle.ignore_modes = True
     async with connected(vehicle) as drone:
         with pytest.raises(

@@ -8,7 +8,8 @@ import pytest
 from offboard.drone import VelocityCommand
 from offboard.link import telemetry
 from offboard.link.commands import PendingRequests
-from offboard.link.telemetry import MAX_JITTER_S, TelemetryFeed, TickSource
+from offboard.link.telemetry import MAX_JITTER_S, TelemetryFeed
+from offboard.link.ticks import TickSource
 
 COMMAND = VelocityCommand(forward_m_s=0.5)
 
