@@ -311,7 +311,7 @@ async def test_a_visitor_who_may_not_fly_is_told_to_log_in(monitor, monkeypatch)
     monkeypatch.setattr(Access, "visitor", lambda _self, _connection: nobody)
     pilot = await monitor()
     words = pilot.page.locator(".p-refused")
-    assert await words.text_content() == "Only those who logged in may fly. Log in"
+    assert await words.text_content() == "Only judges and organisers may fly. Log in"
     for name in ("Take sticks", "Arm", "Take off", "Hold", "Land", "Disarm", "Stop motors"):
         assert await pilot.page.get_by_role("button", name=name, exact=name != "Stop motors").is_disabled()
     await pilot.page.evaluate(

@@ -42,7 +42,7 @@ class OperatorPage {
     addEventListener("keydown", (event) => this.#key(event, true), { capture: true });
     addEventListener("keyup", (event) => this.#key(event, false), { capture: true });
     if (mayFly) this.#connect();
-    else this.#refuse("only those who logged in may operate a flight");
+    else this.#refuse("only judges and organisers may operate a flight");
     const live = new LiveChannel(["status"]);
     live.on("status", (message) => {
       this.#status = message.drones[0] ?? null;

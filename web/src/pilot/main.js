@@ -104,7 +104,7 @@ class PilotPage {
     if (this.root.querySelector(".p-refused")) return;
     const link = make("a", { href: "/login" }, "Log in");
     this.root.prepend(
-      make("p", { class: "p-refused problem", role: "alert" }, "Only those who logged in may fly. ", link),
+      make("p", { class: "p-refused problem", role: "alert" }, "Only judges and organisers may fly. ", link),
     );
     this.#show();
   }
