@@ -136,12 +136,8 @@ class MissionService(Service):
             return
         as_int = _FORMS.get(message.get_msgId())
         if as_int is not None:
-            self._use_form(link, as_int)
+            (self._float_links.discard if as_int else self._float_links.add)(link)
         work(_Partner(link, (message.get_srcSystem(), message.get_srcComponent())), message)
-
-    def _use_form(self, link: Link, as_int: bool) -> None:
-        """Request items of uploads on this link with integers, or with floats."""
-        (self._float_links.discard if as_int else self._float_links.add)(link)
 
     # Uploads
 
@@ -249,7 +245,7 @@ class MissionService(Service):
         if message.type == mavlink.MAV_MISSION_OPERATION_CANCELLED:
             self._upload = None
         elif message.type == mavlink.MAV_MISSION_UNSUPPORTED:
-            self._use_form(partner.link, partner.link in self._float_links)
+            self._float_links.symmetric_difference_update({partner.link})
             self._request_next(upload)
 
     # Downloads
