@@ -49,6 +49,12 @@ Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
 
 
+ScenarioName = Annotated[
+    str,
+    Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80, description="small letters, digits, - and _"),
+]
+
+
 class ScenarioError(UserError):
     """A scenario that cannot be used; the message is one line for people."""
 
@@ -307,9 +313,7 @@ class Origin(Part):
 class Scenario(Part):
     """All that is given before a flight."""
 
-    name: str = Field(
-        pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80, description="small letters, digits, - and _"
-    )
+    name: ScenarioName
     description: str = Field("", description="what this scenario is and where its numbers come from")
     arena: Arena = Field(Arena(), description="the flying space")
     base: Base = Field(Base(), description="where to land")

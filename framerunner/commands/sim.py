@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import Faults, Sensors, WholeNumber, check_range, say, with_faults, with_sensors
+from framerunner.commands import (
+    Faults,
+    Sensors,
+    ShowLayout,
+    WholeNumber,
+    check_range,
+    say,
+    with_faults,
+    with_sensors,
+)
 from framerunner.commands.ardupilot import ardupilot_server
 from framerunner.commands.px4 import px4_server
 from framerunner.extras import install_advice, is_installed
@@ -86,6 +95,7 @@ class Connections:
     video_rtp: Annotated[
         str, Parameter(help="host or host:port that gets the video as H.264 in RTP, UDP 5600, or off")
     ] = "127.0.0.1"
+    show_layout: ShowLayout = False
 
 
 @Parameter(name="*")
@@ -210,7 +220,8 @@ def sim(
     check_range("--count", count, 1, _MAX_COUNT)
     chosen, onboard = connections or Connections(), onboard or Onboard()
     flown_by = flown_by or FlownBy()
-    watcher = _monitor(chosen.video_port, count) if monitor and flown_by.autopilot == "own" else None
+    is_watched = monitor and flown_by.autopilot == "own"
+    watcher = _monitor(scenario, chosen.video_port, count) if is_watched else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
@@ -263,11 +274,12 @@ def _grants(descriptor: int | None) -> TimeGrants | None:
     return TimeGrants(socket.socket(fileno=descriptor))
 
 
-def _monitor(video_port: int | None, count: int) -> MonitorProcess:
+def _monitor(scenario: str, video_port: int | None, count: int) -> MonitorProcess:
     from framerunner.child_process import MonitorProcess
+    from scenarios.loader import load_scenario
 
     ports = () if video_port is None else range(video_port, video_port + count)
-    return MonitorProcess(camera_hosts=[f"127.0.0.1:{port}" for port in ports])
+    return MonitorProcess(load_scenario(scenario), camera_hosts=[f"127.0.0.1:{port}" for port in ports])
 
 
 def _settings(
@@ -298,6 +310,7 @@ def _settings(
         speed=speed,
         links=links,
         signing_key=_read_key(chosen.signing_key),
+        show_layout=chosen.show_layout,
         storage=onboard.storage,
         shell=onboard.shell,
         camera=onboard.camera,

@@ -50,8 +50,8 @@ async def fly_once(settings: FlightSettings) -> int:
     from framerunner.child_process import MonitorProcess
 
     # The simulator that is started has a referee; a running drone may have none.
-    scenario = None if settings.real_time.drone_url is None else settings.plan.scenario
-    async with MonitorProcess(scenario, settings.out, _camera_hosts(settings.real_time)) as monitor:
+    judges, hosts = settings.real_time.drone_url is not None, _camera_hosts(settings.real_time)
+    async with MonitorProcess(settings.plan.scenario, settings.out, hosts, judges=judges) as monitor:
         await monitor.opened()
         real_time = replace(settings.real_time, monitor_socket=monitor.operator_socket)
         code = await _fly_and_judge(replace(settings, real_time=real_time), monitor.link)

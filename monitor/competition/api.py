@@ -27,6 +27,7 @@ from monitor.competition.validation import (
     NextForm,
     QueueForm,
     RefusedError,
+    ScenarioForm,
     SettingsForm,
     TeamChangeForm,
     TeamForm,
@@ -190,6 +191,12 @@ def _organising_routes(service: CompetitionService, judges: _Judges) -> APIRoute
         form, entry = await judges.read(request, DrawForm)
         count = form.count or (await service.board()).rule.scenarios
         return json_response({"round": await service.draw(form.pool, count, entry)})
+
+    @routes.post("/pool")
+    async def check_scenario(request: Request) -> Response:
+        form, _ = await judges.read(request, ScenarioForm)
+        await service.check_drawable(form.scenario)
+        return json_response({"scenario": form.scenario})
 
     @routes.post("/settings")
     async def set_rule(request: Request) -> Response:
