@@ -2,7 +2,8 @@
 import "./edit.css";
 import { isTyping, make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
-import { DiagramView } from "./diagram_view.js";
+import { DiagramView } from "../lib/diagram/diagram_view.js";
+import { takeMouse } from "./diagram_mouse.js";
 import { divider } from "./divider.js";
 import { button, choice, textField } from "./fields.js";
 import { flownId } from "./flights.js";
@@ -21,7 +22,7 @@ import { ReplayPanel } from "./replay_panel.js";
 import { LessonPanel } from "./lesson_panel.js";
 import { word } from "./words.js";
 
-/** @typedef {import("./diagram_view.js").Selection} Selection */
+/** @typedef {import("../lib/diagram/diagram_view.js").Selection} Selection */
 
 const root = pageRoot("edit");
 const file = new URLSearchParams(location.search).get("file");
@@ -35,7 +36,7 @@ async function chooseFile() {
   const { mayEdit } = pageData();
   const problem = make("p", { class: "problem", role: "alert", hidden: true });
   const list = make("ul", { class: "e-files" });
-  root.append(make("h1", {}, word("open")), problem, list);
+  root.append(make("h1", {}, word("open")), ...(mayEdit ? [] : [make("p", {}, make("a", { href: "/login" }, word("log_in")))]), problem, list);
   const answer = await fetch(`/api/edit/files?language=${language()}`);
   const told = await answer.json();
   if (!answer.ok) {
@@ -110,14 +111,17 @@ function edit(name) {
   const redo = button(word("redo"), () => session.redo(), { "aria-keyshortcuts": "Control+Y" });
   const save = button(word("save"), store, { class: "e-first", "aria-keyshortcuts": "Control+S" });
   const tools = make("div", { class: "e-tools", role: "toolbar" },
-    make("a", { href: "/edit" }, word("files")), make("strong", {}, name), state, save, undo, redo,
+    make("a", { href: "/edit" }, word("files")), make("strong", {}, name), pageData().mayEdit ? null : make("a", { href: "/login" }, word("log_in")), state, save, undo, redo,
     button(word("new_state"), () => inspector.add(false)),
     button(word("new_superstate"), () => inspector.add(true)),
     button(word("new_template"), () => inspector.addTemplate()),
-    button(word("fit"), () => diagram.fit()),
+    button(word("fit"), () => diagram.whole()),
     button(word("arrange"), arrange),
     make("details", { class: "e-export" }, make("summary", {}, word("export")),
-      button("PNG", () => savePicture(drawing, stem, "png")), button("SVG", () => savePicture(drawing, stem, "svg")),
+      ...["png", "svg"].map((kind) => button(kind.toUpperCase(), () => {
+        diagram.whole();
+        savePicture(drawing, stem, /** @type {"png"|"svg"} */ (kind));
+      })),
       ...["mermaid", "scxml"].map((kind) => make("a", { href: `/api/edit/export?kind=${kind}&language=${language()}&file=${encodeURIComponent(name)}`, download: true }, kind === "scxml" ? "SCXML" : "Mermaid"))),
     button(word("language"), changeLanguage));
   const panes = make("div", { class: "e-panes" }, drawing, form, writing, tabs.root);
@@ -156,7 +160,8 @@ function edit(name) {
     redo: () => session.redo(),
     moved: follow,
   });
-  const diagram = new DiagramView(drawing, {
+  const diagram = new DiagramView(drawing, { done: word("done"), resume: word("resume") });
+  takeMouse(diagram, {
     selected: (chosen) => select(chosen, true, false),
     placed(places) {
       settle();
@@ -170,7 +175,7 @@ function edit(name) {
       select(chosen, true);
       inspector.focus();
     },
-  }, { done: word("done"), resume: word("resume") });
+  });
   const inspector = new Inspector(form, session, (chosen) => select(chosen, true));
 
   /** @param {string[]} active @param {Object<string, number>} counts @param {string[]} taken ids as flights have them */
