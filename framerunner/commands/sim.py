@@ -218,17 +218,16 @@ def sim(
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
-    chosen, onboard = connections or Connections(), onboard or Onboard()
-    flown_by = flown_by or FlownBy()
-    is_watched = monitor and flown_by.autopilot == "own"
-    watcher = _monitor(scenario, chosen.video_port, count) if is_watched else None
+    chosen, onboard, flown_by = connections or Connections(), onboard or Onboard(), flown_by or FlownBy()
+    watched = monitor and flown_by.autopilot == "own"
+    watcher = _monitor(scenario, chosen.video_port, count) if watched else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
     flown_by.check(count, settings, monitor=monitor)
     check_range("--seed", seed, 0, 2**63 - 1)
-    server = _server(flown_by, (scenario, settings, onboard, fault), count, seed, _grants(time_grants))
-    asyncio.run(_run(server, watcher, lifeline=lifeline))
+    flown = (scenario, settings, onboard, fault)
+    asyncio.run(_run(_server(flown_by, flown, count, seed, _grants(time_grants)), watcher, lifeline=lifeline))
     return 0
 
 
