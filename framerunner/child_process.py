@@ -144,13 +144,19 @@ class MonitorProcess(ChildProcess):
     """`framerunner monitor` as a child process; what it prints is printed here.
 
     Args:
-        scenario: for a drone without a referee; None if it has one.
+        scenario: what is flown.
+        judges: it judges that by telemetry: the drone has no referee.
         runs: folder of recorded flights; None for the monitor's own default.
         camera_hosts: HOST or HOST:PORT of cameras whose drones' packets are sent by this process.
     """
 
     def __init__(
-        self, scenario: Scenario | None = None, runs: Path | None = None, camera_hosts: Sequence[str] = ()
+        self,
+        scenario: Scenario,
+        runs: Path | None = None,
+        camera_hosts: Sequence[str] = (),
+        *,
+        judges: bool = False,
     ) -> None:
         port = _free_port()
         self.link = f"udpout://127.0.0.1:{port}"  # to which the drones' packets are to be sent
@@ -158,10 +164,11 @@ class MonitorProcess(ChildProcess):
         self._folder = TemporaryDirectory(prefix="framerunner-monitor-")  # only this user may read it
         self.operator_socket = Path(self._folder.name) / "operator.sock"
         arguments += ["--operator-socket", str(self.operator_socket)]
-        if scenario is not None:
-            # It reads the scenario that was checked here, even if the user's file changes.
-            path = Path(self._folder.name) / "scenario.yaml"
-            path.write_text(dump_yaml(scenario), encoding="utf-8")
+        # It reads the scenario that was checked here, even if the user's file changes.
+        path = Path(self._folder.name) / "scenario.yaml"
+        path.write_text(dump_yaml(scenario), encoding="utf-8")
+        arguments += ["--scenarios", "scenarios", "--scenarios", str(path)]
+        if judges:
             arguments += ["--scenario", str(path)]
         if runs is not None:
             arguments += ["--runs", str(runs)]

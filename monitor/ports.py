@@ -97,7 +97,8 @@ class Equipment:
         make_referee: for a drone without one of its own; follows its telemetry.
         scenario: what is flown, if that was specified when the monitor was started.
         list_scenarios: names that can be drawn.
-        load_scenario: one of them; raises `ScenarioError`.
+        load_scenario: one of them, or of another name, never a path; raises `ScenarioError`.
+        scenario_argument: what `framerunner fly` is given to fly one of them.
         runs: recorded flights; None if there is no such folder.
         start_pose: where a scenario's drone stands at first: its centre (m) and yaw (rad), arena axes; None:
             a drone without a referee of its own cannot be judged.
@@ -115,3 +116,4 @@ class Equipment:
     start_pose: Callable[[Scenario], tuple[float, float, float, float]] | None = None
     camera_hosts: tuple[str, ...] = ()
     extensions: tuple[Extension, ...] = ()
+    scenario_argument: Callable[[str], str] = str

@@ -6,12 +6,18 @@ import io
 import socket
 from collections.abc import Iterable
 from ipaddress import IPv4Address, IPv6Address, ip_address
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 import ifaddr
 import segno
 
 from wire.transports.urls import in_url, is_loopback
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+
+    from monitor.server import Monitor
 
 # Networks within this machine, of containers and virtual machines: no phone is in them.
 _VIRTUAL = ("docker", "br-", "veth", "virbr", "lxc", "lxdbr", "cni", "podman", "vmnet", "vboxnet")
@@ -53,6 +59,13 @@ def urls_for_visitor(host: str, port: int, requested: str, scheme: str = "http")
     if is_loopback(parts.hostname or "localhost"):
         return urls
     return [theirs, *(url for url in urls if url != theirs)]
+
+
+def urls_of(monitor: Monitor, request: Request) -> list[str]:
+    """The URLs that open a monitor on other machines; none if it is for this one only, or in no network."""
+    if not is_for_others(monitor.place[0]):
+        return []
+    return urls_for_visitor(*monitor.place, str(request.url), monitor.settings.scheme)
 
 
 def is_for_others(host: str) -> bool:

@@ -54,6 +54,12 @@ Component = Annotated[float, Field(ge=-1e6, le=1e6)]
 """Of a direction, whose length does not matter."""
 
 
+ScenarioName = Annotated[
+    str,
+    Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80, description="small letters, digits, - and _"),
+]
+
+
 class ScenarioError(UserError):
     """A scenario that cannot be used; the message is one line for people."""
 
@@ -313,9 +319,7 @@ class Origin(Part):
 class Scenario(Part):
     """All that is given before a flight."""
 
-    name: str = Field(
-        pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80, description="small letters, digits, - and _"
-    )
+    name: ScenarioName
     description: str = Field("", description="what this scenario is and where its numbers come from")
     arena: Arena = Field(Arena(), description="the flying space")
     base: Base = Field(Base(), description="where to land")

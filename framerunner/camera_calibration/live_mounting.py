@@ -33,7 +33,7 @@ from wire.simulator_api import SimulatorApi
 from wire.vehicle_telemetry import VehicleTelemetry
 
 if TYPE_CHECKING:
-    from scenarios.models import Scenario
+    from scenarios.task import Task
     from vision.calibration.model import Calibration
     from wire.transports.vehicle_link import VehicleLink
 
@@ -54,7 +54,7 @@ class Watched:
 
     Args:
         calibration: of its camera.
-        scenario: of the simulator that renders the images; None: they are a real camera's.
+        task: of the simulator that renders the images; None: they are a real camera's.
 
     Attributes:
         reports: the drone's states, axes north, west, up.
@@ -63,14 +63,14 @@ class Watched:
         vehicle: MAVLink id; None until it is heard.
     """
 
-    def __init__(self, calibration: Calibration, scenario: Scenario | None) -> None:
+    def __init__(self, calibration: Calibration, task: Task | None) -> None:
         self.reports: list[MotionReport] = []
         self.images: list[Detections] = []
         self.stamped = False
         self.vehicle: int | None = None
-        smooth = scenario is not None and scenario.camera.effects is not None
+        smooth = task is not None and task.camera.effects is not None
         self._detect = new_detector(
-            "frames", calibration=calibration, rendered=scenario is not None, smooth=smooth
+            "frames", calibration=calibration, rendered=task is not None, smooth=smooth
         )
         self._telemetry = VehicleTelemetry()
         self._lag_s: float | None = None
@@ -114,12 +114,12 @@ class Watched:
             self.images.append(self._detect(frame.image, time_us))
 
 
-async def _rendering_scenario(camera_url: str) -> Scenario | None:
-    """The scenario whose images a URL serves, if it is that of a simulator or a virtual camera."""
+async def _rendered_task(camera_url: str) -> Task | None:
+    """The task whose images a URL serves, if it is that of a simulator or a virtual camera."""
     import aiohttp
     from pydantic import ValidationError
 
-    from scenarios.models import Scenario
+    from scenarios.task import Task
 
     api = SimulatorApi.of_video(camera_url)
     if api is None or api.video_url != camera_url:
@@ -127,7 +127,7 @@ async def _rendering_scenario(camera_url: str) -> Scenario | None:
     limit = aiohttp.ClientTimeout(total=2.0)
     try:
         async with aiohttp.ClientSession() as session, session.get(api.scenario_url, timeout=limit) as answer:
-            return Scenario.model_validate_json(await answer.read()) if answer.status == 200 else None
+            return Task.model_validate_json(await answer.read()) if answer.status == 200 else None
     except (aiohttp.ClientError, TimeoutError, ValidationError):
         return None
 
@@ -160,7 +160,7 @@ async def measure_live(
         LinkError: the link cannot be opened or has failed.
         DroneError: no vehicle is heard, or it has restarted.
     """
-    watched = Watched(calibration, await _rendering_scenario(camera_url))
+    watched = Watched(calibration, await _rendered_task(camera_url))
     with closing(open_link(drone_url)) as link:
         reading = _Reading(link, watched)
         reader = asyncio.create_task(reading.run())

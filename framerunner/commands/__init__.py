@@ -30,6 +30,13 @@ MAX_FAULTS = 20  # as many as a scenario file may have
 WholeNumber = Annotated[int, Parameter(converter=_whole)]
 
 
+ShowLayout = Annotated[
+    bool,
+    Parameter(
+        negative="", help="for training: tell every app where frames and obstacles are (/scenario.json)"
+    ),
+]
+
 Sensors = Annotated[
     str | None,
     Parameter(help="the drone's sensor suite instead of the scenario's: ideal, mocap, outdoor, …, or a file"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from errors import SettingError
-from framerunner.commands import WholeNumber, check_range, say
+from framerunner.commands import ShowLayout, WholeNumber, check_range, say
 
 if TYPE_CHECKING:
     from vision.calibration.board import Board
@@ -41,6 +41,7 @@ def camera(
     ] = False,
     bind: Annotated[str, Parameter(help="address to serve the video on")] = "127.0.0.1",
     port: Annotated[WholeNumber, Parameter(help="TCP port of the video")] = 8100,
+    show_layout: ShowLayout = False,
 ) -> int:
     """Render what a camera on a drone would see of the arena, from the pose that the drone reports.
 
@@ -68,7 +69,8 @@ def camera(
     loaded = load_scenario(scenario)
     link = VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)
     virtual = VirtualCamera(loaded, level=level, base=not no_base)
-    asyncio.run(CameraServer(virtual, link, VideoServer(bind, port), say).run())
+    server = CameraServer(virtual, link, VideoServer(bind, port), say, show_layout=show_layout)
+    asyncio.run(server.run())
     return 0
 
 

@@ -17,11 +17,14 @@ from errors import SettingError
 from framerunner.commands import WholeNumber, check_range, say
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from monitor.ports import Equipment
     from scenarios.models import Scenario
 
 MISSIONS = Path("missions")
 PUPILS_FILE = "course-pupils.json"  # in the folder of missions
+SCENARIOS = (Path("scenarios"),)
 DATABASE_FILE = Path("framerunner.db")
 DATABASE = f"sqlite:///{DATABASE_FILE}"
 _OPEN_FILES = 4096
@@ -34,6 +37,10 @@ COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 _Drone = Annotated[str, Parameter(help="MAVLink URL: where drones send to ground stations")]
 _Scenario = Annotated[
     str | None, Parameter(help="name or file; for a drone without a referee, such as a real one")
+]
+_Scenarios = Annotated[
+    tuple[Path, ...],
+    Parameter(help="your own scenarios, files or folders: they can be drawn, and their arena is shown"),
 ]
 _Bind = Annotated[str, Parameter(help="address to listen on; 0.0.0.0 lets other machines in")]
 _CameraHosts = Annotated[
@@ -67,6 +74,7 @@ def monitor(
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
     missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
+    scenarios: _Scenarios = SCENARIOS,
     pilot: PilotOption = None,
     camera_host: _CameraHosts = (),
     trusted_proxy: _TrustedProxy = (),
@@ -101,7 +109,7 @@ def monitor(
 
     parse_url(drone)
     flown = None if scenario is None else load_scenario(scenario)
-    given = equipment(drone, flown, runs, camera_host, missions=missions, pilot=pilot)
+    given = equipment(drone, flown, runs, camera_host, missions=missions, scenarios=scenarios, pilot=pilot)
     settings = MonitorSettings(
         *(bind, port, database, _secret("ORGANISER_PASSWORD"), trusted_proxy),
         judge_password=_secret("JUDGE_PASSWORD"),
@@ -126,6 +134,7 @@ def equipment(
     camera_hosts: tuple[str, ...] = (),
     *,
     missions: Path = MISSIONS,
+    scenarios: Sequence[Path] = SCENARIOS,
     pilot: Path | None = None,
 ) -> Equipment:
     """What the monitor, which may not import other rooms' functions, is given of them.
@@ -144,11 +153,11 @@ def equipment(
     from framerunner.editing.web import EditingDoor
     from framerunner.flying.plan import FlightPlan
     from framerunner.monitoring.run_library import RunFolders
+    from framerunner.monitoring.scenario_library import ScenarioLibrary
     from monitor.ports import Equipment
     from monitor.visitors.pupils import PupilBook
     from offboard.pilot import Pilot
     from offboard.pilot_file import read_pilot
-    from scenarios.loader import list_scenarios, load_scenario
     from wire.transports.vehicle_link import VehicleLink
 
     if missions != MISSIONS and not missions.is_dir():  # the default is made when the first mission is
@@ -156,13 +165,15 @@ def equipment(
     pilot_class = Pilot if pilot is None else read_pilot(pilot).pilot_class()
     session = Path(mkdtemp(prefix="framerunner-flights-"))
     atexit.register(shutil.rmtree, session, ignore_errors=True)
+    library = ScenarioLibrary(scenarios)
     editing = EditingSettings(pilot, session, live=LiveSettings(drone_url, runs, pilot))
     return Equipment(
         make_referee=lambda flown: FlightPlan(flown).new_referee(),
         open_link=lambda: VehicleLink(drone_url, system_id=SYSTEM_ID, component_id=COMPONENT_ID),
         scenario=scenario,
-        list_scenarios=list_scenarios,
-        load_scenario=load_scenario,
+        list_scenarios=library.names,
+        load_scenario=library.load,
+        scenario_argument=library.argument,
         runs=RunFolders(runs, session, pilot),
         start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,

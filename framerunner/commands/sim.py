@@ -12,7 +12,16 @@ from cyclopts import Parameter
 
 from errors import SettingError
 from errors.files import TextError, read_text
-from framerunner.commands import Faults, Sensors, WholeNumber, check_range, say, with_faults, with_sensors
+from framerunner.commands import (
+    Faults,
+    Sensors,
+    ShowLayout,
+    WholeNumber,
+    check_range,
+    say,
+    with_faults,
+    with_sensors,
+)
 from framerunner.commands.ardupilot import ardupilot_server
 from framerunner.commands.px4 import px4_server
 from framerunner.extras import install_advice, is_installed
@@ -87,6 +96,7 @@ class Connections:
     video_rtp: Annotated[
         str, Parameter(help="host or host:port that gets the video as H.264 in RTP, UDP 5600, or off")
     ] = "127.0.0.1"
+    show_layout: ShowLayout = False
 
 
 @Parameter(name="*")
@@ -209,16 +219,16 @@ def sim(
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, _MAX_INSTANCES - 1)
     check_range("--count", count, 1, _MAX_INSTANCES - instance)
-    chosen, onboard = connections or Connections(), onboard or Onboard()
-    flown_by = flown_by or FlownBy()
-    watcher = _monitor(chosen.video_port, count) if monitor and flown_by.autopilot == "own" else None
+    chosen, onboard, flown_by = connections or Connections(), onboard or Onboard(), flown_by or FlownBy()
+    watched = monitor and flown_by.autopilot == "own"
+    watcher = _monitor(scenario, chosen.video_port, count) if watched else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
     flown_by.check(count, settings, monitor=monitor)
     check_range("--seed", seed, 0, 2**63 - 1)
-    server = _server(flown_by, (scenario, settings, onboard, fault), count, seed, _grants(time_grants))
-    asyncio.run(_run(server, watcher, lifeline=lifeline))
+    flown = (scenario, settings, onboard, fault)
+    asyncio.run(_run(_server(flown_by, flown, count, seed, _grants(time_grants)), watcher, lifeline=lifeline))
     return 0
 
 
@@ -264,11 +274,12 @@ def _grants(descriptor: int | None) -> TimeGrants | None:
     return TimeGrants(socket.socket(fileno=descriptor))
 
 
-def _monitor(video_port: int | None, count: int) -> MonitorProcess:
+def _monitor(scenario: str, video_port: int | None, count: int) -> MonitorProcess:
     from framerunner.child_process import MonitorProcess
+    from scenarios.loader import load_scenario
 
     ports = () if video_port is None else range(video_port, video_port + count)
-    return MonitorProcess(camera_hosts=[f"127.0.0.1:{port}" for port in ports])
+    return MonitorProcess(load_scenario(scenario), camera_hosts=[f"127.0.0.1:{port}" for port in ports])
 
 
 def _settings(
@@ -299,6 +310,7 @@ def _settings(
         speed=speed,
         links=links,
         signing_key=_read_key(chosen.signing_key),
+        show_layout=chosen.show_layout,
         storage=onboard.storage,
         shell=onboard.shell,
         camera=onboard.camera,

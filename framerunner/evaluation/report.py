@@ -47,6 +47,13 @@ VERDICT_COLOURS = {
 }
 _FRAME_COLOURS = {"red": "#cc3311", "green": "#228833", "blue": "#3355bb"}
 _INK, _FAINT = "#262626", "#6b6b6b"
+# Colours of charts that are those of the page, which has others in the dark.
+_IN_PAGE = {
+    _INK: "--ink",
+    _FAINT: "--faint",
+    "#bbbbbb": "--line",
+    "#222222": "--ink",
+}
 _WIDTH_IN = 5.4
 _MAX_STATES = 14
 
@@ -298,4 +305,6 @@ def _svg(figure: Figure, name: str) -> str:
     svg = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", svg, count=1)
     svg = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", svg, count=1)
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    for colour, name_in_page in _IN_PAGE.items():
+        svg = svg.replace(colour, f"var({name_in_page})")
     return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", svg)

@@ -58,8 +58,8 @@ async def fly_once(settings: FlightSettings) -> int:
     from framerunner.child_process import MonitorProcess
 
     # The simulator that is started has a referee; a running drone may have none.
-    scenario = None if settings.real_time.drone_url is None else settings.plan.scenario
-    async with MonitorProcess(scenario, settings.out, _camera_hosts(settings.real_time)) as monitor:
+    judges, hosts = settings.real_time.drone_url is not None, _camera_hosts(settings.real_time)
+    async with MonitorProcess(settings.plan.scenario, settings.out, hosts, judges=judges) as monitor:
         await monitor.opened()
         if settings.wait_for_viewer:
             await monitor.viewed()

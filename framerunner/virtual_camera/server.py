@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 
 from framerunner.virtual_camera.camera import VirtualCamera
+from scenarios.task import Task
 from sitl.video import VideoServer
 from wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
@@ -41,7 +42,16 @@ Say = Callable[[str], None]
 class CameraServer:
     """Reads a vehicle's telemetry from a link, which is closed at the end; serves the rendered images."""
 
-    def __init__(self, camera: VirtualCamera, link: VehicleLink, video: VideoServer, say: Say) -> None:
+    def __init__(
+        self,
+        camera: VirtualCamera,
+        link: VehicleLink,
+        video: VideoServer,
+        say: Say,
+        *,
+        show_layout: bool = False,
+    ) -> None:
+        self._show_layout = show_layout
         self._camera = camera
         self._link = link
         self._video = video
@@ -67,7 +77,8 @@ class CameraServer:
         self._failed = loop.create_future()
         self._video.add_json(REFEREE_PATH, self._referee_answer)
         scenario = self._camera.plan.scenario
-        self._video.add_json(SCENARIO_PATH, lambda _query: scenario.model_dump(mode="json"))
+        task = Task.of(scenario, show_layout=self._show_layout)
+        self._video.add_json(SCENARIO_PATH, lambda _query: task.model_dump(mode="json"))
         reader = threading.Thread(target=self._read, args=(loop,), name="telemetry", daemon=True)
         updates: asyncio.Task[None] | None = None
         try:

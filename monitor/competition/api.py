@@ -27,6 +27,7 @@ from monitor.competition.validation import (
     NextForm,
     QueueForm,
     RefusedError,
+    ScenarioForm,
     SettingsForm,
     TeamChangeForm,
     TeamForm,
@@ -197,6 +198,12 @@ def _organising_routes(service: CompetitionService, organisers: _Writers) -> API
         form, entry = await organisers.read(request, DrawForm)
         count = form.count or (await service.board()).rule.scenarios
         return json_response({"round": await service.draw(form.pool, count, entry)})
+
+    @routes.post("/pool")
+    async def check_scenario(request: Request) -> Response:
+        form, _ = await organisers.read(request, ScenarioForm)
+        await service.check_drawable(form.scenario)
+        return json_response({"scenario": form.scenario})
 
     @routes.post("/settings")
     async def set_rule(request: Request) -> Response:

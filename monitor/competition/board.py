@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 from sqlalchemy import ColumnElement, select
@@ -65,8 +66,13 @@ class _Judged:
         return self.row.state == "ended" or (self.row.state == "interrupted" and self.correction is not None)
 
 
-def read_board(session: Session, version: int, max_tries: int = MAX_TRIES_SHOWN) -> Board:
-    """Read everything; of the tries the newest."""
+def read_board(
+    session: Session,
+    version: int,
+    max_tries: int = MAX_TRIES_SHOWN,
+    argument: Callable[[str], str] = str,
+) -> Board:
+    """Read everything; of the tries the newest. `argument`: what `fly` is given to fly a scenario."""
     rule, rule_view = _read_rule(session)
     teams = {team.id: team for team in session.scalars(select(tables.Team).order_by(tables.Team.id))}
     tries = _read_tries(session)
@@ -84,7 +90,7 @@ def read_board(session: Session, version: int, max_tries: int = MAX_TRIES_SHOWN)
         called=_call_view(session, teams),
         last_call=_last_call_view(session, teams),
         queue=QueueView(number=calls.queue_number(session), teams=queue),
-        draws=tuple(_draw_view(draw) for draw in reversed(draws)),
+        draws=tuple(_draw_view(draw, argument) for draw in reversed(draws)),
         tries=tuple(
             _try_view(judged, teams, attempts.get(judged.row.id, 0), rule, countable[judged.row.round])
             for judged in reversed(tries[-max_tries:])
@@ -338,12 +344,12 @@ def _judgement_view(entry: tables.Judgement, teams: Mapping[int, tables.Team]) -
     )
 
 
-def _draw_view(draw: tables.Draw) -> DrawView:
+def _draw_view(draw: tables.Draw, argument: Callable[[str], str]) -> DrawView:
     names = tuple(name for name, _ in _drawn(draw))
     return DrawView(
         round=draw.round,
         scenarios=names,
-        commands=tuple(f"framerunner fly {name}" for name in names),
+        commands=tuple(f"framerunner fly {shlex.quote(argument(name))}" for name in names),
         pool=tuple(draw.pool.splitlines()),
         who=draw.who,
         at=draw.at,

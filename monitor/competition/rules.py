@@ -142,7 +142,7 @@ def rank(
 
     Returns:
         The best first; within a rank by fewer contacts, then by name. Teams with the same total share a
-        rank, and the ranks after them are left out.
+        rank, and the ranks after them are left out. Teams that have not flown have no rank and come last.
     """
     drawn = list(scenarios)[: rule.scenarios]
     drawn += [("", COLOURS)] * (rule.scenarios - len(drawn))
@@ -159,7 +159,7 @@ def rank(
             contacts += chosen.result.contacts if chosen is not None else 0
         rows.append(
             RowView(
-                rank=0,
+                rank=None,
                 team=team,
                 name=name,
                 total_s=sum(round(cell.counted_s * 100) for cell in cells) / 100,
@@ -168,9 +168,13 @@ def rank(
                 cells=tuple(cells),
             )
         )
-    rows.sort(key=lambda row: (row.total_s, row.contacts, row.name.casefold(), row.name, row.team))
-    totals = [row.total_s for row in rows]
-    return tuple(row.model_copy(update={"rank": totals.index(row.total_s) + 1}) for row in rows)
+    rows.sort(
+        key=lambda row: (not row.flown, row.total_s, row.contacts, row.name.casefold(), row.name, row.team)
+    )
+    totals = [row.total_s for row in rows if row.flown]
+    return tuple(
+        row.model_copy(update={"rank": totals.index(row.total_s) + 1}) if row.flown else row for row in rows
+    )
 
 
 def _cell(scenario: str, frames: Sequence[str], attempt: Attempt | None, tries: int, rule: Rule) -> CellView:

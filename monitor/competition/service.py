@@ -210,16 +210,20 @@ class CompetitionService:
             raise RefusedError(
                 f"count {count} is more than the {len(names)} scenarios of the pool; tick more"
             )
-        frames = {name: await self.frames(name) for name in names}
-        for name, colours in frames.items():
-            if colours != COLOURS:
-                has = f"only the {' and the '.join(colours)} frame" if colours else "no frames"
-                raise RefusedError(
-                    f"scenario {shown(name)} cannot be drawn: it has {has}, a try needs a red, "
-                    "a green and a blue one; take it out of the pool"
-                )
-        drawn = {name: frames[name] for name in self._random.sample(names, count)}
+        for name in names:
+            await self.check_drawable(name)
+        drawn = dict.fromkeys(self._random.sample(names, count), COLOURS)
         return await self.change(lambda store: store.draw(drawn, names, entry))
+
+    async def check_drawable(self, scenario: str) -> None:
+        """Raise `RefusedError` if a scenario is unknown or lacks a frame."""
+        colours = await self.frames(scenario)
+        if colours != COLOURS:
+            has = f"only the {' and the '.join(colours)} frame" if colours else "no frames"
+            raise RefusedError(
+                f"scenario {shown(scenario)} cannot be drawn: it has {has}, a try needs a red, "
+                "a green and a blue one; take it out of the pool"
+            )
 
     async def frames(self, scenario: str) -> tuple[str, ...]:
         """Colours to cross in a scenario, in order. Raises `RefusedError` if it is unknown."""
@@ -236,7 +240,8 @@ class CompetitionService:
                 given = await asyncio.to_thread(self._equipment.load_scenario, scenario)
             except Exception as error:  # the loader is passed in, and its errors are not known here
                 raise RefusedError(
-                    f"scenario {shown(scenario)} is unknown; choose one of the list"
+                    f"scenario {shown(scenario)} is unknown; choose one of the list, LEVEL-SEED such as "
+                    "calm-17, or put its file into the folder of --scenarios"
                 ) from error
         colours = {frame.colour for frame in given.frames}
         frames = tuple(colour for colour in COLOURS if colour in colours)
@@ -306,7 +311,7 @@ class CompetitionService:
 
     async def _refresh(self) -> None:
         """Read everything again and send that it changed."""
-        board = await self.read(lambda store: store.board())
+        board = await self.read(lambda store: store.board(self._equipment.scenario_argument))
         if self._board is None or board.version > self._board.version:
             self._board = board
         self.problem = ""

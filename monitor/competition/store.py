@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import datetime
@@ -46,11 +46,11 @@ class Store:
         """Close the database."""
         self._database.close()
 
-    def board(self) -> Board:
-        """The whole contest, with a higher version at each call."""
+    def board(self, argument: Callable[[str], str] = str) -> Board:
+        """The whole contest, with a higher version at each call; `argument`: of `fly` for a scenario."""
         self._version += 1
         with self._database.transaction() as session:
-            return read_board(session, self._version)
+            return read_board(session, self._version, argument=argument)
 
     def everything(self) -> Board:
         """The whole contest with all tries, however many."""

@@ -108,6 +108,12 @@ class DrawForm(FormModel):
     count: int | None = Field(None, ge=1, le=MAX_SCENARIOS, description="null for as many as a round has")
 
 
+class ScenarioForm(FormModel):
+    """A scenario to be added to the pool of a draw."""
+
+    scenario: Name
+
+
 class JudgementForm(FormModel):
     """A correction. It replaces an earlier one: what is left out or null is as the referee says."""
 

@@ -175,7 +175,7 @@ class CellView(View):
 class RowView(View):
     """A row of the ranking."""
 
-    rank: int
+    rank: int | None = Field(description="null before the first judged try")
     team: int
     name: str
     total_s: float
@@ -248,7 +248,7 @@ class RankingStateView(View):
 _TRY_COLUMNS = (
     *("try", "round", "team", "scenario", "attempt", "drone", "state", "judged", "verdict"),
     *("crossed", "missing", "contacts", "penalty_s", "try_time_s", "total_s", "completed", "counted_s"),
-    *("corrected_by", "source", "final", "started", "ended", "reason"),
+    *("counts", "why_not", "corrected_by", "source", "final", "started", "ended", "reason"),
 )
 
 
@@ -268,20 +268,41 @@ def ranking_csv(ranking: RankingView) -> str:
 
 
 def tries_csv(board: Board) -> str:
-    """The tries of a board, oldest first, after correction."""
+    """The tries of a board with all of them, oldest first, after correction."""
+    counting = {
+        (row.team, cell.scenario, ranking.round): cell.attempt
+        for ranking in board.rankings
+        for row in ranking.rows
+        for cell in row.cells
+    }
     rows: list[list[object]] = []
     for each in reversed(board.tries):
         result = each.result
+        chosen = counting.get((each.team or 0, each.scenario, each.round))
+        counts = chosen == each.id
+        why_not = "" if counts else _why_not(each, chosen, board.rule.counting)
         rows.append(
             [
                 *(each.id, each.round, each.team_name, each.scenario, each.attempt or "", each.drone_id),
                 *(each.state, each.judged, each.verdict, " ".join(result.crossed), " ".join(result.missing)),
                 *(result.contacts, result.penalty_s, result.try_time_s, result.total_s, result.completed),
-                *(result.counted_s, each.corrected_by, each.source, each.final, each.started.isoformat()),
+                *(result.counted_s, counts, why_not, each.corrected_by, each.source, each.final),
+                each.started.isoformat(),
                 *(each.ended.isoformat() if each.ended is not None else "", each.reason),
             ]
         )
     return csv_text(_TRY_COLUMNS, rows)
+
+
+def _why_not(each: TryView, chosen: int | None, counting: Counting) -> str:
+    """Why a try does not count; `chosen`: the try of its team that counts at its scenario."""
+    if each.state == "running":
+        return "is being flown"
+    if not each.judged:
+        return "interrupted: to be judged"
+    if each.barrier or chosen is None:
+        return each.barrier
+    return f"try {chosen} is {'better' if counting == 'best' else 'later'}"
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -8,7 +8,7 @@ from fastapi import Request
 from fastapi.responses import Response
 
 from monitor.pages.shell import render
-from monitor.urls import is_for_others, svg_code, urls_for_visitor
+from monitor.urls import is_for_others, svg_code, urls_of
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
@@ -18,14 +18,10 @@ _MAX_OTHERS = 3
 
 def register(monitor: Monitor) -> None:
     """Add the page, and its first code as an image at `/join.svg`."""
-    for_others, scheme = is_for_others(monitor.place[0]), monitor.settings.scheme
-
-    def urls(request: Request) -> list[str]:
-        return urls_for_visitor(*monitor.place, str(request.url), scheme) if for_others else []
 
     @monitor.web.get("/join")
     async def join(request: Request) -> Response:
-        shown = urls(request)[: 1 + _MAX_OTHERS]
+        shown = urls_of(monitor, request)[: 1 + _MAX_OTHERS]
         codes = [{"url": url, "svg": svg_code(url)} for url in shown]
         return render(
             "join.html.j2",
@@ -35,12 +31,12 @@ def register(monitor: Monitor) -> None:
             here="/join",
             style="join",
             classes="join",
-            values={"codes": codes, "for_others": for_others},
+            values={"codes": codes, "for_others": is_for_others(monitor.place[0])},
         )
 
     @monitor.web.get("/join.svg")
     async def code(request: Request) -> Response:
-        found = urls(request)
+        found = urls_of(monitor, request)
         if not found:
             return Response(status_code=404)
         headers = {"Cache-Control": "no-store"}

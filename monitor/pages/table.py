@@ -11,7 +11,7 @@ from starlette.responses import HTMLResponse
 
 from monitor.access import Role
 from monitor.pages.shell import render
-from monitor.urls import is_for_others
+from monitor.urls import urls_of
 
 if TYPE_CHECKING:
     from monitor.access import Visitor
@@ -99,7 +99,7 @@ PAGES = (
         "/ranking",
         "Ranking",
         "ranking",
-        lambda monitor, _request, _visitor: {"join": is_for_others(monitor.place[0])},
+        lambda monitor, request, _visitor: {"join": bool(urls_of(monitor, request))},
     ),
     Page("/stage", "Stage", "stage", here=""),
     Page(

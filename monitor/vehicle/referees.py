@@ -10,9 +10,10 @@ from typing import Any
 import aiohttp
 from pydantic import ValidationError
 
-from monitor.ports import Referee
-from scenarios.models import Scenario, TrueState
+from monitor.ports import Equipment, Referee
+from scenarios.models import Scenario, ScenarioError, TrueState
 from scenarios.result import Standing, first_error
+from scenarios.task import Task, layout_mark
 from wire.simulator_api import SimulatorApi
 
 _PERIOD_S = 0.2
@@ -27,6 +28,26 @@ class _NotThereError(Exception):
     """No usable answer; the message says what is wrong."""
 
 
+def scenario_of(task: Task, equipment: Equipment) -> Scenario:
+    """The scenario of a task, with its layout, which a simulator tells only for training. Blocks.
+
+    Raises:
+        ScenarioError: it is not known here; the message is one line for people.
+    """
+    if task.scenario is not None:
+        return task.scenario
+    advice = "give its file to framerunner monitor --scenarios, or start the simulator with --show-layout"
+    found = equipment.scenario
+    if found is None or found.name != task.name:
+        try:
+            found = equipment.load_scenario(task.name)
+        except ScenarioError:
+            raise ScenarioError(f"scenario '{task.name}' is not known here; {advice}") from None
+    if layout_mark(found) != task.layout_mark:
+        raise ScenarioError(f"scenario '{task.name}' has another layout here; {advice}")
+    return found.model_copy(update={"arena": task.arena, "base": task.base, "start": task.start})
+
+
 class RefereeChannel:
     """Requests `/referee.json` five times a second while it is answered, and each scenario once.
 
@@ -34,14 +55,22 @@ class RefereeChannel:
         api: of the simulator or virtual camera that serves the vehicle's video.
         take: called with each answer.
         say: called with level and one line for people.
+        find: the scenario of a task, as `scenario_of`; called in a thread.
 
     Attributes:
         scenario: what is flown there; None until it is known.
         lift_m: how much higher the frames hang than the scenario says.
     """
 
-    def __init__(self, api: SimulatorApi, take: Callable[[Standing], None], say: Say) -> None:
+    def __init__(
+        self,
+        api: SimulatorApi,
+        take: Callable[[Standing], None],
+        say: Say,
+        find: Callable[[Task], Scenario],
+    ) -> None:
         self._api = api
+        self._find = find
         self._take = take
         self._say = say
         self._problem = ""
@@ -78,14 +107,14 @@ class RefereeChannel:
         """Get what is flown there; the referee's answers count even if that fails."""
         self.scenario = None
         try:
-            scenario = Scenario.model_validate(await _fetch(session, self._api.scenario_url))
-        except (_NotThereError, ValidationError) as error:
+            task = Task.model_validate(await _fetch(session, self._api.scenario_url))
+            if task.name != name:
+                return  # it changed between the two answers: request it again
+            self.scenario = await asyncio.to_thread(self._find, task)
+        except (_NotThereError, ScenarioError, ValidationError) as error:
             reason = first_error(error) if isinstance(error, ValidationError) else error
             self._warn(f"{self._api.scenario_url}: {reason}; the arena cannot be drawn")
-            self._requested = name
-            return
-        if scenario.name == name:  # otherwise it changed between the two answers: request it again
-            self.scenario, self._requested = scenario, name
+        self._requested = name
 
     def _warn(self, line: str) -> None:
         if line != self._problem:

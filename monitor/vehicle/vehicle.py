@@ -6,6 +6,7 @@ import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import cos, sin
 from typing import Any
 
@@ -14,7 +15,7 @@ from monitor.vehicle.camera import CAMERAS, CameraWatch
 from monitor.vehicle.commands import Answer, CommandSender, StickStream, carry_out
 from monitor.vehicle.link_quality import LinkQuality, RateWatch, RepeatedRequest
 from monitor.vehicle.mission import MissionView
-from monitor.vehicle.referees import RefereeChannel
+from monitor.vehicle.referees import RefereeChannel, scenario_of
 from monitor.vehicle.texts import Texts
 from monitor.vehicle.track import History, Placement
 from monitor.vehicle.tries import Judging, TryEvent
@@ -310,5 +311,6 @@ class Vehicle:
         def say(level: str, text: str) -> None:
             self._callbacks.notice(level, f"drone {self.id}: {text}")
 
-        self._channel = RefereeChannel(api, take, say)
+        find = partial(scenario_of, equipment=self._equipment)
+        self._channel = RefereeChannel(api, take, say, find)
         self._channel_task = asyncio.create_task(self._channel.run())

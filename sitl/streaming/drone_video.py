@@ -11,6 +11,7 @@ from geometry.rotations import rotation, yaw_of
 from geometry.solids import Solid
 from scenarios.models import TrueState
 from scenarios.result import LocalFrame, Standing, StandingPlace
+from scenarios.task import Task
 from sitl.server_settings import ServerSettings
 from sitl.vehicle import SimulatedVehicle
 from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
@@ -67,7 +68,8 @@ class DroneVideo:
             self._settings.bind, self._settings.http_port, options="--instance (sim also: --video-port)"
         )
         video.add_json(REFEREE_PATH, self._referee_answer)
-        video.add_json(SCENARIO_PATH, lambda _query: scenario.model_dump(mode="json"))
+        task = Task.of(scenario, show_layout=self._settings.show_layout)
+        video.add_json(SCENARIO_PATH, lambda _query: task.model_dump(mode="json"))
         if self._settings.video_rtp is not None:
             await asyncio.to_thread(import_module, "sitl.streaming.rtp")
             from sitl.streaming.rtp import RtpSender

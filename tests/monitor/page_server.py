@@ -18,7 +18,7 @@ from monitor.pages.table import PAGES, render_page
 from monitor.security import CONTENT_POLICY
 
 SOURCES = Path(__file__).parents[2] / "web" / "src"
-SERVED = {page.path: page for page in PAGES if page.path in ("/", "/chart", "/stage")}
+SERVED = {page.path: page for page in PAGES if page.path in ("/", "/chart", "/stage", "/ranking")}
 JPEG = cv2.imencode(".jpg", np.full((240, 320, 3), (56, 176, 226), np.uint8))[1].tobytes()
 REPEAT_S = 1.0  # a page takes a monitor that says nothing for four seconds for lost
 
@@ -63,6 +63,7 @@ class FakeMonitor:
         app.router.add_get("/ws/live", self._watch)
         app.router.add_get("/video/{id}/frames", self._frames)
         app.router.add_get("/api/competition/stage", self._stage)
+        app.router.add_get("/api/competition/ranking", self._ranking)
         app.router.add_get("/ws/competition", self._contest)
         app.router.add_static("/static", STATIC)
         app.router.add_static("/sources", SOURCES)  # for tests of single modules
@@ -168,6 +169,10 @@ class FakeMonitor:
 
     async def _stage(self, request):
         return web.json_response(self.stage)
+
+    async def _ranking(self, request):
+        rule = {"scenarios": 3, "limit_s": 180, "missing_frame_s": 60, "counting": "best"}
+        return web.json_response({**self.stage, "rounds": [1], "rule": rule, "problem": ""})
 
     async def _contest(self, request):
         watcher = web.WebSocketResponse()

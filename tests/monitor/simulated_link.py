@@ -25,6 +25,7 @@ from framerunner.flying.plan import FlightPlan
 from monitor.ports import Equipment
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario, TrueState
+from scenarios.task import Task
 from sitl.camera import CameraFeed
 from sitl.simulation import Simulation
 from sitl.video import VideoServer
@@ -58,7 +59,7 @@ class SimulatedDrone:
         self._app = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=COMPONENT_ID)
         self.restart()
         if video is not None:
-            video.add_json("/scenario.json", lambda _query: scenario.model_dump(mode="json"))
+            video.add_json("/scenario.json", lambda _query: Task.of(scenario).model_dump(mode="json"))
 
     def restart(self) -> None:
         """Switch it off and on: it stands on its start, and its clock begins at 0."""

@@ -29,6 +29,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 MISSION = load_mission("frame_challenge")
 STATES = list(MISSION.leaves)
 MARKUP = "<img src=x onerror=alert(1)><b>bold</b>"
+LIT = "svg .e-state.e-active:not(.e-super)"
 PATIENCE_MS = 20_000  # a browser that draws without a graphics card, on a machine that has other things to do
 expect.set_options(timeout=PATIENCE_MS)
 LAPTOP, PHONE = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
@@ -144,15 +145,6 @@ async def frames_drawn(page):
     return int(await page.locator(".m-arena").get_attribute("data-frames") or 0)
 
 
-async def test_the_library_for_diagrams_is_loaded_before_a_mission_is_received(chromium, fake):
-    fake.welcome = [world()]
-    page, complaints = await visit(chromium, fake)
-    await until(
-        page, "performance.getEntriesByType('resource').some((each) => /stateDiagram/.test(each.name))"
-    )
-    assert complaints == []
-
-
 async def test_figures_are_those_that_were_sent(chromium, fake):
     page, complaints = await visit(chromium, fake)
     for name, shown in (
@@ -189,7 +181,7 @@ async def test_figures_are_those_that_were_sent(chromium, fake):
 
     await fake.say("status", drones=[status(figures=None)])
     await expect(figure(page, "try_time_s")).to_have_text("–")
-    await expect(figure(page, "verdict")).to_have_text("nobody judges")
+    await expect(figure(page, "verdict")).to_have_text("not judged")
     assert complaints == []
 
 
@@ -218,12 +210,11 @@ async def test_texts_with_markup_are_shown_as_text(chromium, fake):
 
 async def test_the_highlighted_state_follows_the_mission(chromium, fake):
     page, complaints = await visit(chromium, fake, "/chart")
-    lit, around = page.locator("svg .m-active"), page.locator("svg .m-around")
+    lit, around = page.locator(LIT), page.locator("svg .e-super.e-active")
     panel = page.locator(".m-chart")
     await expect(lit).to_contain_text("turning")
     await expect(around).to_contain_text("red")
     await fake.say("pose", drones=[pose()])
-    drawing = await page.evaluate("document.querySelector('.m-chart-picture svg').id")
     await fake.say("pose", drones=[pose(t=10.05, state="blue.crossing")])
     await expect(panel).to_have_attribute("data-state", "blue.crossing")
     await expect(lit).to_have_count(1)
@@ -231,9 +222,37 @@ async def test_the_highlighted_state_follows_the_mission(chromium, fake):
     await expect(around).to_contain_text("blue")
     await fake.say("status", drones=[status(state="landing.stop")])
     await expect(lit).to_contain_text("stop")
-    assert await page.evaluate("document.querySelector('.m-chart-picture svg').id") == drawing
-    await page.get_by_role("button", name="Follow").click()
-    await expect(page.get_by_role("button", name="Whole")).to_have_attribute("aria-pressed", "false")
+    await page.get_by_role("button", name="Whole").click()
+    await expect(page.get_by_role("button", name="Follow")).to_have_attribute("aria-pressed", "false")
+    assert await page.locator("svg .e-closed").count() == 0
+    assert complaints == []
+
+
+LETTERS = """(picture) => {
+  const size = (text) => parseFloat(getComputedStyle(text).fontSize) * Math.abs(text.getScreenCTM().a);
+  const texts = [...document.querySelectorAll('.m-chart-picture text')];
+  const sizes = texts.filter((text) => text.textContent).map(size);
+  const box = document.querySelector('.m-chart-picture').getBoundingClientRect();
+  const lit = document.querySelector('.e-state.e-active:not(.e-super) > rect').getBoundingClientRect();
+  const isWide = lit.left >= box.left && lit.right <= box.right;
+  const isInside = isWide && lit.top >= box.top && lit.bottom <= box.bottom;
+  return [sizes.length, Math.min(...sizes), isInside];
+}"""
+
+
+@pytest.mark.parametrize("path", ["/", "/chart"])
+async def test_a_large_chart_can_be_read_and_shows_the_active_state(chromium, fake, path):
+    fake.welcome[1] = chart() | {"mermaid": mermaid(load_mission("explorer"))}
+    fake.welcome[2] = {"kind": "status", "drones": [status(state="red.crossing")]}
+    page, complaints = await visit(chromium, fake, path, viewport={"width": 1440, "height": 900})
+    for state in ("red.crossing", "blue.stepping_back", "landing.return"):
+        await fake.say("status", drones=[status(state=state)])
+        await expect(page.locator(LIT)).to_have_attribute("data-state", state)
+        count, smallest, is_inside = await page.evaluate(LETTERS)
+        assert count > 5 and smallest >= 9.99 and is_inside
+    await expect(page.locator("svg .e-closed")).to_have_count(3)
+    await page.get_by_role("button", name="Whole").click()
+    await expect(page.locator("svg .e-closed")).to_have_count(0)
     assert complaints == []
 
 
@@ -306,7 +325,7 @@ async def test_a_phone_shows_everything_without_scrolling_sideways(chromium, fak
     await fake.show(JPEG, 10.0)
     await fake.say("detections", id=1, t=10.0, width=320, height=240, boxes=boxes)
     await expect(page.locator(".m-camera")).to_have_attribute("data-boxes-time", "10")
-    await expect(page.locator("svg .m-active")).to_have_count(1)
+    await expect(page.locator(LIT)).to_have_count(1)
     assert await width_of(page) == PHONE["width"]
     names = ("figures", "arena", "camera", "plots", "chart")
     tops = [(await page.locator(f".m-{name}-panel").bounding_box())["y"] for name in names]

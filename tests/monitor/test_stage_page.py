@@ -44,6 +44,46 @@ def ranking(*teams):
     return {"round": 1, "scenarios": ["test-case-1"], "rows": rows}
 
 
+CUT = """() => {
+  const cut = ({ scrollWidth, clientWidth, scrollHeight, clientHeight }) =>
+    scrollWidth > clientWidth || scrollHeight > clientHeight + 1;
+  const box = document.querySelector('.s-list, .rows').getBoundingClientRect();
+  const low = Math.min(box.bottom, innerHeight) + 1;
+  const rows = [...document.querySelectorAll('[data-rank], tbody tr')].filter((row) => !row.hidden);
+  const names = [...document.querySelectorAll('bdi')].filter((name) => cut(name.parentElement));
+  return [
+    rows.map((row) => row.querySelector('bdi').textContent),
+    rows.filter((row) => row.getBoundingClientRect().bottom > low).length,
+    names.map((name) => name.textContent),
+  ];
+}"""
+
+
+@pytest.mark.parametrize(
+    ("path", "size"), [("/stage", (390, 844)), ("/stage", (1440, 900)), ("/ranking", (1440, 900))]
+)
+async def test_all_of_twenty_teams_are_shown_whole(chromium, path, size):
+    names = ["ÁÉÑ Ñandú", "W" * 60, "Équipe Châteauneuf-de-l'Écluse Ålesund Überlingen ÄÖÜ Çédill"]
+    names += [f"Team Número {number}" for number in range(17)]
+    told = ranking(*((name, 100.0 + place) for place, name in enumerate(names)))
+    told["rows"][-1] |= {"rank": None, "flown": 0}
+    page = await chromium.new_page(viewport={"width": size[0], "height": size[1]})
+    async with fake_monitor() as fake:
+        fake.stage |= {"ranking": told, "queue": {"number": 1, "teams": [{"team": 2, "team_name": names[1]}]}}
+        await page.goto(f"{fake.url}{path}")
+        seen = []
+        for _ in range(3):
+            await expect(page.locator("bdi:visible").first).to_be_visible()
+            rows, low, cut = await page.evaluate(CUT)
+            assert (low, cut) == (0, [])
+            seen += [row for row in rows if row not in seen]
+            await page.locator(".pages, .s-pages").dispatch_event("click")
+        assert seen == names
+        last = page.locator(".s-rank, td.rank").last
+        await expect(last).to_have_text("–")
+    await page.close()
+
+
 def split(page, name):
     return page.locator(f'[data-split="{name}"]')
 

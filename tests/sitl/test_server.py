@@ -10,7 +10,7 @@ import aiohttp
 import pytest
 
 from scenarios.loader import load_scenario
-from scenarios.models import Scenario
+from scenarios.task import Task
 from sitl.fleet import side_by_side
 from sitl.pacing.pacer import LagNotices
 from sitl.server import SimulatorServer
@@ -90,11 +90,17 @@ async def test_the_referee_tells_how_the_try_stands():
         assert "red.turning" in answer["report"]["reason"]
 
 
-async def test_who_looks_on_learns_the_scenario_and_where_the_local_frame_is():
+async def test_the_layout_is_told_only_if_that_was_asked_for():
+    scenario = load_scenario("test-case-1")
+    async with serving(Simulation(scenario), show_layout=True) as (_, settings):
+        assert Task.model_validate(await document(settings, "scenario.json")).scenario == scenario
+
+
+async def test_who_looks_on_learns_the_task_and_where_the_local_frame_is():
     scenario = load_scenario("test-case-1")
     simulation = Simulation(scenario)
     async with serving(simulation) as (_, settings):
-        assert Scenario.model_validate(await document(settings, "scenario.json")) == scenario
+        assert Task.model_validate(await document(settings, "scenario.json")) == Task.of(scenario)
         for _ in range(500):
             if (answer := await referee(settings))["local_frame"] is not None:
                 break

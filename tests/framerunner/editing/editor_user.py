@@ -9,7 +9,7 @@ from playwright.async_api import Locator, Page, expect
 
 from tests.chromium import Complaints, until
 
-_TOP_LEFT_PX = {"x": 4, "y": 4}
+_BELOW_EDGE_PX = 4
 NEW = {"New state": "State state", "New superstate": "State group", "New template": "State group"}
 SIZE = {"width": 1700, "height": 1050}
 
@@ -70,7 +70,9 @@ class EditorUser:
     async def select(self, name: str) -> None:
         """Show all of the diagram and click a state."""
         await self.press("Show all")
-        await self.state(name).locator("> rect").first.click(position=_TOP_LEFT_PX)
+        rect = self.state(name).locator("> rect").first
+        width = (await box_of(rect))["width"]
+        await rect.click(position={"x": width / 2, "y": _BELOW_EDGE_PX})  # not on a superstate's triangle
         await expect(self.form.locator("h2")).to_have_text(f"State {name.rpartition('.')[2]}")
 
     async def rename(self, name: str, to: str) -> str:

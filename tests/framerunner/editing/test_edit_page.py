@@ -353,6 +353,7 @@ async def test_a_large_mission_is_drawn_typed_in_and_dragged(windows):
     await expect(user.page.locator(".e-transition")).to_have_count(398)
     await user.type_at(8, " and frame.a < 5")
     await expect(user.transition("s0/tick/0")).to_have_text("1: frame_seen and frame.d < 1 and fr…")
+    await user.press("Show all")
     place = await user.state("s7").get_attribute("transform")
     frames, _ = await drag(user.page, "s7")
     assert frames > 1

@@ -11,6 +11,7 @@ import pytest
 from framerunner.virtual_camera.camera import VirtualCamera
 from framerunner.virtual_camera.server import CameraServer
 from scenarios.loader import load_scenario
+from scenarios.task import Task
 from sitl.video import VideoServer
 from tests.waiting import until
 from wire.dialect import mavlink
@@ -87,7 +88,7 @@ async def test_serves_images_and_the_referee_while_telemetry_is_received():
         assert (answer["scenario"], answer["source"], answer["lift_m"]) == ("test-case-1", "telemetry", 0.0)
         assert len(answer["local_frame"]["origin_arena_m"]) == 3
         async with session.get(f"{video.url}scenario.json") as response:
-            assert (await response.json())["name"] == answer["scenario"]
+            assert await response.json() == Task.of(SCENARIO).model_dump(mode="json")
         link.mute = True
         await until(lambda: any("no new images" in line for line in said))
         link.mute = False

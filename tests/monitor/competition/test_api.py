@@ -17,6 +17,7 @@ POSTS = {
     "next/undo": {"call": 1},
     "queue": {"seen": 0, "teams": [1]},
     "draw": {"pool": ["case-1", "case-2", "case-3"]},
+    "pool": {"scenario": "case-9"},
     "settings": {"limit_s": 180.0, "missing_frame_s": 60.0, "scenarios": 3, "counting": "best"},
     "tries/1/judgement": {"seen": 0, "contacts": 3},
     "tries/1/team": {"seen": 0, "team": 1},
@@ -112,6 +113,9 @@ BAD = [
     ("draw", {"pool": ["case-1"], "count": 0}, 'count "0" cannot be taken; give a whole number from 1 to 10'),
     ("draw", {"pool": ["case-1"], "count": 2}, "count 2 is more than the 1"),
     ("draw", {"pool": ["x" * 81]}, "pool"),
+    ("pool", {"scenario": "nowhere"}, "unknown; choose one of the list, LEVEL-SEED"),
+    ("pool", {"scenario": "../my.yaml"}, "is no name"),
+    ("pool", {"scenario": "two-1"}, "cannot be drawn: it has only the red and the green frame"),
     ("settings", {"limit_s": 0, "missing_frame_s": 1, "scenarios": 3, "counting": "best"}, 'limit_s "0'),
     (
         "settings",

@@ -46,6 +46,37 @@ def test_the_tries_have_all_values(board):
     assert rows[0]["started"] == NOW.isoformat() and rows[0]["reason"] == "'-1+1second line"
 
 
+def test_each_try_says_whether_it_counts_and_why_not():
+    store = Store(Database("sqlite://"))
+    cases = ("a", "b", "c")
+    store.draw(dict.fromkeys(cases, COLOURS), cases, ADA)
+    team = store.add_team("Falken", "", ADA)
+
+    def fly(key, scenario, called=True, **values):
+        store.call(team if called else None, "", ADA)
+        store.take(event("began", key, scenario), COLOURS, NOW)
+        if values:
+            store.take(event("ended", key, scenario, **values), COLOURS, NOW)
+
+    fly("1", "a", time_s=50.0)
+    fly("2", "a", time_s=40.0)
+    fly("3", "x", time_s=30.0)
+    fly("4", "b", called=False, time_s=30.0)
+    fly("5", "c")
+    store.interrupt()
+    fly("6", "c")
+    rows = read(tries_csv(store.everything()))
+    assert [(row["counts"], row["why_not"]) for row in rows] == [
+        ("false", "try 2 is better"),
+        ("true", ""),
+        ("false", "not drawn"),
+        ("false", "no team"),
+        ("false", "interrupted: to be judged"),
+        ("false", "is being flown"),
+    ]
+    store.close()
+
+
 @pytest.mark.parametrize(
     ("value", "text"), [("a=1", "a=1"), ("＝1", "'＝1"), (-1.5, "-1.5"), (None, ""), (True, "true"), (3, "3")]
 )

@@ -175,7 +175,7 @@ async def test_a_whole_contest_by_hand(running, chromium):
     await until(page, "document.querySelector('.flight .clock')?.textContent === '12.0'")
     running.fleet.tell(event("ended", "k", drawn[0], time_s=44.44))
     await until(page, "document.querySelector('.tries .number')?.textContent === '44.44'")
-    assert "Nobody is called" in await page.inner_text(".now")
+    assert "No team is called" in await page.inner_text(".now")
 
     await page.click("summary:has-text('Change the rule')")
     await page.select_option("#rule-counting", "last")

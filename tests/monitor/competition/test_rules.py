@@ -68,7 +68,7 @@ def test_what_was_not_flown_counts_as_if_all_frames_were_missing():
 def test_ties_share_a_rank_and_are_ordered_by_contacts_then_name():
     attempts = [Attempt(team, "a", team, replace(CLEAN, contacts=team == 1)) for team in (1, 2, 3)]
     rows = rank({1: "Alpha", 2: "zulu", 3: "Beta", 4: "Last"}, CASES, attempts, Rule())
-    assert [(row.rank, row.name) for row in rows] == [(1, "Beta"), (1, "zulu"), (1, "Alpha"), (4, "Last")]
+    assert [(row.rank, row.name) for row in rows] == [(1, "Beta"), (1, "zulu"), (1, "Alpha"), (None, "Last")]
 
 
 def test_times_that_look_the_same_are_a_tie():
@@ -152,8 +152,11 @@ def test_ranks_say_how_many_are_better(given_round):
     teams, attempts = given_round
     rows = rank(teams, CASES, attempts, Rule())
     assert sorted(row.team for row in rows) == sorted(teams)
+    ranked = [row for row in rows if row.flown]
+    assert list(rows[: len(ranked)]) == ranked
     for row in rows:
-        assert row.rank == 1 + sum(other.total_s < row.total_s for other in rows)
+        better = sum(other.total_s < row.total_s for other in ranked)
+        assert row.rank == (1 + better if row.flown else None)
         assert round(row.total_s * 100) == sum(round(cell.counted_s * 100) for cell in row.cells)
 
 

@@ -2,15 +2,18 @@
 
 import asyncio
 from contextlib import asynccontextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from functools import partial
 
 import pytest
 from aiohttp import web
 
 from framerunner.flying.plan import FlightPlan
-from monitor.vehicle.referees import RefereeChannel
+from monitor.vehicle.referees import RefereeChannel, scenario_of
 from scenarios.loader import load_scenario
 from scenarios.result import RefereeSnapshot
+from scenarios.task import Task
+from tests.monitor.simulated_link import SimulatedLink, equipment
 from wire.simulator_api import SimulatorApi
 
 SCENARIO = load_scenario("test-case-1")
@@ -29,11 +32,16 @@ def good_answer():
     }
 
 
+def told(scenario, **how):
+    return Task.of(scenario, **how).model_dump(mode="json")
+
+
 class Site:
     """A drone's web server; `answers` by path are JSON, bytes or a response's maker."""
 
     def __init__(self):
-        self.answers = {"/referee.json": good_answer(), "/scenario.json": SCENARIO.model_dump(mode="json")}
+        self.answers = {"/referee.json": good_answer(), "/scenario.json": told(SCENARIO)}
+        self.equipment = replace(equipment(SimulatedLink()), scenario=None)
         self.asked = []
         self.heard, self.said = [], []
         self.channel = None
@@ -63,7 +71,8 @@ async def asked(site):
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", 0).start()
     api = SimulatorApi(f"http://127.0.0.1:{runner.addresses[0][1]}")
-    site.channel = RefereeChannel(api, site.heard.append, lambda level, text: site.said.append(text))
+    find = partial(scenario_of, equipment=site.equipment)
+    site.channel = RefereeChannel(api, site.heard.append, lambda level, text: site.said.append(text), find)
     task = asyncio.create_task(site.channel.run())
     try:
         yield
@@ -97,10 +106,27 @@ async def test_the_scenario_is_requested_again_when_its_name_changes(site):
         await site.until(lambda: site.channel.scenario)
         site.answers = {
             "/referee.json": {**good_answer(), "scenario": other.name},
-            "/scenario.json": other.model_dump(mode="json"),
+            "/scenario.json": told(other),
         }
         await site.until(lambda: site.channel.scenario == other)
     assert site.asked.count("/scenario.json") == 2
+
+
+async def test_a_layout_that_is_not_known_here_is_told_for_training_only(site):
+    own = SCENARIO.model_copy(update={"name": "own-arena"})
+    site.answers["/referee.json"] = {**good_answer(), "scenario": own.name}
+    site.answers["/scenario.json"] = told(own)
+    async with asked(site):
+        await site.until(lambda: site.said)
+        assert site.channel.scenario is None
+    assert "scenario 'own-arena' is not known here; give its file to" in site.said[0]
+    site.answers["/scenario.json"] = told(own, show_layout=True)
+    async with asked(site):
+        await site.until(lambda: site.channel.scenario == own)
+    site.answers["/scenario.json"] = told(own)
+    site.equipment = replace(site.equipment, scenario=own)
+    async with asked(site):
+        await site.until(lambda: site.channel.scenario == own)
 
 
 async def test_requests_without_an_answer_become_less_frequent(site):
@@ -150,7 +176,14 @@ async def test_invalid_answers_are_ignored(site, answer):
 
 
 @pytest.mark.parametrize(
-    "answer", [None, {"name": "UPPER"}, b"no", {**SCENARIO.model_dump(mode="json"), "x": 1}]
+    "answer",
+    [
+        None,
+        {**told(SCENARIO), "name": "../secret.yaml"},
+        b"no",
+        {**told(SCENARIO), "x": 1},
+        {**told(SCENARIO), "layout_mark": "0000"},
+    ],
 )
 async def test_an_invalid_scenario_is_reported_once_and_the_referee_still_counts(site, answer):
     site.answers["/scenario.json"] = answer

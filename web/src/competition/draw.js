@@ -4,8 +4,6 @@ import { send } from "../lib/contest/channel.js";
 import { moment, nameOf } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 
-const NAME = /^[a-z0-9][a-z0-9_-]{0,79}$/;
-
 export class Draw {
   #desk;
   #drawn = make("div", { class: "drawn" });
@@ -33,7 +31,7 @@ export class Draw {
     });
     const form = make("form", { class: "fields" },
       make("fieldset", {}, make("legend", {}, "Draw from"), this.#pool),
-      make("label", { for: "draw-other" }, "Another one, such as calm-17 (a random layout)"),
+      make("label", { for: "draw-other" }, "Another one: calm-17 is a random layout; or the name in an own file in the folder scenarios/"),
       make("div", { class: "buttons" }, this.#other, add),
       make("label", { for: "draw-count" }, "How many"), this.#count,
       make("div", { class: "buttons" }, make("button", { type: "submit", class: "main" }, "Draw")));
@@ -46,12 +44,11 @@ export class Draw {
 
   #add() {
     const name = this.#other.value.trim();
-    if (!NAME.test(name)) {
-      this.#desk.say(`scenario "${name}" is no name; use small letters, digits, - and _`);
-      return;
-    }
-    this.#tick(name, true);
-    this.#other.value = "";
+    return this.#desk.attempt(async () => {
+      await send("pool", { scenario: name });
+      if (!this.#pool.querySelector(`[value="${name}"]`)) this.#tick(name, true);
+      this.#other.value = "";
+    });
   }
 
   #tick(name, checked) {

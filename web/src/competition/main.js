@@ -12,7 +12,7 @@ import { pageData, pageRoot } from "../lib/page_data.js";
 class Desk {
   #line = make("p", { class: "line", role: "status", hidden: true });
   #tries = make("tbody");
-  #none = make("p", { class: "hint" }, "No try has been flown yet.");
+  #none = make("p", { class: "hint" }, "No try has been flown. Each flight is one: ", make("code", {}, "framerunner fly test-case-1"));
   #board = null;
   #clocks = new Map();
 

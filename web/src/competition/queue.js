@@ -44,7 +44,7 @@ export class Calls {
   #callTeam() {
     const team = this.#chosen;
     if (team === null) {
-      this.#desk.say("nobody is in the queue and no team is chosen; enter or choose one");
+      this.#desk.say("the queue is empty and no team is chosen; choose one, or fill the queue with Add all teams");
       return;
     }
     const called = this.#board.called;
@@ -94,7 +94,8 @@ export class Calls {
     const { lines } = nowLines({ running: tries, called, queue });
     if (called === null) {
       lines.push(make("p", { class: "hint" },
-        "Nobody is called. A try that begins now has no team until a judge says whose it is."));
+        "No team is called: a try that begins now has no team until a judge assigns it. ",
+        this.#desk.judge ? "Call one here." : "Judges call one after their log-in."));
     }
     this.#now.replaceChildren(...lines);
   }
@@ -166,7 +167,7 @@ export class Queue {
     setText(this.#count, teams.length === 0 ? "" : String(teams.length));
     this.#all.hidden = this.#absent.length === 0;
     this.#shuffle.hidden = teams.length < 2;
-    if (teams.length === 0) this.#list.replaceChildren(make("li", { class: "hint" }, "Nobody is in the queue."));
+    if (teams.length === 0) this.#list.replaceChildren(make("li", { class: "hint" }, this.#desk.judge ? "The queue is empty. Enter teams, then Add all teams." : "The queue is empty."));
     else this.#list.replaceChildren(...teams.map((each, place) => this.#row(each, place, teams.length - 1)));
   }
 

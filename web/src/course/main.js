@@ -10,14 +10,14 @@ const word = translator({
   en: {
     course: "Course", name: "Your name", language: "Español", start: "Begin", again: "Go on", done: "passed", minutes: "about {minutes} {minutes:minute|minutes}",
     need_name: "Write your name first.", class: "The class", pupil: "Pupil", flights: "{flights} {flights:flight|flights}", after: "passed after {minutes} min, {flights} {flights:flight|flights}",
-    log_in: "Log in to take part.", nobody: "Nobody has begun yet.",
+    log_in: "Log in to take part.", nobody: "No pupil has begun yet.", progress: "{passed} of {all} lessons passed", begun: "begun, {flights} {flights:flight|flights}",
     you: "You are {name}. In another browser log in with your name and your own code word:", word: "Code word", reset: "Begin anew",
     reset_hint: "Forget what {name} has done in all lessons; the missions stay", reset_sure: "Forget what {name} has done in all lessons? The missions stay.", save_class: "Save as CSV",
   },
   es: {
     course: "Curso", name: "Tu nombre", language: "English", start: "Empezar", again: "Seguir", done: "conseguida", minutes: "unos {minutes} {minutes:minuto|minutos}",
     need_name: "Escribe antes tu nombre.", class: "La clase", pupil: "Alumno", flights: "{flights} {flights:vuelo|vuelos}", after: "conseguida tras {minutes} min, {flights} {flights:vuelo|vuelos}",
-    log_in: "Inicia sesión para participar.", nobody: "Nadie ha empezado aún.",
+    log_in: "Inicia sesión para participar.", nobody: "Ningún alumno ha empezado aún.", progress: "{passed} de {all} lecciones conseguidas", begun: "empezada, {flights} {flights:vuelo|vuelos}",
     you: "Eres {name}. En otro navegador inicia sesión con tu nombre y tu propia palabra clave:", word: "Palabra clave", reset: "Empezar de nuevo",
     reset_hint: "Olvidar lo que {name} ha hecho en todas las lecciones; las misiones se quedan", reset_sure: "¿Olvidar lo que {name} ha hecho en todas las lecciones? Las misiones se quedan.", save_class: "Guardar como CSV",
   },
@@ -38,11 +38,14 @@ const other = make("button", { type: "button" }, word("language"));
 other.addEventListener("click", changeLanguage);
 const problem = make("p", { class: "c-problem", role: "alert" });
 const list = make("ol", { class: "c-lessons" });
+const bar = make("progress", { "aria-label": word("course") });
+const passedWords = make("span");
+const progress = make("p", { class: "c-progress", hidden: !mayAct }, bar, passedWords);
 const table = make("table", { class: "c-class" });
 root.append(
   make("div", { class: "c-head" }, make("h1", {}, word("course")), other),
   whoTakesPart(),
-  problem, list,
+  problem, progress, list,
   ...(mayTeach ? [make("h2", {}, word("class")), table, make("p", {}, make("a", { href: "/api/course/class.csv", download: true }, word("save_class")))] : []));
 
 /** The field for the name; of a pupil who has logged in, what is needed in another browser. */
@@ -74,6 +77,10 @@ async function open(lesson) {
 
 function showProgress() {
   const own = learners.find(({ name }) => name === learner())?.lessons ?? {};
+  const passed = lessons.filter(({ name }) => (own[name]?.passed_after_s ?? null) !== null).length;
+  bar.max = lessons.length;
+  bar.value = passed;
+  setText(passedWords, word("progress", { passed: String(passed), all: String(lessons.length) }));
   list.replaceChildren(...lessons.map((lesson) => {
     const done = own[lesson.name];
     const isPassed = done !== undefined && done.passed_after_s !== null;
@@ -81,7 +88,8 @@ function showProgress() {
     begin.addEventListener("click", () => open(lesson));
     return make("li", { "data-passed": String(isPassed) },
       make("strong", {}, inLanguage(lesson.title)), ` (${word("minutes", { minutes: String(lesson.minutes) })}) `,
-      isPassed ? make("span", { class: "c-done" }, `✓ ${word("done")}`) : null,
+      isPassed ? make("span", { class: "c-done" }, `✓ ${word("done")}`)
+        : done ? make("span", { class: "hint" }, word("begun", { flights: String(done.flights) })) : null,
       make("p", {}, inLanguage(lesson.goal)), begin);
   }));
 }

@@ -1,9 +1,9 @@
 /** What the mouse does with the diagram: select, move and join states, lead transitions elsewhere, move the drawing. */
 
 /**
- * @typedef {import("./diagram_view.js").DiagramView} DiagramView
- * @typedef {import("./diagram_view.js").Selection} Selection
- * @typedef {import("./geometry.js").Point} Point
+ * @typedef {import("../lib/diagram/diagram_view.js").DiagramView} DiagramView
+ * @typedef {import("../lib/diagram/diagram_view.js").Selection} Selection
+ * @typedef {import("../lib/diagram/geometry.js").Point} Point
  * @typedef {{selected: (selection: Selection) => void, placed: (places: Object<string, Point>) => void,
  *   joined: (from: string, to: string) => void, moved: (state: string, parent: string, place: Point) => void,
  *   led: (transition: string, end: "source"|"target", state: string) => void,
@@ -16,6 +16,13 @@ const CLICK_PX = 4;
 /** @param {DiagramView} view @param {Listener} listener */
 export function takeMouse(view, listener) {
   const { root } = view;
+  root.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" && event.key !== " ") return;
+    const found = view.at(event.target);
+    if (found.kind === "mission") return;
+    event.preventDefault();
+    listener.selected(found);
+  });
   root.addEventListener("pointerdown", (event) => {
     if (event.button === 0) drag(root, event, pressed(view, listener, event));
   });
@@ -37,6 +44,11 @@ export function takeMouse(view, listener) {
  */
 function pressed(view, listener, event) {
   const point = view.viewport.point(event);
+  const folded = view.foldAt(event.target);
+  if (folded) {
+    view.toggle(folded);
+    return null;
+  }
   const handle = view.handleAt(point); // also below a line
   if (handle !== null) return joining(view, listener, handle);
   const { kind, id } = view.selection;
@@ -48,8 +60,8 @@ function pressed(view, listener, event) {
   }
   const found = view.at(event.target);
   listener.selected(found);
-  if (found.kind === "state") return moving(view, listener, found.id, point);
-  return found.kind === "mission" ? panning(view, event) : null;
+  if (found.kind === "state" && view.isMovable(found.id)) return moving(view, listener, found.id, point);
+  return found.kind === "transition" ? null : panning(view, event);
 }
 
 /**
@@ -88,7 +100,13 @@ function drag(root, start, action) {
 /** @param {DiagramView} view @param {PointerEvent} start @returns {Action} */
 function panning(view, start) {
   const moveBy = view.viewport.mover();
-  return { move: (event) => moveBy(event.clientX - start.clientX, event.clientY - start.clientY), end: () => {} };
+  return {
+    move: (event) => {
+      moveBy(event.clientX - start.clientX, event.clientY - start.clientY);
+      view.viewport.onTouched();
+    },
+    end: () => {},
+  };
 }
 
 /** @param {DiagramView} view @param {Listener} listener @param {string} id @param {Point} start @returns {Action} */

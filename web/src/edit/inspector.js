@@ -8,7 +8,7 @@ import { word } from "./words.js";
  * @typedef {import("./session.js").EditSession} EditSession
  * @typedef {import("./session.js").StateNode} StateNode
  * @typedef {import("./session.js").Edge} Edge
- * @typedef {import("./diagram_view.js").Selection} Selection
+ * @typedef {import("../lib/diagram/diagram_view.js").Selection} Selection
  */
 
 const ACTIONS = "e-actions", VALUES = "e-values";

@@ -3,7 +3,8 @@ import "./edit.css";
 import { loginAddress } from "../lib/course.js";
 import { isTyping, make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
-import { DiagramView } from "./diagram_view.js";
+import { DiagramView } from "../lib/diagram/diagram_view.js";
+import { takeMouse } from "./diagram_mouse.js";
 import { divider } from "./divider.js";
 import { button, choice, textField } from "./fields.js";
 import { flownId } from "./flights.js";
@@ -22,7 +23,7 @@ import { ReplayPanel } from "./replay_panel.js";
 import { LessonPanel } from "./lesson_panel.js";
 import { word } from "./words.js";
 
-/** @typedef {import("./diagram_view.js").Selection} Selection */
+/** @typedef {import("../lib/diagram/diagram_view.js").Selection} Selection */
 
 const root = pageRoot("edit");
 const file = new URLSearchParams(location.search).get("file");
@@ -115,10 +116,13 @@ function edit(name) {
     button(word("new_state"), () => inspector.add(false)),
     button(word("new_superstate"), () => inspector.add(true)),
     button(word("new_template"), () => inspector.addTemplate()),
-    button(word("fit"), () => diagram.fit()),
+    button(word("fit"), () => diagram.whole()),
     button(word("arrange"), arrange),
     make("details", { class: "e-export" }, make("summary", {}, word("export")),
-      button("PNG", () => savePicture(drawing, stem, "png")), button("SVG", () => savePicture(drawing, stem, "svg")),
+      ...["png", "svg"].map((kind) => button(kind.toUpperCase(), () => {
+        diagram.whole();
+        savePicture(drawing, stem, /** @type {"png"|"svg"} */ (kind));
+      })),
       ...["mermaid", "scxml"].map((kind) => make("a", { href: `/api/edit/export?kind=${kind}&language=${language()}&file=${encodeURIComponent(name)}`, download: true }, kind === "scxml" ? "SCXML" : "Mermaid"))),
     button(word("language"), changeLanguage));
   const panes = make("div", { class: "e-panes" }, drawing, form, writing, tabs.root);
@@ -158,7 +162,8 @@ function edit(name) {
     redo: () => session.redo(),
     moved: follow,
   });
-  const diagram = new DiagramView(drawing, {
+  const diagram = new DiagramView(drawing, { done: word("done"), resume: word("resume") });
+  takeMouse(diagram, {
     selected: (chosen) => select(chosen, true, false),
     placed(places) {
       settle();
@@ -172,7 +177,7 @@ function edit(name) {
       select(chosen, true);
       inspector.focus();
     },
-  }, { done: word("done"), resume: word("resume") });
+  });
   const inspector = new Inspector(form, session, (chosen) => select(chosen, true));
 
   /** @param {string[]} active @param {Object<string, number>} counts @param {string[]} taken ids as flights have them */

@@ -41,6 +41,7 @@ export class RunPanel {
   #guards = make("ul", { class: "e-guards" });
   #values = make("dl", { class: "e-read" });
   #table = make("table", { class: "e-batch" });
+  #progress = make("progress", { class: "e-progress", hidden: true, "aria-label": word("fly") });
   #choices = make("div", { class: "e-row" });
   #pause;
   #stop;
@@ -72,7 +73,7 @@ export class RunPanel {
         make("div", { class: "e-row" },
           button(word("fly_once"), () => this.#start(false), { class: "e-first", title: word("fly_hint") }),
           this.#pause, button(word("step"), () => this.#step(), { title: word("step_hint") }), this.#stop, speed),
-        this.#line, this.#hit),
+        this.#line, this.#progress, this.#hit),
       this.#strip,
       make("div", { class: "e-run-columns" },
         make("section", {}, make("h3", {}, word("goes_on")), this.#guards), make("section", {}, make("h3", {}, word("reads")), this.#values)),
@@ -202,13 +203,16 @@ export class RunPanel {
     if (this.#waits) this.#setRun("");
     if (answer.kind === "batch_started") {
       this.#batch = answer.batch;
-      setText(this.#line, word("flying_many", { count: String(answer.count) }));
+      this.#progress.max = answer.count;
+      this.#showBatch();
+      this.#table.scrollIntoView({ block: "nearest" });
     } else setText(this.#line, answer.text);
   }
 
   #forget() {
     this.#setRun("");
     this.#batch = "";
+    this.#progress.hidden = true;
   }
 
   /** Ask for something that is no flight of this panel. @param {object} request @returns {Promise<any>} the answer */
@@ -226,7 +230,10 @@ export class RunPanel {
       this.#listener.lit([], message.counts, []);
       this.#listener.lost(message.lost_in);
     } else if (message.kind === "flight" && message.batch === this.#batch) this.#showFlight(message);
-    else if (message.kind === "batch_ended" && message.batch === this.#batch && message.text) setText(this.#line, message.text);
+    else if (message.kind === "batch_ended" && message.batch === this.#batch) {
+      this.#progress.hidden = true;
+      if (message.text) setText(this.#line, message.text);
+    }
   }
 
   /** Others fly before. @param {import("../lib/course.js").Place & {run: string}} waiting */
@@ -278,8 +285,16 @@ export class RunPanel {
   #showFlight(flight) {
     this.#rows.push(flight);
     this.#rows.sort((a, b) => a.rank - b.rank);
+    this.#showBatch();
+    this.#table.scrollIntoView({ block: "nearest" });
+  }
+
+  /** How many of the layouts are flown, and the table of those. */
+  #showBatch() {
+    this.#progress.hidden = false;
+    this.#progress.value = this.#rows.length;
     const head = make("tr", {}, ...["scenario", "verdict", "lost_in", "seconds"].map((key) => make("th", {}, word(/** @type {any} */ (key)))));
-    this.#table.replaceChildren(head, ...this.#rows.map((each) => {
+    this.#table.replaceChildren(make("caption", {}, word("of_many")), head, ...this.#rows.map((each) => {
       const show = button(each.scenario, () => {
         this.showFlight(each);
         this.#listener.lost(each.lost_in);
@@ -288,7 +303,7 @@ export class RunPanel {
         make("td", {}, show), make("td", {}, shortVerdict(each.verdict)), make("td", {}, each.lost_in), make("td", { class: "e-number" }, number(each.total_time_s, 1)));
     }));
     setText(this.#line, word("flown_many", {
-      flown: String(this.#rows.length), completed: String(this.#rows.filter(({ completed }) => completed).length),
+      flown: String(this.#rows.length), count: String(this.#progress.max), completed: String(this.#rows.filter(({ completed }) => completed).length),
     }));
   }
 }

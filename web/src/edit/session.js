@@ -6,16 +6,13 @@ import { word } from "./words.js";
 const TYPING_PAUSE_MS = 80; // after which typed text is sent
 
 /**
+ * @typedef {import("../lib/diagram/types.js").Span} Span
+ * @typedef {import("../lib/diagram/types.js").Finding} Finding
+ * @typedef {import("../lib/diagram/types.js").StateNode} StateNode
+ * @typedef {import("../lib/diagram/types.js").Edge} Edge
+ * @typedef {import("../lib/diagram/types.js").Diagram} Diagram
+ * @typedef {import("../lib/diagram/types.js").Point} Point
  * @typedef {{start: number, removed: number, inserted: string}} TextChange offsets in UTF-16 code units
- * @typedef {[number, number]|null} Span offsets of the first character and of the one after the last
- * @typedef {{severity: "error"|"warning"|"advice", code: string, message: string, spanish?: string, line: number, span: Span,
- *   state: string, event: string|null, index: number|null, nodes: string[]}} Finding
- * @typedef {{id: string, name: string, parent: string, initial: string, final: boolean, finish: boolean, enter: string[],
- *   during: string[], exit: string[], parameters: [string, string][], template: string, source: string, span: Span}} StateNode
- * @typedef {{id: string, source: string, target: string, missing: boolean, event: "tick"|"done"|"resume", order: number, when: string,
- *   actions: string[], source_state: string, source_index: number, span: Span}} Edge
- * @typedef {{initial: string, readable: boolean, nodes: StateNode[], edges: Edge[]}} Diagram the chart as it is flown
- * @typedef {{x: number, y: number}} Point
  * @typedef {{name: string, type: string, text: string, unit: string, low: number|null, high: number|null,
  *   assignable: boolean, needs_map: boolean}} ValueEntry
  * @typedef {{name: string, text: string, help: string, needs_map: boolean}} PrimitiveEntry

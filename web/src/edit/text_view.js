@@ -5,6 +5,8 @@ import { completionStatus } from "@codemirror/autocomplete";
 import { setDiagnostics } from "@codemirror/lint";
 import { Annotation, ChangeSet, Compartment, EditorState, Prec, StateEffect, StateField } from "@codemirror/state";
 import { Decoration, EditorView, keymap } from "@codemirror/view";
+import { HighlightStyle, syntaxHighlighting } from "@codemirror/language";
+import { tags } from "@lezer/highlight";
 import { newLine } from "./yaml_enter.js";
 
 /** @typedef {import("./session.js").TextChange} TextChange */
@@ -22,6 +24,37 @@ const marked = StateField.define({
     return isByHand ? Decoration.none : before.map(transaction.changes);
   },
   provide: (field) => EditorView.decorations.from(field),
+});
+const COLOURS = syntaxHighlighting(HighlightStyle.define([
+  { tag: [tags.propertyName, tags.definition(tags.propertyName)], color: "var(--accent)" },
+  { tag: [tags.string, tags.content], color: "var(--ink)" },
+  { tag: [tags.keyword, tags.atom, tags.labelName, tags.typeName], color: "var(--good)" },
+  { tag: [tags.comment, tags.meta], color: "var(--faint)", fontStyle: "italic" },
+  { tag: [tags.punctuation, tags.separator, tags.bracket], color: "var(--faint)" },
+  { tag: tags.invalid, color: "var(--bad)" },
+]));
+const MARKED = "color-mix(in srgb, var(--accent) 25%, transparent)";
+/** In the page's colours, which are others in the dark. */
+const THEME = EditorView.theme({
+  "&": { height: "100%", fontSize: "13px", color: "var(--ink)" }, ".cm-scroller": { overflow: "auto" },
+  ".cm-gutters": { backgroundColor: "var(--ground)", color: "var(--faint)", borderRight: "1px solid var(--line)" },
+  ".cm-activeLine, .cm-activeLineGutter": { backgroundColor: "color-mix(in srgb, var(--accent) 8%, transparent)" },
+  ".cm-content": { caretColor: "var(--ink)" }, ".cm-cursor, .cm-dropCursor": { borderLeftColor: "var(--ink)" },
+  "& > .cm-scroller > .cm-selectionLayer .cm-selectionBackground": { backgroundColor: MARKED },
+  "&.cm-focused > .cm-scroller > .cm-selectionLayer .cm-selectionBackground": { backgroundColor: MARKED },
+  ".cm-selectionMatch, .cm-searchMatch, &.cm-focused .cm-matchingBracket": { backgroundColor: MARKED },
+  ".cm-tooltip, .cm-panels": { backgroundColor: "var(--panel)", color: "var(--ink)", border: "1px solid var(--line)" },
+  ".cm-tooltip.cm-tooltip-autocomplete > ul > li[aria-selected]": { backgroundColor: "var(--accent)", color: "var(--on-accent)" },
+  ".cm-foldPlaceholder, .cm-button, .cm-textfield": {
+    backgroundImage: "none", backgroundColor: "var(--ground)", color: "var(--ink)", borderColor: "var(--line)",
+  },
+  // Instead of CodeMirror's pictures in data URLs, which the page's policy refuses.
+  ".cm-lintRange": { backgroundImage: "none", textDecoration: "underline wavy var(--faint)" },
+  ".cm-lintRange-error": { backgroundImage: "none", textDecoration: "underline wavy var(--bad)" },
+  ".cm-lintRange-warning": { backgroundImage: "none", textDecoration: "underline wavy var(--warn)" },
+  ".e-shown": { backgroundColor: MARKED },
+  ".cm-lintRange-info": { backgroundImage: "none" },
+  ".cm-lintRange-active": { backgroundColor: "color-mix(in srgb, var(--warn) 25%, transparent)" },
 });
 const SEVERITY = { error: "error", warning: "warning", advice: "info" };
 
@@ -60,15 +93,8 @@ export class TextView {
         yaml(),
         marked,
         EditorView.lineWrapping,
-        EditorView.theme({
-          "&": { height: "100%", fontSize: "13px" }, ".cm-scroller": { overflow: "auto" },
-          // Instead of CodeMirror's pictures in data URLs, which the page's policy refuses.
-          ".cm-lintRange": { backgroundImage: "none", textDecoration: "underline wavy #888" },
-          ".cm-lintRange-error": { backgroundImage: "none", textDecoration: "underline wavy #b3171b" },
-          ".cm-lintRange-warning": { backgroundImage: "none", textDecoration: "underline wavy #8f5a00" },
-          ".e-shown": { backgroundColor: "#dbe9ff" },
-          ".cm-lintRange-info": { backgroundImage: "none" }, ".cm-lintRange-active": { backgroundColor: "#fff3c4" },
-        }),
+        THEME,
+        COLOURS,
         EditorView.contentAttributes.of({ "aria-label": "mission, YAML" }),
         EditorView.updateListener.of((update) => {
           if (update.docChanged && !update.transactions.some((each) => each.annotation(remote))) {

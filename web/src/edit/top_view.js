@@ -1,7 +1,7 @@
 /** A flight's track from above, with what is in the arena and the goals of a lesson, and the drone's height beside it. */
 import { allFrames, prismsOf } from "../lib/arena/obstacles.js";
 import { make, number } from "../lib/dom.js";
-import { svg } from "./shapes.js";
+import { svg } from "../lib/diagram/shapes.js";
 import { thingName } from "./verdict.js";
 import { word } from "./words.js";
 

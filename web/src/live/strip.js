@@ -29,7 +29,7 @@ export class DroneStrip {
    */
   set(status, order = []) {
     setAttribute(this.#root, "data-empty", status === null);
-    this.#put("mode", status ? status.mode || "–" : "no drone is heard");
+    this.#put("mode", status ? status.mode || "–" : "no drone yet; in another terminal: framerunner fly test-case-1");
     const isKnown = status !== null && !(status.over && status.link?.state === "lost"); // else it is what was heard last
     this.#put("motors", isKnown ? (status.armed ? "armed" : "off") : null, status?.armed ? "on" : null);
     this.#put("ground", isKnown ? (status.landed ? "on the ground" : "in the air") : null);

@@ -20,7 +20,7 @@ const PHASES = {
  */
 export function stateOf(flight, beat, ended) {
   if (ended) return { phase: "ended", head: "Ended", words: ended };
-  if (!flight) return { phase: "none", head: "No flight", words: "none is waiting for an operator" };
+  if (!flight) return { phase: "none", head: "No flight", words: "start one with framerunner fly … --drone URL --monitor" };
   if (!beat) return { phase: "none", head: "Not known", words: "the flight has not said yet what it does" };
   const { phase } = beat;
   const [head, words] = PHASES[phase] ?? [phase, ""];

@@ -152,7 +152,7 @@ class PilotPage {
   }
 
   #order(what, confirmed = false) {
-    if (this.#id === null) this.#say("no drone is heard", "bad");
+    if (this.#id === null) this.#say("there is no drone; start one: framerunner sim", "bad");
     else if (!this.#socket?.order(this.#id, what, confirmed)) this.#say(`${what.replace("_", " ")}: not connected`, "bad");
   }
 

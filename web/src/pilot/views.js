@@ -33,7 +33,7 @@ export class PilotViews {
 
   /** @param {object|undefined} status of that drone */
   setStatus(status) {
-    this.#camera.setImage(status?.video ? `/video/${status.id}` : null, status ? "no video" : "no drone");
+    this.#camera.setImage(status?.video ? `/video/${status.id}` : null, status ? "no video" : "no drone yet: start one with framerunner sim");
   }
 
   /** @param {object} message "world" */

@@ -8,7 +8,7 @@ const BY_HAND = ["Manual", "Altitude", "Position", "Position Slow", "Acro", "Sta
  * @returns {{look: "mine"|"theirs"|"auto"|"lost", head: string, words: string}}
  */
 export function whoFlies(status, seat) {
-  if (!status) return { look: "lost", head: "No drone", words: "none is heard" };
+  if (!status) return { look: "lost", head: "No drone", words: "start one: framerunner sim" };
   const link = status.link?.state;
   if (link === "lost") return { look: "lost", head: "Link lost", words: `last mode: ${status.mode}` };
   const off = status.armed ? "" : ", motors off";

@@ -3,11 +3,13 @@
 import "../lib/contest/contest.css";
 import { ask, oneAtATime, watch } from "../lib/contest/channel.js";
 import { nowLines } from "../lib/contest/now.js";
+import { Pages } from "../lib/contest/pages.js";
 import { nameOf, seconds } from "../lib/contest/words.js";
 import { make, setText, wantsStillness } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 
 const MOVE_MS = 700;
+const WIDE = "(min-width: 44rem)"; // as in the style sheet: the window shows all of it
 const LONGEST_GUESS_S = 1.5; // how long a clock goes on without news
 
 class Ranking {
@@ -19,7 +21,10 @@ class Ranking {
   #table = make("table", { class: "ranking", role: "table" });
   #head = make("tr", { role: "row" });
   #body = make("tbody", { role: "rowgroup" });
+  #empty = make("p", { class: "empty", hidden: true }, "No team has been entered. A judge enters teams on the page ",
+    make("a", { href: "/competition" }, "Competition"), ".");
   #rule = make("p", { class: "hint" });
+  #pages;
   #rows = new Map();
   #wanted = "";
   #linked = true;
@@ -41,10 +46,13 @@ class Ranking {
     document.addEventListener("fullscreenchange", () => {
       document.body.classList.toggle("projector", document.fullscreenElement !== null);
     });
+    const note = make("button", { type: "button", class: "pages", title: "The next ones" });
+    const box = make("div", { class: "rows" }, this.#table, this.#empty);
+    this.#pages = new Pages(box, this.#body, note, () => matchMedia(WIDE).matches);
     this.#table.append(make("thead", { role: "rowgroup" }, this.#head), this.#body);
     element.append(
-      make("div", { class: "bar" }, this.#title, this.#rounds, wide), this.#line, this.#now, this.#table,
-      make("div", { class: "foot" }, this.#rule, join ? joinCode() : null),
+      make("div", { class: "bar" }, this.#title, note, this.#rounds, wide), this.#line,
+      make("div", { class: "above" }, this.#now, join ? joinCode() : null), box, this.#rule,
     );
     const refresh = oneAtATime(() => this.#load(), (error) => this.#say(error.message));
     watch({
@@ -107,7 +115,7 @@ class Ranking {
 
   /** Put the rows in order; those that were there move from where they were. */
   #showRows(rows) {
-    const before = new Map([...this.#rows].map(([team, row]) => [team, row.getBoundingClientRect().top]));
+    const before = new Map([...this.#rows].filter(([, row]) => !row.hidden).map(([team, row]) => [team, row.getBoundingClientRect().top]));
     const present = new Set(rows.map((row) => row.team));
     for (const [team, row] of this.#rows) {
       if (present.has(team)) continue;
@@ -123,13 +131,15 @@ class Ranking {
       this.#fillRow(element, row);
       if (this.#body.children[index] !== element) this.#body.insertBefore(element, this.#body.children[index] ?? null);
     });
-    if (rows.length === 0) this.#table.dataset.empty = "true";
-    else delete this.#table.dataset.empty;
+    this.#table.hidden = rows.length === 0;
+    this.#empty.hidden = rows.length > 0;
+    this.#pages.fit();
     if (!wantsStillness()) this.#move(before);
   }
 
   #move(before) {
     for (const [team, row] of this.#rows) {
+      if (row.hidden) continue;
       const way = (before.get(team) ?? row.getBoundingClientRect().top) - row.getBoundingClientRect().top;
       if (way === 0) continue;
       row.animate(
@@ -144,10 +154,10 @@ class Ranking {
     if (element.dataset.shown === text) return;
     element.dataset.shown = text;
     element.replaceChildren(
-      make("td", { class: "rank", role: "cell" }, String(row.rank)),
+      make("td", { class: "rank", role: "cell" }, String(row.rank ?? "–")),
       make("th", { class: "team", role: "rowheader", scope: "row" }, nameOf(row.name, { class: "name" })),
       ...row.cells.map((cell, index) => this.#cell(cell, this.titles[index + 2])),
-      make("td", { class: "total", role: "cell" }, seconds(row.total_s)),
+      make("td", { class: "total", role: "cell" }, row.flown ? seconds(row.total_s) : "–"),
     );
   }
 

@@ -1,19 +1,29 @@
 /** What the audience's page shows between flights: who is next, the ranking, and at the end the podium. */
 import { isWaiting } from "../lib/contest/now.js";
+import { Pages } from "../lib/contest/pages.js";
 import { nameOf } from "../lib/contest/words.js";
 import { make, number } from "../lib/dom.js";
 
-const MOST_ROWS = 8;
+const LONG = 24; // letters of a name that is written smaller
 const PLACES = 3;
+
+/** A name in large letters; a long one in smaller ones. @param {string} name @param {string} kind class */
+export function bigName(name, kind) {
+  return make("p", { class: kind, "data-long": name.length > LONG }, nameOf(name));
+}
 
 /** Who is next beside the ranking. */
 export class StageRanking {
   #next = make("div", { class: "s-next" });
   #rows = make("ol", { class: "s-rows" });
+  #list = make("div", { class: "s-list" }, this.#rows);
   #shown = null;
+  #pages;
 
   constructor() {
-    this.element = make("section", { class: "s-board" }, this.#next, this.#rows);
+    const note = make("p", { class: "s-pages" });
+    this.#pages = new Pages(this.#list, this.#rows, note);
+    this.element = make("section", { class: "s-board" }, this.#next, make("div", { class: "s-standing" }, this.#list, note));
   }
 
   /** @param {object|null} stage as `/api/competition/stage` answers */
@@ -26,10 +36,10 @@ export class StageRanking {
     const words = called || first
       ? [
         make("p", { class: "s-label" }, called ? "Called" : "Next"),
-        make("p", { class: "s-called" }, nameOf((called ?? first).team_name)),
+        bigName((called ?? first).team_name, "s-called"),
         make("p", { class: "s-where" }, called?.scenario ?? ""),
       ]
-      : [make("p", { class: "s-called" }, "No try is running")];
+      : [bigName("No try is running", "s-called"), make("p", { class: "s-where" }, "A judge calls the next team on the page Competition.")];
     if (called && first) words.push(make("p", { class: "s-before" }, "Next: ", nameOf(first.team_name)));
     const last = stage?.last;
     if (last) {
@@ -38,12 +48,13 @@ export class StageRanking {
     }
     this.#next.replaceChildren(...words);
     const rows = stage?.ranking?.rows ?? [];
-    this.#rows.replaceChildren(...rows.slice(0, MOST_ROWS).map((row) => make(
+    this.#rows.replaceChildren(...rows.map((row) => make(
       "li", { "data-rank": String(row.rank) },
-      make("span", { class: "s-rank" }, String(row.rank)), nameOf(row.name, { class: "s-row-name" }),
+      make("span", { class: "s-rank" }, String(row.rank ?? "–")), nameOf(row.name, { class: "s-row-name" }),
       make("span", { class: "s-total" }, row.flown ? number(row.total_s) : "–"),
     )));
     this.#rows.hidden = rows.length === 0;
+    this.#pages.fit();
   }
 }
 
@@ -63,7 +74,7 @@ export class Podium {
     this.#shown = told;
     this.#steps.replaceChildren(...ranking.rows.slice(0, PLACES).map((row, index) => make(
       "li", { "data-place": String(index + 1), "data-rank": String(row.rank) },
-      nameOf(row.name, { class: "s-winner" }), make("span", { class: "s-total" }, `${number(row.total_s, 2)} s`),
+      bigName(row.name, "s-winner"), make("span", { class: "s-total" }, `${number(row.total_s, 2)} s`),
       make("span", { class: "s-step" }, String(row.rank)),
     )));
   }

@@ -1,5 +1,6 @@
 /** What the audience's page says of a flight: who, how long, how far, and how that compares with the best. */
 import { nameOf } from "../lib/contest/words.js";
+import { bigName } from "./board.js";
 import { make, number, setAttribute, setText } from "../lib/dom.js";
 
 const GOOD = ["clean", "completed"];
@@ -22,7 +23,10 @@ export class StageHead {
   show({ team, scenario, figures, isOver, rank }) {
     if (this.#team.dataset.shown !== team) {
       this.#team.dataset.shown = team;
-      this.#team.replaceChildren(team ? nameOf(team) : "");
+      const name = bigName(team, "s-team");
+      this.#team.replaceWith(name);
+      this.#team = name;
+      this.#team.dataset.shown = team;
     }
     setText(this.#where, scenario);
     setText(this.#clock, number((isOver ? figures?.total_time_s : figures?.try_time_s) ?? null));

@@ -1,7 +1,10 @@
 import { onBeat } from "../beat.js";
 import { make, number, setAttribute, setText } from "../dom.js";
-import { drawDiagram, forget } from "./diagram.js";
-import { PanZoom } from "./panzoom.js";
+import { DiagramView } from "../diagram/diagram_view.js";
+import { readMermaid } from "../diagram/from_mermaid.js";
+import { lookAt } from "../diagram/look.js";
+
+const NONE = "no mission yet; fly one: framerunner fly test-case-1";
 
 /** A mission's diagram with its active state lit, and its last transitions. */
 export class Statechart {
@@ -15,30 +18,29 @@ export class Statechart {
   #table;
   #source;
   #buttons;
-  #pan = null;
-  #nodes = new Map();
-  #lit = [];
+  #view;
   #chart = null;
   #active = null;
   #entered = 0;
-  #mode;
-  #shown = null;
-  #diagram = null;
 
   /**
    * @param {HTMLElement} element an empty box
-   * @param {{small?: boolean, live?: boolean}} [options] small: beside other things, it follows the active state
-   *   from the start; live: seconds count on between two calls (default)
+   * @param {{small?: boolean, live?: boolean}} [options] small: beside other things; live: seconds count on between
+   *   two calls (default)
    */
   constructor(element, { small = false, live = true } = {}) {
-    this.#mode = small || innerWidth < 700 ? "follow" : "whole";
     this.#title = make("span", { class: "m-mission" });
     this.#state = make("output", { class: "m-state", "aria-live": "off" });
     this.#seconds = make("span", { class: "m-state-seconds" });
-    this.#words = make("p", { class: "m-chart-words" }, "no mission is heard of");
+    this.#words = make("p", { class: "m-chart-words" }, NONE);
     this.#picture = make("div", { class: "m-chart-picture", tabindex: "0", role: "group", "aria-label": "diagram of the mission" });
+    this.#view = new DiagramView(this.#picture, { done: "when finished", resume: "after a pause" }, { isEdited: false, wheelNeeds: this.#picture });
+    lookAt(this.#view, this.#picture, () => this.#setMode("free"));
+    this.#view.viewport.onTouched = () => this.#setMode("free");
     this.#picture.append(this.#words);
-    this.#picture.addEventListener("keydown", (event) => this.#key(event));
+    this.#picture.addEventListener("keydown", (event) => {
+      if (event.key === "0" && !event.ctrlKey && !event.metaKey) this.#setMode("whole");
+    });
     const head = make("div", { class: "m-chart-head" }, this.#title, this.#state, this.#seconds, this.#makeButtons());
     this.#rows = make("tbody");
     this.#table = this.#makeTable();
@@ -51,26 +53,22 @@ export class Statechart {
   }
 
   /** @param {{name: string, mermaid: string, states: string[], source: string}|null} chart */
-  async setChart(chart) {
+  setChart(chart) {
     const same = chart && this.#chart && chart.mermaid === this.#chart.mermaid && chart.name === this.#chart.name;
     this.#chart = chart;
     setText(this.#title, chart?.name ?? "");
     setText(this.#source, chart?.source ?? "");
     if (same) return;
-    this.#nodes.clear();
-    this.#lit = [];
-    this.#pan = null;
-    this.#shown = null;
-    if (!chart) return this.#say("no mission is heard of");
-    this.#say("drawing the diagram");
+    this.#say(chart ? "" : NONE);
+    if (!chart) return;
     try {
-      const { clientWidth: wide, clientHeight: high } = this.#picture;
-      const diagram = await drawDiagram(chart.mermaid, wide > 1.2 * high ? "LR" : "TB");
-      if (this.#chart !== chart) return forget(diagram); // another came meanwhile
-      this.#take(diagram);
+      this.#view.forget();
+      this.#view.draw(readMermaid(chart.mermaid), {}, []);
+      this.#light();
+      this.#setMode("follow");
     } catch (error) {
       console.info(`the diagram cannot be drawn: ${error.message}`);
-      if (this.#chart === chart) this.#say("the diagram cannot be drawn; the states and transitions stand below");
+      this.#say("the diagram cannot be drawn; the states and transitions stand below");
     }
   }
 
@@ -100,65 +98,25 @@ export class Statechart {
     this.#table.hidden = list.length === 0;
   }
 
+  /** Say something in place of the diagram; "": show the diagram. */
   #say(words) {
     setText(this.#words, words);
-    this.#picture.replaceChildren(this.#words);
-  }
-
-  /** @param {import("./diagram.js").Diagram} diagram */
-  #take(diagram) {
-    forget(this.#diagram);
-    this.#diagram = diagram;
-    const { svg } = diagram;
-    this.#picture.replaceChildren(svg);
-    // Mermaid names a state's node SVG-state-ID-NUMBER and a superstate's carries its id as data-id.
-    const head = `${svg.id}-state-`;
-    for (const node of /** @type {NodeListOf<SVGGElement>} */ (svg.querySelectorAll("g.statediagram-state"))) {
-      const isSuper = node.classList.contains("statediagram-cluster");
-      const id = isSuper ? node.dataset.id : node.id.replace(head, "").replace(/-\d+$/, "");
-      if (id) this.#nodes.set(id, node);
-    }
-    this.#pan = new PanZoom(this.#picture, svg, () => this.#setMode("free"));
-    this.#light();
-    if (this.#mode === "whole") this.#pan.whole();
+    this.#words.hidden = words === "";
+    setAttribute(this.#view.root, "visibility", words === "" ? null : "hidden");
   }
 
   /** Light the active state and all that it lies in. */
   #light() {
-    for (const node of this.#lit) node.classList.remove("m-active", "m-around");
-    this.#lit = [];
-    if (this.#active === null) return;
-    const parts = this.#active.split(".");
-    for (let length = parts.length; length > 0; length -= 1) {
-      const node = this.#nodes.get(parts.slice(0, length).join("."));
-      if (!node) continue;
-      node.classList.add(length === parts.length ? "m-active" : "m-around");
-      this.#lit.push(node);
-    }
-    this.#follow();
+    const parts = this.#active?.split(".") ?? [];
+    this.#view.light(new Set(parts.map((_, index) => parts.slice(0, index + 1).join("."))), new Map(), new Set());
   }
 
-  /** Show the superstate that the active state lies in; in a narrow box, the state itself and its neighbours. */
-  #follow() {
-    if (this.#mode !== "follow" || !this.#pan || this.#lit.length === 0) return;
-    const [leaf, around] = [this.#lit[0], this.#lit[1] ?? this.#lit[0]];
-    const wide = this.#picture.clientWidth;
-    const part = boxOf(around);
-    const scale = Math.min(wide / part.width, this.#picture.clientHeight / part.height);
-    const target = scale < 0.55 ? nearby(boxOf(leaf), part, wide / 0.62, this.#picture.clientHeight / 0.62) : part;
-    const name = JSON.stringify([target.x, target.y, target.width, target.height].map(Math.round));
-    if (name === this.#shown) return;
-    this.#shown = name;
-    this.#pan.show(target);
-  }
-
-  /** @param {"follow"|"whole"|"free"} mode free: as somebody moved it */
+  /** @param {"follow"|"whole"|"free"} mode follow: the active state with as much around it as can be read; free: as somebody moved it */
   #setMode(mode) {
-    this.#mode = mode;
-    this.#shown = null;
     for (const name of ["follow", "whole"]) setAttribute(this.#buttons[name], "aria-pressed", String(mode === name));
-    if (mode === "whole") this.#pan?.whole();
-    this.#follow();
+    if (mode === "free") this.#view.hold();
+    else if (mode === "whole") this.#view.whole();
+    else this.#view.fit();
   }
 
   #makeButtons() {
@@ -169,14 +127,17 @@ export class Statechart {
       bar.append(button);
       return button;
     };
-    const zoom = (factor) => { this.#setMode("free"); this.#pan?.zoom(factor); };
+    const zoom = (factor) => {
+      this.#setMode("free");
+      this.#view.viewport.zoom(factor);
+    };
     this.#buttons = {
-      follow: add("follow", "Follow", "follow the active state", () => this.#setMode(this.#mode === "follow" ? "free" : "follow")),
+      follow: add("follow", "Follow", "follow the active state, with as much around it as can be read", () => this.#setMode(this.#buttons.follow.getAttribute("aria-pressed") === "true" ? "free" : "follow")),
       whole: add("whole", "Whole", "show the whole diagram", () => this.#setMode("whole")),
       out: add("out", "−", "go away", () => zoom(1 / 1.35)),
       nearer: add("nearer", "+", "come nearer", () => zoom(1.35)),
     };
-    for (const name of ["follow", "whole"]) setAttribute(this.#buttons[name], "aria-pressed", String(this.#mode === name));
+    setAttribute(this.#buttons.follow, "aria-pressed", "true");
     return bar;
   }
 
@@ -200,33 +161,6 @@ export class Statechart {
   #count(seconds = (performance.now() - this.#entered) / 1000) {
     setText(this.#seconds, this.#active === null ? "" : `for ${number(seconds)} s`);
   }
-
-  #key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || !this.#pan) return;
-    if (event.key === "0") this.#setMode("whole");
-    else if (!this.#pan.key(event.key)) return;
-    event.preventDefault();
-  }
-}
-
-/** Where a node is in the drawing's own measure. */
-function boxOf(node) {
-  const box = node.getBBox();
-  const turn = node.ownerSVGElement.getScreenCTM().inverse().multiply(node.getScreenCTM());
-  const [from, to] = [new DOMPoint(box.x, box.y), new DOMPoint(box.x + box.width, box.y + box.height)].map(
-    (point) => point.matrixTransform(turn));
-  return new DOMRect(from.x, from.y, to.x - from.x, to.y - from.y);
-}
-
-/** A window about a leaf, no larger than its superstate. */
-function nearby(leaf, around, width, height) {
-  const along = (middle, low, size, wanted) => {
-    if (size <= wanted) return [low, size];
-    return [Math.min(Math.max(low, middle - wanted / 2), low + size - wanted), wanted];
-  };
-  const [x, w] = along(leaf.x + leaf.width / 2, around.x, around.width, width);
-  const [y, h] = along(leaf.y + leaf.height / 2, around.y, around.height, height);
-  return new DOMRect(x, y, w, h);
 }
 
 function written(value) {

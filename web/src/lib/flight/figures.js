@@ -127,14 +127,14 @@ export class Figures {
 
   #setOutcome(figures, status) {
     const decided = figures && (figures.over || figures.final || FINAL_WORDS.has(figures.verdict));
-    let verdict = "nobody judges";
+    let verdict = "not judged";
     if (decided) verdict = figures.verdict;
     else if (figures) verdict = figures.motors_on ? "under way" : figures.try_time_s > 0 ? "motors off" : "before the start";
     setText(this.#verdict, verdict);
     setAttribute(this.#verdict, "data-value", figures?.verdict ?? null);
     const look = !decided ? "open" : ["clean", "completed"].includes(verdict) ? "good" : "bad";
     setAttribute(this.#verdict, "data-look", look);
-    const without = status ? "a referee comes with the simulator, or with --scenario" : "";
+    const without = status ? "this drone has no referee: start framerunner monitor --scenario NAME" : "";
     setText(this.#reason, decided ? figures.reason ?? "" : figures ? "" : without);
     const by = { truth: "judged by the simulator's truth", telemetry: "judged by telemetry" }[figures?.source];
     const standing = figures?.final ? "final" : "so far";

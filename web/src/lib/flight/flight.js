@@ -85,7 +85,7 @@ export class Flight {
   #forgetImage() {
     this.#image = false;
     const status = this.#status;
-    this.#camera.clearFrame(!status ? "no drone is heard" : status.video ? "waiting for the first image" : "no video");
+    this.#camera.clearFrame(!status ? "no drone yet: start one with framerunner sim" : status.video ? "waiting for the first image" : "no video");
   }
 
   /** Say so when the image is not of now. */

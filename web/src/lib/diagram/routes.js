@@ -13,7 +13,7 @@ const ALONG = [0.5, 0.4, 0.6, 0.3, 0.7, 0.22, 0.78];
 const ASIDE = [0, -9, 9, -18, 18];
 const TRIED_LANES = [0, 1, -1, 2, -2, 3, -3.5];
 const LABEL = { letter: 6.1, above: 11, height: 15, margin: 2 };
-const COST = { along: 60, aside: 0.8, onBox: 3, crossed: 1, bent: 0.22 };
+const COST = { along: 60, aside: 0.8, onBox: 3, crossed: 1, bent: 0.22, struck: 6 };
 const MANY = 150; // transitions; with more of them, there is no room to look for
 const QUICK = { along: [0.5, 0.35, 0.65], aside: [0], lanes: [0] };
 const THOROUGH = { along: ALONG, aside: ASIDE, lanes: TRIED_LANES };
@@ -61,6 +61,7 @@ export class Router {
   #tries;
   #states = new Index();
   #labels = new Index();
+  #passing = new Index();
   /** @type {Map<string, Set<number>>} bends that are taken, by pair of states */
   #lanes = new Map();
 
@@ -121,6 +122,15 @@ export class Router {
     return crossed.size;
   }
 
+  /** Note where a line passes, so that no other one's label is put there. @param {Curve} curve @param {string} id of the transition */
+  pass(curve, id) {
+    if (this.#tries.lanes.length === 1) return;
+    for (let t = 0.04; t < 1; t += 0.04) {
+      const { x, y } = pointOn(curve, t);
+      this.#passing.add({ x: x - 1, y: y - 1, width: 2, height: 2 }, id);
+    }
+  }
+
   /**
    * Where the label of a line stands: the middle of its foot.
    * @param {Curve} curve
@@ -139,6 +149,7 @@ export class Router {
         if (cost >= least) continue;
         const box = labelBox({ x: point.x, y: point.y + dy }, width);
         cost += this.#labels.covered(box, all);
+        if (cost < least) cost += COST.struck * this.#passing.covered(box, (id) => id !== route.id);
         if (cost < least) cost += COST.onBox * this.#states.covered(box, isInTheWay);
         if (cost < least) [best, least] = [{ x: point.x, y: point.y + dy }, cost];
       }

@@ -16,7 +16,7 @@ const shorten = (text) => (text.length > LONGEST_LABEL ? `${text.slice(0, LONGES
 
 /**
  * The words beside a transition.
- * @param {import("./session.js").Edge} edge
+ * @param {import("./types.js").Edge} edge
  * @param {{done: string, resume: string}} words for transitions of these events
  */
 export function labelWords({ event, order, when }, words) {
@@ -25,29 +25,40 @@ export function labelWords({ event, order, when }, words) {
 
 /**
  * A state's box.
- * @param {import("./session.js").StateNode} state
+ * @param {import("./types.js").StateNode} state
  * @param {import("./geometry.js").Box} box
- * @param {{isSuper: boolean, isInitial: boolean, handleHeight: number}} how
+ * @param {{isSuper: boolean, isClosed: boolean, isInitial: boolean, handleHeight: number, isEdited: boolean}} how isSuper: with its states in it
  * @returns {SVGGElement}
  */
-export function stateShape({ id, name, template, final, source }, box, { isSuper, isInitial, handleHeight }) {
-  const kinds = ["e-state", isSuper && "e-super", final && "e-final", !source && "e-foreign"];
+export function stateShape({ id, name, template, final, source, enter, during, exit }, box, { isSuper, isClosed, isInitial, handleHeight, isEdited }) {
+  const kinds = ["e-state", isSuper && "e-super", isClosed && "e-closed", final && "e-final", !source && "e-foreign"];
   const group = svg("g", {
-    class: kinds.filter(Boolean).join(" "), "data-state": id, tabindex: 0, role: "button", "aria-label": `state ${id}`,
+    class: kinds.filter(Boolean).join(" "), "data-state": id, "aria-label": `state ${id}`, ...(isEdited ? { tabindex: 0, role: "button" } : {}),
   },
   svg("rect", { width: box.width, height: box.height, rx: 8 }),
-  svg("text", { x: isSuper ? 12 : box.width / 2, y: isSuper ? 20 : 27, class: isSuper ? "e-name e-left" : "e-name" },
+  svg("text", { x: isSuper ? 24 : box.width / 2, y: isSuper ? 20 : 27, class: isSuper ? "e-name e-left" : "e-name" },
     template ? `${name} : ${template}` : name));
   if (isInitial) group.append(svg("circle", { cx: 0, cy: isSuper ? 15 : box.height / 2, r: 5, class: "e-initial" }));
   if (final) group.append(svg("rect", { x: 3, y: 3, width: box.width - 6, height: box.height - 6, rx: 6, class: "e-inner" }));
-  group.append(svg("circle", { cx: box.width, cy: handleHeight, r: HANDLE, class: "e-handle" },
-    svg("title", {}, "drag to another state: a new transition")));
+  if (isSuper || isClosed) {
+    const y = isSuper ? 15 : box.height / 2;
+    group.append(svg("g", { class: "e-fold", "data-fold": id },
+      svg("rect", { x: 6, y: y - 10, width: 18, height: 22 }), svg("path", { d: isSuper ? `M7,${y - 3}h10l-5,7z` : `M9,${y - 5}v10l7,-5z` }),
+      svg("title", {}, isSuper ? "close" : "open")));
+  }
+  if (isEdited) {
+    group.append(svg("circle", { cx: box.width, cy: handleHeight, r: HANDLE, class: "e-handle" },
+      svg("title", {}, "drag to another state: a new transition")));
+  } else {
+    const actions = Object.entries({ enter, during, exit }).filter(([, each]) => each.length > 0);
+    group.append(svg("title", {}, actions.map(([when, each]) => `${when} / ${each.join(", ")}`).join("\n")));
+  }
   return group;
 }
 
 /**
  * What stands for a state that is missing, at the end of a transition to it.
- * @param {import("./session.js").Edge} edge
+ * @param {import("./types.js").Edge} edge
  * @param {import("./geometry.js").Box} box
  * @returns {SVGGElement}
  */

@@ -1,16 +1,17 @@
-/** The diagram: states as boxes and transitions as lines, drawn in SVG. `diagram_mouse.js` has what the mouse does with it. */
+/** The diagram: states as boxes and transitions as lines, drawn in SVG. What the mouse does with it is elsewhere: it is edited, or looked at. */
+import "./diagram.css";
+import { chainOf, fold } from "./fold.js";
 import { contains, line, pathOf, pointOn } from "./geometry.js";
 import { freePlace } from "./free_place.js";
 import { layOut, placeWithin, renamed, textWidth } from "./layout.js";
 import { Router } from "./routes.js";
 import { HANDLE, labelWords, missingShape, stateShape, svg } from "./shapes.js";
-import { takeMouse } from "./diagram_mouse.js";
 import { Viewport } from "./viewport.js";
 
 /**
- * @typedef {import("./session.js").Diagram} Diagram
- * @typedef {import("./session.js").Finding} Finding
- * @typedef {import("./session.js").Point} Point
+ * @typedef {import("./types.js").Diagram} Diagram
+ * @typedef {import("./types.js").Finding} Finding
+ * @typedef {import("./types.js").Point} Point
  * @typedef {import("./geometry.js").Box} Box
  * @typedef {{kind: "mission"|"state"|"transition", id: string}} Selection id: of a state or transition of the diagram
  */
@@ -18,6 +19,10 @@ import { Viewport } from "./viewport.js";
 const END = 9; // how near to the end of a line the mouse takes it, in the drawing's units
 const END_INWARDS = 17; // how far from its state
 const MISSING_HEIGHT = 24;
+const LARGEST = { edited: 1.2, lookedAt: 1.8 }; // scale by itself
+const READABLE = 10 / 11; // the least scale by itself: the letters of labels have 11 pixels, and shall have 10 on the page
+const BESIDE = { right: 40, bottom: 24 }; // of all states, for lines
+const EMPTY = { initial: "", readable: true, nodes: [], edges: [] };
 
 export class DiagramView {
   root;
@@ -29,8 +34,20 @@ export class DiagramView {
   #labels;
   #draft;
   #ends;
-  /** @type {Diagram} */
-  #diagram = { initial: "", readable: true, nodes: [], edges: [] };
+  #isEdited;
+  /** @type {Diagram} with all superstates open */
+  #whole = EMPTY;
+  /** @type {Map<string, Box>} of all states, as they are without anything closed */
+  #wholeBoxes = new Map();
+  /** @type {Set<string>} superstates whose inside is not drawn */
+  #closed = new Set();
+  /** Whether it opens, closes and shows what there is room for; not once somebody has done so by hand. */
+  #isAuto = true;
+  #focus = "";
+  /** @type {Finding[]} */
+  #findings = [];
+  /** @type {Diagram} as drawn */
+  #diagram = EMPTY;
   /** @type {Map<string, Box>} */
   #boxes = new Map();
   /** @type {Map<string, Box>} what stands for missing targets, by id of the transition */
@@ -50,7 +67,7 @@ export class DiagramView {
   #children = new Map();
   #parents = new Map();
   #initials = new Map();
-  /** @type {Map<string, import("./session.js").Edge>} */
+  /** @type {Map<string, import("./types.js").Edge>} */
   #edges = new Map();
   /** @type {Selection} */
   #selection = { kind: "mission", id: "" };
@@ -62,11 +79,13 @@ export class DiagramView {
 
   /**
    * @param {HTMLElement} parent
-   * @param {import("./diagram_mouse.js").Listener} listener told what the user has done
    * @param {{done: string, resume: string}} words for transitions of these events
+   * @param {{isEdited?: boolean, wheelNeeds?: HTMLElement|null}} [options] isEdited: states can be taken and joined; wheelNeeds: what must
+   *   have the focus before the wheel zooms
    */
-  constructor(parent, listener, words) {
+  constructor(parent, words, { isEdited = true, wheelNeeds = null } = {}) {
     this.#words = words;
+    this.#isEdited = isEdited;
     const arrow = svg("marker", {
       id: "e-arrow", viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 11, markerHeight: 11,
       markerUnits: "userSpaceOnUse", orient: "auto-start-reverse",
@@ -83,16 +102,10 @@ export class DiagramView {
     const world = svg("g", {}, this.#superstates, this.#lines, this.#labels, this.#states, this.#ends.source, this.#ends.target, this.#draft);
     this.root = svg("svg", { class: "e-diagram", role: "group", "aria-label": "diagram" }, svg("defs", {}, arrow), world);
     parent.append(this.root);
-    this.viewport = new Viewport(this.root, world);
-    takeMouse(this, listener);
-    this.root.addEventListener("keydown", (event) => {
-      if (event.key !== "Enter" && event.key !== " ") return;
-      const found = this.at(event.target);
-      if (found.kind !== "mission") {
-        event.preventDefault();
-        listener.selected(found);
-      }
-    });
+    this.root.classList.toggle("e-looked-at", !isEdited);
+    this.viewport = new Viewport(this.root, world, wheelNeeds, isEdited ? LARGEST.edited : LARGEST.lookedAt);
+    this.viewport.onTouched = () => this.hold();
+    new ResizeObserver(() => this.#isAuto && this.#look()).observe(this.root);
   }
 
   get selection() {
@@ -106,40 +119,68 @@ export class DiagramView {
    * @param {Finding[]} findings
    */
   draw(diagram, kept, findings) {
-    for (const [now, before] of renamed(this.#diagram, diagram)) {
+    for (const [now, before] of renamed(this.#whole, diagram)) {
       const place = this.#places.get(before);
       if (place && !kept[now]) this.#places.set(now, place);
       this.#places.delete(before);
-      const box = this.#boxes.get(before);
-      if (box) this.#boxes.set(now, box);
+      const box = this.#wholeBoxes.get(before);
+      if (box) this.#wholeBoxes.set(now, box);
     }
-    this.#diagram = diagram;
-    this.#boxes = layOut(diagram, {
-      places: (id) => kept[id] ?? this.#places.get(id), boxes: this.#boxes, view: this.#isFresh ? null : this.viewport.seen,
+    this.#whole = diagram;
+    this.#wholeBoxes = layOut(diagram, {
+      places: (id) => kept[id] ?? this.#places.get(id), boxes: this.#wholeBoxes,
+      view: this.#isFresh || this.#closed.size > 0 ? null : this.viewport.seen,
     });
-    this.#index();
     this.#remember(kept);
-    this.#stateElements.clear();
-    this.#transitionElements.clear();
-    const plain = [], around = [];
-    for (const state of diagram.nodes) (this.#children.has(state.id) ? around : plain).push(this.#state(state));
-    this.#superstates.replaceChildren(...around);
-    this.#states.replaceChildren(...plain);
-    this.#makeTransitions();
-    this.#mark(findings);
-    this.select(this.#selection);
-    this.light(...this.#light);
-    this.markLost(this.#lost);
-    if (this.#isFresh && diagram.nodes.length > 0) {
+    this.#findings = findings;
+    const isFirst = this.#isFresh && diagram.nodes.length > 0;
+    this.#render();
+    if (isFirst) {
       this.#isFresh = false;
       this.fit();
     }
   }
 
+  /** Draw what is not closed. */
+  #render() {
+    this.#diagram = fold(this.#whole, this.#closed);
+    this.#boxes = this.#diagram === this.#whole ? this.#wholeBoxes : this.#folded(this.#diagram);
+    this.#index();
+    this.#stateElements.clear();
+    this.#transitionElements.clear();
+    const plain = [], around = [];
+    for (const state of this.#diagram.nodes) (this.#children.has(state.id) ? around : plain).push(this.#state(state));
+    this.#superstates.replaceChildren(...around);
+    this.#states.replaceChildren(...plain);
+    this.#makeTransitions();
+    this.#mark(this.#findings);
+    this.select(this.#selection);
+    this.#showLight();
+    this.markLost(this.#lost);
+  }
+
+  /** Places of a diagram with closed superstates: where there are superstates it is arranged anew. @param {Diagram} diagram */
+  #folded(diagram) {
+    return layOut(diagram, { places: (id) => (this.#isAmongLeaves(id) ? this.#places.get(id) : undefined), boxes: new Map(), view: null });
+  }
+
+  /** Whether no state beside this one is a superstate. @param {string} id */
+  #isAmongLeaves(id) {
+    const { nodes } = this.#whole;
+    const parent = nodes.find((each) => each.id === id)?.parent;
+    const around = new Set(nodes.map((each) => each.parent));
+    return !nodes.some((each) => each.parent === parent && around.has(each.id));
+  }
+
+  /** Whether a state's place is as it is kept, so that it can be moved. @param {string} id */
+  isMovable(id) {
+    return this.#closed.size === 0 || this.#isAmongLeaves(id);
+  }
+
   /** Forget all places: the next drawing is arranged anew. */
   forget() {
     this.#places.clear();
-    this.#boxes.clear();
+    this.#wholeBoxes.clear();
   }
 
   /** Places as drawn that are not those that were kept. */
@@ -149,8 +190,8 @@ export class DiagramView {
 
   #remember(kept) {
     this.#unkept = {};
-    for (const { id, parent } of this.#diagram.nodes) {
-      const place = placeWithin(/** @type {Box} */ (this.#boxes.get(id)), this.#boxes.get(parent));
+    for (const { id, parent } of this.#whole.nodes) {
+      const place = placeWithin(/** @type {Box} */ (this.#wholeBoxes.get(id)), this.#wholeBoxes.get(parent));
       this.#places.set(id, place);
       if (kept[id]?.x !== place.x || kept[id]?.y !== place.y) this.#unkept[id] = place;
     }
@@ -169,12 +210,13 @@ export class DiagramView {
     }
   }
 
-  /** @param {import("./session.js").StateNode} state @returns {SVGGElement} */
+  /** @param {import("./types.js").StateNode} state @returns {SVGGElement} */
   #state(state) {
     const { id, parent } = state;
     const initial = parent === "" ? this.#diagram.initial : this.#initials.get(parent);
     const group = stateShape(state, /** @type {Box} */ (this.#boxes.get(id)), {
-      isSuper: this.#children.has(id), isInitial: initial === id, handleHeight: this.#handleHeight(id),
+      isSuper: this.#children.has(id), isClosed: this.#closed.has(id), isInitial: initial === id,
+      handleHeight: this.#handleHeight(id), isEdited: this.#isEdited,
     });
     this.#stateElements.set(id, group);
     this.#place(id);
@@ -198,7 +240,7 @@ export class DiagramView {
       const kind = `${event === "tick" ? "" : ` e-${event}`}${edge.missing ? " e-dangling" : ""}`;
       const path = svg("path", { class: "e-line", "marker-end": "url(#e-arrow)" });
       const hit = svg("path", { class: "e-hit" });
-      const group = svg("g", { class: `e-transition${kind}`, "data-transition": id, tabindex: 0, role: "button",
+      const group = svg("g", { class: `e-transition${kind}`, "data-transition": id, ...(this.#isEdited ? { tabindex: 0, role: "button" } : {}),
         "aria-label": `transition from ${state} to ${edge.target}${when ? ` when ${when}` : ""}` }, hit, path);
       const words = labelWords(edge, this.#words);
       const label = svg("text", { class: "e-label", "data-transition": id, "data-words": words }, words);
@@ -214,6 +256,7 @@ export class DiagramView {
       this.#drawLine(id);
       routes.push(route);
     }
+    for (const [id, { curve }] of this.#transitionElements) router.pass(curve, id);
     for (const route of routes) {
       const { label, curve } = /** @type {any} */ (this.#transitionElements.get(route.id));
       placeLabel(label, router.label(curve, route));
@@ -330,7 +373,15 @@ export class DiagramView {
    */
   light(active, counts, taken) {
     this.#light = [active, counts, taken];
-    for (const [path, group] of this.#stateElements) group.classList.toggle("e-active", active.has(path));
+    this.#showLight();
+    const leaf = [...active].reduce((longest, id) => (id.length > longest.length ? id : longest), "");
+    if (leaf && this.#isAuto) this.focus(leaf);
+  }
+
+  #showLight() {
+    const [active, counts, taken] = this.#light;
+    const inside = (path) => this.#closed.has(path) && [...active].some((id) => id.startsWith(`${path}.`));
+    for (const [path, group] of this.#stateElements) group.classList.toggle("e-active", active.has(path) || inside(path));
     for (const [id, { group, label }] of this.#transitionElements) {
       const count = counts.get(id) ?? 0;
       const words = count > 0 ? `${label.dataset.words} (${count}×)` : label.dataset.words;
@@ -345,18 +396,87 @@ export class DiagramView {
     for (const [path, group] of this.#stateElements) group.classList.toggle("e-lost", path === id);
   }
 
-  /** Show all of it. */
+  /** Show all of it with letters that can be read: with superstates closed that are not looked at, and at least the one that is. */
   fit() {
-    let right = 1, bottom = 1;
-    for (const box of [...this.#boxes.values(), ...this.#missing.values()]) {
-      right = Math.max(right, box.x + box.width + 40);
-      bottom = Math.max(bottom, box.y + box.height + 24);
-    }
-    this.viewport.fit(right, bottom);
+    this.#isAuto = true;
+    this.#look();
+  }
+
+  /** Show all of it with all superstates open, however small. */
+  whole() {
+    this.#isAuto = false;
+    this.#close(new Set());
+    this.viewport.fit(sizeOf(this.#boxes));
+  }
+
+  /** Leave all as it is now shown. */
+  hold() {
+    this.#isAuto = false;
+  }
+
+  /** Look at a state. @param {string} id */
+  focus(id) {
+    if (id === this.#focus) return;
+    this.#focus = id;
+    if (this.#isAuto) this.#look();
+    else this.#open(id);
+  }
+
+  #look() {
+    if (this.#whole.nodes.length === 0) return;
+    const fits = (boxes) => this.viewport.scaleOf(...sizeOf(boxes)) >= READABLE;
+    const around = this.#chain(this.#focus || this.#whole.initial);
+    const isOpen = fits(this.#wholeBoxes);
+    this.#close(new Set(isOpen ? [] : this.#allSuperstates.filter((id) => !around.includes(id))));
+    if (isOpen || fits(this.#boxes)) return this.viewport.fit(sizeOf(this.#boxes));
+    const boxes = around.flatMap((id) => this.#boxes.get(id) ?? []);
+    const whole = boxes.find((box) => this.viewport.scaleOf(box.width, box.height) >= READABLE);
+    const leaf = boxes.at(-1);
+    if (whole && whole !== leaf) this.viewport.show(whole, sizeOf(this.#boxes), [READABLE, LARGEST.edited]);
+    else if (leaf) this.viewport.show(leaf, sizeOf(this.#boxes), [READABLE, READABLE]); // and as much as there is room for
+  }
+
+  get #allSuperstates() {
+    return [...new Set(this.#whole.nodes.map(({ parent }) => parent))].filter(Boolean);
+  }
+
+  /** @param {string} id @returns {string[]} */
+  #chain(id) {
+    return chainOf(new Map(this.#whole.nodes.map((each) => [each.id, each.parent])), id);
+  }
+
+  /** @param {Set<string>} closed superstates */
+  #close(closed) {
+    if (closed.size === this.#closed.size && [...closed].every((id) => this.#closed.has(id))) return;
+    this.#closed = closed;
+    this.#render();
+  }
+
+  /** Open what is around a state. @param {string} id */
+  #open(id) {
+    const around = this.#chain(id);
+    this.#close(new Set([...this.#closed].filter((each) => each === id || !around.includes(each))));
+  }
+
+  /** Open a superstate, or close it. @param {string} id */
+  toggle(id) {
+    this.#isAuto = false;
+    const closed = new Set(this.#closed);
+    if (!closed.delete(id)) closed.add(id);
+    this.#close(closed);
+    this.reveal({ kind: "state", id });
+  }
+
+  /** The superstate that is opened or closed at an element. @param {EventTarget|null} target @param {boolean} [isWhole] or anywhere on a closed one */
+  foldAt(target, isWhole = false) {
+    const element = target instanceof Element ? target.closest(isWhole ? "[data-fold], .e-closed" : "[data-fold]") : null;
+    return element instanceof SVGElement ? element.dataset.fold ?? element.dataset.state ?? "" : "";
   }
 
   /** Bring a state or transition into view, if it is not. @param {Selection} selection */
   reveal({ kind, id }) {
+    const states = kind === "state" ? [id] : this.#whole.edges.filter((edge) => edge.id === id).flatMap(({ source, target }) => [source, target]);
+    for (const each of states) this.#open(each);
     const curve = kind === "transition" ? this.#transitionElements.get(id)?.curve : undefined;
     const point = curve && pointOn(curve, 0.5);
     const box = kind === "state" ? this.#boxes.get(id) : point && { ...point, width: 0, height: 0 };
@@ -467,6 +587,16 @@ export class DiagramView {
     for (const group of this.#stateElements.values()) group.classList.remove("e-target");
     for (const { group } of this.#transitionElements.values()) group.classList.remove("e-pulled");
   }
+}
+
+/** The room that a drawing needs. @param {Map<string, Box>} boxes @returns {[number, number]} */
+function sizeOf(boxes) {
+  let right = 1, bottom = 1;
+  for (const box of boxes.values()) {
+    right = Math.max(right, box.x + box.width + BESIDE.right);
+    bottom = Math.max(bottom, box.y + box.height + BESIDE.bottom);
+  }
+  return [right, bottom];
 }
 
 /** @param {SVGTextElement} label @param {Point} foot */
