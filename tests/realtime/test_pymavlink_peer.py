@@ -21,7 +21,7 @@ def airborne(peer):
     assert peer.command(SET_MODE, 1, 6) == 0
     assert peer.command(ARM, 1) == 0
     peer.fly_until_heartbeat(lambda beat: beat.base_mode & ARMED and beat.custom_mode == OFFBOARD)
-    peer.fly(5.5, down_m_s=-0.6)  # motors idle for a second, the climb grows for three
+    peer.fly(7.0, down_m_s=-0.6)  # as with PX4, it leaves the ground after three seconds
     peer.fly(1.5)
     assert peer.latest["LOCAL_POSITION_NED"].z < -1.0
     yield peer
