@@ -19,7 +19,7 @@ from sitl.ardupilot.poses import POSE_PORT
 from sitl.ardupilot.server import ArduPilotServer
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
-from sitl.pacing.time_grants import Grant, Held, TimeGrants
+from sitl.pacing.time_grants import Grant, TimeGrants, parse_answer
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.sitl.ardupilot.fake_ardupilot import FakeArduPilot
@@ -169,7 +169,7 @@ async def test_frames_wait_until_time_is_granted():
         await asyncio.to_thread(fake.step, STILL)
     for _ in range(3):
         fake.send(STILL)  # as after a second without an answer
-    held = Held.parse(await reader.readline())
+    held = parse_answer(await reader.readline())
     assert (held.time_us, made[-1].time_us) == (20_000, 24_000)
     writer.write(Grant(40_000).line())
     assert (await asyncio.to_thread(fake.receive))["timestamp"] == 0.026
