@@ -98,7 +98,8 @@ def replace_file(path: str | os.PathLike[str], content: str | bytes, new_mode: i
     if mode is not None and not stat.S_ISREG(mode):
         raise OSError(0, "not a regular file")
     try:
-        flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW
+        part.unlink(missing_ok=True)  # of a program that was killed, or a link or pipe of somebody else's
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
         with open(os.open(part, flags, new_mode), "wb") as target:
             target.write(content.encode() if isinstance(content, str) else content)
             target.flush()

@@ -12,7 +12,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, mod
 
 from errors import UserError
 from geometry.axes import flip_quaternion
-from geometry.rotations import MAX_MOUNTING_RAD, quaternion_from_euler
+from geometry.rotations import quaternion_from_euler
 from geometry.solids import Solid
 from geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.air import Wind
@@ -21,7 +21,7 @@ from scenarios.gimbal import Gimbal
 from scenarios.goals import Goal
 from scenarios.imaging.clutter import Hall, Patch
 from scenarios.imaging.effects import CameraEffects
-from scenarios.part import Metres, Part, refusal
+from scenarios.part import Component, Metres, OnDrone, Part, Turn, refusal
 
 Colour = Literal["red", "green", "blue"]
 COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
@@ -47,11 +47,6 @@ _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall doe
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
-OnDrone = Annotated[float, Field(ge=-10, le=10)]
-"""A coordinate on the drone, metres."""
-Turn = Annotated[float, Field(ge=-MAX_MOUNTING_RAD, le=MAX_MOUNTING_RAD)]
-Component = Annotated[float, Field(ge=-1e6, le=1e6)]
-"""Of a direction, whose length does not matter."""
 
 
 ScenarioName = Annotated[

@@ -7,8 +7,15 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from geometry.rotations import MAX_MOUNTING_RAD
+
 Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 """A coordinate in the arena."""
+OnDrone = Annotated[float, Field(ge=-10, le=10)]
+"""A coordinate on the drone, metres."""
+Turn = Annotated[float, Field(ge=-MAX_MOUNTING_RAD, le=MAX_MOUNTING_RAD)]
+Component = Annotated[float, Field(ge=-1e6, le=1e6)]
+"""Of a direction, whose length does not matter."""
 
 
 def refusal(value: float | str, message: str, *at: str | int) -> PydanticCustomError:

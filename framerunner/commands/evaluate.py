@@ -102,11 +102,7 @@ def evaluate(
 
         framerunner evaluate --level calm --mission mine.yaml --compare runs/before
 
-        framerunner evaluate --level calm --sensors flow
-
         framerunner evaluate --level calm --response lag=0.6,dead-time=0.15
-
-        framerunner evaluate my_scenarios/ --out runs/mine
 
         framerunner evaluate test-case-1 test-case-2 calm-17 --jobs 1
 

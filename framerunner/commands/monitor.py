@@ -94,8 +94,6 @@ def monitor(
 
         framerunner monitor
 
-        framerunner monitor --bind 0.0.0.0 --port 80
-
         framerunner monitor --bind 0.0.0.0 --certificate monitor.crt --key monitor.key
 
         framerunner monitor --drone serial:///dev/ttyUSB0:57600 --scenario test-case-1

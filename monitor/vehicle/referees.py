@@ -45,7 +45,8 @@ def scenario_of(task: Task, equipment: Equipment) -> Scenario:
             raise ScenarioError(f"scenario '{task.name}' is not known here; {advice}") from None
     if layout_mark(found) != task.layout_mark:
         raise ScenarioError(f"scenario '{task.name}' has another layout here; {advice}")
-    return found.model_copy(update={"arena": task.arena, "base": task.base, "start": task.start})
+    told = Task.model_fields.keys() & Scenario.model_fields
+    return found.model_copy(update={name: getattr(task, name) for name in told})
 
 
 class RefereeChannel:

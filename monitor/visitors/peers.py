@@ -13,7 +13,10 @@ from pathlib import Path
 
 from starlette.requests import HTTPConnection
 
+from errors.files import TextError, read_text
+
 _TABLES = Path("/proc/net")
+_MOST_BYTES = 1 << 25  # of a table, which has a line for each connection of this machine
 _ESTABLISHED = "01"
 _KNOWN = "framerunner.own"  # in a connection's scope
 Place = tuple[str, int]
@@ -49,8 +52,8 @@ def peer_uid(client: Place, server: Place, tables: Path = _TABLES) -> int | None
             f"{address}:{port:04X}" for address, (_, port) in zip(written, (client, server), strict=True)
         ]
         try:
-            lines = (tables / name).read_text(encoding="ascii").splitlines()[1:]
-        except (OSError, ValueError):
+            lines = read_text(tables / name, _MOST_BYTES).splitlines()[1:]
+        except TextError:
             continue
         for line in lines:
             fields = line.split()

@@ -21,7 +21,7 @@ def airborne(sensors, airframe):
         simulation.tick()
     simulation.autopilot.arm()
     simulation.autopilot.takeoff()
-    for _ in range(750):
+    for _ in range(1500):  # an x500 leaves the ground after 4 s
         simulation.tick()
     return simulation
 

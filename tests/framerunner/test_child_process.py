@@ -8,6 +8,7 @@ import pytest
 from errors import SettingError
 from framerunner.child_process import MonitorProcess
 from monitor.run import FIRST_VIEWER
+from scenarios.loader import load_scenario
 from tests.waiting import until
 
 SHOWN = "import sys, time; print('monitor: http://127.0.0.1:1/', file=sys.stderr, flush=True); "
@@ -16,7 +17,7 @@ FAILED = "sys.exit('error: the port is taken')"
 
 
 def monitor(after):
-    made = MonitorProcess()
+    made = MonitorProcess(load_scenario("empty"))
     made._arguments = [sys.executable, "-c", SHOWN + after]
     return made
 

@@ -10,6 +10,7 @@ import pytest
 
 from monitor.addresses import Places, visitor_key
 from monitor.settings import ConnectionLimits
+from monitor.visitors.login_limit import Rate
 from tests.monitor.serving import browser, serving
 
 SAMPLE = "tests.monitor.sample_page"
@@ -204,8 +205,7 @@ async def guesses(served, forwarded):
 
 
 async def test_behind_a_proxy_the_true_address_counts_and_a_forged_one_does_not(monkeypatch):
-    monkeypatch.setattr("monitor.access.FAILURE_DELAY_S", 0.0)
-    monkeypatch.setattr("monitor.access.TRIES_A_MINUTE", 2)
+    monkeypatch.setattr("monitor.visitors.login_limit.ONE_ADDRESS", Rate(2, 1000.0))
     more = {"bind": "0.0.0.0", "password": PASSWORD}
     async with serving(monkeypatch, trusted_proxies=("127.0.0.1",), **more) as served:
         # What a client forges stands before what the proxy adds.

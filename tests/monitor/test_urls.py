@@ -91,7 +91,7 @@ async def test_the_monitor_prints_its_addresses_for_phones(monkeypatch, networks
         said = "\n".join(served.lines)
         host = "192.168.1.5" if bind == "0.0.0.0" else "127.0.0.1"
         assert served.lines[0] == f"monitor: http://{host}:{served.port}/"
-        assert f"judges log in at http://{host}:{served.port}/login?token=" in said
+        assert f"organisers log in at http://{host}:{served.port}/login?token=" in said
         assert (f"monitor: http://10.0.0.3:{served.port}/" in said) == (bind == "0.0.0.0")
         assert "0.0.0.0" not in said
         codes = [line.partition("\n")[2] for line in served.lines if "█" in line]

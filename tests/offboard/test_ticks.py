@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from offboard.drone import VelocityCommand
-from offboard.link import telemetry
+from offboard.link import ticks
 from offboard.link.commands import PendingRequests
 from offboard.link.telemetry import MAX_JITTER_S, TelemetryFeed
 from offboard.link.ticks import TickSource
@@ -68,7 +68,7 @@ async def test_time_that_waits_gives_every_tick_however_late_it_is_asked_for(fee
 
 
 async def test_a_tick_lost_on_the_link_is_counted_and_the_next_one_is_given(feed, monkeypatch):
-    monkeypatch.setattr(telemetry, "TICK_LOST_S", 0.02)
+    monkeypatch.setattr(ticks, "TICK_LOST_S", 0.02)
     source = TickSource(feed)
     source.use_clock(Clock(feed, lost=(22, 23)))
     await source.begin()
@@ -78,7 +78,7 @@ async def test_a_tick_lost_on_the_link_is_counted_and_the_next_one_is_given(feed
 
 
 async def test_telemetry_that_never_comes_ends_the_waiting(feed, monkeypatch):
-    monkeypatch.setattr(telemetry, "TICK_LOST_S", 0.001)
+    monkeypatch.setattr(ticks, "TICK_LOST_S", 0.001)
     source = TickSource(feed)
     source.use_clock(Clock(feed, lost=range(100)))
     await source.begin()

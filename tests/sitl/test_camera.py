@@ -382,7 +382,7 @@ def test_corners_exactly_on_the_near_plane_and_on_the_eye() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_extreme_settings_give_an_image() -> None:
-    narrow = Camera(width_px=64, height_px=64, horizontal_fov_rad=0.11, near_m=1e-6)
+    narrow = Camera(width_px=64, height_px=64, horizontal_fov_rad=0.11, near_m=0.001)
     wide = Camera(width_px=64, height_px=48, horizontal_fov_rad=2.99)
     large = Arena(length_x_m=1000, width_y_m=1000)
     for settings in (narrow, wide):

@@ -69,6 +69,7 @@ class Course:
 @asynccontextmanager
 async def monitor(folder: Path):
     """A monitor for the network with the missions of a folder; yields its address."""
+    (folder / "missions").mkdir()
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "framerunner", "monitor", "--bind", "0.0.0.0", "--port", "0"),
         *(

@@ -26,7 +26,7 @@ from offboard.chart.messages import ENGLISH
 from offboard.mission import MISSIONS, list_missions
 from offboard.pilot import Pilot
 from offboard.pilot_file import PilotFile
-from tests.framerunner.editing.page_socket import served
+from tests.framerunner.editing.page_socket import ORGANISER, served
 
 HOVER = "name: hover\ninitial: up\nstates:\n  up:\n    enter: [hover]\n    final: true  # ü 😀\n"
 CRLF = HOVER.replace("\n", "\r\n").encode()
@@ -198,7 +198,7 @@ def test_a_message_that_no_page_sends_closes_with_one_line(path, message):
 
 async def test_a_page_that_was_closed_leaves_no_traceback(path, caplog):
     web = FastAPI()
-    web.include_router(DocumentsDoor(EditorDesk(path.parent)).router(lambda _: True))
+    web.include_router(DocumentsDoor(EditorDesk(path.parent)).router(lambda _: ORGANISER))
     came = iter([{"type": "websocket.connect"}])
 
     async def receive():

@@ -27,14 +27,14 @@ def test_explorer_with_a_soft_landing_comes_down_on_the_base_without_falling():
         ("explorer_soft_landing", "abejorro", None, 0.1, 0.5),
         ("racer", "abejorro", None, 0.1, 0.5),
         ("explorer", "abejorro", Response(0.6, 0.15, 0.05), 0.3, 1.0),
-        ("explorer", "x500", None, 1.0, 3.2),  # its motors idle for a second, and then ramp up
+        ("explorer", "x500", None, 2.5, 4.0),  # as with PX4, it leaves the ground after three seconds
         ("frame_challenge", "abejorro", None, 1.0, 2.0),  # waits for the next heartbeat
     ],
 )
 def test_the_drone_takes_off_at_once_but_for_the_paper_s_navigator(
     mission, airframe, response, least_s, most_s
 ):
-    changed = {"airframe": airframe, "try_limit_s": 4.0}
+    changed = {"airframe": airframe, "try_limit_s": 5.0}
     scenario = load_scenario("test-case-2").model_copy(update=changed)
     plan = FlightPlan(scenario, load_mission(mission), response=response)
     risen_s = []
@@ -46,7 +46,7 @@ def test_the_drone_takes_off_at_once_but_for_the_paper_s_navigator(
     vehicle = LockstepVehicle(plan, observers=(watch,))
     surroundings = plan.surroundings
     flight = fly_mission(
-        vehicle.drone, vehicle.perception, plan.chart, limit_s=3.5, surroundings=surroundings
+        vehicle.drone, vehicle.perception, plan.chart, limit_s=4.5, surroundings=surroundings
     )
     outcome = asyncio.run(flight)
     assert (outcome.ended, outcome.pauses) == ("timed out", 0)

@@ -250,7 +250,7 @@ def test_a_seed_is_checked(seed, capsys):
 
 def test_a_seed_without_lockstep_is_refused(capsys):
     assert run(["fly", "empty", "--seed", "1"]) == 2
-    assert "add --lockstep" in capsys.readouterr().err
+    assert "--seed 1: is for a flight in lockstep" in capsys.readouterr().err
 
 
 async def test_a_crossing_prints_a_line(capsys):

@@ -42,7 +42,10 @@ def test_a_generated_mission_is_saved_to_the_byte(seed):
     assert diagram(document).nodes
 
 
-@given(st.text(max_size=80) | st.text(alphabet="a: -\n\r\t#'\"{}[]&*!|>", max_size=80))
+@given(
+    st.text(st.characters(exclude_characters="\0", codec="utf-8"), max_size=80)
+    | st.text(alphabet="a: -\n\r\t#'\"{}[]&*!|>", max_size=80)
+)
 def test_any_text_is_a_document_and_is_saved_to_the_byte(text):
     document = Document.from_bytes(text.encode(), "m.yaml")
     assert document.data == text.encode()

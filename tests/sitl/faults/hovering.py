@@ -7,7 +7,7 @@ from scenarios.faults.declaration import Fault
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 
-FAULT_AT_S = 6.0
+FAULT_AT_S = 9.0  # it hovers by then
 READY_LIMIT_US = 30_000_000
 
 
