@@ -124,7 +124,8 @@ def test_a_ground_station_hears_the_mission_from_its_first_state_to_the_verdict(
     beats = station.of("HEARTBEAT")
     assert {beat.message.type for beat in beats} == {mavlink.MAV_TYPE_ONBOARD_CONTROLLER}
     span_s = (beats[-1].vehicle_us - beats[0].vehicle_us) / 1e6
-    assert len(beats) - 1 == pytest.approx(span_s, abs=1.5)
+    # One a second of wall time; vehicle time stands until the flight begins, and may be slower.
+    assert span_s - 1.5 <= len(beats) - 1 <= span_s + 6.0
     assert [text.message.text for text in station.of("STATUSTEXT")] == [
         "mission: rise",
         "mission: wait",
