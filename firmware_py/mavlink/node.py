@@ -266,7 +266,7 @@ class MavlinkNode:
             update()
 
     def repeat(self) -> None:
-        """Send all streams again while vehicle time stands, for who listens only now."""
+        """Send all streams again, for who listens only now; ten times a second while vehicle time stands."""
         for service in self.services:
             service.repeat()
 

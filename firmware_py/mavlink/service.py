@@ -112,7 +112,7 @@ class Service:
         """Send what is due; called at every update of the node."""
 
     def repeat(self) -> None:
-        """Send again what is sent regularly, while vehicle time stands."""
+        """Send again what is sent regularly; called ten times a second while vehicle time stands."""
 
 
 def merged(tables: Iterable[Mapping[int, Entry]]) -> dict[int, Entry]:

@@ -21,6 +21,7 @@ from wire.link import Link
 AutopilotSource = Callable[[Autopilot], Message | None]
 """Makes a message from the autopilot's state; None: it has no content yet."""
 
+_REPEATS_A_SECOND = 10
 _MAX_MESSAGE_ID = 0xFFFFFF
 _MAX_INTERVAL_US = 0x7FFFFFFF
 _LINK_NODE_STATUS = mavlink.MAVLINK_MSG_ID_LINK_NODE_STATUS  # the one message that differs from link to link
@@ -51,6 +52,7 @@ class StreamService(Service):
         self._exchange = exchange
         self._sources = sources
         self._replies = replies
+        self._repeats = 0
         silent = (getattr(mavlink, f"MAVLINK_MSG_ID_{name}") for name in _SILENT.split())
         self._streamable = frozenset({*sources, _LINK_NODE_STATUS, *silent})
         older_requests = {
@@ -79,9 +81,17 @@ class StreamService(Service):
                     link.schedule.keep(message_id, packet)
 
     def repeat(self) -> None:
-        """Send all streams again; those on the grid of requested ones as they were there."""
+        """Send all streams again; those on the grid of requested ones as they were there.
+
+        Where somebody has answered, heartbeats keep to one a second: others take them for a clock.
+        """
+        beat = self._repeats % _REPEATS_A_SECOND == 0
+        self._repeats += 1
         for link in self._exchange.links.values():
+            answered = link.traffic.messages_received > 0
             for message_id, latest in link.schedule.again():
+                if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and answered and not beat:
+                    continue
                 packet = latest or self._packet(message_id, link)
                 if packet is not None:
                     link.send_stream(packet)
