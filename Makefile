@@ -48,7 +48,7 @@ test-set-up:
 test-checks:
 	$(MAKE) $(AT_ONCE_FLAGS) lint test-collect
 
-test-together: # flights in real time use a third of two processors; one more process of tests gets what they leave
+test-together: # flights in real time use a third of two processors; other tests get what they leave
 	$(MAKE) $(AT_ONCE_FLAGS) test-realtime-shared test-core
 
 # Each worker of pytest reads all tests; once they have been read, what they are compiled to is stored.
@@ -95,12 +95,12 @@ test-fast: $(VENV)/installed-dev ## the tests that need no real time, in paralle
 	$(FAST)
 
 # `test` runs them in two parts; those of the second use browsers and several processes.
-FAST = $(BIN)/pytest -n 3 --dist worksteal -m "not realtime"
+FAST = $(BIN)/pytest -n 4 --dist worksteal -m "not realtime"
 CORE = $(addprefix tests/,geometry wire scenarios firmware_py vision sitl offboard)
 
 .PHONY: test-core test-front
 test-core: $(VENV)/installed-dev
-	nice -n 15 $(BIN)/pytest -m "not realtime" $(CORE)
+	nice -n 15 $(BIN)/pytest -n 2 --dist worksteal -m "not realtime" $(CORE)
 
 test-front: $(VENV)/installed-dev
 	$(FAST) $(addprefix --ignore=,$(CORE))
@@ -109,7 +109,7 @@ test-front: $(VENV)/installed-dev
 test-realtime: test-realtime-shared test-realtime-alone ## the tests that fly in real time
 test-realtime-%: export FRAMERUNNER_MAVPROXY := $(abspath $(MAVPROXY_VENV)/bin/mavproxy.py)
 
-# Its workers have other ports than the three of test-fast.
+# Its workers have other ports than those of test-core.
 test-realtime-shared: export FRAMERUNNER_TEST_FIRST_WORKER := 3
 test-realtime-shared: setup
 	$(BIN)/pytest -n 3 --dist loadgroup -m "realtime and not alone" tests/offboard tests/realtime

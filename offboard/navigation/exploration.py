@@ -154,9 +154,10 @@ class Explorer:
     def _place_obstacles(self, columns_m: Sequence[Vec3]) -> None:
         if not columns_m:
             self._obstruction = None
-        elif self._obstruction is None or self._obstruction.columns_m != tuple(columns_m):
-            grid = self.coverage.grid
-            self._obstruction = Obstruction(columns_m, self._table.grounds_m, grid, self._blocks)
+            return
+        if self._obstruction is None:
+            self._obstruction = Obstruction(self._table.grounds_m, self.coverage.grid, self._blocks)
+        self._obstruction.place(columns_m)
 
     def _near(self, here: Pose) -> list[Viewpoint]:
         """The last choice, and views from where the drone is and from below and above."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import dist, pi, remainder
+from math import dist, hypot, pi, remainder
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
@@ -48,6 +48,7 @@ MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
 LOOKED_AT_RAD = 0.3
 LOOK_GAIN_PER_S = 2.0
 LOOK_RAD_S = 0.9
+STOPPED_M_S = 0.2
 KEEP_MODEL_S = (-0.5, 2.0)  # to a gate, less than 0 behind it: then the model of a late vehicle is kept
 
 
@@ -135,7 +136,7 @@ class PathFlight:
         goals = self._goals_now(goals, state)
         looking = self._lookout.command(state, viewed)
         if looking is not None:
-            return looking
+            return self._look_out(looking, state, seen)
         now_s = state.time_us * 1e-6
         if self.watched is not None and not seen.is_seen(self.watched):
             turn_rad = turn_to(self.watched, state)
@@ -159,14 +160,24 @@ class PathFlight:
             and self._style.looks_ahead
             and self._lookout.begin(self._ahead(AHEAD_S + CHECK_S), state, viewed)
         ):
-            self.path = self._left = None
-            return self._lookout.command(state, viewed) or STILL
+            self._leave()
+            return self._look_out(self._lookout.command(state, viewed) or STILL, state, seen)
         if self.path is not None and seen.has_obstacles and not to_gate:
             later = seen.first_unseen(self._ahead(LOOK_AHEAD_S), position_now(state))
             if later is not None:
                 self._looks_aside = True
                 return self.follow(state, _look_rate(turn_to(later, state)))
         return self.follow(state)
+
+    def _look_out(self, command: VelocityCommand, state: DroneState, seen: SeenSpace) -> VelocityCommand:
+        """The lookout's command; among obstacles the drone first stops on its path, and stays where it is."""
+        if not seen.has_obstacles:
+            self._left = None
+            return command
+        if self._left is not None and hypot(*state.velocity_arena_m_s) > STOPPED_M_S:
+            return self._stand(state, command.yaw_rate_rad_s)
+        self._left = None
+        return replace(command, forward_m_s=0.0, left_m_s=0.0)
 
     def _plan_if_due(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> bool:
         """Plan again if goals or obstacles have changed, or stand in the way; whether that was checked."""
@@ -221,8 +232,13 @@ class PathFlight:
     def _goals_now(self, goals: Sequence[Goal], state: DroneState) -> Sequence[Goal]:
         """The goals, or for a drone that something holds a place on the way that it came."""
         back, now_s = self._stuck.back, state.time_us * 1e-6
+        has_path = self.path is not None
         self._stuck.observe(
-            position_now(state), now_s, self._follower.error_m, has_path=self.path is not None
+            position_now(state),
+            now_s,
+            self._follower.error_m,
+            has_path=has_path,
+            has_way=has_path or not self.refusal,
         )
         if self._stuck.back is not back:
             self.change()

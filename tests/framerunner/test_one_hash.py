@@ -1,4 +1,4 @@
-"""A hundred runs of one flight, half of them beside others in other processes: one hash."""
+"""Runs of one flight, half of them beside others in other processes: one hash."""
 
 from math import inf, nextafter
 
@@ -20,17 +20,17 @@ def task(number, name="test-case-1"):
     return FlightPlan(load_scenario(name).model_copy(update=update), MISSION)
 
 
-def test_a_hundred_runs_of_one_flight_have_one_hash():
-    alone = [fly_task(task(number)) for number in range(50)]
-    ours = [task(number) for number in range(50, 100)]
-    others = [task(number, "test-case-3") for number in range(100, 125)]
+def test_runs_of_one_flight_have_one_hash():
+    alone = [fly_task(task(number)) for number in range(12)]
+    ours = [task(number) for number in range(12, 24)]
+    others = [task(number, "test-case-3") for number in range(24, 30)]
     mixed = [each for pair in zip(ours[::2], others, ours[1::2], strict=True) for each in pair]
     together = list(fly_all(mixed, Pool(jobs=2)))
     own = {each.scenario.name for each in ours}
     hashes = {row.state_sha256 for row in alone} | {
         row.state_sha256 for row in together if row.scenario in own
     }
-    assert len(together) == 75
+    assert len(together) == 18
     assert len(hashes) == 1
     assert {row.state_sha256 for row in together if row.scenario not in own}.isdisjoint(hashes)
 

@@ -157,8 +157,7 @@ def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("busy", [0, 4])
-def test_the_explorer_is_quick_enough_for_a_drone_whose_time_does_not_wait(tmp_path, instance, busy):
+def test_the_explorer_is_quick_enough_for_a_drone_whose_time_does_not_wait(tmp_path, instance):
     """Late ticks and images cost precision, not the flight."""
     (tmp_path / "app").mkdir()
     drone = ("--drone", f"udpin://127.0.0.1:{14540 + instance}")
@@ -166,13 +165,13 @@ def test_the_explorer_is_quick_enough_for_a_drone_whose_time_does_not_wait(tmp_p
     arguments = ("fly", "test-case-1", "--mission", "explorer", *drone, *camera)
     with (
         simulator(tmp_path, instance, "--scenario", "test-case-1"),
-        disturbed(instance, busy=busy, viewers=0),
+        disturbed(instance, busy=4, viewers=0),
         program(tmp_path / "app", *arguments) as flight,
     ):
         assert flight.process.wait(240.0) == 0, flight.err + flight.out
     (run,) = (tmp_path / "app" / "runs").iterdir()
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))
-    assert result["verdict"] in (("clean", "completed") if busy else ("clean",)), result["reason"]
+    assert result["verdict"] in ("clean", "completed"), result["reason"]
     assert result["try_time_s"] < 45.0
     assert result["timing"]["vehicle_time_waits"] is False
 

@@ -27,6 +27,7 @@ from vision.types import ObstacleEdge
 _MOVED_M: Final = 0.15  # an image from a pose nearer than this and _TURNED_RAD to the last one is skipped
 _TURNED_RAD: Final = 0.12
 _MARGIN_M: Final = 0.12  # beyond a frame at a cell's centre: it may be elsewhere in the cell
+_MOST_WAITING: Final = 2
 _FADE: Final = 0.9998  # of what has been seen, an image used: what was seen long ago is looked at again
 
 
@@ -45,11 +46,15 @@ class Coverage:
         self._seen = np.zeros((HEADINGS, self._centres[0].size), dtype=np.float32)
         self._last: tuple[Vec3, float] | None = None
         self._waiting: list[tuple[CameraPose, Sequence[ObstacleEdge]]] = []
+        self._is_asked = False
 
     def update(
         self, position_m: Vec3, attitude_arena: Quaternion, obstacle_edges: Sequence[ObstacleEdge] = ()
     ) -> None:
-        """Take in an image, whatever it showed; what it adds is computed when the coverage is asked for.
+        """Take in an image, whatever it showed.
+
+        What images add is computed when the coverage is asked for and, once it was, soon after them, so that
+        many of them never wait for one tick.
 
         Args:
             position_m: of the drone's centre when the image was exposed, arena axes.
@@ -58,9 +63,12 @@ class Coverage:
         """
         if self._is_new(position_m, yaw_of(attitude_arena)):
             self._waiting.append((self._camera.pose(position_m, attitude_arena), obstacle_edges))
+            if self._is_asked and len(self._waiting) > _MOST_WAITING:
+                self._add(*self._waiting.pop(0))
 
     def _cells(self) -> Floats:
         """Quality of the best view, 0 to 1, by heading and cell of the grid: shape (HEADINGS, x, y, z)."""
+        self._is_asked = True
         for pose, obstacle_edges in self._waiting:
             self._add(pose, obstacle_edges)
         self._waiting.clear()

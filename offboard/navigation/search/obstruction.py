@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import hypot
 from typing import Final
@@ -21,35 +21,58 @@ _MOST_ROUNDS: Final = 80
 
 
 class Obstruction:
-    """Made for one set of obstacles; the work is done once.
+    """Made for one grid; the work is done once for each obstacle.
 
     Args:
-        columns_m: obstacles from the floor to the ceiling, as discs: x, y, radius.
         places_m: x and y of places to look from, shape (places, 2).
         grid: its cells are flown through.
         blocks: its blocks are looked at.
 
     Attributes:
-        columns_m: the obstacles.
+        columns_m: obstacles from the floor to the ceiling, as discs: x, y, radius.
         clear: which blocks, in plan, can be seen from each place: shape (places, blocks x * blocks y).
     """
 
-    def __init__(
-        self, columns_m: Sequence[Vec3], places_m: Floats, grid: SearchGrid, blocks: SearchGrid
-    ) -> None:
-        self.columns_m = tuple(columns_m)
-        self._grid = grid
+    def __init__(self, places_m: Floats, grid: SearchGrid, blocks: SearchGrid) -> None:
+        self.columns_m: tuple[Vec3, ...] = ()
+        self._places_m, self._grid = places_m, grid
         to_x, to_y = (axis.ravel() for axis in np.meshgrid(blocks.x_m, blocks.y_m, indexing="ij"))
         self._blocks_m = (to_x, to_y)
-        self.clear = self.clear_from(places_m)
+        self.clear: Bools = np.ones((len(places_m), to_x.size), dtype=bool)
         x, y = np.meshgrid(grid.x_m, grid.y_m, indexing="ij")
-        self._costs: list[tuple[tuple[slice, slice], tuple[slice, slice], Floats]] = []
-        for step in _STEPS:
-            here, there = _slices(step[0]), _slices(step[1])
-            leave, enter = (here[0], there[0]), (here[1], there[1])
-            clear = _is_clear(self.columns_m, x[leave], y[leave], x[enter], y[enter], room_m=_ROOM_M)
-            length_m = np.float32(hypot(step[0] * _pitch(grid.x_m), step[1] * _pitch(grid.y_m)))
-            self._costs.append((leave, enter, np.where(clear, length_m, np.float32(np.inf))))
+        self._steps: list[_Step] = []
+        for along_x, along_y in _STEPS:
+            (leave_x, enter_x), (leave_y, enter_y) = _slices(along_x), _slices(along_y)
+            leave, enter = (leave_x, leave_y), (enter_x, enter_y)
+            length_m = np.float32(hypot(along_x * _pitch(grid.x_m), along_y * _pitch(grid.y_m)))
+            self._steps.append(_Step(leave, enter, (x[leave], y[leave], x[enter], y[enter]), length_m))
+        self._kept: dict[
+            Vec3, tuple[Bools, ...]
+        ] = {}  # by obstacle: what it leaves in sight, and of each step
+        self._costs_m: list[Floats] = []
+
+    def place(self, columns_m: Sequence[Vec3]) -> None:
+        """Take in which obstacles there are."""
+        if self.columns_m == tuple(columns_m):
+            return
+        self.columns_m = tuple(columns_m)
+        new = tuple(each for each in self.columns_m if each not in self._kept)
+        left = self._left_by(new) if new else ()
+        kept = self._kept | dict(zip(new, left, strict=True))
+        self._kept = {each: kept[each] for each in self.columns_m}
+        together = zip(*self._kept.values(), strict=True)
+        self.clear, *steps = (np.logical_and.reduce(masks) for masks in together)
+        self._costs_m = [
+            np.where(clear, step.length_m, np.float32(np.inf))
+            for step, clear in zip(self._steps, steps, strict=True)
+        ]
+
+    def _left_by(self, columns_m: Sequence[Vec3]) -> Iterator[tuple[Bools, ...]]:
+        """What each obstacle leaves: blocks in sight of each place, and steps from cell to cell."""
+        steps = (_each_clear(columns_m, *step.ends_m, room_m=_ROOM_M) for step in self._steps)
+        x, y = self._places_m[:, 0:1], self._places_m[:, 1:2]
+        in_sight = _each_clear(columns_m, x, y, *self._blocks_m, room_m=0.0, end_m=_IN_BLOCK_M)
+        return zip(in_sight, *steps, strict=True)
 
     def clear_from(self, places_m: Floats) -> Bools:
         """Which blocks, in plan, can be seen from places; those in which an obstacle stands can.
@@ -60,9 +83,8 @@ class Obstruction:
         Returns:
             Shape (places, blocks x * blocks y).
         """
-        return _is_clear(
-            self.columns_m, places_m[:, 0:1], places_m[:, 1:2], *self._blocks_m, room_m=0.0, end_m=_IN_BLOCK_M
-        )
+        from_x, from_y = places_m[:, 0:1], places_m[:, 1:2]
+        return _is_clear(self.columns_m, from_x, from_y, *self._blocks_m, room_m=0.0, end_m=_IN_BLOCK_M)
 
     def ways_from(self, at_m: Vec3) -> WaysRound:
         """The ways from a position."""
@@ -79,12 +101,23 @@ class Obstruction:
         field_m[i, j] = WaysRound(at_m, columns_m, grid, field_m).distances_m(grid.x_m[i], grid.y_m[j])
         for _ in range(_MOST_ROUNDS):
             before = field_m.copy()
-            for leave, enter, cost_m in self._costs:
+            for step, cost_m in zip(self._steps, self._costs_m, strict=True):
+                leave, enter = step.leave, step.enter
                 np.minimum(field_m[enter], field_m[leave] + cost_m, out=field_m[enter])
                 np.minimum(field_m[leave], field_m[enter] + cost_m, out=field_m[leave])
             if np.array_equal(before, field_m):
                 break
         return WaysRound(at_m, columns_m, grid, field_m)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Step:
+    """From each cell to the next one in a direction: where they are in the grid, and in the arena."""
+
+    leave: tuple[slice, slice]
+    enter: tuple[slice, slice]
+    ends_m: tuple[Floats, Floats, Floats, Floats]  # x and y left, x and y entered
+    length_m: np.float32
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,10 +159,25 @@ def _is_clear(
     end_m: float = 0.0,
 ) -> Bools:
     """Whether straight lines stay clear of all obstacles, but for those within `end_m` of their ends."""
+    clear: Bools = _each_clear(columns_m, from_x, from_y, to_x, to_y, room_m=room_m, end_m=end_m).all(axis=0)
+    return clear
+
+
+def _each_clear(
+    columns_m: Sequence[Vec3],
+    from_x: Floats,
+    from_y: Floats,
+    to_x: Floats,
+    to_y: Floats,
+    *,
+    room_m: float,
+    end_m: float = 0.0,
+) -> Bools:
+    """Likewise of each obstacle, shape (obstacles, *lines)."""
     along_x, along_y = to_x - from_x, to_y - from_y
     length_2 = np.maximum(along_x * along_x + along_y * along_y, np.float32(1e-6))
-    clear = np.ones(length_2.shape, dtype=bool)
     columns = np.array(columns_m, dtype=np.float32).reshape(-1, 3)
+    clear = np.empty((len(columns), *length_2.shape), dtype=bool)
     at_once = max(_LARGEST // max(length_2.size, 1), 1)
     for first in range(0, len(columns), at_once):
         x, y, radius = columns[first : first + at_once].T.reshape(3, -1, *(1 for _ in length_2.shape))
@@ -141,7 +189,7 @@ def _is_clear(
         if end_m > 0.0:
             dx, dy = x - to_x, y - to_y
             free |= dx * dx + dy * dy < np.float32(end_m**2)
-        clear &= free.all(axis=0)
+        clear[first : first + at_once] = free
     return clear
 
 
