@@ -12,8 +12,9 @@ OFF_PATH_M = 0.1  # a drone that is so far from its path, and
 HELD_M = 0.08  # not farther than this from one place
 HELD_S = 1.0  # for so long, is held
 STUCK_S = 3.0  # near one place, and off its path at times, or without a way: it flies back the way it came
-BACK_M = 0.8  # by this
+BACK_M = 0.8  # by this, and farther if it is stuck there again
 STEP_M = 0.1  # between two places of this way
+WAY_M = 8.0  # that is remembered
 MAX_BACK_S = 3.0
 
 
@@ -35,7 +36,7 @@ class StuckDetector:
         self._near_s = 0.0  # since when it has been near there, with a path to fly
         self._way_s = 0.0  # when there was a way last
         self._was_off = False  # and has been off its path
-        self._way: deque[Vec3] = deque(maxlen=round(BACK_M / STEP_M))  # that the drone came
+        self._way: deque[Vec3] = deque(maxlen=round(WAY_M / STEP_M))  # that the drone came
 
     def observe(
         self, here_m: Vec3, now_s: float, off_path_m: float, *, has_path: bool, has_way: bool
@@ -52,7 +53,7 @@ class StuckDetector:
         if not has_path or off_path_m < OFF_PATH_M or dist(here_m, self._free_m) > HELD_M:
             self._free_m, self._free_s = here_m, now_s
         self.is_held = now_s - self._free_s > HELD_S
-        if not self._way or dist(here_m, self._way[-1]) > STEP_M:
+        if self.back is None and (not self._way or dist(here_m, self._way[-1]) > STEP_M):
             self._way.append(here_m)
         if not has_path or dist(here_m, self._near_m) > STEP_M:
             self._near_m, self._near_s, self._was_off = here_m, now_s, False
@@ -68,7 +69,9 @@ class StuckDetector:
 
     def _turn_back(self, here_m: Vec3, now_s: float) -> None:
         """Fly back, if the drone has come from anywhere."""
-        (x, y, _), place_m = here_m, self._way[0]
+        for _ in range(min(round(BACK_M / STEP_M), len(self._way)) - 1):
+            self._way.pop()
+        (x, y, _), place_m = here_m, self._way[-1]
         if dist(here_m, place_m) > STEP_M:
             self.back = Point(place_m, atan2(y - place_m[1], x - place_m[0]))
             self._back_s = self._near_s = self._way_s = now_s

@@ -1,9 +1,9 @@
-"""Random layouts, known: plans through them, what a plan must obey, and flights in lockstep."""
+"""Random layouts, known: plans through them, what a plan must obey, and flights in lockstep or as told."""
 
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, hypot, sin
 
 import numpy as np
@@ -13,6 +13,7 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
 from geometry.solids import Solid
 from geometry.vectors import Vec3
+from offboard.drone import DroneState, VelocityCommand
 from offboard.keep_in_box import KeepInBox
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import CONTEST, FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
@@ -25,6 +26,15 @@ from scenarios.random_scenarios import load_level, random_scenario
 from scenarios.result import RefereeReport
 
 STEP_S = 0.01
+
+
+def flown(state: DroneState, command: VelocityCommand) -> DroneState:
+    """The state a tick later of a drone that flies as it is told."""
+    c, s, forward, left = cos(state.yaw), sin(state.yaw), command.forward_m_s, command.left_m_s
+    velocity = (c * forward - s * left, s * forward + c * left, command.up_m_s)
+    x, y, z = (at + 0.05 * v for at, v in zip((state.x, state.y, state.z), velocity, strict=True))
+    yaw, time_us = state.yaw + 0.05 * command.yaw_rate_rad_s, state.time_us + 50_000
+    return replace(state, time_us=time_us, x=x, y=y, z=z, yaw=yaw, velocity_arena_m_s=velocity)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """What the navigator does with a goal, and when it needs every image."""
 
 from dataclasses import replace
-from math import cos, sin
 
 from framerunner.flying.plan import FlightPlan
 from offboard.drone import DroneState
@@ -10,6 +9,7 @@ from offboard.navigation import path_flight
 from offboard.navigation.goals import Refusal
 from offboard.navigation.navigator import Navigator
 from scenarios.random_scenarios import load_level, random_scenario
+from tests.offboard.navigation.flown_layouts import flown
 
 STATE = DroneState(0, 0.0, 0.0, 1.0, 0.0, (0.5, 0.0, 0.0), armed=True, offboard=True)
 
@@ -56,25 +56,32 @@ def test_a_drone_that_something_unseen_holds_flies_back_the_way_it_came():
     plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
     navigator = Navigator(plan.surroundings, plan.command_limits)
     state, wall_x_m, stopped, least_x_m = STATE, 1.0, False, 9.0
-    for tick in range(1, 20 * 9):
+    for _ in range(20 * 9):
         navigator.observe(state, ())
-        command = navigator.fly_to((3.0, 0.0, 1.0))
-        level = (
-            cos(state.yaw) * command.forward_m_s - sin(state.yaw) * command.left_m_s,
-            sin(state.yaw) * command.forward_m_s + cos(state.yaw) * command.left_m_s,
-        )
-        x_m = min(state.x + 0.05 * level[0], wall_x_m)
-        velocity_m_s = ((x_m - state.x) / 0.05, level[1], command.up_m_s)
-        state = replace(
-            state,
-            time_us=50_000 * tick,
-            x=x_m,
-            y=state.y + 0.05 * level[1],
-            z=state.z + 0.05 * command.up_m_s,
-            yaw=state.yaw + 0.05 * command.yaw_rate_rad_s,
-            velocity_arena_m_s=velocity_m_s,
-        )
+        before, state = state, flown(state, navigator.fly_to((3.0, 0.0, 1.0)))
+        x_m, (_, y_m_s, up_m_s) = min(state.x, wall_x_m), state.velocity_arena_m_s
+        state = replace(state, x=x_m, velocity_arena_m_s=((x_m - before.x) / 0.05, y_m_s, up_m_s))
         stopped = stopped or x_m == wall_x_m
         least_x_m = min(least_x_m, x_m) if stopped else 9.0
     assert stopped
     assert least_x_m < wall_x_m - 0.5
+
+
+def test_a_drone_from_which_no_way_leads_on_flies_back_the_way_it_came(monkeypatch):
+    plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
+    navigator, xs_m = Navigator(plan.surroundings, plan.command_limits), [0.0]
+
+    class Refusing(path_flight.Search):
+        def path(self, start=None):
+            shut = max(xs_m) > 1.2 and xs_m[-1] > 0.8 and self.goals[0].position_m[0] > 1.0
+            return Refusal("obstacles block the way") if shut else super().path(start)
+
+    monkeypatch.setattr(path_flight, "Search", Refusing)
+    state = STATE
+    while len(xs_m) < 20 * 40 and xs_m[-1] < 2.8:
+        navigator.observe(state, ())
+        state = flown(state, navigator.fly_to((3.0, 0.3 if max(xs_m) > 1.2 else 0.0, 1.0)))
+        xs_m.append(state.x)
+    assert xs_m[-1] >= 2.8
+    farthest = next(tick for tick, x_m in enumerate(xs_m) if x_m > 1.2)
+    assert min(xs_m[farthest:]) < 0.8

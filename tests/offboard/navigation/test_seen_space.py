@@ -8,7 +8,7 @@ from math import atan2, cos, dist, hypot, pi, sin
 import pytest
 
 from geometry.rotations import quaternion_from_yaw
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState
 from offboard.limits import CONTEST as CONTEST_LIMITS
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import CONTEST, Gate, Obstacles, Point
@@ -16,6 +16,7 @@ from offboard.navigation.path_flight import TICK_WORK, PathFlight
 from offboard.navigation.search.viewed_space import ViewedSpace
 from offboard.navigation.seen_space import SeenSpace
 from scenarios.models import Arena, Base, Camera
+from tests.offboard.navigation.flown_layouts import flown
 from tests.offboard.navigation.test_obstacle_map import edges_of
 
 CAMERA = CameraModel.of(Camera(position_flu_m=(0.0, 0.0, 0.0)))
@@ -117,15 +118,6 @@ def test_a_path_after_a_pause_begins_at_its_start():
     assert flight._follower.progress_on(flight.path) == pytest.approx(0.05)
 
 
-def flown(state: DroneState, command: VelocityCommand) -> DroneState:
-    """The state a tick later of a drone that flies as it is told."""
-    c, s, forward, left = cos(state.yaw), sin(state.yaw), command.forward_m_s, command.left_m_s
-    velocity = (c * forward - s * left, s * forward + c * left, command.up_m_s)
-    x, y, z = (at + 0.05 * v for at, v in zip((state.x, state.y, state.z), velocity, strict=True))
-    yaw, time_us = state.yaw + 0.05 * command.yaw_rate_rad_s, state.time_us + 50_000
-    return replace(state, time_us=time_us, x=x, y=y, z=z, yaw=yaw, velocity_arena_m_s=velocity)
-
-
 def test_a_drone_that_stops_before_unseen_space_does_not_fly_on_while_it_plans():
     """It finds ways round what may be there, and leaves each at once, because nothing of them was seen."""
     seen, flight = seen_from(), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
@@ -186,3 +178,19 @@ def height_after_a_metre(gate: Gate, *, needed: bool) -> float:
 def test_before_a_steep_flight_to_a_gate_the_drone_climbs_until_the_way_is_in_view():
     gate = Gate((3.0, 0.0, 3.0), 0.0)
     assert height_after_a_metre(gate, needed=True) > height_after_a_metre(gate, needed=False) + 0.3
+
+
+def test_among_obstacles_a_drone_stops_on_its_path_and_looks_up_from_there():
+    """Beside its path may be what it has not seen."""
+    seen, viewed = seen_from(posts=[(4.0, 3.0, 0.2)]), ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0))
+    flight, gate = PathFlight(Arena(), CONTEST, CONTEST_LIMITS), Gate((3.0, 0.0, 3.0), 0.0)
+    state, looking_m_s = DroneState(0, *HERE, yaw=0.0), []
+    for _ in range(60):
+        viewed.update(CAMERA.pose((state.x, state.y, state.z), quaternion_from_yaw(state.yaw)))
+        command = flight.fly([gate], Obstacles((gate,)), state, seen, viewed)
+        state = flown(state, command)
+        if flight.looks:
+            looking_m_s.append(hypot(command.forward_m_s, command.left_m_s))
+    assert len(looking_m_s) > 10
+    assert looking_m_s[-1] == 0.0
+    assert sum(looking_m_s) * 0.05 < 0.3
