@@ -46,24 +46,26 @@ def main() -> None:
     options = parser.parse_args()
     cv2.setNumThreads(1)
     plans = plan_level(options.level, options.seed, options.count, load_mission(options.mission))
-    longest, every = (0.0, ""), []
+    longest, every, clean = (0.0, ""), [], 0
     for plan in plans.tasks():
-        repeats = [ticks(plan)]
+        is_clean, flown = ticks(plan)
+        clean += is_clean
+        repeats = [flown]
         while len(repeats) < options.repeats and max(ms for ms, _, _ in repeats[-1]) > LIMIT_MS:
-            repeats.append(ticks(plan))
+            repeats.append(ticks(plan)[1])
         for same in zip(*repeats, strict=True):
             took_ms = min(ms for ms, _, _ in same)
             _, at_s, state = same[0]
             every.append(took_ms)
             longest = max(longest, (took_ms, f"{plan.scenario.name}, {at_s:.2f} s after take-off in {state}"))
     over = sum(ms > LIMIT_MS for ms in every)
-    print(f"longest tick: {longest[0]:.1f} ms ({longest[1]})")
+    print(f"{options.count} flights, {clean} clean; longest tick: {longest[0]:.1f} ms ({longest[1]})")
     print(f"{len(every)} ticks: {over} over {LIMIT_MS:g} ms", end="; ")
     print(", ".join(f"{share} % below {np.percentile(every, share):.1f} ms" for share in (50, 99, 99.9)))
 
 
-def ticks(plan: FlightPlan) -> list[tuple[float, float, str]]:
-    """Of one flight: processor time, milliseconds, time of flight, seconds, and the mission's state."""
+def ticks(plan: FlightPlan) -> tuple[bool, list[tuple[float, float, str]]]:
+    """Whether a flight is clean; of each tick processor time, ms, time of flight, s, and mission's state."""
     found: list[tuple[float, float, str]] = []
     took_ms = 0.0
 
@@ -83,8 +85,8 @@ def ticks(plan: FlightPlan) -> list[tuple[float, float, str]]:
     def end(moment: Moment) -> None:
         found.append((took_ms, moment.flight_time_s, moment.mission_state))
 
-    asyncio.run(lockstep_flight(plan, observers=(end,), before_tick=begin))
-    return found
+    flown = asyncio.run(lockstep_flight(plan, observers=(end,), before_tick=begin))
+    return flown.result.verdict == "clean", found
 
 
 if __name__ == "__main__":
