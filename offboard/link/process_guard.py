@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import faulthandler
 import json
+import logging
 import os
 import signal
 import subprocess
@@ -14,6 +15,7 @@ from typing import IO, Self
 
 _PROGRAM = Path(__file__).with_name("guard_process.py")
 _END_S = 2.0
+logger = logging.getLogger(__name__)
 
 
 class ProcessGuard:
@@ -45,6 +47,7 @@ class ProcessGuard:
         self._trace_path = trace
         self._trace: IO[str] | None = None
         self._process: subprocess.Popen[bytes] | None = None
+        self._has_failed = False
         self.is_used = False
 
     def __enter__(self) -> Self:
@@ -57,17 +60,20 @@ class ProcessGuard:
 
     def expect(self, limit_s: float) -> None:
         """This process stands still if this is not called again within some seconds; 0: it need not be."""
-        if self._process is None and not limit_s:
+        if self._has_failed or (self._process is None and not limit_s):
             return
         self.is_used = True
         line = b"%g\n" % limit_s
         for _ in range(2):  # a guard that somebody has ended is started again
-            if self._process is None:
-                self._start()
-            assert self._process is not None
-            assert self._process.stdin is not None
             try:
-                os.write(self._process.stdin.fileno(), line)
+                process = self._process = self._process or self._started()
+            except OSError as error:
+                self._has_failed = True
+                logger.warning("the guard against a hung app cannot be started (%s)", error.strerror)
+                return
+            assert process.stdin is not None
+            try:
+                os.write(process.stdin.fileno(), line)
             except BlockingIOError:  # it is stopped, and has thousands of lines
                 return
             except OSError:
@@ -87,19 +93,21 @@ class ProcessGuard:
             self._trace.close()
             self._trace = None
 
-    def _start(self) -> None:
+    def _started(self) -> subprocess.Popen[bytes]:
         if self._trace_path is not None and self._trace is None:
-            self._trace = self._trace_path.open("w", encoding="utf-8")
+            with suppress(OSError):
+                self._trace = self._trace_path.open("w", encoding="utf-8")
         with suppress(OSError, ValueError, RuntimeError):  # standard error may be no file
             faulthandler.register(signal.SIGUSR1, self._trace or sys.stderr)
-        self._process = subprocess.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-I", "-S", str(_PROGRAM), str(os.getpid()), json.dumps(self._words)],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             start_new_session=True,  # Ctrl-C and a closed terminal are for this process
         )
-        assert self._process.stdin is not None
-        os.set_blocking(self._process.stdin.fileno(), False)
+        assert process.stdin is not None
+        os.set_blocking(process.stdin.fileno(), False)
+        return process
 
     def _forget(self) -> None:
         process, self._process = self._process, None
