@@ -55,7 +55,7 @@ def read_foreign(text: str, source: str) -> Calibration:
         ) from None
     except (cv2.error, SystemError):  # SystemError: of its constructor
         raise CalibrationError(f"{source}: {kind}: cannot be read; it is damaged") from None
-    except (ValueError, TypeError, AttributeError, RecursionError, yaml.YAMLError) as error:
+    except (ValueError, TypeError, AttributeError, OverflowError, RecursionError, yaml.YAMLError) as error:
         reason = str(error).strip().splitlines() or ["it is damaged"]
         raise CalibrationError(f"{source}: {kind}: {reason[0]:.200}") from None
 
@@ -95,7 +95,7 @@ def _ros_fields(text: str) -> dict[str, _Field]:
 def _calibration(fields: Mapping[str, _Field]) -> Calibration:
     plain = {re.sub(r"[^a-z]", "", name.lower()): value for name, value in fields.items()}
     lens = fields.get("distortion_model", _LENSES[0])
-    if lens not in _LENSES or _numbers(plain, ("fisheyemodel",), [0.0])[0]:
+    if lens not in _LENSES or any(_numbers(plain, ("fisheyemodel",), [0.0])):
         known = "plumb_bob or rational_polynomial"
         raise ValueError(
             f"the lens is {lens if lens not in _LENSES else 'fisheye'}; only {known} is understood"
@@ -134,7 +134,7 @@ def _numbers(
     fields: Mapping[str, _Field], names: Sequence[str], default: Sequence[float] | None, shown: str = ""
 ) -> Sequence[float]:
     value = next((fields[name] for name in names if name in fields), default)
-    if value is None:
+    if value is None or (shown and not value):
         raise ValueError(f"{shown} is missing; add it")
     if isinstance(value, str):
         raise ValueError(f"{shown or names[0]} is '{value}'; must be a number")
