@@ -80,10 +80,10 @@ class _Job:
         refused: it was not even started.
     """
 
-    def __init__(self, name: str, worker: WorkerProcess, *, is_batch: bool, language: Language) -> None:
+    def __init__(self, name: str, *, is_batch: bool, language: Language) -> None:
         self.name = name
         self.language = language  # of who started it
-        self.worker = worker
+        self.worker = WorkerProcess()  # never started, until one is taken
         self.is_batch = is_batch
         self.task: BaseModel | None = None
         self.watchers: set[Watcher] = set()
@@ -182,7 +182,8 @@ class EditingService:
             self._cancel(job)
         if self._live is not None:
             await self._live.close()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        while self._tasks:  # they may begin others, to end a worker
+            await asyncio.gather(*self._tasks, return_exceptions=True)
 
     async def _do_live(self, request: messages.StartLive | messages.StopLive, watcher: Watcher) -> None:
         if self._live is None:
@@ -225,7 +226,7 @@ class EditingService:
             )
         else:
             task = messages.RunTask.model_validate({**common, "run": name, "start": start})
-        job = self._jobs[name] = _Job(name, WorkerProcess(), is_batch=is_batch, language=request.language)
+        job = self._jobs[name] = _Job(name, is_batch=is_batch, language=request.language)
         job.task = task
         job.watchers.add(watcher)
         job.ask(watcher, request.tag)
@@ -304,7 +305,8 @@ class EditingService:
                 how = Said("flight.silent", seconds=self._settings.silent_s)
                 job.worker.kill()
             if is_ready:
-                self._workers.give_back(job.worker)
+                worker, job.worker = job.worker, WorkerProcess()  # the next one's, from now on
+                self._workers.give_back(worker)
             else:
                 how = await job.worker.ended() or how
         finally:
