@@ -213,8 +213,8 @@ def _next_multiple_us(tick_number: int, period_us: int) -> int:
     return -(-tick_number * TICK_US // period_us) * period_us
 
 
-class Asking:
-    """Asks one vehicle, and waits while its ticks go on.
+class Requester:
+    """Sends requests to one vehicle, and waits while its ticks go on.
 
     Args:
         feed: the vehicle's telemetry.
