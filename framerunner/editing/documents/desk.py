@@ -6,12 +6,13 @@ import asyncio
 import contextlib
 import re
 import time
-from collections import OrderedDict, defaultdict
+from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
+from weakref import WeakValueDictionary
 
 from errors.files import read_text, resolved_in_folder
 from framerunner.editing.documents.open_document import OpenDocument, write_problem
@@ -106,7 +107,7 @@ class EditorDesk:
         self.folder = folder
         self._pilot_class = pilot_class
         self._open: dict[str, SharedDocument] = {}
-        self._opening: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._opening: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
         self._threads = ThreadPoolExecutor(_THREADS, "editor")
 
     async def work(self, what: Callable[[], T]) -> T:
@@ -125,7 +126,8 @@ class EditorDesk:
         """A file's document; call its `leave` at the end. Raises `DeskError` or `MissionError`."""
         if not _FILE.fullmatch(name):
             raise DeskError("desk.not_here", name=name[:80])
-        async with self._opening[name]:  # of this file only: others are not held up
+        # Of this file only: others are not held up.
+        async with self._opening.setdefault(name, asyncio.Lock()):
             shared = self._open.get(name)
             if shared is not None and shared.users == 0 and await self.work(shared.opened.is_outdated):
                 self._open.pop(name, None)
