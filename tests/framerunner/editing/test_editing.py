@@ -16,8 +16,8 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from framerunner.course.lessons import find_lesson
-from framerunner.editing.line import Line
 from framerunner.editing.service import EditingSettings
+from framerunner.editing.waiting_queue import WaitingQueue
 from framerunner.editing.web import EditingDoor
 from framerunner.editing.worker_pool import WorkerPool
 from framerunner.evaluation.runner import fly_task
@@ -347,7 +347,7 @@ def test_a_pupil_starts_no_flight_in_the_simulator():
 
 def test_a_line_expects_turns_by_the_durations_of_those_before():
     now_s = 0.0
-    line = Line(2, 10.0, lambda: now_s)
+    line = WaitingQueue(2, 10.0, lambda: now_s)
     for each in "abcde":
         line.enter(each)
     assert list(line.begin()) == ["a", "b"]
