@@ -113,6 +113,23 @@ def replace_file(path: str | os.PathLike[str], content: str | bytes, new_mode: i
         raise
 
 
+def make_file(path: Path, text: str) -> None:
+    """Write a new file, as UTF-8, completely or not at all.
+
+    Raises:
+        FileExistsError: there is something already, which is left as it is.
+        OSError: it cannot be written.
+    """
+    with path.open("xb") as file:
+        try:
+            file.write(text.encode())
+            file.flush()
+        except OSError:
+            with contextlib.suppress(OSError):
+                path.unlink()  # of a part, which would be taken for the whole
+            raise
+
+
 def resolved_in_folder(path: Path) -> Path:
     """Where a file of a folder lies, links followed; it need not exist.
 

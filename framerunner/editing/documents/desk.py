@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 from weakref import WeakValueDictionary
 
-from errors.files import read_text, resolved_in_folder
+from errors.files import make_file, read_text, resolved_in_folder
 from framerunner.editing.documents.open_document import OpenDocument, write_problem
 from framerunner.editing.words import Language, Said, SaidError
 from offboard.mission import MISSIONS, list_missions, new_mission
@@ -194,14 +194,7 @@ class EditorDesk:
         path = self.folder / (f"{name}-{owner}.yaml" if owner else f"{name}.yaml")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            with path.open("x", encoding="utf-8", newline="") as file:
-                try:
-                    file.write(text)
-                    file.flush()
-                except OSError:
-                    with contextlib.suppress(OSError):
-                        path.unlink()  # half a mission
-                    raise
+            make_file(path, text)
         except FileExistsError:
             raise DeskError("desk.taken", name=path.name) from None
         except OSError as error:
