@@ -32,16 +32,17 @@ async def request_rates(feed: TelemetryFeed, plugin: Any, *, stands: bool = Fals
 
     A refusal is no error. A vehicle whose time stands is asked for what is not known to come often enough.
     """
-    needed = [plugin.set_rate_position_velocity_ned, plugin.set_rate_landed_state]
-    if not stands:
+    if stands:
+        needed = [plugin.set_rate_position_velocity_ned, plugin.set_rate_landed_state]
+    else:
         start_us, attitudes, positions = feed.time_us, feed.attitudes, feed.positions
         await asyncio.sleep(0.5)
         span_s = max((feed.time_us - start_us) / 1e6, 1e-3)
-        rates = (
-            (plugin.set_rate_attitude_euler, feed.attitudes - attitudes),
-            (plugin.set_rate_position_velocity_ned, feed.positions - positions),
-        )
-        needed = [request for request, received in rates if received / span_s < 0.9 * WANTED_RATE_HZ]
+        needed = []
+        if (feed.attitudes - attitudes) / span_s < 0.9 * WANTED_RATE_HZ:
+            needed.append(plugin.set_rate_attitude_euler)
+        if (feed.positions - positions) / span_s < 0.9 * WANTED_RATE_HZ:
+            needed.append(plugin.set_rate_position_velocity_ned)
     for request in needed:
         with contextlib.suppress(MavsdkError):
             await request(WANTED_RATE_HZ)
