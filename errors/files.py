@@ -11,8 +11,9 @@ import contextlib
 import os
 import stat
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
-from errno import EINVAL, ELOOP, EPERM
+from errno import EINVAL, ELOOP, ENOSPC, EPERM
 from pathlib import Path
+from secrets import token_hex
 from typing import Literal
 
 from errors import UserError
@@ -93,12 +94,11 @@ def replace_file(path: str | os.PathLike[str], content: str | bytes, new_mode: i
         OSError: it cannot be written, or is there and is no regular file.
     """
     file = Path(os.path.realpath(path))
-    part = file.with_name(f".{file.name}.part")
+    part = file.with_name(f".{file.name}.{token_hex(4)}.part")  # others may be writing it, too
     mode = file.stat().st_mode if file.exists() else None
     if mode is not None and not stat.S_ISREG(mode):
         raise OSError(0, "not a regular file")
     try:
-        part.unlink(missing_ok=True)  # of a program that was killed, or a link or pipe of somebody else's
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
         with open(os.open(part, flags, new_mode), "wb") as target:
             target.write(content.encode() if isinstance(content, str) else content)
@@ -111,6 +111,23 @@ def replace_file(path: str | os.PathLike[str], content: str | bytes, new_mode: i
         with contextlib.suppress(OSError):
             part.unlink()
         raise
+
+
+def make_file(path: Path, text: str) -> None:
+    """Write a new file, as UTF-8, completely or not at all.
+
+    Raises:
+        FileExistsError: there is something already, which is left as it is.
+        OSError: it cannot be written.
+    """
+    with path.open("xb") as file:
+        try:
+            file.write(text.encode())
+            file.flush()
+        except OSError:
+            with contextlib.suppress(OSError):
+                path.unlink()  # of a part, which would be taken for the whole
+            raise
 
 
 def resolved_in_folder(path: Path) -> Path:
@@ -150,7 +167,7 @@ def append_in_folder(path: Path, data: bytes) -> None:
     After a line that a full disk took in part, it begins a new one.
 
     Raises:
-        OSError: see `resolved_in_folder`, or it cannot be written.
+        OSError: see `resolved_in_folder`, or it cannot be written as a whole.
     """
     flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC
     handle = os.open(resolved_in_folder(path), flags, 0o600)
@@ -158,6 +175,7 @@ def append_in_folder(path: Path, data: bytes) -> None:
         size = os.fstat(handle).st_size
         if size and os.pread(handle, 1, size - 1) != b"\n":
             data = b"\n" + data
-        os.write(handle, data)
+        if os.write(handle, data) < len(data):
+            raise OSError(ENOSPC, os.strerror(ENOSPC))
     finally:
         os.close(handle)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import hypot, inf, radians
 from typing import TYPE_CHECKING
 
-from firmware_py.airframe import Airframe
+from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.commands import ControlCommand
 from firmware_py.guidance.limits import speed_limits
 from firmware_py.parameters import Parameters
@@ -29,7 +29,6 @@ _LIFTED_HEIGHT_M = 0.03
 _MIN_CLIMB_SHARE = 0.02  # of the commanded climb, also where the ramp allows less
 _LIFT_M_S = 0.04  # a commanded climb above this starts a lift-off
 _LIFT_HELD_TICKS = 125  # half a second in which integrals are held: the ground may carry the weight
-_GRAVITY_M_S2 = 9.80665
 _GAIN_1_S, _INTEGRAL_GAIN_1_S2 = 4.0, 2.0  # PX4's defaults of MPC_Z_VEL_P_ACC and MPC_Z_VEL_I_ACC
 _FIRST_CLIMB_M_S = -0.7  # of PX4's trajectory on the ground
 
@@ -191,10 +190,10 @@ class _ClimbRamp:
         """
         period_s = (time_us - self._time_us) / 1e6
         self._time_us = time_us
-        least_m_s = -_GRAVITY_M_S2 / _GAIN_1_S
+        least_m_s = -GRAVITY_M_S2 / _GAIN_1_S
         error_m_s = min(climb_m_s, least_m_s + share * (max_m_s - least_m_s)) - self.climb_m_s
-        climb_m_s2 = max(_GAIN_1_S * error_m_s + self._integral_m_s2, -_GRAVITY_M_S2)
-        if climb_m_s2 > -_GRAVITY_M_S2 or error_m_s > 0.0:
+        climb_m_s2 = max(_GAIN_1_S * error_m_s + self._integral_m_s2, -GRAVITY_M_S2)
+        if climb_m_s2 > -GRAVITY_M_S2 or error_m_s > 0.0:
             self._integral_m_s2 += _INTEGRAL_GAIN_1_S2 * error_m_s * period_s
         self.climb_m_s = max(0.0, self.climb_m_s + climb_m_s2 * period_s)
         self.climb_m_s2 = climb_m_s2 if self.climb_m_s > 0.0 else 0.0

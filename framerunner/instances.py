@@ -59,6 +59,11 @@ def _open_lock(path: Path) -> BinaryIO:
         made = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_EXCL)
         with os.fdopen(made, "rb"):
             os.fchmod(made, 0o644)
+    return _opened(path)
+
+
+def _opened(path: Path) -> BinaryIO:
+    """A file that is there, for reading; a link is refused, and a pipe is not waited for."""
     return os.fdopen(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb")
 
 
@@ -81,7 +86,7 @@ def _is_free(instance: int) -> bool:
 def _is_locked_by_px4(instance: int) -> bool:
     """Whether a PX4 of this instance runs: it locks a file, whichever program has started it."""
     try:
-        with Path(f"{_PX4_LOCKS}{instance}").open("rb") as file:
+        with _opened(Path(f"{_PX4_LOCKS}{instance}")) as file:
             fcntl.lockf(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except FileNotFoundError:
         return False

@@ -29,7 +29,7 @@ class DryRunDrone(MavsdkDrone):
     async def motors_on(self, *, confirmed: bool = True) -> None:
         """Enter offboard with zero setpoints; nothing is armed."""
         await self._stream_before_offboard()
-        await self._asking.request(
+        await self._requester.request(
             "offboard mode",
             self._stream.request_offboard(),
             lambda: self._feed.mode == self._stream.modes.offboard,

@@ -25,7 +25,7 @@ from offboard.link.process_guard import ProcessGuard
 from offboard.link.reported_state import reported_state
 from offboard.link.resets import ResetFeed, followed
 from offboard.link.telemetry import CHECKS, TelemetryFeed, pose_of
-from offboard.link.ticks import CONFIRM_S, SHOWN_S, Asking, TickSource, VehicleClock, not_shown
+from offboard.link.ticks import CONFIRM_S, SHOWN_S, Requester, TickSource, VehicleClock, not_shown
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
@@ -107,7 +107,7 @@ class MavsdkDrone:
         self._telemetry: Any = None
         self._direct: Any = None  # kept, because MAVSDK ends the subscriptions of a plugin that is deleted
         self._requests = PendingRequests()
-        self._asking = Asking(self._feed, self._ticks, self._requests)
+        self._requester = Requester(self._feed, self._ticks, self._requests)
         self._tracker = CommandTracker()
         self._corrects = corrects
         self._latest: DroneState | None = None
@@ -219,14 +219,14 @@ class MavsdkDrone:
                 while not self._in_offboard and not self._feed.armed:
                     with contextlib.suppress(MavsdkError):  # refused without a position
                         await self._ticks.until_done(self._requests.wait(self._stream.request_offboard()))
-                    await self._asking.becomes(lambda: self._in_offboard, SHOWN_S)
+                    await self._requester.becomes(lambda: self._in_offboard, SHOWN_S)
         with contextlib.suppress(TimeoutError):  # with an exchange its checks have had their time
             first_s = 0.0 if self._stream.exchange else min(FIRST_MODE_S, limit_s / 2)
-            await self._asking.until(lambda: not self._feed.missing(), first_s)
+            await self._requester.until(lambda: not self._feed.missing(), first_s)
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
-            await self._asking.request("offboard mode", self._stream.request_offboard())
-        await self._asking.until(lambda: not self._feed.missing(), limit_s)
+            await self._requester.request("offboard mode", self._stream.request_offboard())
+        await self._requester.until(lambda: not self._feed.missing(), limit_s)
 
     async def ticks(self) -> AsyncIterator[DroneState]:
         """States at 20 Hz of vehicle time; ticks that were not waited for are skipped."""
@@ -252,11 +252,11 @@ class MavsdkDrone:
         self._watchdog.start()
         try:
             offboard, request = self._stream.modes.offboard, self._stream.request_offboard()
-            await self._asking.request(
+            await self._requester.request(
                 f"{offboard.lower()} mode", request, lambda: self._feed.mode == offboard
             )
             armed = (lambda: bool(self._feed.armed)) if confirmed else None
-            await self._asking.request("arming", self._stream.arm(), armed)
+            await self._requester.request("arming", self._stream.arm(), armed)
         except BaseException:
             self._watchdog.stop()
             await self._hold_on_ground()
@@ -284,7 +284,7 @@ class MavsdkDrone:
         """Stop the motors at once (forced disarm), in the air too."""
         self._commanding = False
         self._feed.arming.forget()
-        await self._asking.request(
+        await self._requester.request(
             "stopping the motors", self._stream.kill(), lambda: self._feed.armed is False
         )
         self._watchdog.stop()
@@ -300,13 +300,13 @@ class MavsdkDrone:
 
         self._commanding = False
         request, land = self._stream.land(), self._stream.modes.land
-        await self._asking.request("landing", request, lambda: feed.mode == land or not armed())
+        await self._requester.request("landing", request, lambda: feed.mode == land or not armed())
         self._watchdog.stop()
         limit_us = feed.time_us + int(LAND_LIMIT_S * 1e6)
         while armed():
             self._check_alive(await self._ticks.next(LINK_LOST_S))
             # One heartbeat has mode and arming, but MAVSDK passes them on one after the other.
-            if feed.mode != land and not await self._asking.becomes(lambda: not armed(), 0.5):
+            if feed.mode != land and not await self._requester.becomes(lambda: not armed(), 0.5):
                 raise DroneError(f"landing was interrupted: mode {feed.mode}{feed.recent_texts()}")
             if feed.time_us > limit_us:
                 raise DroneError(f"still not landed after {LAND_LIMIT_S:g} s{feed.recent_texts()}")
@@ -349,7 +349,7 @@ class MavsdkDrone:
         watchdog, feed = self._watchdog, self._feed
         left_s = SHOWN_S if watchdog.stood_still else SHOWN_S - feed.heard_for_s()
         if left_s > 0.0:
-            await self._asking.becomes(lambda: False, left_s)
+            await self._requester.becomes(lambda: False, left_s)
         if watchdog.stood_still and feed.heartbeat_age_s() > SHOWN_S:
             raise DroneError("the vehicle is not heard, so nothing is requested of it; its failsafe acts")
         watchdog.stood_still = False
@@ -369,10 +369,10 @@ class MavsdkDrone:
         for _ in range(HOLD_ATTEMPTS):
             refusal = None
             try:
-                await self._asking.request("hold", stream.request_hold())
+                await self._requester.request("hold", stream.request_hold())
             except DroneError as error:
                 refusal = error
-            if await self._asking.becomes(lambda: not self._in_offboard, SHOWN_S):
+            if await self._requester.becomes(lambda: not self._in_offboard, SHOWN_S):
                 return
         raise refusal or DroneError(
             f"requested {HOLD_ATTEMPTS} times and acknowledged, but telemetry still shows offboard; "

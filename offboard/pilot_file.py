@@ -71,12 +71,12 @@ class PilotFile:
         module = ModuleType(f"pilot_file_{digest[:16]}")
         module.__file__ = self.name
         sys.modules[module.__name__] = module  # where typing and dataclasses look up a class's module
-        with self._whatever_it_raises(module.__name__, "cannot be imported"):
+        with self._errors_refused(module.__name__, "cannot be imported"):
             exec(code, vars(module))
         return module
 
     @contextmanager
-    def _whatever_it_raises(self, module_name: str, what: str) -> Iterator[None]:
+    def _errors_refused(self, module_name: str, what: str) -> Iterator[None]:
         """Make an exception of any kind, but not the user's Ctrl-C, a `MissionError`."""
         with _interrupts_noted() as interrupts:
             try:
@@ -89,7 +89,7 @@ class PilotFile:
 
     def _check(self, kind: type[Pilot]) -> None:
         """Refuse members that would fail only in flight."""
-        with self._whatever_it_raises(kind.__module__, f"a type in class {kind.__name__} is unknown"):
+        with self._errors_refused(kind.__module__, f"a type in class {kind.__name__} is unknown"):
             get_type_hints(kind)  # an annotation may be any expression
         for name, member in inspect.getmembers(kind):
             if name.startswith("_") or getattr(Pilot, name, None) is member:
@@ -101,7 +101,7 @@ class PilotFile:
     def new_pilot(self, variables: dict[str, object]) -> Pilot:
         """A pilot of a new class, with the mission's variables. Raises `MissionError`."""
         kind = self.pilot_class()
-        with self._whatever_it_raises(kind.__module__, f"{kind.__name__} cannot be created"):
+        with self._errors_refused(kind.__module__, f"{kind.__name__} cannot be created"):
             pilot = kind(variables)
         if not hasattr(pilot, "memory"):
             text = f"{kind.__name__}.__init__ must begin with 'super().__init__(variables)'"

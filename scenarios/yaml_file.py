@@ -77,15 +77,11 @@ class FileKind(Generic[Model]):
         text = str(name_or_path)
         names = self.names()
         if isinstance(name_or_path, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text:
-            return self.parse(self._read(Path(text), names), _shorten(text))
+            return self.parse(self.read(Path(text), names), _shorten(text))
         if text not in names:
             return None
         entry = self._folder() / f"{text}.yaml"
         return self.parse(entry.read_bytes(), entry.name)
-
-    def read(self, path: Path) -> bytes:
-        """The content of a file that is not installed."""
-        return self._read(path, [])
 
     def unknown(self, name: str, nearest: Sequence[str] = (), others: str = "") -> UserError:
         """Make the error for a name that `load` does not find.
@@ -116,8 +112,8 @@ class FileKind(Generic[Model]):
     def _folder(self) -> Traversable:
         return resources.files(self.package) / self.folder
 
-    def _read(self, path: Path, known: list[str]) -> bytes:
-        """Read a file that may be anything, but never more than is allowed."""
+    def read(self, path: Path, known: Sequence[str] = ()) -> bytes:
+        """Read a file that may be anything, but never more than is allowed; the known names are told."""
         name, kind, error = _shorten(str(path)), self.name, self.error
         try:
             status = path.stat()

@@ -93,18 +93,17 @@ class _Line:
         return self.text[: self.start] + text + self.text[self.stop :]
 
 
-def load_parameters(path: Path, parameters: Parameters, system_id: int | None = None) -> LoadedParameters:
+def load_parameters(path: Path, parameters: Parameters, system_id: int = 1) -> LoadedParameters:
     """Read a file; a missing one is empty. The parameters only declare what is valid and are not changed.
 
     Args:
         path: of the file.
         parameters: of the vehicle.
-        system_id: of the vehicle; None: MAV_SYS_ID. Lines of others are left out.
+        system_id: of the vehicle. Lines of others are left out.
 
     Raises:
         ParameterFileError: it cannot be read, or a line is wrong; the message names the line.
     """
-    system_id = parameters.integer(_SYSTEM_ID) if system_id is None else system_id
     loaded = LoadedParameters(system_id=system_id)
     for number, line in enumerate(_read(path, system_id), start=1):
         if line.other is not None:
@@ -180,7 +179,7 @@ def save_parameters(
     changed: Mapping[str, float],
     parameters: Parameters,
     *,
-    system_id: int | None = None,
+    system_id: int = 1,
     since: Collection[str] | None = None,
 ) -> None:
     """Write changed values into a file; lines that are not of them stay as they are.
@@ -189,13 +188,12 @@ def save_parameters(
         path: of the file; a new one is made if there is none.
         changed: values that differ from the defaults, by name.
         parameters: gives their types and defaults.
-        system_id: of the vehicle; None: MAV_SYS_ID.
+        system_id: of the vehicle.
         since: names of what was set since the file was read or written, whose lines are changed; None: all.
 
     Raises:
         ParameterFileError: it is not understood or cannot be written; the old file is unchanged.
     """
-    system_id = parameters.integer(_SYSTEM_ID) if system_id is None else system_id
     lines = _read(path, system_id)
     last = {line.name: number for number, line in enumerate(lines) if line.name}  # that one counts
     written = [line.text for line in lines]
@@ -235,7 +233,7 @@ def _shortest(declared: Parameter, value: float) -> str:
 
 
 def open_parameters(
-    parameters: Parameters, path: Path, notice: Callable[[str], None], system_id: int | None = None
+    parameters: Parameters, path: Path, notice: Callable[[str], None], system_id: int = 1
 ) -> ParameterKeeper:
     """Set the parameters that a file holds, and save later changes to it; notices are lines for people.
 
@@ -259,16 +257,16 @@ class ParameterKeeper:
         parameters: to be changed on the event loop's thread only.
         path: of the file.
         notice: called with a line for people when saving fails.
-        system_id: of the vehicle; None: MAV_SYS_ID.
+        system_id: of the vehicle.
     """
 
     def __init__(
-        self, parameters: Parameters, path: Path, notice: Callable[[str], None], system_id: int | None = None
+        self, parameters: Parameters, path: Path, notice: Callable[[str], None], system_id: int = 1
     ) -> None:
         self._parameters = parameters
         self._path = path
         self._notice = notice
-        self._system_id = parameters.integer(_SYSTEM_ID) if system_id is None else system_id
+        self._system_id = system_id
         self._since: set[str] = set()  # names of what was set since the file was read or written
         self._saving = Lock()  # a save may still be under way when the last one begins
         self._changed = asyncio.Event()
@@ -294,7 +292,7 @@ class ParameterKeeper:
                 self._changed.clear()
                 await asyncio.to_thread(self._save, self._parameters.changed(), self._taken())
         finally:
-            if self._changed.is_set():
+            if self._changed.is_set() or self._since:  # perhaps it can be written by now
                 self._save(self._parameters.changed(), self._taken())
 
     def _note(self, name: str, _value: float) -> None:
@@ -311,5 +309,5 @@ class ParameterKeeper:
             with self._saving:
                 save_parameters(self._path, changed, self._parameters, system_id=self._system_id, since=since)
         except ParameterFileError as error:
-            self._since |= since
+            self._since.update(since)
             self._notice(f"parameters are not saved: {error}")

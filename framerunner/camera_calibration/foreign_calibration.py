@@ -19,8 +19,12 @@ _Field: TypeAlias = "str | Sequence[float]"  # a matrix row by row; a number is 
 
 _OPENCV = re.compile(r"\s*%YAML:1\.0|.*?(?:opencv[-_]matrix|<opencv_storage>)", re.DOTALL)
 _ROS = re.compile(r"^(?:camera_matrix|distortion_model)\s*:", re.MULTILINE)
-_MATRIX = ("cameramatrix", "intrinsicmatrix", "k", "mtx")
-_DISTORTION = ("distortioncoefficients", "distcoeffs", "distortion", "d", "dist")
+_NAMES = {
+    "image_width": ("imagewidth", "width"),
+    "image_height": ("imageheight", "height"),
+    "camera_matrix": ("cameramatrix", "intrinsicmatrix", "k", "mtx"),
+    "distortion_coefficients": ("distortioncoefficients", "distcoeffs", "distortion", "d", "dist"),
+}
 _LENSES = ("plumb_bob", "rational_polynomial", "brown-conrady")
 _COEFFICIENTS = 5
 _RADIAL = 4  # without k3
@@ -55,7 +59,7 @@ def read_foreign(text: str, source: str) -> Calibration:
         ) from None
     except (cv2.error, SystemError):  # SystemError: of its constructor
         raise CalibrationError(f"{source}: {kind}: cannot be read; it is damaged") from None
-    except (ValueError, TypeError, AttributeError, RecursionError, yaml.YAMLError) as error:
+    except (ValueError, TypeError, AttributeError, OverflowError, RecursionError, yaml.YAMLError) as error:
         reason = str(error).strip().splitlines() or ["it is damaged"]
         raise CalibrationError(f"{source}: {kind}: {reason[0]:.200}") from None
 
@@ -94,33 +98,33 @@ def _ros_fields(text: str) -> dict[str, _Field]:
 
 def _calibration(fields: Mapping[str, _Field]) -> Calibration:
     plain = {re.sub(r"[^a-z]", "", name.lower()): value for name, value in fields.items()}
-    lens = fields.get("distortion_model", _LENSES[0])
-    if lens not in _LENSES or _numbers(plain, ("fisheyemodel",), [0.0])[0]:
-        known = "plumb_bob or rational_polynomial"
-        raise ValueError(
-            f"the lens is {lens if lens not in _LENSES else 'fisheye'}; only {known} is understood"
-        )
-    size = _numbers(plain, ("imagesize",), [])
-    width, height = (
-        size
-        if len(size) == 2
-        else (
-            _numbers(plain, ("imagewidth", "width"), None, "image_width")[0],
-            _numbers(plain, ("imageheight", "height"), None, "image_height")[0],
-        )
-    )
-    matrix = _numbers(plain, _MATRIX, None, "camera_matrix")
+
+    def numbers(name: str) -> Sequence[float]:
+        value = next((plain[each] for each in _NAMES[name] if each in plain), ())
+        if not value:
+            raise ValueError(f"{name} is missing; add it")
+        if isinstance(value, str):
+            raise ValueError(f"{name} is '{value}'; must be a number")
+        return value
+
+    is_fisheye = plain.get("fisheyemodel", [0.0]) != [0.0]
+    lens = "fisheye" if is_fisheye else fields.get("distortion_model", _LENSES[0])
+    if lens not in _LENSES:
+        raise ValueError(f"the lens is {lens}; only plumb_bob or rational_polynomial is understood")
+    size = plain.get("imagesize")
+    if not isinstance(size, list) or len(size) != 2:
+        size = [numbers("image_width")[0], numbers("image_height")[0]]
+    matrix, distortion = numbers("camera_matrix"), numbers("distortion_coefficients")
     if len(matrix) != 9 or [matrix[each] for each in (1, 3, 6, 7, 8)] != [0, 0, 0, 0, 1]:
         raise ValueError("camera_matrix: must be fx 0 cx, 0 fy cy, 0 0 1")
-    distortion = _numbers(plain, _DISTORTION, None, "distortion_coefficients")
     if len(distortion) < _RADIAL or any(distortion[_COEFFICIENTS:]):
         raise ValueError(
             f"distortion_coefficients: has {len(distortion)}; must be k1, k2, p1, p2, k3, and all others 0"
         )
     return Calibration.model_validate(
         {
-            "width_px": width,
-            "height_px": height,
+            "width_px": size[0],
+            "height_px": size[1],
             "fx_px": matrix[0],
             "fy_px": matrix[4],
             "cx_px": matrix[2],
@@ -128,14 +132,3 @@ def _calibration(fields: Mapping[str, _Field]) -> Calibration:
             "distortion": (*distortion[:_COEFFICIENTS], 0.0)[:_COEFFICIENTS],
         }
     )
-
-
-def _numbers(
-    fields: Mapping[str, _Field], names: Sequence[str], default: Sequence[float] | None, shown: str = ""
-) -> Sequence[float]:
-    value = next((fields[name] for name in names if name in fields), default)
-    if value is None:
-        raise ValueError(f"{shown} is missing; add it")
-    if isinstance(value, str):
-        raise ValueError(f"{shown or names[0]} is '{value}'; must be a number")
-    return value

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import App, Parameter
 
 from errors import SettingError
+from errors.files import make_file
 from framerunner.commands import load_mission_with, say
 
 app = App(
@@ -59,8 +60,7 @@ def start(
     text, path = found.text, out / f"lesson_{found.number}.yaml"
     try:
         out.mkdir(parents=True, exist_ok=True)
-        with path.open("x", encoding="utf-8") as file:
-            file.write(found.start)
+        make_file(path, found.start)
     except FileExistsError:
         raise SettingError(f"{path} is there already and is left as it is; choose another --out") from None
     except OSError as error:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import App, Parameter
 
 from errors import SettingError
+from errors.files import make_file
 from framerunner.commands import load_mission_with, say
 
 if TYPE_CHECKING:
@@ -164,8 +165,7 @@ def _print_or_write(text: str, out: Path | None) -> None:
         print(text, end="")
         return
     try:
-        with out.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+        make_file(out, text)
     except FileExistsError:
         raise SettingError(f"{out} is there already and is left as it is; choose another --out") from None
     except OSError as error:
@@ -215,7 +215,6 @@ def _write(files: NewMission) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
         for path, text in files.texts.items():
-            with path.open("x", encoding="utf-8") as file:
-                file.write(text)
+            make_file(path, text)
     except OSError as error:
         raise SettingError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None

@@ -26,6 +26,7 @@ from starlette.requests import HTTPConnection
 from starlette.responses import Response, StreamingResponse
 
 from errors import UserError
+from errors.files import make_file
 from framerunner.course.lessons import Lesson, find_lesson, load_lessons
 from framerunner.course.progress import (
     CourseEvent,
@@ -186,8 +187,8 @@ class CourseDoor:
         lesson, learner = find_lesson(name), checked_name(learner)
         path = self._folder / f"lesson_{lesson.number}_{key or file_key(learner)}.yaml"
         self._note(learner, lesson, "opened")
-        with contextlib.suppress(FileExistsError), path.open("x", encoding="utf-8") as file:
-            file.write(lesson.start)
+        with contextlib.suppress(FileExistsError):
+            make_file(path, lesson.start)
         return path.name
 
     async def _check(self, learner: str, lesson: Lesson, text: str, language: Language) -> AsyncIterator[str]:

@@ -18,6 +18,7 @@ from monitor.competition.views import csv_text
 
 EventKind = Literal["opened", "flown", "passed", "reset"]
 MAX_LEARNER = 60  # characters of a name
+_ADVICE = f"use 1 to {MAX_LEARNER} printable characters"
 _KINDS = get_args(EventKind)
 _MAX_FILE_BYTES = 50_000_000
 
@@ -74,7 +75,7 @@ class CourseProgress:
             SettingError: the name cannot be used, or the file cannot be written.
         """
         if checked_name(event.learner) != event.learner:
-            raise _wrong_name(event.learner)
+            raise SettingError(f"learner {event.learner!r}: {_ADVICE}")
         line = json.dumps(asdict(event), ensure_ascii=False) + "\n"
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
@@ -132,23 +133,21 @@ def progress_csv(table: Mapping[str, Mapping[str, LessonProgress]], lessons: Seq
 
 
 def checked_name(text: str) -> str:
-    """A name as it is kept, of a learner. Raises `SettingError` if there is none or it is too long."""
-    line = learner_name(text)
-    if not line or len(" ".join(text.split())) > MAX_LEARNER:
-        raise _wrong_name(text)
-    return line
+    """A learner's name as it is kept: one line of printable characters.
 
-
-def _wrong_name(text: str) -> SettingError:
+    Raises:
+        SettingError: there is none, or it is too long.
+    """
     if not text.strip():
-        return SettingError("nobody has given a name in this browser; open the lesson from the page Course")
-    return SettingError(f"learner {text[:60]!r}: use 1 to {MAX_LEARNER} printable characters")
+        raise SettingError("nobody has given a name in this browser; open the lesson from the page Course")
+    name = _one_line(text)
+    if not name or len(name) > MAX_LEARNER:
+        raise SettingError(f"learner {text[:60]!r}: {_ADVICE}")
+    return name
 
 
-def learner_name(text: str) -> str:
-    """A name as it is kept: one line of printable characters, not too long; may be empty."""
-    line = "".join(each if each.isprintable() else " " for each in text)
-    return " ".join(line.split())[:MAX_LEARNER].strip()
+def _one_line(text: str) -> str:
+    return " ".join("".join(each if each.isprintable() else " " for each in text).split())
 
 
 def _read(line: bytes) -> CourseEvent | None:
@@ -156,7 +155,7 @@ def _read(line: bytes) -> CourseEvent | None:
         found = json.loads(line)
         event = CourseEvent(
             float(found["time_s"]),
-            learner_name(str(found["learner"])),
+            _one_line(str(found["learner"]))[:MAX_LEARNER].strip(),
             str(found["lesson"]),
             found["kind"],
             str(found.get("reason", "")),

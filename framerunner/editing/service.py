@@ -16,9 +16,9 @@ from typing import Protocol
 from pydantic import BaseModel, ValidationError
 
 from framerunner.editing import messages
-from framerunner.editing.line import Line
 from framerunner.editing.live import LiveFlight, LiveSettings
 from framerunner.editing.session_runs import forget_old
+from framerunner.editing.waiting_queue import WaitingQueue
 from framerunner.editing.words import Language, Said, say
 from framerunner.editing.worker_pool import WorkerPool
 from framerunner.editing.worker_process import WorkerProcess
@@ -80,10 +80,10 @@ class _Job:
         refused: it was not even started.
     """
 
-    def __init__(self, name: str, worker: WorkerProcess, *, is_batch: bool, language: Language) -> None:
+    def __init__(self, name: str, *, is_batch: bool, language: Language) -> None:
         self.name = name
         self.language = language  # of who started it
-        self.worker = worker
+        self.worker = WorkerProcess()  # never started, until one is taken
         self.is_batch = is_batch
         self.task: BaseModel | None = None
         self.watchers: set[Watcher] = set()
@@ -123,9 +123,9 @@ class EditingService:
         self._tasks: set[asyncio.Task[None]] = set()
         self._pages: set[Watcher] = set()
         self._workers = WorkerPool(settings.max_batches, self._keep)
-        self._lines = {
-            True: Line[_Job](settings.max_batches, settings.batch_s, time.monotonic),
-            False: Line[_Job](settings.max_runs, None, time.monotonic),
+        self._queues = {
+            True: WaitingQueue[_Job](settings.max_batches, settings.batch_s, time.monotonic),
+            False: WaitingQueue[_Job](settings.max_runs, None, time.monotonic),
         }  # of batches, and of flights under control
         self._closed = False
         self._live = None if settings.live is None else LiveFlight(settings.live, self._tell_pages)
@@ -152,14 +152,14 @@ class EditingService:
         elif isinstance(request, messages.Watch):
             self._watch(job, request, watcher)
         elif isinstance(request, messages.Cancel) or (
-            isinstance(request, messages.Stop) and job in self._lines[job.is_batch]
+            isinstance(request, messages.Stop) and job in self._queues[job.is_batch]
         ):
             _put(watcher, messages.Done(tag=request.tag))
             self._cancel(job)
         elif job.over or job.is_batch:
             why = Said("flight.is_batch" if job.is_batch else "flight.over")
             _refuse(watcher, request.tag, why, run=name)
-        elif job in self._lines[job.is_batch]:
+        elif job in self._queues[job.is_batch]:
             _refuse(watcher, request.tag, Said("flight.waits"), run=name)
         else:
             job.worker.send(request.model_copy(update={"tag": job.ask(watcher, request.tag)}))
@@ -182,7 +182,8 @@ class EditingService:
             self._cancel(job)
         if self._live is not None:
             await self._live.close()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        while self._tasks:  # they may begin others, to end a worker
+            await asyncio.gather(*self._tasks, return_exceptions=True)
 
     async def _do_live(self, request: messages.StartLive | messages.StopLive, watcher: Watcher) -> None:
         if self._live is None:
@@ -225,35 +226,35 @@ class EditingService:
             )
         else:
             task = messages.RunTask.model_validate({**common, "run": name, "start": start})
-        job = self._jobs[name] = _Job(name, WorkerProcess(), is_batch=is_batch, language=request.language)
+        job = self._jobs[name] = _Job(name, is_batch=is_batch, language=request.language)
         job.task = task
         job.watchers.add(watcher)
         job.ask(watcher, request.tag)
-        self._lines[is_batch].enter(job)
+        self._queues[is_batch].enter(job)
         self._advance(is_batch=is_batch)
 
     def _advance(self, *, is_batch: bool) -> None:
         """Begin what need not wait any more, and tell the others how long they have to."""
-        line = self._lines[is_batch]
-        for job in () if self._closed else line.begin():
+        queue = self._queues[is_batch]
+        for job in () if self._closed else queue.begin():
             job.worker = self._workers.take()
             self._keep(self._follow(job))
             asyncio.get_running_loop().call_later(_SPARE_S, self._prepare)
-        for job, place, seconds in line.waiting():
+        for job, place, seconds in queue.waiting():
             for watcher, tag in job.asked.values():
                 _put(watcher, messages.Waiting(tag=tag, run=job.name, place=place, seconds=seconds))
 
     def _cancel(self, job: _Job) -> None:
-        """End a job, or take it out of its line."""
+        """End a job, or take it out of its queue."""
         job.cancelled = True
-        if job not in self._lines[job.is_batch]:
+        if job not in self._queues[job.is_batch]:
             job.worker.kill()
             return
         for watcher, tag in job.asked.values():
             _refuse(watcher, tag, Said("flight.cancelled"))
         job.over = True
         del self._jobs[job.name]
-        self._lines[job.is_batch].leave(job)
+        self._queues[job.is_batch].leave(job)
         self._advance(is_batch=job.is_batch)
 
     def _prepare(self) -> None:
@@ -267,13 +268,13 @@ class EditingService:
         task.add_done_callback(self._tasks.discard)
 
     def _no_room(self, watcher: Watcher, *, is_batch: bool) -> Said | None:
-        """Why no more can be started; None if it can. A page has one batch: it does not fill the line."""
+        """Why no more can be started; None if it can. A page has one batch: it does not fill the queue."""
         own = [job for job in self._jobs.values() if not job.over and watcher in job.watchers]
         if is_batch and any(job.is_batch for job in own):
             return Said("flight.yours")
         if not is_batch and len(own) >= _MAX_OWN_RUNS:
             return Said("flight.too_many", count=_MAX_OWN_RUNS)
-        waiting = len(self._lines[is_batch])
+        waiting = len(self._queues[is_batch])
         return Said("flight.full", count=waiting) if waiting >= _MAX_WAITING else None
 
     def _watch(self, job: _Job, request: messages.Watch, watcher: Watcher) -> None:
@@ -304,13 +305,14 @@ class EditingService:
                 how = Said("flight.silent", seconds=self._settings.silent_s)
                 job.worker.kill()
             if is_ready:
-                self._workers.give_back(job.worker)
+                worker, job.worker = job.worker, WorkerProcess()  # the next one's, from now on
+                self._workers.give_back(worker)
             else:
                 how = await job.worker.ended() or how
         finally:
             if not is_ready:
                 job.worker.kill()
-            self._lines[job.is_batch].leave(job, counts=not (job.refused or job.cancelled))
+            self._queues[job.is_batch].leave(job, counts=not (job.refused or job.cancelled))
             if self._settings.keep is not None:
                 await asyncio.to_thread(forget_old, self._settings.keep)
             if job.refused:

@@ -74,7 +74,6 @@ _ENGLISH: Mapping[str, str] = {
     ),
     "live.none_here": "this program flies no simulator",
     # Lessons.
-    "lesson.too_long": "the flight was not over after {seconds:g} s",
     "lesson.no_result": "the flight had no result",
     "lesson.one_check": "{name}'s mission is being checked or waits for it already; wait for that",
 }
@@ -139,7 +138,6 @@ _SPANISH: Mapping[str, str] = {
         "cada uno más 0 a 9); termina un simulador"
     ),
     "live.none_here": "este programa no vuela ningún simulador",
-    "lesson.too_long": "el vuelo no había terminado tras {seconds:g} s",
     "lesson.no_result": "el vuelo no tuvo resultado",
     "lesson.one_check": "la misión de {name} ya se comprueba o espera su turno; espera a que termine",
 }

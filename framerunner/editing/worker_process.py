@@ -26,11 +26,12 @@ class WorkerProcess:
         self._process: Process | None = None
         self._errors: asyncio.Task[bytes] | None = None
         self._starting = asyncio.Lock()
+        self._is_needed = True
 
     async def start(self) -> None:
         """Start it, once; others that call this wait for it. Raises OSError if that is not possible."""
         async with self._starting:
-            if self._process is None:
+            if self._process is None and self._is_needed:
                 await self._start()
 
     async def _start(self) -> None:
@@ -85,10 +86,12 @@ class WorkerProcess:
         return Said("plain", text=f"{how}: {lines[-1][:300]}" if lines else how)
 
     async def end(self) -> None:
-        """Kill it and wait for its end, if it was started."""
-        if self._process is not None:
-            self.kill()
-            await self.ended()
+        """Kill it and wait for its end, if it was started; it is not started any more."""
+        async with self._starting:
+            self._is_needed = False
+            if self._process is not None:
+                self.kill()
+                await self.ended()
 
     def kill(self) -> None:
         """End it and all that it started at once."""

@@ -31,7 +31,7 @@ RESULTS, REPORT = "results.csv", "report.html"
 _ESTIMATES = TypeAdapter(tuple[FrameEstimate, ...])
 _FOLDERS = ("scenarios", "tracks", "errors")
 _FILES = (IDENTITY, FLIGHTS, RESULTS, REPORT)
-_PART = re.compile(r"^\.?(.+)\.part$")  # what a killed program left of `replace_file`
+_PART = re.compile(r"^\.?(.+?)(?:\.[0-9a-f]{8})?\.part$")  # what a killed program left of `replace_file`
 
 
 @dataclass(frozen=True, slots=True)

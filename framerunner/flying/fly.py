@@ -101,7 +101,7 @@ async def fly(
 
 
 class _Keeper:
-    """Gives away, once a second of vehicle time, the result of a flight that is not finished."""
+    """Passes on, once a second of vehicle time, the result of a flight that is not finished."""
 
     def __init__(
         self, plan: FlightPlan, judge: Judge, recorder: TrackRecorder, keep: Callable[[FlightResult], None]

@@ -285,7 +285,7 @@ def flight_guard(settings: RealTimeSettings, folder: RunFolder) -> ProcessGuard:
     where = f"where it hung is in {trace}"
     return ProcessGuard(
         hung=f"error: the app hung for {limits.locked_s:g} s and was ended: {then}; {where}, {kept}",
-        ended=f"error: the app was ended, and its keys with it: {then}; {kept}",
+        ended=f"error: the app was ended, so its keys have no effect: {then}; {kept}",
         trace=trace,
         unfinished=folder.unfinished,
         result=folder.result,

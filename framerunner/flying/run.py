@@ -98,7 +98,7 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
                 interrupted = isinstance(error, asyncio.CancelledError | KeyboardInterrupt)
                 folder.stopped_before_start = interrupted and records.recorder.latest is None
                 if guard is not None and guard.is_used and folder.end_unfinished(_why(error)):
-                    warn(f"the flight ended without its end: {folder.result} has what was flown until then")
+                    warn(f"the flight was not ended in order; {folder.result} has what was flown until then")
                 raise
             records.stop_keeping()
             result = records.complete(flown.result)

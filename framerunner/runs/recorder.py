@@ -185,6 +185,7 @@ class RunRecords:
         self.recorder = FlightRecorder()
         self.recording = recording
         self._keeper = ThreadPoolExecutor(1, "unfinished result")  # a slow disk must not delay a flight
+        self._kept: Future[None] | None = None
 
     def see(self, moment: Moment) -> None:
         """Record a tick."""
@@ -212,8 +213,9 @@ class RunRecords:
         return result.model_copy(update=wall)
 
     def keep_unfinished(self, result: FlightResult) -> None:
-        """Keep what the result is to be if this program is ended now."""
-        self._keeper.submit(self.folder.keep_unfinished, self.complete(result))
+        """Keep what the result is to be if this program is ended now; not while the last is being written."""
+        if self._kept is None or self._kept.done():
+            self._kept = self._keeper.submit(self.folder.keep_unfinished, self.complete(result))
 
     def stop_keeping(self) -> None:
         """Wait until it is kept; afterwards there is no more."""

@@ -12,8 +12,8 @@ another program uses the names of this package only:
 **Document** (immutable): `open(path)`, `from_bytes`, `from_text`; `text` (lines end with a line feed),
 `data` (the file's bytes, with its own line ends), `path`, `unreadable` (why it is not YAML, or None),
 `outline`, `chart`, `positions`. Any text is a document. Offsets count characters of `text`; lines and
-columns count from 1. JavaScript counts UTF-16 units: `positions.to_utf16(offset)` and `from_utf16`
-convert, which matters only for characters beyond U+FFFF.
+columns count from 1. JavaScript counts UTF-16 units: `positions.to_utf16(offset)`
+converts, which matters only for characters beyond U+FFFF.
 
 **Paths.** Edits name a state by where it is written: `red`, `landing.stop`, and `@cross_frame.turning`
 for the state of a template (`@cross_frame` is the template). The diagram names states by the full id
@@ -55,7 +55,7 @@ Spanish; for several languages, `findings_of(document, reported_problems(documen
 high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
 
 **Diagram**: `diagram(document)`: `nodes` and `edges` with ids, places in the text and what edits need,
-`settings`, `variables`, `templates`; `edge_taken` finds the edge of an engine's `TransitionTaken`.
+`settings`, `variables`, `templates`.
 
 **Layout**: `read_layout`, `write_layout`, `parse_layout`, `follow` after an edit; the side file
 `NAME.layout.json` is {version: 1, states: {id: {x, y, width?, height?}}, corners: {edge id: [[x, y],

@@ -102,24 +102,6 @@ class Diagram:
     templates: dict[str, tuple[str, ...]] = field(default_factory=dict)
     readable: bool = True
 
-    def edge_taken(self, source: str, target: str, when: str) -> str:
-        """Id of the edge that the engine took, by its `TransitionTaken`; empty if none fits.
-
-        Args:
-            source: the state that was left.
-            target: the state that was entered.
-            when: the guard that held, "done" or "resume".
-        """
-        event = when if when in ("done", "resume") else "tick"
-        outer = source
-        while outer:
-            for edge in self.edges:
-                fits = edge.source == outer and edge.event == event and (event != "tick" or edge.when == when)
-                if fits and f"{target}.".startswith(f"{edge.target}."):
-                    return edge.id
-            outer = outer.rpartition(".")[0]
-        return ""
-
 
 def diagram(document: Document) -> Diagram:
     """The diagram of a document, as far as it can be understood."""

@@ -13,12 +13,12 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError
 
 from errors import UserError
-from errors.files import TextError, read_text, replace_file
+from errors.files import TextError, decode_text, read_in_folder, replace_file
 from offboard.authoring.document import Document
 from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState, StrictModel
 from offboard.authoring.references import chart_ids, instances, prefix_change
 
-MAX_LAYOUT_BYTES = 1_000_000
+_MAX_BYTES = 1_000_000
 _ADVICE = "correct it, or delete the file and the states are placed anew"
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 Size = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
@@ -66,11 +66,17 @@ def read_layout(mission: str | Path) -> Layout:
     """The layout of a mission file; an empty one if it has none. Raises `LayoutError`."""
     path = layout_path(mission)
     try:
-        return parse_layout(read_text(path, MAX_LAYOUT_BYTES), path.name)
+        data = read_in_folder(path, _MAX_BYTES)
+        text = decode_text(data)
+    except FileNotFoundError:
+        return Layout()
+    except OSError as error:
+        raise LayoutError(f"{path.name}: cannot be read: {error.strerror}; {_ADVICE}") from None
     except TextError as error:
-        if error.fault == "missing":
-            return Layout()
         raise LayoutError(f"{path.name}: {error}; {_ADVICE}") from None
+    if len(data) > _MAX_BYTES:
+        raise LayoutError(f"{path.name}: is larger than {_MAX_BYTES / 1e6:g} MB; {_ADVICE}")
+    return parse_layout(text, path.name)
 
 
 def layout_text(layout: Layout) -> str:

@@ -227,17 +227,7 @@ class Positions:
         """The same offset as JavaScript counts it: characters beyond U+FFFF count two."""
         return offset + bisect_left(self._wide, offset)
 
-    def from_utf16(self, offset: int) -> int:
-        """An offset counted as JavaScript does, in characters."""
-        offset = min(offset, self.to_utf16(len(self._text)))
-        return offset - bisect_left(self._wide_utf16, offset)
-
     @cached_property
     def _wide(self) -> list[int]:
         """Offsets of the characters beyond U+FFFF."""
         return [] if self._text.isascii() else [found.start() for found in _WIDE.finditer(self._text)]
-
-    @cached_property
-    def _wide_utf16(self) -> list[int]:
-        """The same as JavaScript counts them."""
-        return [offset + count for count, offset in enumerate(self._wide)]

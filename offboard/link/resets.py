@@ -22,6 +22,7 @@ from geometry.rotations import rotation, to_world, yaw_of
 from geometry.vectors import Vec3
 from offboard.drone import DroneError
 from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
+from wire.vehicle_telemetry import MessageOrder
 
 RATE_HZ = 10.0
 MAX_STEP_S = 0.3  # between two reports, from which a jump can be told from motion
@@ -63,6 +64,7 @@ class ResetFeed:
 
     def __init__(self) -> None:
         self.heard = self._is_wanted = False
+        self._order = MessageOrder()
         self._last: _Report | None = None
         self._jumps: deque[Jump | None] = deque(maxlen=100)
 
@@ -89,8 +91,8 @@ class ResetFeed:
         ):
             return  # it is for the vehicle, or of another frame
         now, last = _report(fields), self._last
-        if last is not None and 0 <= last.time_us - now.time_us < MAX_STEP_S * 1e6:
-            return  # a link swaps packets
+        if not self._order.is_next(now.time_us):
+            return
         self.heard, self._last = True, now
         if last is None or now.resets == last.resets:
             return

@@ -33,17 +33,19 @@ async def request_rates(feed: TelemetryFeed, plugin: Any, *, stands: bool = Fals
     A refusal is no error. A vehicle whose time stands is asked for what is not known to come often enough.
     """
     if stands:
-        await plugin.set_rate_position_velocity_ned(WANTED_RATE_HZ)
-        await plugin.set_rate_landed_state(WANTED_RATE_HZ)
-        return
-    start_us, attitudes, positions = feed.time_us, feed.attitudes, feed.positions
-    await asyncio.sleep(0.5)
-    span_s = max((feed.time_us - start_us) / 1e6, 1e-3)
-    with contextlib.suppress(MavsdkError):
+        needed = [plugin.set_rate_position_velocity_ned, plugin.set_rate_landed_state]
+    else:
+        start_us, attitudes, positions = feed.time_us, feed.attitudes, feed.positions
+        await asyncio.sleep(0.5)
+        span_s = max((feed.time_us - start_us) / 1e6, 1e-3)
+        needed = []
         if (feed.attitudes - attitudes) / span_s < 0.9 * WANTED_RATE_HZ:
-            await plugin.set_rate_attitude_euler(WANTED_RATE_HZ)
+            needed.append(plugin.set_rate_attitude_euler)
         if (feed.positions - positions) / span_s < 0.9 * WANTED_RATE_HZ:
-            await plugin.set_rate_position_velocity_ned(WANTED_RATE_HZ)
+            needed.append(plugin.set_rate_position_velocity_ned)
+    for request in needed:
+        with contextlib.suppress(MavsdkError):
+            await request(WANTED_RATE_HZ)
 
 
 class VehicleClock(Protocol):
@@ -212,8 +214,8 @@ def _next_multiple_us(tick_number: int, period_us: int) -> int:
     return -(-tick_number * TICK_US // period_us) * period_us
 
 
-class Asking:
-    """Asks one vehicle, and waits while its ticks go on.
+class Requester:
+    """Sends requests to one vehicle, and waits while its ticks go on.
 
     Args:
         feed: the vehicle's telemetry.

@@ -38,11 +38,6 @@ class Lens(Part):
         """In OpenCV's order."""
         return (self.k1, self.k2, self.p1, self.p2, self.k3)
 
-    @property
-    def distorts(self) -> bool:
-        """Whether it is not an ideal lens."""
-        return any(self.coefficients)
-
     def sees_up_to(self, width: float, height: float) -> bool:
         """Whether every place of an image belongs to one ray.
 

@@ -25,7 +25,6 @@ FREE_US = 1 << 62
 _POLL_S = 0.0005
 # At least 2 s: a setpoint has a socket of its own, and one that was lost is sent again in 0.05 s.
 _POLLS = 4000
-
 _MOST_WAITING_BYTES = 1 << 26  # of images that the program has not read, while time is free
 
 # Forward, right, down in level axes (m/s) and yaw rate (rad/s, clockwise).
@@ -158,18 +157,17 @@ class TimeGrants:
     async def hold(self, time_us: int, image_us: int, received: Callable[[], Velocity | None]) -> None:
         """Report where simulated time holds (see `Held`), and wait until it may advance.
 
-        `received` returns the velocity setpoint that the autopilot has now.
+        `received` returns the velocity setpoint that the autopilot has now, in a link's single precision.
         """
         self._granted.clear()
         wanted = self._setpoint
         # An older one that MAVSDK's thread has sent again may have come after it.
-        missed = self._missed or not (wanted is None or _same(wanted, received()))
+        missed = self._missed or not (wanted is None or wanted == received())
         if self._writer is not None:
             self._writer.write(Held(time_us, image_us, missed).line())
         await self._granted.wait()
-        wanted = self._setpoint
-        polls = 0
-        while not (arrived := wanted is None or _same(wanted, received())) and polls < _POLLS:
+        wanted, polls = self._setpoint, 0
+        while not (arrived := wanted is None or wanted == received()) and polls < _POLLS:
             polls += 1
             await asyncio.sleep(_POLL_S)
         self._missed = not arrived
@@ -183,8 +181,3 @@ class TimeGrants:
         finally:  # the channel has closed
             self.until_us, self._setpoint, self.used = FREE_US, None, True
             self._granted.set()
-
-
-def _same(wanted: Velocity, received: Velocity | None) -> bool:
-    """Whether two setpoints are equal; both have a link's single precision, to the last bit."""
-    return wanted == received

@@ -192,7 +192,9 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         ended = () if self._ended is None else (self._ended,)
         try:
             await asyncio.wait({held, *ended}, return_when=asyncio.FIRST_COMPLETED)
-            if not held.done() and self._ended is not None:
+            if held.done():
+                held.result()
+            elif self._ended is not None:
                 await self._end_try(self._ended.result())
         finally:
             held.cancel()

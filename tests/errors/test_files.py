@@ -3,7 +3,7 @@ import os
 import pytest
 
 from errors import SettingError
-from errors.files import TextError, decode_text, read_text, replace_file
+from errors.files import TextError, append_in_folder, decode_text, read_text, replace_file
 from framerunner.commands.sim import _read_key
 from framerunner.mocap.poses import Axes, parse_line, read_poses
 from framerunner.preflight.kept import load_kept
@@ -112,3 +112,27 @@ def test_what_is_no_regular_file_is_not_replaced(tmp_path):
     with pytest.raises(OSError, match="not a regular file"):
         replace_file(path, "text")
     assert path.is_fifo()
+
+
+def test_two_programs_that_write_at_the_same_time_each_replace_all_of_it(tmp_path, monkeypatch):
+    path, sync = tmp_path / "a.txt", os.fsync
+
+    def other_program_writes(handle):
+        monkeypatch.setattr(os, "fsync", sync)
+        replace_file(path, "other")
+        assert path.read_text() == "other"
+        sync(handle)
+
+    monkeypatch.setattr(os, "fsync", other_program_writes)
+    replace_file(path, "own")
+    assert path.read_text() == "own"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_a_line_that_a_full_disk_takes_in_part_is_told(tmp_path):
+    path = tmp_path / "lines"
+    append_in_folder(path, b"first\n")
+    with pytest.raises(OSError, match="No space left"), disk_that_takes(10):
+        append_in_folder(path, b"second\n")
+    append_in_folder(path, b"third\n")
+    assert path.read_bytes() == b"first\nseco\nthird\n"

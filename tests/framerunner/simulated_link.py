@@ -27,7 +27,7 @@ from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box
 from offboard.link.dialect import Px4Dialect
 from offboard.link.telemetry import TelemetryFeed
-from offboard.link.ticks import Asking, TickSource
+from offboard.link.ticks import Requester, TickSource
 from offboard.link.watchdog import LIMITS
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
@@ -321,7 +321,7 @@ class LinkedDrone(MavsdkDrone):
         self._vehicle = vehicle
         self._feed = TelemetryFeed(vehicle.time_s)
         self._ticks = TickSource(self._feed)
-        self._asking = Asking(self._feed, self._ticks, self._requests)
+        self._requester = Requester(self._feed, self._ticks, self._requests)
         self._watchdog = vehicle.watchdog = SimulatedWatchdog(self._stand_still, self._stop_from_watchdog)
 
     async def connect(self):

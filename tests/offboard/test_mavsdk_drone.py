@@ -217,7 +217,7 @@ async def test_an_app_that_hangs_while_a_pilot_has_it_leaves_no_stream_and_asks_
         error = await until_error(ticks)
         assert error.startswith("this app hung") and error.endswith("its watchdog stopped sending")
         vehicle.mode = (6, 0)  # somebody gives it back to an app that has given up
-        await drone._asking.until(lambda: drone._feed.mode == "OFFBOARD", 3.0)
+        await drone._requester.until(lambda: drone._feed.mode == "OFFBOARD", 3.0)
         await drone.hold()
         assert vehicle.mode == (4, 3)
         assert not fresh_setpoints(vehicle, 0.2)
@@ -346,7 +346,7 @@ async def test_before_a_heartbeat_has_shown_the_arming_the_vehicle_lands_until_o
     async with armed_by_acknowledgement(vehicle) as (drone, ticks):
         await take(ticks, 16)
         landing = asyncio.create_task(drone.land())
-        await drone._asking.until(lambda: drone._feed.mode == "LAND", 3.0)
+        await drone._requester.until(lambda: drone._feed.mode == "LAND", 3.0)
         assert not landing.done()
         vehicle.tells_disarmed = False
         await landing

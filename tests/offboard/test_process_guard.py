@@ -14,6 +14,8 @@ from textwrap import dedent
 
 import pytest
 
+from offboard.link.process_guard import ProcessGuard
+
 LIMIT_S = 0.3
 PROGRAM = dedent("""\
     import ctypes, os, signal, sys, time
@@ -93,3 +95,12 @@ def test_the_terminal_has_lines_and_echo_again(tmp_path):
     finally:
         os.close(ours)
         os.close(terminal)
+
+
+def test_a_flight_goes_on_without_a_guard_that_cannot_be_started(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "none"))
+    with ProcessGuard(trace=tmp_path / "none" / "hang.txt") as guard:
+        for _ in range(2):
+            guard.expect(LIMIT_S)
+    (warning,) = caplog.messages
+    assert "cannot be started (No such file or directory)" in warning

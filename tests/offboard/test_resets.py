@@ -104,3 +104,10 @@ def test_packets_that_are_late_and_those_of_others_are_no_resets():
     vehicle.fly(STEP_S).report()
     assert vehicle.feed.take() == []
     assert vehicle.feed.heard
+
+
+def test_a_packet_from_before_a_reset_that_is_late_by_more_than_a_step_is_no_reset():
+    vehicle = Vehicle().report().fly(STEP_S).reset(radians(10)).report()
+    assert len(vehicle.feed.take()) == 1
+    vehicle.report(time_s=vehicle.time_s - 0.5, reset_counter=0).fly(STEP_S).report()
+    assert vehicle.feed.take() == []

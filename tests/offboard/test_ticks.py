@@ -4,12 +4,13 @@ import asyncio
 from types import SimpleNamespace
 
 import pytest
+from mavsdk.asyncio import MavsdkError
 
 from offboard.drone import VelocityCommand
 from offboard.link import ticks
 from offboard.link.commands import PendingRequests
 from offboard.link.telemetry import MAX_JITTER_S, TelemetryFeed
-from offboard.link.ticks import TickSource
+from offboard.link.ticks import TickSource, request_rates
 
 COMMAND = VelocityCommand(forward_m_s=0.5)
 
@@ -183,3 +184,17 @@ async def test_a_flight_begins_and_arms_at_multiples_of_a_period_whenever_the_ap
     assert feed.sample.time_us == 10_050_000
     await source.before_arming(None, None)
     assert feed.sample.time_us == 15_000_000
+
+
+async def test_a_vehicle_whose_time_stands_may_refuse_rates_too(feed):
+    asked = []
+
+    class Telemetry:
+        async def set_rate_position_velocity_ned(self, rate_hz):
+            asked.append(rate_hz)
+            raise MavsdkError
+
+        set_rate_landed_state = set_rate_position_velocity_ned
+
+    await request_rates(feed, Telemetry(), stands=True)
+    assert asked == [50.0, 50.0]

@@ -41,7 +41,7 @@ def test_what_changed_is_written_as_ground_stations_do_and_read_again(path):
 
 def test_the_system_id_is_written_first_but_not_kept(path):
     parameters = Parameters({"MAV_SYS_ID": 3, "MIS_TAKEOFF_ALT": 1.5})
-    keep(path, parameters)
+    save_parameters(path, parameters.changed(), parameters, system_id=3)
     assert path.read_text().splitlines()[-1] == "3\t1\tMIS_TAKEOFF_ALT\t1.5\t9"
     assert "MAV_SYS_ID" not in load_parameters(path, Parameters()).values
 
@@ -222,6 +222,20 @@ async def test_what_a_user_edits_meanwhile_stays(path):
     parameters.set("RTL_RETURN_ALT", 25.0)
     await keeper.close()
     assert path.read_text() == "MIS_TAKEOFF_ALT 9 # by hand\nRTL_RETURN_ALT 25\n"
+
+
+async def test_what_could_not_be_saved_is_saved_at_the_end(path, monkeypatch):
+    monkeypatch.setattr("sitl.parameter_file.SAVE_DELAY_S", 0.0)
+    parameters, failed = Parameters(), asyncio.Event()
+    loop = asyncio.get_running_loop()
+    keeper = open_parameters(parameters, path, lambda _: loop.call_soon_threadsafe(failed.set))
+    keeper.start()
+    path.write_text("a line that is not understood\n")
+    parameters.set("RTL_RETURN_ALT", 25.0)
+    await failed.wait()
+    path.write_text("RTL_RETURN_ALT 20\n")
+    await keeper.close()
+    assert path.read_text() == "RTL_RETURN_ALT 25\n"
 
 
 def test_opening_takes_over_what_is_there_and_says_what_is_not(path):

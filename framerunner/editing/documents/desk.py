@@ -6,14 +6,15 @@ import asyncio
 import contextlib
 import re
 import time
-from collections import OrderedDict, defaultdict
+from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
+from weakref import WeakValueDictionary
 
-from errors.files import read_text, resolved_in_folder
+from errors.files import make_file, read_text, resolved_in_folder
 from framerunner.editing.documents.open_document import OpenDocument, write_problem
 from framerunner.editing.words import Language, Said, SaidError
 from offboard.mission import MISSIONS, list_missions, new_mission
@@ -106,7 +107,7 @@ class EditorDesk:
         self.folder = folder
         self._pilot_class = pilot_class
         self._open: dict[str, SharedDocument] = {}
-        self._opening: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._opening: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
         self._threads = ThreadPoolExecutor(_THREADS, "editor")
 
     async def work(self, what: Callable[[], T]) -> T:
@@ -125,7 +126,8 @@ class EditorDesk:
         """A file's document; call its `leave` at the end. Raises `DeskError` or `MissionError`."""
         if not _FILE.fullmatch(name):
             raise DeskError("desk.not_here", name=name[:80])
-        async with self._opening[name]:  # of this file only: others are not held up
+        # Of this file only: others are not held up.
+        async with self._opening.setdefault(name, asyncio.Lock()):
             shared = self._open.get(name)
             if shared is not None and shared.users == 0 and await self.work(shared.opened.is_outdated):
                 self._open.pop(name, None)
@@ -192,14 +194,7 @@ class EditorDesk:
         path = self.folder / (f"{name}-{owner}.yaml" if owner else f"{name}.yaml")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            with path.open("x", encoding="utf-8", newline="") as file:
-                try:
-                    file.write(text)
-                    file.flush()
-                except OSError:
-                    with contextlib.suppress(OSError):
-                        path.unlink()  # half a mission
-                    raise
+            make_file(path, text)
         except FileExistsError:
             raise DeskError("desk.taken", name=path.name) from None
         except OSError as error:

@@ -9,7 +9,7 @@ from pathlib import Path
 from secrets import token_urlsafe
 
 from errors import UserError, is_disk_full
-from errors.files import TextError, decode_text, read_in_folder, replace_file, resolved_in_folder
+from errors.files import read_in_folder, replace_file, resolved_in_folder
 from framerunner.editing.words import Said, SaidError
 from offboard.authoring import (
     Change,
@@ -22,10 +22,9 @@ from offboard.authoring import (
     StateBox,
     known_places,
     layout_path,
-    parse_layout,
+    read_layout,
     write_layout,
 )
-from offboard.authoring.layout import MAX_LAYOUT_BYTES
 from offboard.mission import MAX_FILE_BYTES
 from offboard.pilot import Pilot
 
@@ -93,16 +92,8 @@ class OpenDocument:
             document = Document.from_bytes(read_in_folder(path, MAX_FILE_BYTES), path)
         except OSError as error:
             raise SaidError("desk.not_read", name=path.name, reason=_words(error)) from None
-        side = layout_path(path)
         try:
-            text = decode_text(read_in_folder(side, MAX_LAYOUT_BYTES))
-            layout, problem = parse_layout(text, side.name), ""
-        except FileNotFoundError:
-            layout, problem = Layout(), ""
-        except OSError as error:
-            layout, problem = Layout(), f"{side.name}: cannot be read: {_words(error)}"
-        except TextError as error:
-            layout, problem = Layout(), f"{side.name}: {error}"
+            layout, problem = read_layout(path), ""
         except LayoutError as error:
             layout, problem = Layout(), str(error)
         session = EditSession(document, layout)
@@ -203,12 +194,9 @@ class OpenDocument:
 
     def _write_layout(self) -> None:
         try:
-            resolved_in_folder(layout_path(self.path))
             write_layout(self.path, known_places(self.layout, self.document))
         except LayoutError as error:
             raise SaidError("places.not_written", reason=error) from None
-        except OSError as error:
-            raise SaidError("places.not_written", reason=_words(error)) from None
 
     def is_outdated(self) -> bool:
         """Whether the file has another text, and nothing here is to be saved."""

@@ -45,8 +45,7 @@ class Passages:
 
     def prepare(self) -> None:
         """Do the part of the work that all ways have in common."""
-        if not self.work:
-            assert self._graph is not None
+        _ = self._graph
 
     def corners(self, start_m: Array, end_m: Array) -> list[Array] | None:
         """Where to turn on the way between two points in plan; None if there is no way."""

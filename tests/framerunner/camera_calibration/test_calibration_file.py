@@ -87,6 +87,8 @@ def test_a_calibration_of_opencv_is_read(path, suffix, names):
         ("500.0, 0.0", "500.0, 3.0", "camera_matrix: must be fx 0 cx"),
         ("500.0, 0.0", "-5.0, 0.0", "fx_px: Input should be greater than 1"),
         ("data: [500.0", "data: [[500.0]", "float"),
+        ("image_width: 640", "image_width: {data: []}", "image_width is missing; add it"),
+        ("image_width: 640", f"image_width: 1{400 * '0'}", "int too large to convert to float"),
         ("image_width: 640", "%YAML:1.0\n---\n{{", "OpenCV's FileStorage: "),
     ],
 )

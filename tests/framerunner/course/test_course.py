@@ -11,6 +11,7 @@ from framerunner.course.progress import CourseEvent, CourseProgress, LessonProgr
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
+from tests.disk import disk_that_takes
 
 LESSONS = load_lessons()
 NAMES = [lesson.name for lesson in LESSONS]
@@ -108,3 +109,12 @@ def test_a_damaged_file_keeps_what_is_whole(tmp_path):
 def test_a_name_that_would_not_be_shown_as_it_is_is_refused(name, tmp_path):
     with pytest.raises(SettingError, match=r"use 1 to 60 printable characters|nobody has given a name"):
         CourseProgress(tmp_path / "file").add(CourseEvent(1.0, name, NAMES[0], "opened"))
+
+
+@pytest.mark.parametrize("command", [["course", "start", "1"], ["mission", "new", "mine"]])
+def test_a_full_disk_leaves_no_part_of_a_mission_that_is_then_taken_for_one(tmp_path, command, capsys):
+    with disk_that_takes(10):
+        assert run([*command, "--out", str(tmp_path)]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+    assert run([*command, "--out", str(tmp_path)]) == 0

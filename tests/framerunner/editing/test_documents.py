@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import resource
 import time
@@ -18,6 +19,7 @@ from framerunner.editing.documents.desk import DeskError, EditorDesk
 from framerunner.editing.documents.door import DocumentsDoor
 from framerunner.editing.documents.messages import catalogue_message, document_message
 from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
+from framerunner.editing.words import SaidError
 from monitor.access import Role, Visitor
 from offboard.authoring import read_layout
 from offboard.authoring.edits import AddState
@@ -567,3 +569,15 @@ def test_a_pupil_sees_and_changes_own_files_only_until_the_log_in_ends(tmp_path)
                 window.ask("save")
             assert refused.value.code == 4403
     assert (tmp_path / "lesson_1_ada.yaml").read_text() == HOVER
+
+
+async def test_names_that_are_asked_for_take_no_memory(tmp_path):
+    def locks():
+        gc.collect()
+        return sum(isinstance(each, asyncio.Lock) for each in gc.get_objects())
+
+    desk, before = EditorDesk(tmp_path), locks()
+    for number in range(20):
+        with pytest.raises(SaidError):
+            await desk.open(f"none-{number}.yaml")
+    assert locks() < before + 20

@@ -16,9 +16,10 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from framerunner.course.lessons import find_lesson
-from framerunner.editing.line import Line
 from framerunner.editing.service import EditingSettings
+from framerunner.editing.waiting_queue import WaitingQueue
 from framerunner.editing.web import EditingDoor
+from framerunner.editing.worker_pool import WorkerPool
 from framerunner.evaluation.runner import fly_task
 from framerunner.flying.plan import FlightPlan
 from monitor.access import Role, Visitor
@@ -346,7 +347,7 @@ def test_a_pupil_starts_no_flight_in_the_simulator():
 
 def test_a_line_expects_turns_by_the_durations_of_those_before():
     now_s = 0.0
-    line = Line(2, 10.0, lambda: now_s)
+    line = WaitingQueue(2, 10.0, lambda: now_s)
     for each in "abcde":
         line.enter(each)
     assert list(line.begin()) == ["a", "b"]
@@ -393,3 +394,24 @@ def test_the_choices_are_listed():
     assert "test-case-1" in choices["scenarios"]
     assert "calm" in choices["levels"]
     assert "1_take_off" in choices["lessons"]
+
+
+def test_a_batch_that_is_over_is_not_cancelled_with_the_next_one_of_its_worker():
+    batch = {"text": HOVER, "level": None, "scenarios": ["test-case-1"]}
+    with page() as browser:
+        first = browser.answer("start_batch", **batch)["batch"]
+        assert browser.until("batch_ended")["text"] == ""
+        assert browser.answer("start_batch", **batch)["kind"] == "batch_started"
+        assert browser.answer("cancel", batch=first)["kind"] == "done"
+        ended = browser.until("batch_ended")
+        assert (ended["text"], ended["flown"]) == ("", 1)
+
+
+async def test_a_worker_that_is_being_started_when_nobody_needs_it_is_ended():
+    before, tasks = workers(), []
+    pool = WorkerPool(1, lambda work: tasks.append(asyncio.create_task(work)))
+    pool.prepare()
+    await asyncio.sleep(0)
+    pool.end_spare()
+    await asyncio.gather(*tasks)
+    assert workers() == before

@@ -213,3 +213,9 @@ def test_a_lock_in_the_shared_folder_neither_changes_nor_waits_for_other_files(t
     with claimed_instance(), claimed_instance() as instance:
         assert instance == 2
     assert (three_instances / "framerunner-2.lock").stat().st_mode & 0o777 == 0o644
+
+
+def test_a_pipe_in_the_place_of_a_lock_of_px4_is_not_waited_for(three_instances):
+    os.mkfifo(three_instances / "px4_lock-0")
+    with claimed_instance() as instance:
+        assert instance == 0

@@ -112,7 +112,8 @@ def test_other_files_are_not_deleted(tmp_path, plan):
 
 def test_a_folder_without_a_complete_identity_is_started_again(tmp_path, plan):
     (tmp_path / ".lock").touch()
-    (tmp_path / "evaluation.json.part").write_text('{"form', encoding="utf-8")
+    for name in ("evaluation.json.part", ".evaluation.json.0a1b2c3d.part"):
+        (tmp_path / name).write_text('{"form', encoding="utf-8")
     assert kept(tmp_path, plan) == []
     assert (tmp_path / "evaluation.json").exists()
 

@@ -3,6 +3,8 @@
 import errno
 import json
 import re
+from threading import Event
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,6 +12,7 @@ from errors import SettingError, UserError
 from framerunner.flying import run
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings
+from framerunner.runs.recorder import RunRecords
 from framerunner.runs.run_folder import UNFINISHED, RunFolder, write_outcome
 from framerunner.runs.track import Track
 from offboard.mission import load_mission
@@ -112,3 +115,18 @@ async def test_a_flight_that_armed_leaves_a_result_whatever_error_ended_it(
         [(f"aborted ({why})", why)] if why else []
     )
     assert not list(tmp_path.glob("*/unfinished.json"))
+
+
+def test_a_slow_disk_has_no_line_of_unfinished_results_to_write():
+    is_fast, written = Event(), []
+
+    def write(result):
+        is_fast.wait(5.0)
+        written.append(result)
+
+    records = RunRecords(SimpleNamespace(keep_unfinished=write), None)
+    for _ in range(10):
+        records.keep_unfinished(FlightResult(verdict="clean", seed=None))
+    is_fast.set()
+    records.stop_keeping()
+    assert len(written) == 1

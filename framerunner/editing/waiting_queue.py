@@ -1,4 +1,4 @@
-"""The line of flights or batches that wait until others are over."""
+"""The queue of flights or batches that wait until others are over."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Item = TypeVar("Item")
 _NEWEST = 0.3  # part of the last one's duration in the mean
 
 
-class Line(Generic[Item]):
+class WaitingQueue(Generic[Item]):
     """First come, first served, some at the same time.
 
     Args:
@@ -57,13 +57,9 @@ class Line(Generic[Item]):
     def waiting(self) -> Iterator[tuple[Item, int, int | None]]:
         """Each that waits, with its place from 1 and the seconds until its turn, if they can be expected."""
         duration_s, now_s = self._duration_s, self._clock()
-        if duration_s is None:
-            yield from ((item, place, None) for place, item in enumerate(list(self._waiting), start=1))
-            return
-        free_s = [max(0.0, began_s + duration_s - now_s) for began_s in self._began_s.values()]
+        free_s = [max(0.0, began_s + (duration_s or 0.0) - now_s) for began_s in self._began_s.values()]
         free_s += [0.0] * (self._places - len(free_s))
         heapq.heapify(free_s)
         for place, item in enumerate(list(self._waiting), start=1):
-            turn_s = heapq.heappop(free_s)
-            heapq.heappush(free_s, turn_s + duration_s)
-            yield item, place, math.ceil(turn_s)
+            turn_s = heapq.heapreplace(free_s, free_s[0] + (duration_s or 0.0))
+            yield item, place, None if duration_s is None else math.ceil(turn_s)
