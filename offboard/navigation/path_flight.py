@@ -23,7 +23,7 @@ from offboard.navigation.planning import Search, obstructed
 from offboard.navigation.search.lookout import Lookout, turn_to
 from offboard.navigation.search.viewed_space import ViewedSpace
 from offboard.navigation.seen_space import SeenSpace
-from offboard.response import ResponseEstimate
+from offboard.response import Prediction, ResponseEstimate
 from scenarios.models import Arena
 
 STILL = VelocityCommand()
@@ -255,7 +255,7 @@ class PathFlight:
             braking = self._follower.braking() if self._left is not None else None
             if braking is not None:
                 return replace(braking, yaw_rad=state.yaw), True
-        return self._own_motion(state), True
+        return _own_motion(state, self._response.predict() if self._follower.response.late else None), True
 
     def _plan(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> None:
         """Begin to search for a path from the motion now."""
@@ -312,16 +312,6 @@ class PathFlight:
         later_s = found.crossings[0].time_s + self._follower.lead_s - (coming.time_s - now_s)
         return later_s > LATER_S and not _moved(found.crossings[0].gate, coming.gate, STILL_GOOD_M)
 
-    def _own_motion(self, state: DroneState) -> Motion:
-        """The drone's, when the next command is flown."""
-        x, y, z = position_now(state)
-        if not self._follower.response.late:
-            return Motion((x, y, z), state.velocity_arena_m_s, state.yaw)
-        coming = self._response.predict()
-        dx, dy, dz = coming.moved_m
-        yaw_rad = state.yaw + coming.turned_rad
-        return Motion((x + dx, y + dy, z + dz), coming.velocity_m_s, yaw_rad, coming.yaw_rate_rad_s)
-
     def _ahead(self, time_s: float) -> list[Vec3]:
         """Where the drone will be on its path within a time, the vehicle's lag added."""
         path = self.path
@@ -359,6 +349,16 @@ class PathFlight:
         ]
         places_m = self._ahead(AHEAD_S + CHECK_S)
         return obstructed(places_m, gates, obstacles=obstacles, arena=self._arena, style=self._style)
+
+
+def _own_motion(state: DroneState, coming: Prediction | None) -> Motion:
+    """The drone's, when the next command is flown; `coming` is that of a vehicle that answers late."""
+    x, y, z = position_now(state)
+    if coming is None:
+        return Motion((x, y, z), state.velocity_arena_m_s, state.yaw)
+    dx, dy, dz = coming.moved_m
+    yaw_rad = state.yaw + coming.turned_rad
+    return Motion((x + dx, y + dy, z + dz), coming.velocity_m_s, yaw_rad, coming.yaw_rate_rad_s)
 
 
 def position_now(state: DroneState) -> Vec3:

@@ -40,12 +40,12 @@ class Obstruction:
         self._blocks_m = (to_x, to_y)
         self.clear: Bools = np.ones((len(places_m), to_x.size), dtype=bool)
         x, y = np.meshgrid(grid.x_m, grid.y_m, indexing="ij")
-        self._steps: list[_Step] = []
+        self._steps: list[_GridStep] = []
         for along_x, along_y in _STEPS:
             (leave_x, enter_x), (leave_y, enter_y) = _slices(along_x), _slices(along_y)
             leave, enter = (leave_x, leave_y), (enter_x, enter_y)
             length_m = np.float32(hypot(along_x * _pitch(grid.x_m), along_y * _pitch(grid.y_m)))
-            self._steps.append(_Step(leave, enter, (x[leave], y[leave], x[enter], y[enter]), length_m))
+            self._steps.append(_GridStep(leave, enter, (x[leave], y[leave], x[enter], y[enter]), length_m))
         self._kept: dict[
             Vec3, tuple[Bools, ...]
         ] = {}  # by obstacle: what it leaves in sight, and of each step
@@ -111,7 +111,7 @@ class Obstruction:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Step:
+class _GridStep:
     """From each cell to the next one in a direction: where they are in the grid, and in the arena."""
 
     leave: tuple[slice, slice]
@@ -159,8 +159,8 @@ def _is_clear(
     end_m: float = 0.0,
 ) -> Bools:
     """Whether straight lines stay clear of all obstacles, but for those within `end_m` of their ends."""
-    clear: Bools = _each_clear(columns_m, from_x, from_y, to_x, to_y, room_m=room_m, end_m=end_m).all(axis=0)
-    return clear
+    each = _each_clear(columns_m, from_x, from_y, to_x, to_y, room_m=room_m, end_m=end_m)
+    return np.logical_and.reduce(each)
 
 
 def _each_clear(
