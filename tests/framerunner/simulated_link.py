@@ -45,6 +45,7 @@ SETPOINT_US = 50_000
 LATENCY_US = 2_000
 OVERTAKEN_BY_US = 8_000
 AFTER_S = 2.5
+STILL_US = 2_000_000  # a vehicle that is disarmed stays where it is
 
 
 @dataclass(frozen=True)
@@ -457,7 +458,7 @@ def fly_over(
         caps: on the commands.
         events: what happens at times in seconds, in order.
         parameters: of the vehicle, set before.
-        after_s: for which the vehicle is followed when the app has ended.
+        after_s: for which the vehicle is followed when the app has ended, or shortly if it is disarmed.
     """
     vehicle = LinkedVehicle(scenario, impairment, seed)
     vehicle.events.extend(events)
@@ -484,10 +485,10 @@ def fly_over(
     with asyncio.Runner(loop_factory=lambda: SimulatedTimeLoop(vehicle)) as runner:
         outcome = runner.run(fly())
     flown = len(vehicle.truths)
-    end_us = vehicle.time_us + after_s * 1e6
-    while vehicle.time_us < end_us:
+    end_us, status, armed_us = vehicle.time_us + after_s * 1e6, vehicle.autopilot.status, vehicle.time_us
+    while vehicle.time_us < end_us and (vehicle.events or vehicle.time_us - armed_us < STILL_US):
         vehicle.tick()
-    status = vehicle.autopilot.status
+        armed_us = vehicle.time_us if status.armed else armed_us
     frames = vehicle.simulation.referee.snapshot().crossed
     return LinkedFlight(outcome, flown, box, vehicle.truths, status.mode, status.armed, frames, moments)
 

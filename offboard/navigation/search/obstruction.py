@@ -160,7 +160,8 @@ def _is_clear(
 ) -> Bools:
     """Whether straight lines stay clear of all obstacles, but for those within `end_m` of their ends."""
     each = _each_clear(columns_m, from_x, from_y, to_x, to_y, room_m=room_m, end_m=end_m)
-    return np.logical_and.reduce(each)
+    clear: Bools = np.logical_and.reduce(each)
+    return clear
 
 
 def _each_clear(

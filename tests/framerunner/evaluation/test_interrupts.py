@@ -30,8 +30,8 @@ def lines_in(path):
 
 @pytest.mark.parametrize(
     ("jobs", "number"),
-    [(1, signal.SIGINT), (2, signal.SIGINT), (2, signal.SIGKILL)],
-    ids=["1-SIGINT", "2-SIGINT", "2-SIGKILL"],
+    [(1, signal.SIGINT), (2, signal.SIGKILL)],
+    ids=["1-SIGINT", "2-SIGKILL"],
 )
 def test_a_stopped_evaluation_is_continued_where_it_was(place, jobs, number):
     out = f"{number.name}-{jobs}"
