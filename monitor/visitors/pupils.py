@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import hmac
 import json
-import os
 import re
 import secrets
 from pathlib import Path
@@ -14,7 +12,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from errors import UserError
-from errors.files import read_in_folder
+from errors.files import read_in_folder, replace_file
 
 MAX_PUPILS = 300
 _MAX_FILE_BYTES = 1_000_000
@@ -34,7 +32,7 @@ class Pupil(BaseModel):
         word: with which the pupil goes on in another browser.
     """
 
-    model_config = ConfigDict(frozen=True, extra="ignore")
+    model_config = ConfigDict(frozen=True, extra="allow")  # what a teacher adds is kept
 
     name: Annotated[str, Field(min_length=1, max_length=60)]
     key: Annotated[str, Field(pattern=r"^[a-z0-9_]{1,200}$")]
@@ -42,6 +40,8 @@ class Pupil(BaseModel):
 
 
 class _FileContent(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
     pupils: list[Pupil] = []
 
 
@@ -59,11 +59,14 @@ class PupilBook:
 
     def all(self) -> tuple[Pupil, ...]:
         """The pupils, in the order in which they joined. Raises `PupilError` if the file cannot be read."""
+        return tuple(self._read().pupils)
+
+    def _read(self) -> _FileContent:
         try:
             data = json.loads(read_in_folder(self._path, _MAX_FILE_BYTES))
-            return tuple(_FileContent.model_validate(data).pupils)
+            return _FileContent.model_validate(data)
         except FileNotFoundError:
-            return ()
+            return _FileContent()
         except (OSError, ValueError, RecursionError, ValidationError):
             raise PupilError(
                 f"{self._path.name} cannot be read, so nobody can join; the teacher mends or removes it"
@@ -98,28 +101,22 @@ class PupilBook:
         return self._join(name) if is_of_class else None
 
     def _join(self, name: str) -> Pupil:
-        pupils = self.all()
-        if len(pupils) >= MAX_PUPILS:
+        content = self._read()
+        if len(content.pupils) >= MAX_PUPILS:
             raise PupilError(
                 f"{MAX_PUPILS} pupils have joined; the teacher removes some from {self._path.name}"
             )
-        taken = {each.key for each in pupils}
+        taken = {each.key for each in content.pupils}
         key = first = file_key(name)
         number = 2
         while key in taken:
             key, number = f"{first}_{number}", number + 1
         pupil = Pupil(name=name, key=key, word=_new_word())
-        content = _FileContent(pupils=[*pupils, pupil]).model_dump_json(indent=1)
-        part = self._path.with_name(f".{self._path.name}.part")
+        content.pupils.append(pupil)
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            part.unlink(missing_ok=True)
-            with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-                file.write(content)
-            part.replace(self._path)
+            replace_file(self._path, content.model_dump_json(indent=1), new_mode=0o600)
         except OSError as error:
-            with contextlib.suppress(OSError):
-                part.unlink(missing_ok=True)
             raise PupilError(
                 f"{self._path.name} cannot be written ({error.strerror}); tell the teacher"
             ) from None

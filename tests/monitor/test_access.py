@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -110,6 +111,18 @@ async def test_a_file_of_pupils_that_cannot_be_read_is_left_as_it_is(tmp_path):
     with pytest.raises(LoginRefusedError, match=r"pupils\.json cannot be read"):
         await access.log_in("Bo", "our class", "10.0.0.1")
     assert path.read_text() == '{"pupils": [{"name": "Ada"}]}'
+
+
+async def test_a_teachers_additions_to_the_file_of_pupils_are_kept(tmp_path):
+    path = tmp_path / "pupils.json"
+    ada = {"name": "Ada", "key": "ada", "word": "nano-bimo-17", "desk": 4}
+    path.write_text(json.dumps({"school": "South", "pupils": [ada]}))
+    access = Access(Secrets(class_code="our class"), pupils=PupilBook(path, "our class"))
+    _, bo = await access.log_in("Bo", "our class", "10.0.0.1")
+    kept = json.loads(path.read_text())
+    assert (kept["school"], kept["pupils"][0]) == ("South", ada)
+    path.write_text("damaged while Bo is logged in")
+    assert access.code_word(bo) == ""  # the page Course is shown without it
 
 
 async def test_a_restart_keeps_judges_logged_in_until_their_session_ends(tmp_path):

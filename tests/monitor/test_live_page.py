@@ -256,6 +256,22 @@ async def test_a_large_chart_can_be_read_and_shows_the_active_state(chromium, fa
     assert complaints == []
 
 
+async def test_a_new_chart_begins_at_its_initial_state(chromium, fake):
+    states = [f'state "x{n}" as x{n}' for n in range(40)]
+    arrows = [f"x{n} --> x{n + 1}" for n in range(39)]
+    before = "\n".join(["stateDiagram-v2", *states, "[*] --> x0", *arrows])
+    after = before.replace("x", "y")
+    fake.welcome[1] = chart() | {"mermaid": before}
+    fake.welcome[2] = {"kind": "status", "drones": [status(state="x39")]}
+    page, complaints = await visit(chromium, fake, "/chart")
+    await expect(page.locator('.e-state[data-state="x39"]')).to_be_in_viewport(ratio=0.9)
+    await fake.say("status", drones=[status() | {"mission": None}])
+    await expect(page.locator(LIT)).to_have_count(0)
+    await fake.say(**chart() | {"mermaid": after})
+    await expect(page.locator('.e-state[data-state="y0"]')).to_be_in_viewport(ratio=0.9)
+    assert complaints == []
+
+
 async def test_an_invalid_diagram_is_reported_and_the_state_is_still_shown(chromium, fake):
     fake.welcome[1] = chart() | {"mermaid": "stateDiagram-v2\n    state {{ --> }\n"}
     page, _ = await visit(chromium, fake, "/chart")

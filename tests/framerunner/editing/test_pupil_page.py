@@ -74,6 +74,22 @@ async def test_a_beginner_sees_the_goal_and_only_what_is_needed_without_scrollin
     await user.page.context.close()
 
 
+async def test_a_check_whose_connection_is_lost_says_so_and_can_be_repeated(browser, program):
+    user = await pupil(browser, program, "start.yaml", "1_take_off")
+    await user.page.evaluate("localStorage.setItem('framerunner-learner', 'Ada')")
+    await user.page.locator("#e-tab-lesson").click()
+    await user.page.route("**/api/course/check*", lambda route: route.abort())
+    line = user.page.locator(".e-lesson-line")
+    for said in ("no connection to the monitor", "try later"):
+        await user.press("Check the lesson", user.page.locator(".e-verdict"))
+        await expect(line).to_contain_text(said)
+        await user.page.unroute("**/api/course/check*")
+        await user.page.route(
+            "**/api/course/check*", lambda route: route.fulfill(status=503, json={"detail": "try later"})
+        )
+    await user.page.context.close()
+
+
 async def test_a_divider_is_dragged_moved_by_keys_and_remembered(browser, program):
     user = await pupil(browser, program, "start.yaml", "1_take_off")
     drawing = user.page.locator(".e-drawing")

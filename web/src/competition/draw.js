@@ -31,7 +31,7 @@ export class Draw {
     });
     const form = make("form", { class: "fields" },
       make("fieldset", {}, make("legend", {}, "Draw from"), this.#pool),
-      make("label", { for: "draw-other" }, "Another one: calm-17 is a random layout; or the name in an own file in the folder scenarios/"),
+      make("label", { for: "draw-other" }, "Another one: a random layout such as calm-17, or the name of your own scenario"),
       make("div", { class: "buttons" }, this.#other, add),
       make("label", { for: "draw-count" }, "How many"), this.#count,
       make("div", { class: "buttons" }, make("button", { type: "submit", class: "main" }, "Draw")));
@@ -46,7 +46,9 @@ export class Draw {
     const name = this.#other.value.trim();
     return this.#desk.attempt(async () => {
       await send("pool", { scenario: name });
-      if (!this.#pool.querySelector(`[value="${name}"]`)) this.#tick(name, true);
+      const known = /** @type {HTMLInputElement|null} */ (this.#pool.querySelector(`[value="${CSS.escape(name)}"]`));
+      if (known) known.checked = true;
+      else this.#tick(name, true);
       this.#other.value = "";
     });
   }

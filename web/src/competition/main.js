@@ -1,4 +1,4 @@
-/** The desk of a contest: who flies and who is next, teams, draw, tries, rule. Judges have controls; all others look. */
+/** The desk of a contest: who flies and who is next, teams, draw, tries, rule. Organisers have controls, judges correct tries; all others look. */
 
 import "../lib/contest/contest.css";
 import { ask, oneAtATime, watch } from "../lib/contest/channel.js";
@@ -44,7 +44,7 @@ class Desk {
     this.#line.hidden = words === "";
   }
 
-  /** Do what a judge asks, and say why if it was refused. @returns {Promise<boolean>} whether it was done */
+  /** Do what somebody asks, and say why if it was refused. @returns {Promise<boolean>} whether it was done */
   async attempt(work) {
     try {
       await work();

@@ -5,7 +5,7 @@ import { isWaiting, nowLines } from "../lib/contest/now.js";
 import { nameOf } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 
-/** "Now and next": who flies, who is called, and a judge's form to call a team. */
+/** "Now and next": who flies, who is called, and an organiser's form to call a team. */
 export class Calls {
   #desk;
   #now = make("div", { class: "now" });
@@ -95,7 +95,7 @@ export class Calls {
     if (called === null) {
       lines.push(make("p", { class: "hint" },
         "No team is called: a try that begins now has no team until a judge assigns it. ",
-        this.#desk.judge ? "Call one here." : "Judges call one after their log-in."));
+        this.#desk.judge ? "Call one here." : "Organisers call one after their log-in."));
     }
     this.#now.replaceChildren(...lines);
   }
@@ -111,7 +111,7 @@ function offer(select, options) {
   if (options.some(([value]) => value === chosen)) select.value = chosen;
 }
 
-/** The queue: everybody sees the order, judges change it. */
+/** The queue: everybody sees the order, organisers change it. */
 export class Queue {
   #desk;
   #list = make("ol", { class: "queue" });

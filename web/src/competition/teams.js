@@ -64,7 +64,7 @@ export class Teams {
       return flying.has(team.id) ? "flying" : team.id === waiting ? "called" : inQueue;
     };
     if (board.teams.length === 0) {
-      this.#list.replaceChildren(make("li", { class: "hint" }, this.#desk.judge ? "No team has been entered. Enter the first one here." : "No team has been entered. Judges enter them after their log-in."));
+      this.#list.replaceChildren(make("li", { class: "hint" }, this.#desk.judge ? "No team has been entered. Enter the first one here." : "No team has been entered. Organisers enter them after their log-in."));
       return;
     }
     this.#list.replaceChildren(...board.teams.map((team) => this.#row(team, state(team))));

@@ -59,6 +59,7 @@ function whoTakesPart() {
 let lessons = [];
 /** @type {{name: string, word: string, lessons: Object<string, {flights: number, passed_after_s: number|null, last_reason: string}>}[]} */
 let learners = [];
+let shownClass = "";
 
 function tell(text) {
   setText(problem, text);
@@ -95,6 +96,9 @@ function showProgress() {
 }
 
 function showClass() {
+  const told = JSON.stringify([lessons, learners]);
+  if (told === shownClass) return; // a selected code word and the focus stay
+  shownClass = told;
   const head = make("tr", {}, make("th", {}, word("pupil")), make("th", {}, word("word")), ...lessons.map(({ number: each, title }) => make("th", {}, `${each}. ${inLanguage(title)}`)));
   const cell = (done) => {
     if (!done) return make("td", {}, "");
@@ -105,7 +109,7 @@ function showClass() {
   };
   const rows = learners.map((each) => make("tr", {}, make("th", { scope: "row" }, each.name), make("td", {}, make("code", {}, each.word)),
     ...lessons.map(({ name }) => cell(each.lessons[name])), make("td", {}, reset(each.name))));
-  table.replaceChildren(head, ...(rows.length > 0 ? rows : [make("tr", {}, make("td", { colspan: "7", class: "hint" }, word("nobody")))]));
+  table.replaceChildren(head, ...(rows.length > 0 ? rows : [make("tr", {}, make("td", { colspan: String(lessons.length + 3), class: "hint" }, word("nobody")))]));
 }
 
 /** @param {string} name of a pupil who begins anew */

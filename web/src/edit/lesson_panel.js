@@ -58,8 +58,11 @@ export class LessonPanel {
     }
     if (this.#isChecking) return;
     this.#isChecking = true;
-    await this.#checkNow();
-    this.#isChecking = false;
+    try {
+      await this.#checkNow();
+    } finally {
+      this.#isChecking = false;
+    }
   }
 
   async #checkNow() {
@@ -73,7 +76,7 @@ export class LessonPanel {
     }
     const told = await checkLesson({ learner: learner(), lesson: this.#name, text }, (place) => setText(this.#line, waitingWords(place)));
     if (told.detail !== undefined) {
-      setText(this.#line, told.detail || word("lost_connection"));
+      setText(this.#line, told.detail);
       return;
     }
     this.#line.setAttribute("data-passed", String(told.passed));

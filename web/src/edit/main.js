@@ -42,7 +42,7 @@ async function chooseFile() {
   const told = await answer.json();
   if (!answer.ok) {
     problem.hidden = false;
-    problem.replaceChildren(word("may_not"), " ", make("a", { href: loginAddress() }, word("log_in")));
+    problem.replaceChildren(told.detail, " ", answer.status === 403 ? make("a", { href: loginAddress() }, word("log_in")) : "");
     return;
   }
   const link = (name) => make("li", {}, make("a", { href: `/edit?file=${encodeURIComponent(name)}` }, name));

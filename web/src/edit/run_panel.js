@@ -132,10 +132,9 @@ export class RunPanel {
   }
 
   async #start(paused) {
-    setText(this.#line, word("starting"));
+    if (this.#waits) return; // the line tells its place in the queue
     const text = await this.#text();
     if (!text) return;
-    if (this.#waits) return;
     if (this.#run) await this.#flights.ask({ do: "stop", run: this.#run });
     this.#counts = {};
     this.#spans = [];

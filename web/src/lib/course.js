@@ -1,5 +1,5 @@
 /** What the course's pages share: the lessons, and the pupil's name. */
-import { language } from "./language.js";
+import { language, translator } from "./language.js";
 import { pageData } from "./page_data.js";
 
 const KEPT = "framerunner-learner";
@@ -32,11 +32,16 @@ export async function loadLessons() {
   return answer.ok ? (await answer.json()).lessons : [];
 }
 
-/** @param {string} what @param {object} content */
+const word = translator({
+  en: { lost: "no connection to the monitor; is it running? Try again" },
+  es: { lost: "no hay conexión con el monitor; ¿está en marcha? Inténtalo de nuevo" },
+});
+
+/** @param {string} what @param {object} content @returns {Promise<Response>} an error without a connection */
 function post(what, content) {
   return fetch(`/api/course/${what}?language=${language()}`, {
     method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(content),
-  });
+  }).catch(() => Response.json({ detail: word("lost") }, { status: 503 }));
 }
 
 /** Ask the course for something. @param {string} what @param {object} content @returns {Promise<any>} `detail` says why not */
@@ -64,7 +69,7 @@ export async function checkLesson(content, waits) {
       if (told.place === undefined) return told;
       waits(told);
     }
-    if (done) return { detail: "" };
+    if (done) return { detail: word("lost") };
   }
 }
 

@@ -21,7 +21,7 @@ class Ranking {
   #table = make("table", { class: "ranking", role: "table" });
   #head = make("tr", { role: "row" });
   #body = make("tbody", { role: "rowgroup" });
-  #empty = make("p", { class: "empty", hidden: true }, "No team has been entered. A judge enters teams on the page ",
+  #empty = make("p", { class: "empty", hidden: true }, "No team has been entered. Organisers enter teams on the page ",
     make("a", { href: "/competition" }, "Competition"), ".");
   #rule = make("p", { class: "hint" });
   #pages;

@@ -39,7 +39,7 @@ export class StageRanking {
         bigName((called ?? first).team_name, "s-called"),
         make("p", { class: "s-where" }, called?.scenario ?? ""),
       ]
-      : [bigName("No try is running", "s-called"), make("p", { class: "s-where" }, "A judge calls the next team on the page Competition.")];
+      : [bigName("No try is running", "s-called"), make("p", { class: "s-where" }, "Organisers call the next team on the page Competition.")];
     if (called && first) words.push(make("p", { class: "s-before" }, "Next: ", nameOf(first.team_name)));
     const last = stage?.last;
     if (last) {

@@ -22,7 +22,6 @@ export class StageHead {
   /** @param {{team: string, scenario: string, figures: object|null, isOver: boolean, rank: number|null}} told */
   show({ team, scenario, figures, isOver, rank }) {
     if (this.#team.dataset.shown !== team) {
-      this.#team.dataset.shown = team;
       const name = bigName(team, "s-team");
       this.#team.replaceWith(name);
       this.#team = name;

@@ -35,7 +35,7 @@ export class Statechart {
     this.#words = make("p", { class: "m-chart-words" }, NONE);
     this.#picture = make("div", { class: "m-chart-picture", tabindex: "0", role: "group", "aria-label": "diagram of the mission" });
     this.#view = new DiagramView(this.#picture, { done: "when finished", resume: "after a pause" }, { isEdited: false, wheelNeeds: this.#picture });
-    lookAt(this.#view, this.#picture, () => this.#setMode("free"));
+    lookAt(this.#view, this.#picture);
     this.#view.viewport.onTouched = () => this.#setMode("free");
     this.#picture.append(this.#words);
     this.#picture.addEventListener("keydown", (event) => {

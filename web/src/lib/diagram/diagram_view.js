@@ -425,7 +425,8 @@ export class DiagramView {
   #look() {
     if (this.#whole.nodes.length === 0) return;
     const fits = (boxes) => this.viewport.scaleOf(...sizeOf(boxes)) >= READABLE;
-    const around = this.#chain(this.#focus || this.#whole.initial);
+    const isThere = this.#whole.nodes.some(({ id }) => id === this.#focus);
+    const around = this.#chain(isThere ? this.#focus : this.#whole.initial);
     const isOpen = fits(this.#wholeBoxes);
     this.#close(new Set(isOpen ? [] : this.#allSuperstates.filter((id) => !around.includes(id))));
     if (isOpen || fits(this.#boxes)) return this.viewport.fit(sizeOf(this.#boxes));
@@ -467,10 +468,10 @@ export class DiagramView {
     this.reveal({ kind: "state", id });
   }
 
-  /** The superstate that is opened or closed at an element. @param {EventTarget|null} target @param {boolean} [isWhole] or anywhere on a closed one */
-  foldAt(target, isWhole = false) {
-    const element = target instanceof Element ? target.closest(isWhole ? "[data-fold], .e-closed" : "[data-fold]") : null;
-    return element instanceof SVGElement ? element.dataset.fold ?? element.dataset.state ?? "" : "";
+  /** The superstate that is opened or closed at an element. @param {EventTarget|null} target */
+  foldAt(target) {
+    const element = target instanceof Element ? target.closest("[data-fold]") : null;
+    return element instanceof SVGElement ? element.dataset.fold ?? "" : "";
   }
 
   /** Bring a state or transition into view, if it is not. @param {Selection} selection */

@@ -3,8 +3,8 @@
 const CLICK_PX = 5;
 const STEP = 1.35;
 
-/** @param {import("./diagram_view.js").DiagramView} view @param {HTMLElement} box holds it and takes the focus @param {() => void} onTouched */
-export function lookAt(view, box, onTouched) {
+/** @param {import("./diagram_view.js").DiagramView} view @param {HTMLElement} box holds it and takes the focus */
+export function lookAt(view, box) {
   const { root, viewport } = view;
   /** @type {Map<number, {x: number, y: number}>} */
   const fingers = new Map();
@@ -28,7 +28,7 @@ export function lookAt(view, box, onTouched) {
     }
     fingers.set(event.pointerId, now);
     moved += Math.hypot(now.x - before.x, now.y - before.y);
-    if (moved > CLICK_PX) onTouched();
+    if (moved > CLICK_PX) viewport.onTouched();
   });
   root.addEventListener("pointerup", (event) => {
     if (moved <= CLICK_PX && fingers.size === 1) {
@@ -47,7 +47,7 @@ export function lookAt(view, box, onTouched) {
     else if (event.key === "+" || event.key === "=") viewport.zoom(STEP);
     else if (event.key === "-") viewport.zoom(1 / STEP);
     else return;
-    onTouched();
+    viewport.onTouched();
     event.preventDefault();
   });
 }
