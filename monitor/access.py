@@ -6,7 +6,6 @@ import contextlib
 import hmac
 import json
 import logging
-import re
 import secrets
 import time
 import unicodedata
@@ -24,7 +23,7 @@ from starlette.websockets import WebSocket
 from errors import UserError
 from errors.files import replace_file
 from monitor.visitors.login_limit import LoginLimit
-from monitor.visitors.pupils import PupilBook, PupilError
+from monitor.visitors.pupils import PupilBook, PupilError, owns
 
 REFUSED_CODE = 4403  # closes a WebSocket, as 403 ends a request
 SESSION_S = 12 * 3600.0
@@ -103,8 +102,7 @@ class Visitor:
         """Whether they may see and change a mission's file; a pupil the own ones only."""
         if self.role is not Role.PUPIL:
             return self.may_teach
-        own = rf"(lesson_[0-9]+_{self.key}|[a-z][a-z0-9_]*-{self.key})\.yaml"
-        return re.fullmatch(own, file) is not None
+        return owns(self.key, file)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from errors.files import read_in_folder, replace_file
 
 MAX_PUPILS = 300
 _MAX_FILE_BYTES = 1_000_000
+_OWNED = re.compile(r"(?:lesson_[0-9]+_|[a-z][a-z0-9_]*-)(?P<key>[a-z0-9_]+)\.yaml")
 _CONSONANTS, _VOWELS = "bdfgklmnprstvz", "aeiou"
 
 
@@ -106,7 +107,7 @@ class PupilBook:
             raise PupilError(
                 f"{MAX_PUPILS} pupils have joined; the teacher removes some from {self._path.name}"
             )
-        taken = {each.key for each in content.pupils}
+        taken = {each.key for each in content.pupils} | self._keys_of_files()
         key = first = file_key(name)
         number = 2
         while key in taken:
@@ -121,6 +122,18 @@ class PupilBook:
                 f"{self._path.name} cannot be written ({error.strerror}); tell the teacher"
             ) from None
         return pupil
+
+
+    def _keys_of_files(self) -> set[str]:
+        """Keys with which a new pupil would own a file that somebody has named; lessons are their learner's."""
+        found = (_OWNED.fullmatch(path.name) for path in self._path.parent.glob("*-*.yaml"))
+        return {match["key"] for match in found if match is not None}
+
+
+def owns(key: str, file: str) -> bool:
+    """Whether a mission's file is that of the pupil with a key: a lesson, or one that the pupil has named."""
+    match = _OWNED.fullmatch(file)
+    return match is not None and match["key"] == key
 
 
 def file_key(name: str) -> str:

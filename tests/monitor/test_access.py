@@ -104,6 +104,17 @@ async def test_a_pupil_joins_with_the_class_s_word_and_goes_on_with_the_own_one(
     assert (tmp_path / "class" / "pupils.json").stat().st_mode & 0o077 == 0
 
 
+async def test_a_pupil_s_name_gives_no_file_that_is_there_already(tmp_path):
+    for name in ("my-mission.yaml", "lesson_1_ada.yaml"):
+        (tmp_path / name).write_text("name: x")
+    access = Access(Secrets(class_code="our class"), pupils=PupilBook(tmp_path / "pupils.json", "our class"))
+    _, pupil = await access.log_in("Mission", "our class", "10.0.0.1")
+    assert not pupil.may_edit("my-mission.yaml")
+    assert pupil.may_edit(f"my-{pupil.key}.yaml")
+    _, ada = await access.log_in("Ada", "our class", "10.0.0.1")
+    assert ada.may_edit("lesson_1_ada.yaml")  # from before there was a class
+
+
 async def test_a_file_of_pupils_that_cannot_be_read_is_left_as_it_is(tmp_path):
     path = tmp_path / "pupils.json"
     path.write_text('{"pupils": [{"name": "Ada"}]}')
