@@ -123,9 +123,8 @@ class PupilBook:
             ) from None
         return pupil
 
-
     def _keys_of_files(self) -> set[str]:
-        """Keys with which a new pupil would own a file that somebody has named; lessons are their learner's."""
+        """Keys with which a new pupil would own a file that has been named; lessons are their learner's."""
         found = (_OWNED.fullmatch(path.name) for path in self._path.parent.glob("*-*.yaml"))
         return {match["key"] for match in found if match is not None}
 
