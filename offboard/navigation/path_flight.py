@@ -41,7 +41,7 @@ LOOK_AHEAD_S = 2.0  # likewise; the drone turns in flight to look at what it has
 AHEAD_STEP_S = 0.1
 CHECK_S = 0.2  # between two checks that a path is free, if neither it nor the obstacles have changed
 WAITING_REPLAN_S = 0.2  # between two attempts to go on
-TICK_WORK = 300_000
+TICK_WORK = 200_000
 """Of searching for a path in one tick, in the unit of `LegFinder`: some milliseconds of a processor. Then the
 search pauses, so that no command is late; most paths need less."""
 MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
