@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shlex
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -43,6 +44,8 @@ __all__ = [
 
 MAX_FILE_BYTES = 1_000_000
 MISSIONS = Path(__file__).parent / "missions"
+BaseReader = Callable[[MissionFile], MissionFile]
+"""Reads the mission that one extends."""
 TEMPLATES = Path(__file__).parent / "templates"
 _FAULTS: dict[TextFault, str] = {
     "missing": "file.unreadable",
@@ -134,7 +137,7 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
     name = str(name_or_path)
     path = _find(name, Path.cwd(), Place(name))
     label = path.name if path.parent == MISSIONS else name
-    return _checked(read_mission_file(_read_text(path, label), path, label), path, pilot)
+    return _checked(read_mission_file(_read_text(path, label), path, label), path, pilot, read_base)
 
 
 def mission_from_text(
@@ -154,18 +157,16 @@ def mission_from_text(
     if len(text) > MAX_FILE_BYTES:
         raise mission_error(Place(path.name), Message("file.too_large"))
     written = read_mission_file(text.replace("\r\n", "\n").replace("\r", "\n"), path)
-    if written.extends and written.extends not in list_missions():
-        known = ", ".join(list_missions())
-        message = Message("extends.package_only", name=cut(written.extends), names=known)
-        raise mission_error(written.place, message)
-    return _checked(written, path, pilot)
+    return _checked(written, path, pilot, read_package_base)
 
 
-def _checked(written: MissionFile, path: Path, pilot: PilotFile | type[Pilot] | None) -> Mission:
+def _checked(
+    written: MissionFile, path: Path, pilot: PilotFile | type[Pilot] | None, open_base: BaseReader
+) -> Mission:
     pilot = Pilot if pilot is None else pilot
     problems = ProblemList()
     pilot_class = pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot
-    spec = expand_and_check(written, pilot_class, problems)
+    spec = expand_and_check(written, pilot_class, problems, open_base)
     problems.raise_if_any()
     mission = Mission(
         spec.name,
@@ -182,13 +183,21 @@ def _checked(written: MissionFile, path: Path, pilot: PilotFile | type[Pilot] | 
     return mission
 
 
-def expand_and_check(written: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> MissionFile:
+def expand_and_check(
+    written: MissionFile, pilot_class: type[Pilot], problems: ProblemList, open_base: BaseReader
+) -> MissionFile:
     """Merge a mission file with what it extends, expand it and check it; `problems` takes what is found.
+
+    Args:
+        written: the file.
+        pilot_class: whose names it uses.
+        problems: see above.
+        open_base: reads what a mission extends: `read_base` or `read_package_base`.
 
     Raises:
         MissionError: what it extends cannot be read, or it is too large.
     """
-    spec = expand(merge_extended(written, read_base), problems)
+    spec = expand(merge_extended(written, open_base), problems)
     check(spec, pilot_class, problems)
     return spec
 
@@ -205,6 +214,19 @@ def read_base(mission: MissionFile) -> MissionFile:
         raise mission_error(mission.place, Message("extends.elsewhere", name=mission.extends))
     label = path.name if path.name != mission.path.name else str(path)
     return read_mission_file(_read_text(path, label), path, label)
+
+
+def read_package_base(mission: MissionFile) -> MissionFile:
+    """Read the mission that one extends, of the package only: files beside it may be others'.
+
+    Raises:
+        MissionError: the package has none of that name.
+    """
+    known = list_missions()
+    if mission.extends not in known:
+        message = Message("extends.package_only", name=cut(mission.extends), names=", ".join(known))
+        raise mission_error(mission.place, message)
+    return read_base(mission)
 
 
 def _find(name: str, folder: Path, place: Place) -> Path:

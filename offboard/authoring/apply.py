@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from offboard.authoring import edits, state_edits, transition_edits
@@ -88,7 +88,7 @@ def _typed(document: Document, typed: Sequence[tuple[int, int, str]]) -> Edited:
 
 
 def _changed(document: Document, change: Change) -> Edited:
-    changed = Document(document.content.changed(change), document.path)
+    changed = replace(document, content=document.content.changed(change))
     _refuse_too_long(changed)
     return Edited(changed, (change,) if change.removed != change.inserted else ())
 
@@ -216,7 +216,7 @@ class EditSession:
         for change in changes:
             content = content.changed(change)
         if changes:
-            self.document = Document(content, self.document.path)
+            self.document = replace(self.document, content=content)
             layout = completed(layout, self.layout, self.document)
         self.layout = layout
         return changes

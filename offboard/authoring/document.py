@@ -15,7 +15,7 @@ from offboard.chart.problems import MissionError, Place, ProblemList, mission_er
 from offboard.chart.read import parse_mission_yaml, read_mission_file, read_nodes
 from offboard.chart.spec import MissionFile, expand, merge_extended
 from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
-from offboard.mission import MAX_FILE_BYTES, read_base, unreadable
+from offboard.mission import MAX_FILE_BYTES, BaseReader, read_base, unreadable
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,12 @@ class Document:
     Attributes:
         content: the text, with the file's line ends.
         path: of the file, which need not exist; what it extends is looked for beside it.
+        open_base: reads what it extends; `read_package_base` if it may not be another file of the folder.
     """
 
     content: MissionText
     path: Path
+    open_base: BaseReader = read_base
 
     @classmethod
     def from_text(cls, text: str, path: str | Path = "mission.yaml") -> Document:
@@ -125,7 +127,7 @@ class Document:
         if not self.outline.text("extends"):
             return None
         try:
-            return merge_extended(read_base(self._written()), read_base)
+            return merge_extended(self.open_base(self._written()), self.open_base)
         except MissionError:
             return None
 
@@ -138,7 +140,7 @@ class Document:
             problems = ProblemList()
             written = self._written()
             try:
-                merged = merge_extended(written, read_base)
+                merged = merge_extended(written, self.open_base)
             except MissionError:
                 merged = written
             return expand(merged, problems)

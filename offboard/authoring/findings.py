@@ -86,7 +86,7 @@ def problems_of(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[P
     """What the checker notes of a document."""
     problems = ProblemList()
     try:
-        expand_and_check(document.read(), pilot_class, problems)
+        expand_and_check(document.read(), pilot_class, problems, document.open_base)
     except MissionError as error:
         return (*problems.all, *error.problems)
     return problems.all

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 from offboard.authoring.blocks import Blocks, Owner, Patch
 from offboard.authoring.document import Document
@@ -59,7 +60,7 @@ class Work:
             if change.removed != change.inserted:
                 self.changes.append(change)
                 content = content.changed(change)
-        self.document = Document(content, self.document.path)
+        self.document = replace(self.document, content=content)
 
     @property
     def blocks(self) -> Blocks:

@@ -122,8 +122,16 @@ class EditorDesk:
             return []
         return sorted(name for name in names if _FILE.fullmatch(name))[:_MAX_LISTED]
 
-    async def open(self, name: str) -> SharedDocument:
-        """A file's document; call its `leave` at the end. Raises `DeskError` or `MissionError`."""
+    async def open(self, name: str, *, package_only: bool = False) -> SharedDocument:
+        """A file's document; call its `leave` at the end.
+
+        Args:
+            name: of the file.
+            package_only: who opens it may not read what other files of the folder say.
+
+        Raises:
+            DeskError, MissionError: it cannot be opened.
+        """
         if not _FILE.fullmatch(name):
             raise DeskError("desk.not_here", name=name[:80])
         # Of this file only: others are not held up.
@@ -139,6 +147,9 @@ class EditorDesk:
                 path = self.folder / name
                 opened = await self.work(lambda: OpenDocument.open(path, self._pilot_class))
                 shared = SharedDocument(opened)
+            if package_only:
+                async with shared.lock:
+                    shared.opened.extend_package_only()
             self._open[name] = shared
             shared.users += 1
         return shared

@@ -75,8 +75,8 @@ class DocumentsDoor:
 
         @router.get("/api/edit/export")
         async def export(request: Request, file: str, kind: Literal["scxml", "mermaid"]) -> Response:
-            demand(request, file)
-            return await _export(desk, file, kind, language_of(request))
+            package_only = not demand(request, file).may_teach
+            return await _export(desk, file, kind, language_of(request), package_only=package_only)
 
         @router.websocket("/ws/edit")
         async def edit(websocket: WebSocket, file: str, client: str = "") -> None:
@@ -86,7 +86,7 @@ class DocumentsDoor:
                 await refuse(websocket, say(_refusal(visitor), language))
                 return
             try:
-                shared = await desk.open(file)
+                shared = await desk.open(file, package_only=not visitor.may_teach)
             except UserError as error:
                 await refuse(websocket, reason(error, language))
                 return
@@ -141,7 +141,12 @@ def _add_files(router: APIRouter, desk: EditorDesk, demand: Callable[[Request], 
 
 
 async def _export(
-    desk: EditorDesk, file: str, kind: Literal["scxml", "mermaid"], language: Language
+    desk: EditorDesk,
+    file: str,
+    kind: Literal["scxml", "mermaid"],
+    language: Language,
+    *,
+    package_only: bool,
 ) -> Response:
     def export(opened: OpenDocument) -> str:
         chart = opened.document.chart
@@ -150,7 +155,7 @@ async def _export(
         return export_scxml(chart) if kind == "scxml" else mermaid_of(chart)
 
     try:
-        shared = await desk.open(file)
+        shared = await desk.open(file, package_only=package_only)
         try:
             async with shared.lock:
                 text = await desk.work(lambda: export(shared.opened))

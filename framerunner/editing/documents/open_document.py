@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from secrets import token_urlsafe
 
@@ -25,7 +25,7 @@ from offboard.authoring import (
     read_layout,
     write_layout,
 )
-from offboard.mission import MAX_FILE_BYTES
+from offboard.mission import MAX_FILE_BYTES, read_package_base
 from offboard.pilot import Pilot
 
 _JOURNAL_SUFFIX = ".unsaved"
@@ -121,6 +121,10 @@ class OpenDocument:
     def layout(self) -> Layout:
         """Where its states are drawn."""
         return self.session.layout
+
+    def extend_package_only(self) -> None:
+        """From now on it extends missions of the package only: other files of the folder are others'."""
+        self.session.document = replace(self.document, open_base=read_package_base)
 
     @property
     def is_saved(self) -> bool:

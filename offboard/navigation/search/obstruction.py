@@ -84,7 +84,9 @@ class Obstruction:
             Shape (places, blocks x * blocks y).
         """
         from_x, from_y = places_m[:, 0:1], places_m[:, 1:2]
-        return _is_clear(self.columns_m, from_x, from_y, *self._blocks_m, room_m=0.0, end_m=_IN_BLOCK_M)
+        each = _each_clear(self.columns_m, from_x, from_y, *self._blocks_m, room_m=0.0, end_m=_IN_BLOCK_M)
+        clear: Bools = np.logical_and.reduce(each)
+        return clear
 
     def ways_from(self, at_m: Vec3) -> WaysRound:
         """The ways from a position."""
@@ -143,25 +145,9 @@ class WaysRound:
         j = np.abs(y_m[:, None] - self.grid.y_m).argmin(axis=1)
         straight_m = np.sqrt((x_m - x) * (x_m - x) + (y_m - y) * (y_m - y))
         around_m = np.maximum(self.field_m[i, j], straight_m)
-        is_straight = _is_clear(self.columns_m, x, y, x_m, y_m, room_m=_ROOM_M)
+        is_straight = np.logical_and.reduce(_each_clear(self.columns_m, x, y, x_m, y_m, room_m=_ROOM_M))
         distances_m: Floats = np.where(is_straight, straight_m, around_m)
         return distances_m
-
-
-def _is_clear(
-    columns_m: Sequence[Vec3],
-    from_x: Floats,
-    from_y: Floats,
-    to_x: Floats,
-    to_y: Floats,
-    *,
-    room_m: float,
-    end_m: float = 0.0,
-) -> Bools:
-    """Whether straight lines stay clear of all obstacles, but for those within `end_m` of their ends."""
-    each = _each_clear(columns_m, from_x, from_y, to_x, to_y, room_m=room_m, end_m=end_m)
-    clear: Bools = np.logical_and.reduce(each)
-    return clear
 
 
 def _each_clear(
@@ -174,7 +160,10 @@ def _each_clear(
     room_m: float,
     end_m: float = 0.0,
 ) -> Bools:
-    """Likewise of each obstacle, shape (obstacles, *lines)."""
+    """Which straight lines stay clear of each obstacle, shape (obstacles, *lines).
+
+    An obstacle within `end_m` of a line's end is not in its way.
+    """
     along_x, along_y = to_x - from_x, to_y - from_y
     length_2 = np.maximum(along_x * along_x + along_y * along_y, np.float32(1e-6))
     columns = np.array(columns_m, dtype=np.float32).reshape(-1, 3)

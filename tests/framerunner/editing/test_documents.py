@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import json
 import os
 import resource
 import time
@@ -569,6 +570,22 @@ def test_a_pupil_sees_and_changes_own_files_only_until_the_log_in_ends(tmp_path)
                 window.ask("save")
             assert refused.value.code == 4403
     assert (tmp_path / "lesson_1_ada.yaml").read_text() == HOVER
+
+
+def test_a_pupil_reads_no_others_mission_by_extending_it(tmp_path):
+    (tmp_path / "lesson_1_bo.yaml").write_text(HOVER.replace("up", "veiled"))
+    (tmp_path / "lesson_1_ada.yaml").write_text("name: mine\nextends: lesson_1_bo.yaml\n")
+    teacher, ada = Visitor("Teacher", Role.ORGANISER), Visitor("Ada", Role.PUPIL, "ada")
+    visitors, told = [], []
+    with served(tmp_path, visitor=lambda: visitors[-1]) as server:
+        for visitor in (teacher, ada):
+            visitors.append(visitor)
+            params = {"file": "lesson_1_ada.yaml", "kind": "scxml"}
+            export = server.http.get("/api/edit/export", params=params).text
+            with server.window("lesson_1_ada.yaml") as window:
+                told.append(export + json.dumps(window.document))
+    assert ["veiled" in each for each in told] == [True, False]
+    assert "here a mission extends one of the package" in told[1]
 
 
 async def test_names_that_are_asked_for_take_no_memory(tmp_path):
