@@ -22,6 +22,8 @@ _BATTERY_LOW, _BATTERY_CRITICAL, _BATTERY_EMERGENCY = 2, 3, 4  # MAV_BATTERY_CHA
 class Reaction(Enum):
     """What a failsafe does, in order of severity."""
 
+    __hash__ = object.__hash__  # an enumeration's own is not compiled, and rows are looked up in each tick
+
     NOTHING = "nothing"
     WARN = "warn"
     STABILIZED = "stabilized"
@@ -40,6 +42,8 @@ STICK_REACTIONS = frozenset({Reaction.STABILIZED, Reaction.ALTITUDE, Reaction.PO
 
 class Cause(Enum):
     """What a failsafe reacts to."""
+
+    __hash__ = object.__hash__  # an enumeration's own is not compiled, and rows are looked up in each tick
 
     SETPOINTS = "offboard setpoints lost"
     GROUND_STATION = "connection to ground station lost"

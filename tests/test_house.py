@@ -64,6 +64,7 @@ def documented_commands():
 
 
 COMMANDS = documented_commands()
+program = cache(build_app)
 
 
 def test_the_readme_shows_the_four_uses_in_order():
@@ -79,7 +80,7 @@ def test_the_readme_shows_the_four_uses_in_order():
 
 @pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS.keys())
 def test_documented_commands_are_understood(words):
-    build_app().parse_args(words, print_error=False, exit_on_error=False)
+    program().parse_args(words, print_error=False, exit_on_error=False)
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=name_of)

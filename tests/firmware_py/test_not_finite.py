@@ -60,27 +60,27 @@ class Breaker:
         return replace(readings, **{self.slot: broken[self.number]}), pose
 
 
-@pytest.mark.parametrize("bad", [nan, inf, -inf], ids=str)
 @pytest.mark.parametrize("slot", SLOTS)
-def test_no_number_of_any_sensor_reaches_a_motor(slot, bad):
-    """Each number is broken for some tenths of a second, one after the other, in the same flight."""
+def test_no_number_of_any_sensor_reaches_a_motor(slot):
+    """Each number is broken in each way for some tenths of a second, one after the other, in one flight."""
     sensors, airframe = ("mocap", "racer-3in") if slot == "pose" else ("outdoor", "x500")
     if slot == "optical_flow":
         sensors = "flow"
     simulation = airborne(sensors, airframe)
     number, count = 0, 1
     while number < count:
-        breaker = Breaker(slot, number, bad)
-        simulation.faults.sensors = breaker
-        for _ in range(TICKS if slot != "imu" else 20):
-            simulation.tick()
-            assert all(map(isfinite, simulation.autopilot.output.speeds_rad_s)), number
-            assert isfinite(sum(simulation.autopilot.state.position_ned_m))
-        count = breaker.numbers or 1
+        for bad in (nan, inf, -inf):
+            breaker = Breaker(slot, number, bad)
+            simulation.faults.sensors = breaker
+            for _ in range(TICKS if slot != "imu" else 20):
+                simulation.tick()
+                assert all(map(isfinite, simulation.autopilot.output.speeds_rad_s)), (number, bad)
+                assert isfinite(sum(simulation.autopilot.state.position_ned_m))
+            count = breaker.numbers or 1
+            simulation.faults.sensors = None
+            for _ in range(20):
+                simulation.tick()
         number += 1
-        simulation.faults.sensors = None
-        for _ in range(20):
-            simulation.tick()
     assert number > 1 or slot in ("barometer", "range_finder")
     assert simulation.autopilot.flight.failsafes == ()
     assert simulation.autopilot.status.armed
