@@ -12,6 +12,7 @@ from offboard.navigation.path import Crossing, Path
 
 COMMIT_M = 0.3  # before the opening; from there the path is not planned again
 COMMIT_ACROSS_M = 0.06  # if the drone is no farther beside the opening's axis
+STOP_M = 0.9  # before the opening; a drone that must look brakes on its path if it finds no other
 SETTLED_M = 0.7  # before the opening; from there it is only if the frame turns out to be elsewhere,
 SETTLED_MOVE_M = 0.02  # by this,
 SETTLED_TURN_RAD = 0.05  # or this
@@ -102,6 +103,11 @@ class CrossingAttempt:
             return None
         (x, y, z), heading = self._aim.gate.centre_m, self._aim.heading_rad
         return Point((x + BEHIND_M * cos(heading), y + BEHIND_M * sin(heading), z), heading)
+
+    @property
+    def must_stop(self) -> bool:
+        """The drone comes near, and must not fly on through the opening, since it must look."""
+        return self.looks and -STOP_M < self._along_m < 0.0
 
     @property
     def is_committed(self) -> bool:

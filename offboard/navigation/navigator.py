@@ -172,13 +172,19 @@ class Navigator:
             return STILL
         crossing.known_s = now_s
         looked = crossing.looks
-        distance_m = dist(estimate.position_m, position_now(state))
+        gate = self._world.gate_of(estimate)
+        distance_m = dist(gate.centre_m, position_now(state))  # not to where it seems to be outside the arena
         near_m = self._style.look_again_m + self._style.look_braking_m
         if crossing.must_look(estimate, distance_m, near_m, now_s) != looked:
             self._flight.change()
         if crossing.looks:
-            return self._fly(self._places.before(estimate, position_now(state), self._world.obstacles()))
-        command = self._fly(self._world.gate_of(estimate), *self._goals_after(colour))
+            place = self._places.before(estimate, position_now(state), self._world.obstacles())
+            command = self._fly(place)
+            if crossing.must_stop and crossing.is_on(self._flight.path):  # no path to the place yet
+                self._flight.leave()
+                return self._flight.follow(state)
+            return command
+        command = self._fly(gate, *self._goals_after(colour))
         path = self._flight.path
         finds_way = path is not None or self._flight.looks
         no_path = "" if finds_way else self._flight.refusal or "none was planned"

@@ -150,7 +150,7 @@ class PathFlight:
         if self.path is not None and seen.has_obstacles:
             self.watched = seen.first_unseen(self._ahead(AHEAD_S), position_now(state))
             if self.watched is not None:
-                self._leave()
+                self.leave()
                 self._watched_s = now_s
                 return self._stand(state, _look_rate(turn_to(self.watched, state)))
         self._looks_aside = False
@@ -160,7 +160,7 @@ class PathFlight:
             and self._style.looks_ahead
             and self._lookout.begin(self._ahead(AHEAD_S + CHECK_S), state, viewed)
         ):
-            self._leave()
+            self.leave()
             return self._look_out(self._lookout.command(state, viewed) or STILL, state, seen)
         if self.path is not None and seen.has_obstacles and not to_gate:
             later = seen.first_unseen(self._ahead(LOOK_AHEAD_S), position_now(state))
@@ -197,7 +197,7 @@ class PathFlight:
             if not begun and _differ((goals, obstacles), searched_for, position_now(state)):
                 self._plan(goals, obstacles, state)
             if self._is_obstructed(obstacles):
-                self._leave()
+                self.leave()
         return checked
 
     def follow(self, state: DroneState, turn_rad_s: float | None = None) -> VelocityCommand:
@@ -216,7 +216,7 @@ class PathFlight:
         prediction = self._response.predict() if self._follower.response.late else None
         return self._follower.command(self.path, state, now_s, prediction, turn_rad_s=turn_rad_s)
 
-    def _leave(self) -> None:
+    def leave(self) -> None:
         """Stop, on the path if it is flown already."""
         if not self._anew:
             self._left = None if self._follower.response.late else self.path
@@ -238,7 +238,7 @@ class PathFlight:
             now_s,
             self._follower.error_m,
             has_path=has_path,
-            has_way=has_path or not self.refusal,
+            has_way=has_path or self.looks,
         )
         if self._stuck.back is not back:
             self.change()
@@ -291,7 +291,7 @@ class PathFlight:
             self.refusal = found.reason
             self._refusals += 1
             if self._refusals >= MAX_REFUSALS:
-                self._leave()
+                self.leave()
             return
         self.refusal, self._refusals = "", 0
         if not restarts and self._delays(found, search.obstacles):

@@ -146,15 +146,17 @@ class LegFinder:
             return None
         points = [start_m[:2], *corners, end_m[:2]]
         along_m = lengths(points)
+        shares = [length_m / along_m[-1] for length_m in along_m[1:-1]]
+        places_m = [
+            self._beside_frames(np.array([*corner, start_m[2] + part * (end_m[2] - start_m[2])]))
+            for corner, part in zip(corners, shares, strict=True)
+        ]
         chain = [before, after]
         for share in _CORNER_SHARES:
             chain = [before]
-            for i, corner in enumerate(corners, start=1):
-                part = along_m[i] / along_m[-1]
-                height_m = start_m[2] + part * (end_m[2] - start_m[2])
-                speed = share * self._style.axis_speed_m_s * _corner_direction(*points[i - 1 : i + 2])
-                yaw = _turned(before, after, part)
-                chain.append(place(np.array([corner[0], corner[1], height_m]), speed, yaw))
+            for i, (place_m, part) in enumerate(zip(places_m, shares, strict=True)):
+                speed = share * self._style.axis_speed_m_s * _corner_direction(*points[i : i + 3])
+                chain.append(place(place_m, speed, _turned(before, after, part)))
             chain.append(after)
             legs = self.direct(list(pairwise(chain)))
             if legs.motions.strains.max() <= _STRAIN:
@@ -163,6 +165,15 @@ class LegFinder:
                 if not any(hits):
                     return [Step(legs[i], end) for i, end in enumerate(chain[1:])]
         return (yield from self._chain(chain, min(depth - 1, 1)))
+
+    def _beside_frames(self, corner_m: Array) -> Array:
+        """A corner between columns, above or below the frame that it is in: legs may end in obstacles."""
+        depths = self._clearance.depths(corner_m[None])[0]
+        if depths.max() <= 0.0:
+            return corner_m
+        ways = self._clearance.ways_round(corner_m, np.zeros(3), int(depths.argmax()))
+        clear = self._clearance.depths(np.array([way_m for way_m, _ in ways])).max(axis=1) <= 0.0
+        return ways[int(clear.argmax())][0]
 
     def _chain(self, passes: Sequence[Pass], depth: int) -> Seeking:
         """Clear legs from pass to pass."""

@@ -2,12 +2,16 @@
 
 from dataclasses import replace
 
+import pytest
+
 from framerunner.flying.plan import FlightPlan
 from offboard.drone import DroneState
 from offboard.mission import load_mission
 from offboard.navigation import path_flight
-from offboard.navigation.goals import Refusal
+from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.goals import Gate, Refusal
 from offboard.navigation.navigator import Navigator
+from offboard.navigation.world_model import WorldModel
 from scenarios.random_scenarios import load_level, random_scenario
 from tests.offboard.navigation.flown_layouts import flown
 
@@ -67,21 +71,55 @@ def test_a_drone_that_something_unseen_holds_flies_back_the_way_it_came():
     assert least_x_m < wall_x_m - 0.5
 
 
-def test_a_drone_from_which_no_way_leads_on_flies_back_the_way_it_came(monkeypatch):
+def farthest_at(xs_m):
+    return next((tick for tick, x_m in enumerate(xs_m) if x_m > 1.2), len(xs_m))
+
+
+@pytest.mark.parametrize("refused", [True, False], ids=["no path is found", "each path is obstructed"])
+def test_a_drone_from_which_no_way_leads_on_flies_back_the_way_it_came(monkeypatch, refused):
     plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
     navigator, xs_m = Navigator(plan.surroundings, plan.command_limits), [0.0]
 
+    def is_shut(to_x_m):
+        """The way is blocked from when the drone is at 1.2 m until it has been back at 0.8 m."""
+        return min(xs_m[farthest_at(xs_m) :], default=0.0) > 0.8 and to_x_m > xs_m[-1]
+
     class Refusing(path_flight.Search):
         def path(self, start=None):
-            shut = max(xs_m) > 1.2 and xs_m[-1] > 0.8 and self.goals[0].position_m[0] > 1.0
+            shut = refused and is_shut(self.goals[0].position_m[0])
             return Refusal("obstacles block the way") if shut else super().path(start)
 
     monkeypatch.setattr(path_flight, "Search", Refusing)
+    monkeypatch.setattr(
+        path_flight, "obstructed", lambda places_m, *_, **__: not refused and is_shut(places_m[-1][0])
+    )
     state = STATE
     while len(xs_m) < 20 * 40 and xs_m[-1] < 2.8:
         navigator.observe(state, ())
         state = flown(state, navigator.fly_to((3.0, 0.3 if max(xs_m) > 1.2 else 0.0, 1.0)))
         xs_m.append(state.x)
     assert xs_m[-1] >= 2.8
-    farthest = next(tick for tick, x_m in enumerate(xs_m) if x_m > 1.2)
-    assert min(xs_m[farthest:]) < 0.8
+    assert min(xs_m[farthest_at(xs_m) :]) < 0.8
+
+
+def test_a_frame_that_is_not_certain_is_not_flown_through(monkeypatch):
+    """It seems to be above the ceiling, and no path is found to a place from which it would be looked at."""
+    plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
+    navigator, state = Navigator(plan.surroundings, plan.command_limits), replace(STATE, z=3.5)
+    ceiling_m = plan.surroundings.arena.height_m
+    unsure = FrameEstimate("red", (3.0, 0.0, ceiling_m + 0.46), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 3, 0)
+    monkeypatch.setattr(WorldModel, "frame", lambda self, colour: unsure if colour == "red" else None)
+
+    class Refusing(path_flight.Search):
+        def path(self, start=None):
+            gate = isinstance(self.goals[0], Gate)
+            return super().path(start) if gate else Refusal("obstacles block the way")
+
+    monkeypatch.setattr(path_flight, "Search", Refusing)
+    xs_m = []
+    while not navigator.refused and len(xs_m) < 20 * 15:
+        navigator.observe(state, ())
+        state = flown(state, navigator.cross("red"))
+        xs_m.append(state.x)
+    assert 2.0 < max(xs_m) < 2.9
+    assert navigator.refused

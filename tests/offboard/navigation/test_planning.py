@@ -8,6 +8,7 @@ import pytest
 from geometry.vectors import Vec3
 from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, Refusal
 from offboard.navigation.path import Path
+from offboard.navigation.planner.clearance import Clearance
 from offboard.navigation.planner.detours import MOST_WORK
 from offboard.navigation.planning import Search, plan
 from scenarios.models import Arena, Base
@@ -115,6 +116,17 @@ def test_a_search_in_parts_finds_the_same_and_begins_where_the_drone_has_come_to
     assert later.at(0.0).position_m == pytest.approx(path.at(0.3).position_m, abs=1e-3)
     assert later.duration_s == pytest.approx(path.duration_s - 0.3, abs=0.3)
     assert in_parts.path(Motion((-4.0, 4.0, 1.0))) is None  # from there it would be a long way
+
+
+@pytest.mark.parametrize("height_m", [0.9, 1.1])
+def test_a_way_round_columns_does_not_lead_through_the_frame_at_its_corner(height_m: float):
+    wall = tuple((2.0, y_m, 0.2) for y_m in np.arange(-1.0, 5.0, 0.3))
+    frame = Gate((2.0, -1.45, height_m), 0.0)
+    obstacles = Obstacles((frame,), wall)
+    goals = [Point((4.0, 0.0, 1.0))]
+    path = plan(Motion((0.0, 0.0, 1.0)), goals, obstacles=obstacles, arena=Arena(), style=CONTEST)
+    assert isinstance(path, Path)
+    assert Clearance(obstacles, Arena(), CONTEST).depths(Sampled(path).positions).max() < 0.03
 
 
 def test_what_cannot_be_reached_is_refused():
