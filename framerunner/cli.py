@@ -16,6 +16,13 @@ if TYPE_CHECKING:
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 _INTERRUPT_AGAIN_S = 0.02
+# Module and what in it is the command; a module is imported when its command, or help of all, is wanted.
+_COMMANDS = {
+    **{"sim": "sim", "fly": "fly", "camera": "app", "mocap": "mocap", "doctor": "doctor"},
+    **{"preflight": "preflight", "evaluate": "evaluate", "bound": "bound", "monitor": "monitor"},
+    **{"px4": "app", "ardupilot": "app", "replay": "replay", "film": "film", "mission": "app"},
+    **{"edit": "edit", "course": "app", "scenario": "app", "vision": "app"},
+}
 _DISK_REFUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 
@@ -23,54 +30,18 @@ def build_app() -> App:
     """Return the program with all its commands."""
     from cyclopts import App, Parameter
 
-    from framerunner.commands import (
-        ardupilot,
-        bound,
-        camera,
-        course,
-        doctor,
-        edit,
-        evaluate,
-        film,
-        fly,
-        mission,
-        mocap,
-        monitor,
-        preflight,
-        px4,
-        replay,
-        scenario,
-        sim,
-        vision,
-    )
-
     app = App(
         name="framerunner",
         help="A simulated MAVLink drone, and an app that flies the frame challenge with it.",
         version=_version,
+        version_format="plaintext",
         help_format="markdown",
         default_parameter=Parameter(negative=(), show_default=_shown_default),
         suppress_keyboard_interrupt=False,
         result_action="return_value",
     )
-    app.command(sim.sim)
-    app.command(fly.fly)
-    app.command(camera.app)
-    app.command(mocap.mocap)
-    app.command(doctor.doctor)
-    app.command(preflight.preflight)
-    app.command(evaluate.evaluate)
-    app.command(bound.bound)
-    app.command(monitor.monitor)
-    app.command(px4.app)
-    app.command(ardupilot.app)
-    app.command(replay.replay)
-    app.command(film.film)
-    app.command(mission.app)
-    app.command(edit.edit)
-    app.command(course.app)
-    app.command(scenario.app)
-    app.command(vision.app)
+    for name, made_by in _COMMANDS.items():
+        app.command(f"framerunner.commands.{name}:{made_by}", name=name)
     return app
 
 
@@ -122,7 +93,10 @@ def run(arguments: list[str]) -> int:
         The exit code: 0 done, 1 flown but not completed, 2 bad input, 130 Ctrl-C.
     """
     try:
-        code = build_app()(arguments or ["--help"], print_error=False, exit_on_error=False)
+        app = build_app()
+        if arguments in ([], ["--help"], ["-h"]):
+            app.resolved_commands()  # what each says of itself
+        code = app(arguments or ["--help"], print_error=False, exit_on_error=False)
         sys.stdout.flush()  # here, where an error is reported in one line
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
