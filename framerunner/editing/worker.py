@@ -43,6 +43,7 @@ Tell = Callable[[BaseModel], None]
 def main() -> int:
     """Do the tasks that lines of standard input name: batches, or one flight; returns 0, also if refused."""
     import cv2
+    import scipy.optimize  # noqa: F401  # a flight imports it late, in each child of its own if not here
 
     output = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a contestant's file prints is no message
