@@ -16,12 +16,26 @@ if TYPE_CHECKING:
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 _INTERRUPT_AGAIN_S = 0.02
-# Module and what in it is the command; a module is imported when its command, or help of all, is wanted.
+# Each command, in the module of its name, which is imported only if the command, or help of all, is wanted.
 _COMMANDS = {
-    **{"sim": "sim", "fly": "fly", "camera": "app", "mocap": "mocap", "doctor": "doctor"},
-    **{"preflight": "preflight", "evaluate": "evaluate", "bound": "bound", "monitor": "monitor"},
-    **{"px4": "app", "ardupilot": "app", "replay": "replay", "film": "film", "mission": "app"},
-    **{"edit": "edit", "course": "app", "scenario": "app", "vision": "app"},
+    "sim": "sim",
+    "fly": "fly",
+    "camera": "app",
+    "mocap": "mocap",
+    "doctor": "doctor",
+    "preflight": "preflight",
+    "evaluate": "evaluate",
+    "bound": "bound",
+    "monitor": "monitor",
+    "px4": "app",
+    "ardupilot": "app",
+    "replay": "replay",
+    "film": "film",
+    "mission": "app",
+    "edit": "edit",
+    "course": "app",
+    "scenario": "app",
+    "vision": "app",
 }
 _DISK_REFUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
