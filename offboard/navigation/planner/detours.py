@@ -147,10 +147,13 @@ class LegFinder:
         points = [start_m[:2], *corners, end_m[:2]]
         along_m = lengths(points)
         shares = [length_m / along_m[-1] for length_m in along_m[1:-1]]
-        places_m = [
-            self._beside_frames(np.array([*corner, start_m[2] + part * (end_m[2] - start_m[2])]))
-            for corner, part in zip(corners, shares, strict=True)
-        ]
+        places_m = []
+        for corner, part in zip(corners, shares, strict=True):
+            height_m = start_m[2] + part * (end_m[2] - start_m[2])
+            place_m = self._outside(np.array([corner[0], corner[1], height_m]))
+            if place_m is None:
+                return None
+            places_m.append(place_m)
         chain = [before, after]
         for share in _CORNER_SHARES:
             chain = [before]
@@ -166,14 +169,14 @@ class LegFinder:
                     return [Step(legs[i], end) for i, end in enumerate(chain[1:])]
         return (yield from self._chain(chain, min(depth - 1, 1)))
 
-    def _beside_frames(self, corner_m: Array) -> Array:
-        """A corner between columns, above or below the frame that it is in: legs may end in obstacles."""
+    def _outside(self, corner_m: Array) -> Array | None:
+        """A corner between columns; beside the frame that it is in: a leg may end in an obstacle."""
         depths = self._clearance.depths(corner_m[None])[0]
         if depths.max() <= 0.0:
             return corner_m
-        ways = self._clearance.ways_round(corner_m, np.zeros(3), int(depths.argmax()))
-        clear = self._clearance.depths(np.array([way_m for way_m, _ in ways])).max(axis=1) <= 0.0
-        return ways[int(clear.argmax())][0]
+        ways_m = [m for m, _ in self._clearance.ways_round(corner_m, np.zeros(3), int(depths.argmax()))]
+        clear = self._clearance.depths(np.array(ways_m)).max(axis=1) <= 0.0
+        return ways_m[int(clear.argmax())] if clear.any() else None
 
     def _chain(self, passes: Sequence[Pass], depth: int) -> Seeking:
         """Clear legs from pass to pass."""
