@@ -148,6 +148,10 @@ def test_every_command_has_a_safe_answer_in_every_state_and_situation(state):
                 )
         if row.target is State.DISARMED:
             assert event is Event.FORCE_DISARM or may_stop_motors(state, event, row, now)
+    for now in SITUATIONS:
+        row = first_match(RULES[state, Event.TICK], now)
+        if row is not None and row.target is State.DISARMED:
+            assert may_stop_motors(state, Event.TICK, row, now)
 
 
 def may_stop_motors(state, event, row, now):
@@ -338,8 +342,6 @@ def test_only_arming_arms_and_only_when_checks_pass():
 def test_failsafes_come_first(state):
     for now in SITUATIONS:
         row = first_match(RULES[state, Event.TICK], now)
-        if row is not None and row.target is State.DISARMED:
-            assert may_stop_motors(state, Event.TICK, row, now)
         if when.sensors_lost(now):
             assert row is not None
             assert row.target is (State.DISARMED if now.landed else State.TERMINATED)

@@ -7,7 +7,7 @@ import pytest
 from firmware_py.estimation.error_state import ATTITUDE, POSITION
 from tests.firmware_py.estimation.passenger import DOWN, HEADING, NORTH, NORTHWARD, Passenger
 
-MISSING_S = 6
+MISSING_S = 10
 GROUND, PRESSURE = "ground", "barometer"  # slow errors of the sensor itself
 
 CASES = [

@@ -23,7 +23,7 @@ def test_there_are_many_rows_and_no_two_are_the_same():
 
 @pytest.mark.parametrize("row", ROWS, ids=name)
 def test_a_flight_ends_as_the_table_says(row):
-    seen = hover(row.fault, row.sensors, row.airframe, after_s=25.0 if row.end is FaultEnd.LANDS else 8.0)
+    seen = hover(row.fault, row.sensors, row.airframe, after_s=25.0 if row.end is FaultEnd.LANDS else 10.0)
     assert seen.finite
     if row.end in {FaultEnd.FLIES_ON, FaultEnd.DISPLACED}:
         assert seen.failsafes == []
