@@ -14,6 +14,8 @@ from pymavlink import mavutil
 
 from tests.processes import free_instance, simulator
 
+SILENCE_S = {"COM_OF_LOSS_T": 1.0, "COM_RC_LOSS_T": 0.5}  # defaults, for a drone in real time
+
 
 def pytest_collection_modifyitems(items):
     """The tests of a file share a simulator, so one worker runs them, after each other."""
@@ -130,10 +132,18 @@ def instance():
 def sim(request, tmp_path_factory, instance):
     """A running simulator with the module's `SIM_OPTIONS`; it must not have complained at the end.
 
-    Each test leaves the drone on the ground, disarmed, and nothing that the next would find.
+    Each test leaves the drone on the ground, disarmed, and nothing that the next would find. At a higher speed
+    the drone waits for setpoints and sticks as long as a drone does in real time, so that a peer on a busy
+    machine may be late by as much.
     """
     options = getattr(request.module, "SIM_OPTIONS", ())
-    with simulator(tmp_path_factory.mktemp("sim"), instance, *options) as running:
+    folder = tmp_path_factory.mktemp("sim")
+    if "--speed" in options:
+        speed = float(options[options.index("--speed") + 1])
+        lines = (f"{instance + 1}\t1\t{name}\t{speed * time_s:g}\t9\n" for name, time_s in SILENCE_S.items())
+        (folder / "patience.params").write_text("".join(lines))
+        options = (*options, "--parameters", str(folder / "patience.params"))
+    with simulator(folder, instance, *options) as running:
         yield running
         assert running.process.poll() is None
         assert "Traceback" not in running.err
