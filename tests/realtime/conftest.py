@@ -132,9 +132,9 @@ def instance():
 def sim(request, tmp_path_factory, instance):
     """A running simulator with the module's `SIM_OPTIONS`; it must not have complained at the end.
 
-    Each test leaves the drone on the ground, disarmed, and nothing that the next would find. At a higher speed
-    the drone waits for setpoints and sticks as long as a drone does in real time, so that a peer on a busy
-    machine may be late by as much.
+    Each test leaves the drone on the ground, disarmed, and nothing that the next would find. At a higher
+    speed the drone waits as long for setpoints and sticks as one in real time, which a peer on a busy
+    machine needs.
     """
     options = getattr(request.module, "SIM_OPTIONS", ())
     folder = tmp_path_factory.mktemp("sim")
