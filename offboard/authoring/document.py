@@ -158,8 +158,10 @@ class Document:
 
     def read(self) -> MissionFile:
         """What it says, without what it extends. Raises `MissionError` with all faults of its form."""
+        if self.unreadable is not None:
+            raise self.unreadable
         if self.nodes is None:
-            return read_mission_file(self.text, self.path)  # says why
+            return read_mission_file(self.text, self.path)  # it is empty, and says so
         written, problems = self._read
         problems.raise_if_any()
         return written

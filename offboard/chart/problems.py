@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Literal
 
@@ -33,7 +33,9 @@ class Place:
 
     def moved(self, characters: int) -> Place:
         """The place some characters further on in the line; the same if the column is not known."""
-        return replace(self, column=self.column + characters) if self.column else self
+        if not (self.column and characters):
+            return self
+        return Place(self.file, self.line, self.column + characters)
 
 
 NOWHERE = Place("")

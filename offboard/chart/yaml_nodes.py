@@ -195,7 +195,8 @@ class _Composer:
                 self._problems.raise_if_any()
             if key in items:
                 self._problems.add(key_place, Message("yaml.key_twice", key=key, line=keys[key].place.line))
-            items[key], keys[key] = value, replace(key_node, place=key_place)
+            items[key] = value
+            keys[key] = key_node if key_node.place == key_place else replace(key_node, place=key_place)
         flow = _is_flow(event)
         end = _end(inner) if flow else end
         return MapNode(place, items, {key: node.place for key, node in keys.items()}, keys, start, end, flow)
