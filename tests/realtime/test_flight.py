@@ -24,17 +24,6 @@ from tests.processes import free_instance, ports_are_free, program, simulator
 
 pytestmark = pytest.mark.realtime
 
-# Three frames near each other: crossed and back on the base after 14.4 s.
-SCENARIO = """\
-name: near-frames
-base: {x_m: -1.0}
-start: {x_m: -1.0}
-frames:
-  - {colour: red, x_m: 0.5, y_m: 0.0, z_m: 1.0}
-  - {colour: green, x_m: 2.0, y_m: 1.0, z_m: 1.2, yaw_rad: 0.7}
-  - {colour: blue, x_m: 1.0, y_m: 2.5, z_m: 1.0, yaw_rad: 2.8}
-"""
-TAKES_OFF = "take_off"  # from then on the machine is busy
 FIELDS = {
     *("scenario", "mission", "seed", "verdict", "reason", "frames_crossed", "crossing_times_s"),
     *("crossing_offsets_m", "contacts", "outside_s", "try_time_s", "penalty_s", "total_time_s"),
@@ -89,22 +78,12 @@ def disturbed(instance, busy, viewers):
 
 
 @pytest.fixture(scope="module")
-def scenario(tmp_path_factory):
-    """The file of the scenario."""
-    path = tmp_path_factory.mktemp("scenario") / "near-frames.yaml"
-    path.write_text(SCENARIO, encoding="utf-8")
-    return str(path)
-
-
-@pytest.fixture(scope="module")
-def busy_flight(tmp_path_factory, scenario):
-    """A flight three times as fast as real, on a busy machine with viewers: folder and words."""
+def busy_flight(tmp_path_factory):
+    """Test case 1, three times as fast as real, on a busy machine with viewers: folder and words."""
     folder, instance = tmp_path_factory.mktemp("flight"), free_instance()
     options = ("--instance", str(instance), "--speed", "3", "--record")
-    with program(folder, "fly", scenario, *options) as flight:
-        flight.wait_for(TAKES_OFF, 60.0)
-        with disturbed(instance, busy=3, viewers=5):
-            code = flight.process.wait(300.0)
+    with disturbed(instance, busy=3, viewers=5), program(folder, "fly", "test-case-1", *options) as flight:
+        code = flight.process.wait(300.0)
         assert code == 0, flight.err + flight.out
     assert ports_are_free(instance)
     (run,) = (folder / "runs").iterdir()
@@ -112,10 +91,10 @@ def busy_flight(tmp_path_factory, scenario):
 
 
 @pytest.fixture(scope="module")
-def lockstep_flight(tmp_path_factory, scenario):
+def lockstep_flight(tmp_path_factory):
     """The same in lockstep: result, and its recording."""
     path = tmp_path_factory.mktemp("lockstep") / "flight.mcap"
-    plan = FlightPlan(load_scenario(scenario), load_mission("explorer"))
+    plan = FlightPlan(load_scenario("test-case-1"), load_mission("explorer"))
     with FlightRecording(path, plan.scenario, plan.chart, None) as recording:
         flown = fly_lockstep(plan, observers=(recording.see,), on_image=recording.see_image)
         recording.finish(flown.result, flown.track.time_s)
@@ -126,12 +105,12 @@ def lockstep_flight(tmp_path_factory, scenario):
 def test_every_tick_and_image_is_that_of_lockstep_to_the_last_bit(busy_flight, lockstep_flight):
     folder, out = busy_flight
     (ticks, images_by_time), (wanted_ticks, wanted_images) = map(events, (folder, lockstep_flight[1]))
-    assert len(ticks) == len(wanted_ticks) > 280
+    assert len(ticks) == len(wanted_ticks) > 600
     for tick, wanted in zip(ticks, wanted_ticks, strict=True):
         assert tick == wanted, f"at {wanted.state.time_us} us"
     until_us = ticks[-1].state.time_us - 100_000
     used = {time_us: image for time_us, image in wanted_images.items() if time_us < until_us}
-    assert len(used) > 180
+    assert len(used) > 300
     for time_us, wanted in used.items():
         assert np.array_equal(images_by_time[time_us], wanted), f"at {time_us} us"
     timing = json.loads((folder / "result.json").read_text(encoding="utf-8"))["timing"]
@@ -178,23 +157,22 @@ def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
 
 
 @pytest.mark.alone
-def test_the_explorer_is_quick_enough_for_a_drone_whose_time_does_not_wait(tmp_path, instance, scenario):
+def test_the_explorer_is_quick_enough_for_a_drone_whose_time_does_not_wait(tmp_path, instance):
     """Late ticks and images cost precision, not the flight."""
     (tmp_path / "app").mkdir()
     drone = ("--drone", f"udpin://127.0.0.1:{14540 + instance}")
     camera = ("--camera", f"http://127.0.0.1:{8100 + instance}/video")
-    arguments = ("fly", scenario, "--mission", "explorer", *drone, *camera)
+    arguments = ("fly", "test-case-1", "--mission", "explorer", *drone, *camera)
     with (
-        simulator(tmp_path, instance, "--scenario", scenario),
+        simulator(tmp_path, instance, "--scenario", "test-case-1"),
+        disturbed(instance, busy=4, viewers=0),
         program(tmp_path / "app", *arguments) as flight,
     ):
-        flight.wait_for(TAKES_OFF, 60.0)
-        with disturbed(instance, busy=4, viewers=0):
-            assert flight.process.wait(240.0) == 0, flight.err + flight.out
+        assert flight.process.wait(240.0) == 0, flight.err + flight.out
     (run,) = (tmp_path / "app" / "runs").iterdir()
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))
     assert result["verdict"] in ("clean", "completed"), result["reason"]
-    assert result["try_time_s"] < 21.0
+    assert result["try_time_s"] < 45.0
     assert result["timing"]["vehicle_time_waits"] is False
 
 
