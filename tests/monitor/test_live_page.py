@@ -547,6 +547,29 @@ async def test_an_image_that_comes_before_the_first_pose_is_shown(chromium, fake
     assert complaints == []
 
 
+async def test_where_a_page_draws_only_twice_a_second_the_newest_pose_is_shown_at_last(chromium, fake):
+    page, complaints = await visit(chromium, fake)
+    shown_s = await page.evaluate(
+        """async (poses) => {
+          const { Playout } = await import("/sources/lib/flight/playout.js");
+          const { setPeriod } = await import("/sources/lib/beat.js");
+          setPeriod(500);
+          let shown_s = 0;
+          const playout = new Playout(({ poses }) => { shown_s = poses[0].t; });
+          for (const pose of poses) playout.addPoses([pose]);
+          const began = performance.now();
+          while (shown_s < poses.at(-1).t && performance.now() - began < 10000) {
+            playout.addPoses([poses.at(-1)]);
+            await new Promise((resolve) => setTimeout(resolve, 100));
+          }
+          return shown_s;
+        }""",
+        [pose(), pose(t=20.0), pose(t=20.1)],
+    )
+    assert shown_s == 20.1
+    assert complaints == []
+
+
 async def test_a_restarted_monitor_does_not_say_that_a_flight_has_not_begun(chromium, fake):
     """The names of a mission's states are received some seconds after its state."""
     unnamed = status(state="")

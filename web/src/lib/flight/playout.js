@@ -146,8 +146,8 @@ export class Playout {
     const delay_s = isQuiet ? 0 : Math.min(MAX_DELAY_S, Math.max(MIN_DELAY_S, this.#lag_s + MARGIN_S));
     const wanted = track.newest - delay_s + (isQuiet ? 0 : Math.min(0.1, silent_s));
     const isFar = track.shown === null || Math.abs(wanted - track.shown) > JUMP_S;
-    const step = passed_s + CATCH_UP * passed_s * (wanted - (track.shown ?? 0) - passed_s);
-    const aim = isFar ? wanted : track.shown + Math.max(0, step);
+    const share = Math.min(1, CATCH_UP * passed_s); // with few beats a second, all of it
+    const aim = isFar ? wanted : track.shown + Math.max(0, passed_s + share * (wanted - track.shown - passed_s));
     track.shown = Math.min(track.newest, Math.max(track.poses[0].t, aim));
     return track.shown < track.newest;
   }
