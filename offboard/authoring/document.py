@@ -12,7 +12,7 @@ from offboard.authoring.outline import Outline
 from offboard.authoring.text import MissionText, Positions
 from offboard.chart.messages import Message
 from offboard.chart.problems import MissionError, Place, ProblemList, mission_error
-from offboard.chart.read import parse_mission_yaml, read_mission_file, read_nodes
+from offboard.chart.read import parse_mission_yaml, read_nodes
 from offboard.chart.spec import MissionFile, expand, merge_extended
 from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
 from offboard.mission import MAX_FILE_BYTES, BaseReader, read_base, unreadable
@@ -77,17 +77,16 @@ class Document:
         return Positions(self.text)
 
     @cached_property
-    def _nodes(self) -> tuple[MapNode | None, MissionError | None]:
+    def _parsed(self) -> MapNode | MissionError:
         try:
-            return parse_mission_yaml(self.text, self.label), None
+            return parse_mission_yaml(self.text, self.label)
         except MissionError as error:
-            empty = error.problems[0].message.code == "yaml.empty"
-            return None, None if empty else error
+            return error
 
     @property
     def nodes(self) -> MapNode | None:
         """The nodes of its YAML; None if it is empty or cannot be read."""
-        return self._nodes[0]
+        return self._parsed if isinstance(self._parsed, MapNode) else None
 
     @cached_property
     def _scalars(self) -> tuple[list[int], list[Scalar]]:
@@ -114,7 +113,10 @@ class Document:
     @property
     def unreadable(self) -> MissionError | None:
         """Why it is not YAML; None if it is, or is empty. Only its text can be edited then."""
-        return self._nodes[1]
+        error = self._parsed
+        if isinstance(error, MapNode) or error.problems[0].message.code == "yaml.empty":
+            return None
+        return error
 
     @cached_property
     def outline(self) -> Outline:
@@ -158,10 +160,8 @@ class Document:
 
     def read(self) -> MissionFile:
         """What it says, without what it extends. Raises `MissionError` with all faults of its form."""
-        if self.unreadable is not None:
-            raise self.unreadable
-        if self.nodes is None:
-            return read_mission_file(self.text, self.path)  # it is empty, and says so
+        if isinstance(self._parsed, MissionError):
+            raise self._parsed
         written, problems = self._read
         problems.raise_if_any()
         return written

@@ -14,7 +14,7 @@ from pymavlink import mavutil
 
 from tests.processes import free_instance, simulator
 
-SILENCE_S = {"COM_OF_LOSS_T": 1.0, "COM_RC_LOSS_T": 0.5}  # defaults, for a drone in real time
+SILENCE_S = 1.0  # COM_OF_LOSS_T, its default
 
 
 def pytest_collection_modifyitems(items):
@@ -133,16 +133,15 @@ def sim(request, tmp_path_factory, instance):
     """A running simulator with the module's `SIM_OPTIONS`; it must not have complained at the end.
 
     Each test leaves the drone on the ground, disarmed, and nothing that the next would find. At a higher
-    speed the drone waits as long for setpoints and sticks as one in real time, which a peer on a busy
-    machine needs.
+    speed the drone waits as long for setpoints as one in real time, which a peer on a busy machine needs.
     """
     options = getattr(request.module, "SIM_OPTIONS", ())
     folder = tmp_path_factory.mktemp("sim")
     if "--speed" in options:
         speed = float(options[options.index("--speed") + 1])
-        lines = (f"{instance + 1}\t1\t{name}\t{speed * time_s:g}\t9\n" for name, time_s in SILENCE_S.items())
-        (folder / "patience.params").write_text("".join(lines))
-        options = (*options, "--parameters", str(folder / "patience.params"))
+        parameters = folder / "silence.params"
+        parameters.write_text(f"{instance + 1}\t1\tCOM_OF_LOSS_T\t{speed * SILENCE_S:g}\t9\n")
+        options = (*options, "--parameters", str(parameters))
     with simulator(folder, instance, *options) as running:
         yield running
         assert running.process.poll() is None
