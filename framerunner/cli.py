@@ -61,7 +61,9 @@ def build_app() -> App:
 
 def _shown_default(value: object) -> str | None:
     """What help says of a default; nothing of a flag that is off and of options that need not be given."""
-    return None if value is None or value is False or value in ((), "") else str(value)
+    if value is None or value is False or value in ((), ""):
+        return None
+    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _version() -> str:

@@ -304,6 +304,7 @@ def test_help_shows_examples_that_fit_80_columns(capsys, monkeypatch, command):
     assert run([*command.split(), "--help"]) == 0
     help_text = capsys.readouterr().out
     assert "Example" in help_text
+    assert "default: (" not in help_text  # a value as one would type it
     section = help_text.partition("Example")[2].partition("╭")[0]
     examples = [line.strip() for line in section.splitlines()[1:] if line.strip()]
     assert examples[0].startswith(f"framerunner {command}")
