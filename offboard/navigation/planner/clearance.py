@@ -33,6 +33,7 @@ class Clearance:
         low_m: least x, y, z of the drone's centre, shape (3,).
         high_m: greatest x, y, z.
         boxes: how many of the obstacles are boxes.
+        columns: how many are columns.
         base: the index of the base; -1 if there is none.
     """
 
@@ -57,6 +58,7 @@ class Clearance:
         self.boxes = len(rows)
         self._rows: Array = np.array(rows).reshape(-1, 8)
         self._columns: Array = np.array(obstacles.columns_m).reshape(-1, 3)
+        self.columns = len(self._columns)
         self._radii_m: Array = self._columns[:, 2] + level_m
 
     def frame_of(self, gate: Gate) -> int:
@@ -84,7 +86,7 @@ class Clearance:
         """
         beyond = np.maximum(self.low_m - points_m, points_m - self.high_m).max(axis=1) - _ROUNDING_M
         parts = [beyond[:, None]]
-        if len(self._columns):
+        if self.columns:
             parts.insert(0, self.column_depths(points_m))
         if self.boxes:
             parts.insert(0, (self._rows[:, 5:8] - np.abs(self.offsets(points_m))).min(axis=-1))
@@ -96,9 +98,31 @@ class Clearance:
         dy = points_m[:, None, 1] - self._columns[:, 1]
         return np.asarray(self._radii_m - np.sqrt(dx * dx + dy * dy))
 
+    def line_depths(self, start_m: Array, ways_m: Array, steps_m: Array) -> tuple[Array, Array]:
+        """Bounds of how deep the deepest of points along straight lines is in the enlarged columns, in plan.
+
+        Args:
+            start_m: of all lines, shape (2,).
+            ways_m: from there to their ends, shape (n, 2).
+            steps_m: between the points of each, whose ends need not be among them, shape (n,).
+
+        Returns:
+            Lower and upper bounds, metres, each of shape (n,).
+        """
+        centres = self._columns[:, :2] - start_m
+        squares = np.maximum((ways_m**2).sum(axis=1, keepdims=True), _ROUNDING_M**2)
+        shares = ways_m @ centres.T / squares
+        aside = centres - np.clip(shares, 0.0, 1.0)[..., None] * ways_m[:, None]
+        nearest_m, step_m = np.hypot(aside[..., 0], aside[..., 1]), steps_m[:, None]
+        beside = (shares > 0.0) & (shares < 1.0)
+        # The point that is nearest to that place is at most a step from it along the line.
+        farthest_m = np.where(beside, np.hypot(nearest_m, step_m), nearest_m + step_m)
+        least, greatest = self._radii_m - farthest_m, self._radii_m - nearest_m
+        return least.max(axis=1, initial=-1.0), greatest.max(axis=1, initial=-1.0)
+
     def is_column(self, obstacle: int) -> bool:
         """Whether an index of `depths` is a column's."""
-        return self.boxes <= obstacle < self.boxes + len(self._columns)
+        return self.boxes <= obstacle < self.boxes + self.columns
 
     def offsets(self, points_m: Array) -> Array:
         """From the boxes' centres to points, in the boxes' axes, shape (n, boxes, 3)."""
@@ -143,7 +167,7 @@ class Clearance:
             obstacle: index of a column of `depths`.
         """
         level = np.array([velocity_m_s[0], velocity_m_s[1], 0.0])
-        if obstacle >= self.boxes + len(self._columns):
+        if obstacle >= self.boxes + self.columns:
             inside = np.clip(point_m, self.low_m + _SPARE_M, self.high_m - _SPARE_M)
             return [(inside, np.where(inside == point_m, velocity_m_s, 0.0))]
         if obstacle < self.boxes:

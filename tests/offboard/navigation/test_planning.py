@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,8 @@ from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, R
 from offboard.navigation.path import Path
 from offboard.navigation.planner.clearance import Clearance
 from offboard.navigation.planner.detours import MOST_WORK
+from offboard.navigation.planner.legs import Array
+from offboard.navigation.planner.passages import CELL_M, SPARE_M, Passages
 from offboard.navigation.planning import Search, plan
 from scenarios.models import Arena, Base
 from tests.offboard.navigation.flown_layouts import (
@@ -202,3 +206,31 @@ def test_a_drone_that_was_stopped_in_an_opening_leaves_it_along_the_normal(along
     path = plan(start, [Point(goal_m)], obstacles=Obstacles((gate,)), arena=Arena(), style=CONTEST)
     assert isinstance(path, Path), path
     assert touching(Sampled(path), gate) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_way_between_columns_turns_only_where_it_must(seed: int):
+    """Straight lines between its corners are clear, and a line that leaves out a corner is not."""
+    random = np.random.default_rng(seed)
+    columns = [tuple(random.uniform((-4.5, -4.5, 0.03), (4.5, 4.5, 0.3)).tolist()) for _ in range(25)]
+    clearance = Clearance(Obstacles((), columns_m=tuple(columns)), Arena(), CONTEST)
+    passages = Passages(clearance)
+
+    def is_clear(one: Array, other: Array) -> bool:
+        count = int(np.linalg.norm(other - one) / 0.05)
+        points = one + np.linspace(0.0, 1.0, max(count, 1) + 1)[1:-1, None] * (other - one)
+        return bool((clearance.column_depths(points).max(axis=1, initial=-1.0) < -SPARE_M).all())
+
+    turns = 0
+    for start, end in random.uniform(-4.6, 4.6, (40, 2, 2)):
+        corners = passages.corners(start, end)
+        if corners is None:
+            continue
+        way = [start, *corners, end]
+        straight = [is_clear(one, other) for one, other in pairwise(way)]
+        # The next point of the grid is always taken, also from a start within a column's margin.
+        near = [np.linalg.norm(other - one) < 5 * CELL_M for one, other in pairwise(way)]
+        assert all(np.logical_or(straight, near))
+        assert not any(is_clear(one, other) for one, other in zip(way, way[2:], strict=False))
+        turns += len(corners)
+    assert turns > 20
