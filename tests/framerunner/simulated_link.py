@@ -45,7 +45,7 @@ SETPOINT_US = 50_000
 LATENCY_US = 2_000
 OVERTAKEN_BY_US = 8_000
 AFTER_S = 2.5
-STILL_US = 2_000_000  # a vehicle that is disarmed stays where it is
+STILL_US = 1_000_000  # a vehicle that is disarmed stays where it is
 
 
 @dataclass(frozen=True)
