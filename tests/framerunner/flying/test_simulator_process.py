@@ -3,8 +3,8 @@
 import asyncio
 import os
 import signal
-import subprocess
 import sys
+from contextlib import ExitStack
 
 import aiohttp
 import pytest
@@ -13,50 +13,54 @@ from errors import SettingError, UserError
 from framerunner.flying.judges import ask_referee
 from framerunner.flying.simulator_process import GenuineAutopilot, SitlProcess
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE
-from tests.processes import bound, free_instance, is_running, ports_are_free, program, simulator
+from tests.processes import bound, free_instance, is_running, ports_are_free, program
 from tests.waiting import until
 from vision.types import CameraError
 
+STANDS_IN = """
+import os, signal, sys
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
-def test_a_signal_ends_the_simulator_and_frees_its_ports(tmp_path, number):
-    instance = free_instance()
-    with simulator(tmp_path, instance) as sim:
-        assert not ports_are_free(instance)
-        assert sim.end(number) == 130
-        assert sim.err.splitlines()[-1] == "interrupted"
-        assert "Traceback" not in sim.err
-    assert ports_are_free(instance)
+def interrupted(*_):
+    print("interrupted", file=sys.stderr, flush=True)
+    os._exit(130)
 
-
-def test_two_simulators_run_side_by_side(tmp_path):
-    folders = [tmp_path / "one", tmp_path / "two"]
-    for folder in folders:
-        folder.mkdir()
-    first = free_instance()
-    with simulator(folders[0], first):
-        second = free_instance()
-        assert second != first
-        with bound(14540 + first) as app, bound(14540 + second) as other, simulator(folders[1], second):
-            for instance, station in ((first, app), (second, other)):
-                station.settimeout(5.0)
-                packet = station.recv(300)
-                assert packet[0] == 0xFD
-                assert packet[5] == instance + 1  # the system's id
+signal.signal(signal.SIGTERM, interrupted)
+os.write(int(sys.argv[1]), b"up\\n")
+sys.stdin.read()
+"""
 
 
-def test_with_a_lifeline_it_ends_when_its_standard_input_ends(tmp_path):
-    instance = free_instance()
-    with program(tmp_path, "sim", "--lifeline", "--instance", str(instance), stdin=subprocess.PIPE) as sim:
-        sim.wait_for("Ctrl-C stops")
-        sim.process.stdin.write(b"still here\n")
-        sim.process.stdin.flush()
-        with pytest.raises(subprocess.TimeoutExpired):
-            sim.process.wait(0.5)
-        sim.process.stdin.close()
-        assert sim.process.wait(10) == 0
-        assert "Traceback" not in sim.err
-    assert ports_are_free(instance)
+def stand_in():
+    """A child that says that it is up, and ends as the simulator does; for what does not ask it for more."""
+    made = SitlProcess("empty")
+    number = made._arguments[made._arguments.index("--time-grants") + 1]
+    made._arguments = [sys.executable, "-S", "-c", STANDS_IN, number]
+    return made
+
+
+def test_two_simulators_run_side_by_side_until_a_signal_ends_them_and_frees_their_ports(tmp_path):
+    first = free_instance(2)
+    with ExitStack() as stack:
+        sims = {}
+        for instance in (first, first + 1):  # both start at once
+            folder = tmp_path / str(instance)
+            folder.mkdir()
+            ground = ("--ground-remote", f"127.0.0.1:{14550 + instance}")
+            sims[instance] = stack.enter_context(program(folder, "sim", "--instance", str(instance), *ground))
+        for sim in sims.values():
+            sim.wait_for("Ctrl-C stops", 60.0)
+        for instance in sims:
+            with bound(14540 + instance) as app:
+                app.settimeout(5.0)
+                packet = app.recv(300)
+            assert packet[0] == 0xFD
+            assert packet[5] == instance + 1  # the system's id
+        for (instance, sim), number in zip(sims.items(), (signal.SIGINT, signal.SIGTERM), strict=True):
+            assert not ports_are_free(instance)
+            assert sim.end(number) == 130
+            assert sim.err.splitlines()[-1] == "interrupted"
+            assert "Traceback" not in sim.err
+            assert ports_are_free(instance)
 
 
 async def answering(sitl):
@@ -64,16 +68,29 @@ async def answering(sitl):
         return await ask_referee(sitl.api, session)
 
 
-async def test_a_child_simulator_answers_and_has_ended_afterwards():
-    instance = free_instance()
+async def test_a_child_simulator_answers_until_its_standard_input_ends():
+    instance, said = free_instance(), []
     async with SitlProcess("test-case-1", instance=instance) as sitl:
-        pid = sitl._process.pid
+        sitl._on_line = said.append
         answer = await answering(sitl)
         assert answer.scenario == "test-case-1"
         assert answer.snapshot.motors_on is False
         assert str(14540 + instance) in sitl.drone_url
-    assert not is_running(pid)
+        process = sitl._process
+        process.stdin.write(b"still here\n")
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(process.wait(), 0.5)
+        process.stdin.close()
+        assert await asyncio.wait_for(process.wait(), 10) == 0
+    assert "Traceback" not in "".join(said)
     assert ports_are_free(instance)
+
+
+async def test_a_child_simulator_has_ended_afterwards():
+    async with stand_in() as sitl:
+        pid = sitl._process.pid
+        assert is_running(pid)
+    assert not is_running(pid)
 
 
 async def test_its_last_line_is_the_reason_when_it_cannot_start():
@@ -86,7 +103,7 @@ async def test_its_last_line_is_the_reason_when_it_cannot_start():
 async def test_an_error_that_follows_from_its_end_is_replaced_by_its_last_line(ended):
     reason = "the simulator ended with code 130: interrupted" if ended else "cannot connect"
     with pytest.raises(UserError, match=reason):  # noqa: PT012 - the error comes from leaving the block
-        async with SitlProcess("empty", instance=free_instance()) as sitl:
+        async with stand_in() as sitl:
             if ended:
                 os.kill(sitl._process.pid, signal.SIGTERM)
                 await sitl._process.wait()
@@ -94,7 +111,7 @@ async def test_an_error_that_follows_from_its_end_is_replaced_by_its_last_line(e
 
 
 async def test_a_flight_whose_simulator_ends_ends_with_the_reason_and_its_result():
-    async with SitlProcess("empty", instance=free_instance()) as sitl:
+    async with stand_in() as sitl:
 
         async def fly():
             try:
@@ -139,11 +156,11 @@ async def asks_it_once_more():
 @pytest.mark.parametrize("work", [lambda: asyncio.sleep(30), asks_it_once_more])
 async def test_its_end_cancels_the_work_that_it_guards(work, monkeypatch):
     monkeypatch.setattr("framerunner.child_process._GRACE_S", 0.1)
-    async with SitlProcess("empty", instance=free_instance()) as sitl:
+    async with stand_in() as sitl:
         work = asyncio.create_task(work())
         os.kill(sitl._process.pid, signal.SIGKILL)
         with pytest.raises(SettingError, match="was ended by signal 9"):
-            await sitl.guard(work)
+            await asyncio.wait_for(sitl.guard(work), 20.0)
         assert work.cancelled()
 
 
@@ -161,7 +178,7 @@ async def test_the_result_of_work_that_was_cancelled_is_returned():
         await asyncio.sleep(0)  # what comes after it is not cancelled
         return outcome
 
-    async with SitlProcess("empty", instance=free_instance()) as sitl:
+    async with stand_in() as sitl:
         task = asyncio.create_task(guarded())
         await asyncio.sleep(0.1)
         task.cancel()
@@ -169,7 +186,7 @@ async def test_the_result_of_work_that_was_cancelled_is_returned():
 
 
 async def test_work_that_is_cancelled_stays_cancelled():
-    async with SitlProcess("empty", instance=free_instance()) as sitl:
+    async with stand_in() as sitl:
         work = asyncio.create_task(asyncio.sleep(30))
         task = asyncio.create_task(sitl.guard(work))
         await asyncio.sleep(0.1)
