@@ -10,7 +10,14 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-_START = "from framerunner.cli import main; main()"
+# It makes no worker ready before one is needed: each page that is opened would have it start one, and most
+# tests of pages do not fly.
+_START = """
+from framerunner.editing.worker_pool import WorkerPool
+WorkerPool.prepare = lambda pool: None
+from framerunner.cli import main
+main()
+"""
 
 
 @dataclass

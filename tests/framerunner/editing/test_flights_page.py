@@ -16,12 +16,14 @@ LAPTOP = {"width": 1366, "height": 768}
 CLIMB, LANDING = "climb_to_the_point_above_the_base", "land_wherever_the_drone_is_just_now"
 MISSION = find_lesson("1").start.replace("rise", CLIMB).replace("landing", LANDING)
 GUARD = "1: distance_to_goal_m < 0.1"
+AT_ONCE = f"name: at_once\ninitial: {LANDING}\nstates:\n  {LANDING}: {{enter: [hover, land], final: true}}\n"
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def program(tmp_path_factory):
     path = tmp_path_factory.mktemp("missions") / "short.yaml"
     path.write_text(MISSION)
+    path.with_name("at_once.yaml").write_text(AT_ONCE)
     async with editor(path) as running:
         yield running
 
@@ -83,7 +85,8 @@ async def test_a_flight_is_replayed_on_the_chart_and_the_map(user):
     assert not await wide_parts(replay)
 
 
-async def test_the_table_of_many_flights_is_not_wider_than_its_panel(user):
+async def test_the_table_of_many_flights_is_not_wider_than_its_panel(user, program):
+    await user.open(program.page("at_once.yaml"))
     fly = await user.show_tab("fly")
     await user.press("Fly 20 layouts", fly)
     await expect(fly.locator(".e-batch tr")).to_have_count(21, timeout=90_000)

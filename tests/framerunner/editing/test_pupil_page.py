@@ -12,6 +12,7 @@ from tests.framerunner.editing.editor_user import EditorUser
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 SMALL = {"width": 1024, "height": 720}
+LINE = ".e-tabs .e-tab:not([hidden]) .e-run-line"
 LESSON_4 = find_lesson("4")
 CARELESS = LESSON_4.solution.replace(
     "- cmd.vel_x = 0.3\n    during:\n      - look_to_frame", "- cmd.vel_x = 0.3"
@@ -22,7 +23,9 @@ CARELESS = LESSON_4.solution.replace(
 async def program(tmp_path_factory):
     folder = tmp_path_factory.mktemp("missions")
     (folder / "careless.yaml").write_text(CARELESS)
-    (folder / "start.yaml").write_text(find_lesson("1").start)
+    start = find_lesson("1").start
+    (folder / "start.yaml").write_text(start)
+    (folder / "waits.yaml").write_text(start.replace("distance_to_goal_m < 0.1", "imu.z > 3"))
     async with editor(folder / "careless.yaml") as running:
         yield running
 
@@ -48,9 +51,17 @@ async def test_a_frame_that_is_hit_is_named_and_marked(browser, program):
     await expect(user.page.locator('.t-frame[data-colour="red"]')).to_have_count(
         2
     )  # from above and its height
-    await expect(user.page.locator(".e-tabs .e-tab:not([hidden]) .e-run-line")).to_contain_text(
-        "The time was up after 120 s", timeout=60_000
-    )
+    await user.press("Stop", user.page.locator(".e-controls"))
+    await expect(user.page.locator(LINE)).to_have_text("You stopped the flight.")
+    assert not user.complaints
+    await user.page.context.close()
+
+
+async def test_a_flight_whose_time_is_up_says_so_and_where_it_was(browser, program):
+    user = await pupil(browser, program, "waits.yaml", "1_take_off")
+    await user.press("Fly", user.page.locator(".e-controls"))
+    told = "The time was up after 60 s; the drone was still in the state rise."
+    await expect(user.page.locator(LINE)).to_have_text(told, timeout=60_000)
     assert not user.complaints
     await user.page.context.close()
 
@@ -63,7 +74,7 @@ async def test_a_beginner_sees_the_goal_and_only_what_is_needed_without_scrollin
         ).to_be_in_viewport()
     await expect(user.page.locator(".e-more")).to_be_hidden()
     await user.press("Volar", user.page.locator(".e-controls"))
-    line = user.page.locator(".e-tabs .e-tab:not([hidden]) .e-run-line")
+    line = user.page.locator(LINE)
     told = "El dron aterrizó, pero no estuvo 3 s en el punto (0, 0, 1.5). Lo más cerca"
     await expect(line).to_contain_text(told, timeout=30_000)
     await expect(line).to_be_in_viewport()
