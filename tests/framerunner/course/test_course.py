@@ -57,20 +57,26 @@ def test_a_lesson_is_found_by_number_and_name():
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_a_lesson_is_begun_and_checked_at_the_command_line(language, tmp_path, capsys):
+def test_a_lesson_is_begun_at_the_command_line(language, tmp_path, capsys):
     assert run(["course", "start", "1", "--out", str(tmp_path), "--language", language]) == 0
     told = capsys.readouterr().out
     assert LESSONS[0].text.goal.in_language(language) in told
     path = tmp_path / "lesson_1.yaml"
     assert f"framerunner edit {path}" in told  # the steps are about its page
     assert path.read_text() == LESSONS[0].start
+    path.write_text(LESSONS[0].solution)
+    assert run(["course", "start", "1", "--out", str(tmp_path)]) == 2
+    assert path.read_text() == LESSONS[0].solution
+
+
+def test_a_lesson_is_checked_at_the_command_line(tmp_path, capsys):
+    path = tmp_path / "lesson_1.yaml"
+    path.write_text(LESSONS[0].start)
     assert run(["course", "check", "1", str(path)]) == 1
     assert "not yet: aborted" in capsys.readouterr().out
     path.write_text(LESSONS[0].solution)
     assert run(["course", "check", "1", str(path)]) == 0
     assert "passed: clean" in capsys.readouterr().out
-    assert run(["course", "start", "1", "--out", str(tmp_path)]) == 2
-    assert path.read_text() == LESSONS[0].solution
 
 
 def test_a_class_has_a_table(tmp_path):
