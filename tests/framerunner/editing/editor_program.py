@@ -10,14 +10,10 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-# It makes no worker ready before one is needed: each page that is opened would have it start one, and most
-# tests of pages do not fly.
-_START = """
-from framerunner.editing.worker_pool import WorkerPool
-WorkerPool.prepare = lambda pool: None
-from framerunner.cli import main
-main()
-"""
+_START = "from framerunner.cli import main; main()"
+_NO_SPARES = (
+    "from framerunner.editing.worker_pool import WorkerPool; WorkerPool.prepare = lambda pool: None; "
+)
 
 
 @dataclass
@@ -50,11 +46,16 @@ def free_port(kind: int = socket.SOCK_STREAM) -> int:
 
 
 @asynccontextmanager
-async def editor(mission: Path, *options: str, port: int = 0):
-    """Run the editor for a mission; yields an `EditorProgram`."""
+async def editor(mission: Path, *options: str, port: int = 0, spares: bool = True):
+    """Run the editor for a mission; yields an `EditorProgram`.
+
+    Without `spares` it makes no worker ready before a flight needs one: each page that is opened would have
+    it start one, and most tests of pages do not fly.
+    """
     drone = f"udpin://127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-c", _START, "edit", str(mission), "--no-browser"),
+        *(sys.executable, "-c", _START if spares else _NO_SPARES + _START),
+        *("edit", str(mission), "--no-browser"),
         *("--port", str(port), "--drone", drone, *options),
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.STDOUT,

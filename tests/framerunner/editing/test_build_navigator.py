@@ -136,7 +136,7 @@ async def build(user: EditorUser) -> None:
 @pytest.mark.asyncio
 async def test_the_papers_navigator_is_built_by_hand_checked_saved_and_flown(tmp_path):
     mission = tmp_path / "mine.yaml"
-    async with editor(mission) as program, chromium() as browser:
+    async with editor(mission, spares=False) as program, chromium() as browser:
         user = EditorUser(await browser.new_page(viewport=SIZE))
         user.page.set_default_timeout(10_000)
         await user.open(program.page(mission.name))

@@ -41,7 +41,7 @@ states:
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def program(tmp_path_factory):
-    async with editor(tmp_path_factory.mktemp("missions") / "first.yaml") as running:
+    async with editor(tmp_path_factory.mktemp("missions") / "first.yaml", spares=False) as running:
         running.folder = tmp_path_factory.getbasetemp() / "missions0"
         yield running
 
@@ -370,7 +370,7 @@ async def test_a_killed_program_loses_at_most_five_seconds(browser, tmp_path):
     path, port = tmp_path / "hover.yaml", free_port()
     path.write_text(HOVER)
     context = await browser.new_context(viewport=SIZE)
-    async with editor(path, port=port) as program:
+    async with editor(path, port=port, spares=False) as program:
         user = EditorUser(await context.new_page())
         await user.open(program.page(path.name))
         await user.add("New state", "kept")
@@ -384,7 +384,7 @@ async def test_a_killed_program_loses_at_most_five_seconds(browser, tmp_path):
         await user.type_at(1, "typed in vain")
         assert "in vain" not in await user.text()
     assert "kept" not in path.read_text()
-    async with editor(path, port=port) as program:
+    async with editor(path, port=port, spares=False) as program:
         await expect(user.page.locator(".e-message")).to_contain_text("is here again", timeout=15_000)
         await expect(user.state("kept")).to_be_attached()
         await expect(user.page.locator(".e-saved")).to_contain_text("not saved")

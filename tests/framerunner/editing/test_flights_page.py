@@ -24,7 +24,7 @@ async def program(tmp_path_factory):
     path = tmp_path_factory.mktemp("missions") / "short.yaml"
     path.write_text(MISSION)
     path.with_name("at_once.yaml").write_text(AT_ONCE)
-    async with editor(path) as running:
+    async with editor(path, spares=False) as running:
         yield running
 
 

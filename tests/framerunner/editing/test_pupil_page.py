@@ -26,7 +26,7 @@ async def program(tmp_path_factory):
     start = find_lesson("1").start
     (folder / "start.yaml").write_text(start)
     (folder / "waits.yaml").write_text(start.replace("distance_to_goal_m < 0.1", "imu.z > 3"))
-    async with editor(folder / "careless.yaml") as running:
+    async with editor(folder / "careless.yaml", spares=False) as running:
         yield running
 
 
