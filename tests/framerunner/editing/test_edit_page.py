@@ -41,8 +41,9 @@ states:
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def program(tmp_path_factory):
-    async with editor(tmp_path_factory.mktemp("missions") / "first.yaml", spares=False) as running:
-        running.folder = tmp_path_factory.getbasetemp() / "missions0"
+    folder = tmp_path_factory.mktemp("missions")
+    async with editor(folder / "first.yaml", spares=False) as running:
+        running.folder = folder
         yield running
 
 
