@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import socket
 from collections.abc import Callable
 from functools import cache
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
 
 FIRST_VIEWER = "a browser shows the monitor"  # is said once
 _MAX_UNSENT_BYTES = 1 << 16  # that the kernel buffers for a slow viewer
-# A large mission has many objects; by default, half of the time of reading it goes to collecting garbage.
-_COLLECT_AFTER = (100_000, 20, 50)
 
 
 async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[str], None]) -> None:
@@ -42,7 +39,6 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
     with _listen(settings.bind, settings.port) as listener:
         # Importing the libraries takes more than a second, so other tasks of this loop run meanwhile.
         await asyncio.to_thread(_import_server)
-        gc.set_threshold(*_COLLECT_AFTER)
         from monitor.server import assemble, make_server  # noqa: PLC0415 - see above
 
         certificate = None

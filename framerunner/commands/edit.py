@@ -51,7 +51,7 @@ def edit(
         framerunner edit my_mission.yaml --pilot my_pilot.py
     """
     check_range("--port", port, 0, 65535)
-    from framerunner.commands.monitor import equipment
+    from framerunner.commands.monitor import equipment, prepare_server
     from framerunner.editing.documents.desk import EditorDesk
     from monitor.run import serve
     from monitor.settings import MonitorSettings
@@ -76,6 +76,7 @@ def edit(
             if browser:
                 webbrowser.open(f"{url}{path}")
 
+    prepare_server()
     asyncio.run(serve(given, settings, hear))
     return 0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import atexit
+import gc
 import os
 import resource
 import shutil
@@ -28,6 +29,8 @@ SCENARIOS = (Path("scenarios"),)
 DATABASE_FILE = Path("framerunner.db")
 DATABASE = f"sqlite:///{DATABASE_FILE}"
 _OPEN_FILES = 4096
+# By default, half of the time of reading a large mission beside others goes to collecting garbage.
+_COLLECT_AFTER = (100_000, 20, 50)
 _NICENESS = 5  # beside a flight, which the monitor must not slow down
 # The doctor has 247, the virtual camera 246, MAVSDK 245, other ground stations 255.
 SYSTEM_ID = 250
@@ -118,7 +121,7 @@ def monitor(
         certificate=certificate,
         key=key,
     )
-    _allow_many_files()
+    prepare_server()
     os.nice(_NICENESS if lifeline else 0)
     work = serve(given, settings, say)
     asyncio.run(until_standard_input_ends(work) if lifeline else work)
@@ -188,8 +191,9 @@ def _secret(what: str) -> str | None:
     return os.environ.get(f"FRAMERUNNER_{what}") or None
 
 
-def _allow_many_files() -> None:
-    """Raise this process's limit of open files, as each connection is one, as far as allowed."""
+def prepare_server() -> None:
+    """Have this process collect garbage less often, and raise its limit of open files as far as allowed."""
+    gc.set_threshold(*_COLLECT_AFTER)
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = _OPEN_FILES if hard == resource.RLIM_INFINITY else min(_OPEN_FILES, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:

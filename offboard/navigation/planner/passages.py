@@ -127,8 +127,8 @@ class Passages:
     def _last_in_sight(self, points_m: Array, at: int) -> int:
         """Which of the points that come after one is the last that is in sight; the next one always is.
 
-        Only lines that pass a column by a few millimetres are looked at step by step; to all others a bound
-        of their depths says what that would find.
+        Only lines that pass a column by a few millimetres are looked at step by step; of all others bounds of
+        their depths say what that would find. Counted is the work of looking at each step by step.
         """
         ways = points_m[at + 2 :] - points_m[at]
         lengths_m = np.linalg.norm(ways, axis=1)
