@@ -471,7 +471,7 @@ async def test_camera_boxes_and_arena_are_of_one_moment(chromium, fake):
     page, complaints = await visit(chromium, fake)
     await fake.until_filmed()
     await page.evaluate(WATCH_MOMENTS)
-    for step in range(60):
+    for step in range(600):  # a slow browser draws a few times a second
         t = 10 + step / 20
         await fake.say("pose", drones=[pose(t=t, p=[t - 12, 0.0, 1.5])])
         if step % 2 == 0:
@@ -479,9 +479,10 @@ async def test_camera_boxes_and_arena_are_of_one_moment(chromium, fake):
             seen = {"red": BOX, "green": None, "blue": None}
             await fake.say("detections", id=1, t=round(t - 0.2, 3), width=320, height=240, boxes=seen)
         await asyncio.sleep(0.05)
-    await until(page, "Number(document.querySelector('.m-camera').dataset.time) >= 12.69")
-    moments = [each for each in await page.evaluate("window.moments") if each[0] > 10.5]
-    assert len(moments) >= 4
+        moments = [each for each in await page.evaluate("window.moments") if each[0] > 10.5]
+        if len(moments) >= 6 and t > 13:
+            break
+    assert len(moments) >= 6
     assert {boxes for _, boxes, _ in moments} == {f"{image:.6g}" for image, _, _ in moments}
     # An image stands until the next one's moment, 0.1 s later; a slow browser draws a few times a second.
     assert all(-0.001 <= arena - image < 0.5 for image, _, arena in moments), moments

@@ -364,7 +364,7 @@ async def test_folder_without_images(tmp_path: Path) -> None:
 @pytest.fixture
 def clip(tmp_path: Path) -> Path:
     path = tmp_path / "clip.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 50.0, (64, 48))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (64, 48))
     for i in range(10):
         writer.write(picture(20 * i))
     writer.release()
@@ -372,10 +372,12 @@ def clip(tmp_path: Path) -> Path:
 
 
 async def test_file_plays_to_its_end(clip: Path) -> None:
+    """At its own speed: 0.9 s. A busy machine may miss images, but not the last one."""
     async with open_source(str(clip)) as source:
         frames = [frame async for frame in source.frames()]
-    assert 5 <= len(frames) <= 10
-    assert abs(int(frames[-1].image[0, 0, 0]) - 180) < 5
+    numbers = [round(int(frame.image[0, 0, 0]) / 20) for frame in frames]
+    assert numbers == sorted(set(numbers)) and numbers[-1] == 9
+    assert frames[-1].received_s - frames[0].received_s > 0.15
     assert all(frame.time_us is None for frame in frames)
 
 
