@@ -38,6 +38,7 @@ from offboard.navigation.path_flight import PathFlight
 
 LIMIT_MS = 20.0
 SHARES = (50, 99, 99.9)
+SHOWN = 10  # of the longest ticks
 
 
 def main() -> None:
@@ -64,11 +65,12 @@ def main() -> None:
         every += flown
     print(f"{options.count} flights, {clean} clean")
     for what, times in (("ticks", "took_ms"), ("planning in them", "planned_ms")):
-        longest = max(every, key=attrgetter(times))
+        longest = sorted(every, key=attrgetter(times), reverse=True)[:SHOWN]
         all_ms = np.array([getattr(tick, times) for tick in every])
         below = ", ".join(f"{share} % below {np.percentile(all_ms, share):.1f} ms" for share in SHARES)
         print(f"{len(every)} {what}: {np.sum(all_ms > LIMIT_MS)} over {LIMIT_MS:g} ms; {below}")
-        print(f"  longest {getattr(longest, times):.1f} ms: {longest.where}")
+        for tick in longest:
+            print(f"  {getattr(tick, times):.1f} ms: {tick.where}")
 
 
 @dataclass(frozen=True, slots=True)
