@@ -84,19 +84,28 @@ class Clearance:
 
         Not above zero where a point is clear.
         """
-        beyond = np.maximum(self.low_m - points_m, points_m - self.high_m).max(axis=1) - _ROUNDING_M
-        parts = [beyond[:, None]]
-        if self.columns:
-            parts.insert(0, self.column_depths(points_m))
-        if self.boxes:
-            parts.insert(0, (self._rows[:, 5:8] - np.abs(self.offsets(points_m))).min(axis=-1))
-        return np.concatenate(parts, axis=1)
+        boxes, columns = self.boxes, self.columns
+        depths = np.empty((len(points_m), boxes + columns + 1))
+        # Axis by axis: NumPy reduces an axis of three numbers many times more slowly.
+        if boxes:
+            half_m, (u, v, w) = self._rows[:, 5:8].T, self._axis_offsets(points_m)
+            aside = np.minimum(half_m[0] - np.abs(u), half_m[1] - np.abs(v))
+            np.minimum(aside, half_m[2] - np.abs(w), out=depths[:, :boxes])
+        if columns:
+            depths[:, boxes:-1] = self.column_depths(points_m)
+        x, y, z = np.maximum(self.low_m - points_m, points_m - self.high_m).T
+        depths[:, -1] = np.maximum(np.maximum(x, y), z) - _ROUNDING_M
+        return depths
 
     def column_depths(self, points_m: Array) -> Array:
         """How deep points are in the enlarged columns, in plan; shapes (n, 2 or 3) and (n, columns)."""
-        dx = points_m[:, None, 0] - self._columns[:, 0]
+        squares = points_m[:, None, 0] - self._columns[:, 0]
+        squares *= squares
         dy = points_m[:, None, 1] - self._columns[:, 1]
-        return np.asarray(self._radii_m - np.sqrt(dx * dx + dy * dy))
+        dy *= dy
+        squares += dy
+        away_m: Array = np.sqrt(squares, out=squares)
+        return np.subtract(self._radii_m, away_m, out=away_m)
 
     def line_depths(self, start_m: Array, ways_m: Array, steps_m: Array) -> tuple[Array, Array]:
         """Bounds of how deep the deepest of points along straight lines is in the enlarged columns, in plan.
@@ -126,17 +135,13 @@ class Clearance:
 
     def offsets(self, points_m: Array) -> Array:
         """From the boxes' centres to points, in the boxes' axes, shape (n, boxes, 3)."""
-        rows = self._rows
-        offset = points_m[:, None, :] - rows[:, :3]
-        c, s = rows[:, 3], rows[:, 4]
-        return np.stack(
-            (
-                c * offset[..., 0] + s * offset[..., 1],
-                c * offset[..., 1] - s * offset[..., 0],
-                offset[..., 2],
-            ),
-            axis=-1,
-        )
+        return np.stack(self._axis_offsets(points_m), axis=-1)
+
+    def _axis_offsets(self, points_m: Array) -> tuple[Array, Array, Array]:
+        """The same, each axis by itself, shape (n, boxes)."""
+        x_m, y_m, z_m, c, s = self._rows[:, :5].T
+        dx, dy = points_m[:, 0, None] - x_m, points_m[:, 1, None] - y_m
+        return c * dx + s * dy, c * dy - s * dx, points_m[:, 2, None] - z_m
 
     def way_out(self, point_m: Array, next_m: Array) -> tuple[Array, Array] | None:
         """Straight out of a frame's opening, for a drone within it: where to, and the direction; else None.
