@@ -141,7 +141,7 @@ async def test_a_pilot_who_takes_over_keeps_the_vehicle_and_can_give_it_back(veh
             drone.command(VelocityCommand(forward_m_s=0.9))
             assert not (await anext(ticks)).offboard
         fresh = fresh_setpoints(vehicle, 1.0)
-        assert len(fresh) >= 5  # PX4 wants more than two a second
+        assert len(fresh) >= 15
         assert set(fresh) == {(0.0, 0.0, 0.0, 0.0)}  # nothing of the mission
         assert not modes_asked_for(vehicle, before)
         assert vehicle.mode == (POSCTL, 0)

@@ -54,7 +54,7 @@ async def test_one_that_has_ended_is_not_waited_for():
         check = IdleCheck(process.pid)
         began_s = time.monotonic()
         assert not await check.wait(5.0)
-        assert time.monotonic() - began_s < 4.0
+        assert time.monotonic() - began_s < 1.0
 
 
 def test_a_process_starts_until_its_script_has_ended():

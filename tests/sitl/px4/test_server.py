@@ -128,7 +128,7 @@ async def test_a_px4_that_is_killed_ends_the_try_and_a_new_one_gets_a_new_drone(
     began_s = time.monotonic()
     run_fake(port, fakes)
     await until(lambda: len(made) == 2 and made[-1].time_us > 1_000_000)
-    assert time.monotonic() - began_s < 15.0  # without waiting for a limit
+    assert time.monotonic() - began_s < 5.0
     assert any("PX4 has closed the connection; at" in line for line in lines)
     await stopped(task)
 
