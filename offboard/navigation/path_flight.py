@@ -41,9 +41,10 @@ LOOK_AHEAD_S = 2.0  # likewise; the drone turns in flight to look at what it has
 AHEAD_STEP_S = 0.1
 CHECK_S = 0.2  # between two checks that a path is free, if neither it nor the obstacles have changed
 WAITING_REPLAN_S = 0.2  # between two attempts to go on
-TICK_WORK = 200_000
+TICK_WORK = 130_000
 """Of searching for a path in one tick, in the unit of `LegFinder`: some milliseconds of a processor. Then the
 search pauses, so that no command is late; most paths need less."""
+PATH_WORK = 40_000  # of making the path that was found, in the same unit
 MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
 LOOKED_AT_RAD = 0.3
 LOOK_GAIN_PER_S = 2.0
@@ -275,9 +276,11 @@ class PathFlight:
         """
         before = search.work
         search.advance(TICK_WORK - self.work)
-        self.work += search.work - before
-        self.search = None if search.over else search
-        if not search.over:
+        searched = search.work - before
+        self.work += searched
+        pauses = not search.over or (searched > 0 and self.work > TICK_WORK - PATH_WORK)
+        self.search = search if pauses else None
+        if pauses:
             return
         start, restarts = self._start(state)
         found = search.path(None if begun else start)

@@ -32,6 +32,8 @@ STOPPING_SHARES = np.array([1.0, 0.7, 0.5, 0.3, 0.15])  # or in the largest of t
 USED_MARGIN_M = 0.05  # of the margin to obstacles, while a path is flown
 MAX_ROUTES = 6  # for which legs are sought
 SLOWER_S = 0.3  # legs slower than expected by this make another route worth a look
+SAME_START_M = 0.02  # a drone that stands drifts less while a path is sought,
+SAME_START_M_S = 0.05  # and moves more slowly
 
 _Route = tuple[list[Pass], list[Steps]]
 
@@ -117,7 +119,8 @@ class Search:
         """What was found.
 
         Args:
-            start: where the drone is going to be now, if the search has taken some time: its own start then.
+            start: where the drone is going to be now, if the search has taken some time; the search's own start
+                if the drone stands there still.
 
         Returns:
             The path, why there is none, or None if what was found is of no use from there.
@@ -125,11 +128,12 @@ class Search:
         route = self._found
         if route is None or isinstance(route, Refusal):
             return route
-        if start is not None:
+        if start is not None and not self._stands(start):
             route = self._from(start, *route)
             if route is None:
                 return None
-        start = start or self._start
+        else:
+            start = self._start
         stretches = _stretches(*route)
         samples = sample(stretches, start, self._style)
         yaw, yaw_rate = headings(samples, stretches, start, self._style)
@@ -151,6 +155,11 @@ class Search:
         position, velocity = run_in(start, self._style)
         (x, y, z), (vx, vy, vz) = position.tolist(), velocity.tolist()
         return replace(start, position_m=(x, y, z), velocity_m_s=(vx, vy, vz))
+
+    def _stands(self, start: Motion) -> bool:
+        """Whether the drone is where the search began, nearly at rest."""
+        moved_m = dist(start.position_m, self._start.position_m)
+        return moved_m < SAME_START_M and hypot(*start.velocity_m_s) < SAME_START_M_S
 
     def _from(self, start: Motion, route: list[Pass], found: list[Steps]) -> _Route | None:
         """The same from another start, where the way to the first place is as short."""
