@@ -7,7 +7,7 @@ MAVPROXY_VENV := .venv-mavproxy
 BENCH_VENV := .venv-bench
 NODE_MODULES := web/node_modules/.package-lock.json
 BIN := $(VENV)/bin
-ROOMS := errors wire geometry scenarios firmware_py sitl vision offboard monitor framerunner
+ROOMS := scenarios firmware_py sitl vision offboard framerunner
 LOCK := uv pip compile --universal --python-version 3.11 --generate-hashes --quiet --custom-compile-command 'make lock'
 LOCK_PROJECT := $(LOCK) pyproject.toml locks/build.in
 # Everything but this project has a hash and is refused if it differs; the folder itself can have none.
@@ -78,12 +78,12 @@ lint-web:
 	@$(IF_NODE) $(MAKE) --silent $(NODE_MODULES) && cd web && npm run --silent lint && npm run --silent types
 
 .PHONY: web web-check
-web: $(NODE_MODULES) ## bundle the monitor's pages, web/, into monitor/static/ (needs Node.js 20)
+web: $(NODE_MODULES) ## bundle the monitor's pages, web/, into framerunner/monitor/static/ (needs Node.js 20)
 	cd web && npm run --silent build
 
 web-check: ## bundle them with packages installed anew; the result must be what is committed
 	@$(IF_NODE) cd web && $(NPM_CI) && npm run --silent build -- ../build/web-check \
-		&& { diff -r ../build/web-check ../monitor/static || { echo "monitor/static/ is not what web/ gives; run: make web"; exit 1; }; }
+		&& { diff -r ../build/web-check ../framerunner/monitor/static || { echo "framerunner/monitor/static/ is not what web/ gives; run: make web"; exit 1; }; }
 
 .PHONY: test-ardupilot
 test-ardupilot: $(VENV)/installed-dev ## fly the challenge on a genuine ArduCopter: ARDUPILOT_DIR=its folder
@@ -96,7 +96,7 @@ test-fast: $(VENV)/installed-dev ## the tests that need no real time, in paralle
 
 # `test` runs them in two parts; those of the second use browsers and several processes.
 FAST = $(BIN)/pytest -n 4 --dist worksteal -m "not realtime"
-CORE = $(addprefix tests/,geometry wire scenarios firmware_py vision sitl offboard)
+CORE = $(addprefix tests/,framerunner/geometry framerunner/vehicle framerunner/wire scenarios firmware_py vision sitl offboard)
 
 .PHONY: test-core test-front
 test-core: $(VENV)/installed-dev
@@ -135,7 +135,7 @@ failsafes: $(VENV)/installed-dev ## write the tables of failsafes in the documen
 	$(BIN)/python -m offboard.safety.failsafes
 
 .PHONY: messages
-messages: $(VENV)/installed-dev ## generate wire/extra_messages.py again from wire/extra_messages.xml
+messages: $(VENV)/installed-dev ## generate framerunner/wire/extra_messages.py again from framerunner/wire/extra_messages.xml
 	$(BIN)/python -m tests.wire.generate_messages
 
 .PHONY: result-schema

@@ -14,7 +14,7 @@ from collections import Counter
 from pathlib import Path
 
 import sitl.ardupilot.simulation as simulated
-from firmware_py.airframe import load_airframe
+from framerunner.vehicle.airframe import load_airframe
 from scenarios.loader import load_scenario
 from sitl.ardupilot.build import ArduPilotProcess, find_build
 from sitl.ardupilot.json_interface import ServoFrame, decode_frame

@@ -25,8 +25,8 @@ from firmware_py.estimation.aiding.aid import NEVER_US
 from firmware_py.estimation.inertial_estimator import InertialEstimator
 from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
-from geometry.rotations import multiply
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import multiply
+from framerunner.geometry.vectors import Quaternion, Vec3
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 

@@ -19,9 +19,9 @@ import numpy.typing as npt
 from firmware_py.setpoints import BodyVelocitySetpoint, Setpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode
 from firmware_py.types import VehicleState
-from geometry.axes import flip_vector
-from geometry.rotations import yaw_of
-from geometry.vectors import Vec3
+from framerunner.geometry.axes import flip_vector
+from framerunner.geometry.rotations import yaw_of
+from framerunner.geometry.vectors import Vec3
 from scenarios.air import Wind
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation

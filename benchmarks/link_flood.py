@@ -28,13 +28,13 @@ from typing import ClassVar
 from rich.console import Console
 from rich.table import Table
 
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.link import Traffic
 from scenarios.loader import load_scenario
 from sitl import server
 from sitl.pacing.pacer import Pacer
 from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
-from wire.dialect import mavlink
-from wire.link import Traffic
 
 LINKS = ("udp", "udp, 60 kB", "tcp", "serial")
 TCP_PORT = 5790

@@ -28,8 +28,8 @@ from firmware_py.status import FlightMode
 from framerunner.flying.detector import plan_detector
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
-from geometry.solids import Solid
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState
 from offboard.mission import MissionError, load_mission

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import time
 
+from framerunner.wire.dialect import mavlink
 from scenarios.loader import load_scenario
 from sitl.autopilots.sensors import with_estimable_sensors
 from sitl.px4.messages import ActuatorControls, ControlsReader, Packer
 from sitl.px4.simulation import Px4Simulation
-from wire.dialect import mavlink
 
 STEPS = 20_000
 HOVER = 0.26

@@ -10,8 +10,9 @@ from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.setpoints import Setpoint
 from firmware_py.status import CommandResult, FlightMode
-from firmware_py.types import WARNING, GeodeticPoint, ManualInput
-from geometry.vectors import Vec3
+from firmware_py.types import WARNING, ManualInput
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.geodesy import GeodeticPoint
 
 _AUTO_BIT, _OFFBOARD_BIT = 1, 2  # of COM_RC_OVERRIDE
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite
 
-from firmware_py.airframe import Airframe
 from firmware_py.parameters import Parameters
-from firmware_py.types import BatteryState
+from framerunner.vehicle.airframe import Airframe
+from framerunner.vehicle.measurements import BatteryState
 
 _OK, _LOW, _CRITICAL, _EMERGENCY = 1, 2, 3, 4  # MAV_BATTERY_CHARGE_STATE
 _MAH_PER_A_S = 1000.0 / 3600.0

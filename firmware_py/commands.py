@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import inf, tan
 from typing import ClassVar
 
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.vectors import ZERO3, Vec3
 
 _DESCENT_SHARE = 0.7  # of hover thrust: less means a descent
 

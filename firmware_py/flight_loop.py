@@ -9,7 +9,6 @@ from collections import deque
 from math import cos, isfinite, isnan, nan, radians
 from typing import TYPE_CHECKING
 
-from firmware_py.airframe import Airframe
 from firmware_py.battery import BatteryMonitor
 from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowChecks
 from firmware_py.commander_table import Event, Row, State
@@ -17,29 +16,20 @@ from firmware_py.commands import ControlCommand
 from firmware_py.estimation.ideal_estimator import IdealEstimator
 from firmware_py.estimation.interface import StateEstimator
 from firmware_py.estimation.wind import WindEstimator
-from firmware_py.geodesy import GeoReference
 from firmware_py.ground_contact import LandDetector, LiftOff
 from firmware_py.guidance.modes import Guidance
 from firmware_py.guidance.orbit import Orbit
-from firmware_py.measurements import Readings
 from firmware_py.missions.flight import LegKind
 from firmware_py.missions.store import MissionStore
 from firmware_py.navigator import Navigator
 from firmware_py.offboard_requests import SetpointQueue
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, LandedState, VehicleStatus
-from firmware_py.types import (
-    CRITICAL,
-    INFO,
-    WARNING,
-    FlightRecord,
-    GeodeticPoint,
-    MotorOutput,
-    MotorSpeeds,
-    Sensors,
-    StatusText,
-)
-from geometry.vectors import NAN3, Vec3
+from firmware_py.types import CRITICAL, INFO, WARNING, FlightRecord, MotorOutput, StatusText
+from framerunner.geometry.vectors import NAN3, Vec3
+from framerunner.vehicle.airframe import Airframe
+from framerunner.vehicle.geodesy import GeodeticPoint, GeoReference
+from framerunner.vehicle.measurements import MotorSpeeds, Readings, Sensors
 
 if TYPE_CHECKING:
     from firmware_py.control.stabiliser import Stabiliser

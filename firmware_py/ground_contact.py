@@ -10,11 +10,11 @@ from __future__ import annotations
 from math import hypot, inf, radians
 from typing import TYPE_CHECKING
 
-from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.commands import ControlCommand
 from firmware_py.guidance.limits import speed_limits
 from firmware_py.parameters import Parameters
 from firmware_py.types import MotorOutput, VehicleState
+from framerunner.vehicle.airframe import GRAVITY_M_S2, Airframe
 
 if TYPE_CHECKING:
     from firmware_py.control.stabiliser import Stabiliser  # it imports SciPy

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from math import hypot, inf, isfinite
 
-from firmware_py.geodesy import GeoReference
 from firmware_py.missions.executor import MissionExecutor
 from firmware_py.missions.flight import IssuedCommand, Leg, View
 from firmware_py.missions.geofence import Geofence
@@ -12,7 +11,8 @@ from firmware_py.missions.items import Do
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.types import StatusText, VehicleState
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.geodesy import GeoReference
 
 _MAX_ISSUED = 100
 _NEARER_M = 2.0  # another place must be nearer than the best so far by this

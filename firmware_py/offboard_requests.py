@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import cos, isfinite, nan, sin
 
-from firmware_py.airframe import Airframe
 from firmware_py.guidance.limits import clamp
 from firmware_py.setpoints import (
     AttitudeSetpoint,
@@ -28,9 +27,10 @@ from firmware_py.setpoints import (
     TrajectorySetpoint,
 )
 from firmware_py.types import VehicleState
-from geometry.rotations import rotation, to_world
-from geometry.vectors import NAN3, ZERO3, Quaternion, Vec3
-from wire.dialect import mavlink
+from framerunner.geometry.rotations import rotation, to_world
+from framerunner.geometry.vectors import NAN3, ZERO3, Quaternion, Vec3
+from framerunner.vehicle.airframe import Airframe
+from framerunner.wire.dialect import mavlink
 
 _LOCAL = "SET_POSITION_TARGET_LOCAL_NED"
 _MIN_LENGTH = 1e-3  # of a quaternion that still has a direction

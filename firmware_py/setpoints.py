@@ -26,8 +26,8 @@ from firmware_py.guidance.limits import (
     yaw_rate,
 )
 from firmware_py.types import VehicleState
-from geometry.rotations import euler_from_quaternion
-from geometry.vectors import NAN3, ZERO3, Quaternion, Vec3
+from framerunner.geometry.rotations import euler_from_quaternion
+from framerunner.geometry.vectors import NAN3, ZERO3, Quaternion, Vec3
 
 _MAX = 1e6  # limit of metres and m/s, which keeps all arithmetic finite
 _MAX_ACCELERATION_M_S2 = 50.0

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 
 from firmware_py.setpoints import Setpoint, TrajectorySetpoint
-from firmware_py.types import GeodeticPoint
-from geometry.vectors import Vec3
-from wire import px4_modes
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.wire import px4_modes
 
 
 class FlightMode(Enum):

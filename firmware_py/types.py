@@ -1,37 +1,11 @@
-"""Inputs and outputs of the autopilot. World NED, body FRD, SI units, radians."""
+"""What the autopilot knows, is told and puts out. World NED, body FRD, SI units, radians."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from geometry.vectors import Quaternion, Vec3
-
-MotorSpeeds = tuple[float, ...]
-
-
-@dataclass(slots=True)
-class Sensors:
-    """One sample of all sensors.
-
-    Attributes:
-        time_us: sampling time, microseconds since boot.
-        position_ned_m: position relative to the geodetic origin given to the autopilot, shape (3,).
-        velocity_ned_m_s: shape (3,).
-        attitude: unit quaternion (w, x, y, z), body FRD to world NED.
-        angular_rate_frd_rad_s: shape (3,).
-        specific_force_frd_m_s2: as an accelerometer measures it, shape (3,); at rest (0, 0, -g).
-        battery_voltage_v: at the battery's terminals.
-        battery_current_a: drawn from the battery.
-    """
-
-    time_us: int
-    position_ned_m: Vec3
-    velocity_ned_m_s: Vec3
-    attitude: Quaternion
-    angular_rate_frd_rad_s: Vec3
-    specific_force_frd_m_s2: Vec3
-    battery_voltage_v: float = 16.2
-    battery_current_a: float = 0.0
+from framerunner.geometry.vectors import Quaternion, Vec3
+from framerunner.vehicle.measurements import MotorSpeeds
 
 
 @dataclass(slots=True)
@@ -81,27 +55,6 @@ class ManualInput:
 
 
 @dataclass(slots=True)
-class BatteryState:
-    """The state of the battery.
-
-    Attributes:
-        voltage_v: at its terminals.
-        current_a: drawn now.
-        used_mah: since boot.
-        remaining: share of the full charge, 0..1.
-        cells: in series.
-        warning: MAV_BATTERY_CHARGE_STATE: 1 ok, 2 low, 3 critical, 4 emergency.
-    """
-
-    voltage_v: float = 16.2
-    current_a: float = 0.0
-    used_mah: float = 0.0
-    remaining: float = 1.0
-    cells: int = 4
-    warning: int = 1
-
-
-@dataclass(slots=True)
 class FlightRecord:
     """Times of the present or last flight, vehicle time in microseconds; 0: not yet.
 
@@ -118,15 +71,6 @@ class FlightRecord:
     landed_us: int = 0
     number: int = 0
     failsafes: tuple[tuple[int, str], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class GeodeticPoint:
-    """A place on Earth: degrees (WGS 84) and metres above mean sea level."""
-
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float
 
 
 CRITICAL, WARNING, INFO = 2, 4, 6

@@ -15,8 +15,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Self, TypeVar
 
-from errors import SettingError
-from monitor.run import FIRST_VIEWER
+from framerunner.errors import SettingError
+from framerunner.monitor.run import FIRST_VIEWER
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 

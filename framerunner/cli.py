@@ -133,7 +133,7 @@ def _reason(error: Exception) -> str | None:
     """The message for the user; None for a fault of this program."""
     from cyclopts import CycloptsError
 
-    from errors import UserError, is_disk_full
+    from framerunner.errors import UserError, is_disk_full
     from framerunner.extras import install_advice
 
     if isinstance(error, CycloptsError):

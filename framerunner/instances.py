@@ -10,15 +10,15 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import BinaryIO
 
-from errors import SettingError
+from framerunner.errors import SettingError
+from framerunner.wire.transports.sockets import bind_udp, listen_tcp
+from framerunner.wire.transports.urls import LinkError
 from sitl.ardupilot import json_interface as ardupilot
 from sitl.ardupilot.poses import POSE_PORT
 from sitl.ardupilot.relay import RELAY_PORT
 from sitl.px4 import link as px4
 from sitl.px4.side_link import CAMERA_PORT
 from sitl.server_settings import VIDEO_PORT
-from wire.transports.sockets import bind_udp, listen_tcp
-from wire.transports.urls import LinkError
 
 INSTANCES = 10
 _TCP_PORTS = (px4.FIRST_PORT, VIDEO_PORT)

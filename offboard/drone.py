@@ -8,8 +8,8 @@ from enum import Enum
 from math import isfinite, isnan
 from typing import Protocol
 
-from errors import UserError
-from geometry.vectors import Quaternion
+from framerunner.errors import UserError
+from framerunner.geometry.vectors import Quaternion
 
 
 class DroneError(UserError):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from errors import UserError
+from framerunner.errors import UserError
 from offboard.chart.expressions import compile_value, names_in
 from offboard.chart.native import RESUME, TICK
 from offboard.chart.spec import Action, Leaf, enter_state, state_path

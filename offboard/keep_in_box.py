@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import cos, hypot, sin
 
-from errors import UserError
-from geometry.vectors import Vec3
+from framerunner.errors import UserError
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from scenarios.models import Scenario
 

@@ -13,7 +13,8 @@ from mavsdk.asyncio import Mavsdk, MavsdkError
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
-from geometry.axes import Alignment, Pose
+from framerunner.geometry.axes import Alignment, Pose
+from framerunner.wire.transports.urls import parse_url
 from offboard.drone import DroneError, DroneState, ResponsePrior, VelocityCommand
 from offboard.keep_in_box import Box, confine
 from offboard.link.autopilots import open_dialect
@@ -31,7 +32,6 @@ from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
 from offboard.safety.caps import CapKeeper, Caps
 from offboard.safety.rules import AbortAction
-from wire.transports.urls import parse_url
 
 STAND_STILL_S = 0.5  # wall time without a tick after which a velocity of zero is sent
 LINK_LOST_S = 1.0  # wall time without telemetry

@@ -12,7 +12,7 @@ from pathlib import Path
 import yaml
 from statemachine import StateChart
 
-from errors.files import TextError, TextFault, read_text
+from framerunner.files.text_file import TextError, TextFault, read_text
 from offboard.chart.check import check, is_finish
 from offboard.chart.messages import Message
 from offboard.chart.native import load_chart, native_document

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from errors import UserError
+from framerunner.errors import UserError
 from offboard.chart.described import unit_of
 from offboard.chart.expressions import Evaluate, names_in
 from offboard.chart.spec import RESUME, THEN, Leaf, State, Transition, transition_id

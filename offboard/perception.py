@@ -8,10 +8,10 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable
 from typing import Protocol
 
-from errors import UserError
+from framerunner.errors import UserError
+from framerunner.wire.vehicle_telemetry import MessageOrder
 from vision.detectors import Detector, new_detector
 from vision.types import CameraFrame, Detections
-from wire.vehicle_telemetry import MessageOrder
 
 CAMERA_DEAD_S = 1.0
 FIRST_IMAGE_S = 5.0

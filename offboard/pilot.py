@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field
 from pydantic.config import JsonDict
 
-from errors import UserError
-from geometry.vectors import Vec3
+from framerunner.errors import UserError
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import VelocityCommand
 from offboard.limits import CONTEST, CommandLimits, clamped
 from scenarios.models import COLOURS, Colour

@@ -20,7 +20,7 @@ from typing import get_type_hints
 
 from statemachine import StateChart
 
-from errors.files import TextError, read_text
+from framerunner.files.text_file import TextError, read_text
 from offboard.chart.problems import MissionError, Place, mission_error
 from offboard.pilot import Pilot
 

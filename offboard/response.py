@@ -17,7 +17,7 @@ from math import cos, exp, pi, remainder, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, ResponsePrior, VelocityCommand
 from offboard.second_lag import LAG_S as OWN_LAG_S
 from offboard.second_lag import SecondLag

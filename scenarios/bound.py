@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import cos, inf, pi, sin
 from typing import TYPE_CHECKING
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from scenarios.models import COLOURS, Frame, Scenario, ScenarioError
 from scenarios.touchdown import STANDING_TOLERANCE_M
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import cos, dist, hypot, sin
 from typing import Literal
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from scenarios.models import Arena, Frame
 
 MAX_GAP_US = 1_000_000  # across a longer gap in the states no crossing counts

@@ -11,8 +11,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from geometry.rotations import yaw_of
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import yaw_of
+from framerunner.geometry.vectors import Quaternion, Vec3
 from scenarios.part import Metres, Part, refusal
 
 _DISTANCES_M = (0.0, 100.0)

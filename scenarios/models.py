@@ -10,11 +10,11 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from errors import UserError
-from geometry.axes import flip_quaternion
-from geometry.rotations import quaternion_from_euler
-from geometry.solids import Solid
-from geometry.vectors import ZERO3, Quaternion, Vec3
+from framerunner.errors import UserError
+from framerunner.geometry.axes import flip_quaternion
+from framerunner.geometry.rotations import quaternion_from_euler
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.air import Wind
 from scenarios.faults.declaration import Fault
 from scenarios.gimbal import Gimbal

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
-from geometry.rotations import MAX_MOUNTING_RAD
+from framerunner.geometry.rotations import MAX_MOUNTING_RAD
 
 Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 """A coordinate in the arena."""

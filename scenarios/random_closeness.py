@@ -8,8 +8,8 @@ from math import ceil, cos, dist, sin
 
 from pydantic import Field
 
-from geometry.solids import Solid
-from geometry.vectors import Vec3
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import Vec3
 from scenarios.models import Arena, Base, Frame
 from scenarios.part import Part
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 
 from pydantic import Field, model_validator
 
-from geometry.solids import Solid
+from framerunner.geometry.solids import Solid
 from scenarios.models import (
     DECOY_COLOURS,
     Arena,

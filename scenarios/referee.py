@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from math import isfinite
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from scenarios.crossing import Boundary, Passage, PathWatch
 from scenarios.goals import GoalWatch
 from scenarios.models import COLOURS, Scenario, TrueState, ground_height

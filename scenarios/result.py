@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema
 
-from errors import UserError
+from framerunner.errors import UserError
 from scenarios.crossing import Side
 from scenarios.models import MissionClass
 from scenarios.verdict import Verdict

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Literal
 
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.vectors import Quaternion, Vec3
 from scenarios.models import Scenario, TrueState, ground_height, is_over_base
 
 HARD_HIT_M_S = 2.0  # a fall of 0.2 m; cutting the motors just above the base gives little over 1 m/s

@@ -18,8 +18,8 @@ from typing import Any, Generic, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from errors import UserError
-from errors.files import TextError, decode_text, read_bytes
+from framerunner.errors import UserError
+from framerunner.files.text_file import TextError, decode_text, read_bytes
 from scenarios.part import field_path
 from scenarios.yaml_tree import Path as FieldPath
 from scenarios.yaml_tree import YamlError, YamlTree, parse_yaml

@@ -7,9 +7,9 @@ times internal resistance.
 
 from __future__ import annotations
 
-from firmware_py.airframe import Airframe
 from firmware_py.parameters import Parameters
-from firmware_py.types import MotorSpeeds
+from framerunner.vehicle.airframe import Airframe
+from framerunner.vehicle.measurements import MotorSpeeds
 
 _A_S_PER_MAH = 3.6
 

@@ -16,7 +16,7 @@ from math import hypot, isfinite
 import cv2
 import numpy as np
 
-from geometry.rotations import (
+from framerunner.geometry.rotations import (
     RotationRows,
     mounting_flu,
     multiply,
@@ -25,8 +25,8 @@ from geometry.rotations import (
     rotation,
     rotation_rows,
 )
-from geometry.solids import Solid
-from geometry.vectors import ZERO3, Quaternion, Vec3
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.models import Scenario, TrueState
 from sitl.camera_projection import Pinhole
 from sitl.optics.lens import SCALE, LensMap

@@ -16,9 +16,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from geometry.rotations import RotationRows
-from geometry.solids import Solid
-from geometry.vectors import Vec3
+from framerunner.geometry.rotations import RotationRows
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import Vec3
 from sitl.camera_scene import Bgr, Face
 
 Floats = npt.NDArray[np.float64]

@@ -20,8 +20,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from geometry.solids import Solid
-from geometry.vectors import Vec3
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import Vec3
 from scenarios.models import Arena, Light, Scenario, UprightFrame
 from sitl.solids import frame_solids
 

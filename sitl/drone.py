@@ -9,7 +9,9 @@ from types import MappingProxyType
 from firmware_py.mavlink.camera.model import CameraModel
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
-from geometry.solids import Solid
+from framerunner.geometry.solids import Solid
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.transports.urls import in_url
 from sitl.drone_files import flight_recorder
 from sitl.link_hub import LinkHub
 from sitl.pacing.time_grants import TimeGrants, Velocity
@@ -21,8 +23,6 @@ from sitl.storage import open_storage
 from sitl.streaming.drone_video import DroneVideo
 from sitl.streaming.streams import video_streams
 from sitl.world import CONTROL_PERIOD_US
-from wire.dialect import mavlink
-from wire.transports.urls import in_url
 
 _REQUESTED_US = MappingProxyType({mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20_000})
 """What the program that grants time will request: before that, too, positions are those of lockstep."""

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import jsbsim
 
-from errors import UserError
-from firmware_py.airframe import Airframe
-from geometry.rotations import quaternion_from_euler
-from geometry.vectors import ZERO3, Quaternion, Vec3
+from framerunner.errors import UserError
+from framerunner.geometry.rotations import quaternion_from_euler
+from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
+from framerunner.vehicle.airframe import Airframe
 
 _METRES_PER_FOOT = 0.3048
 _FEET_PER_METRE = 1 / _METRES_PER_FOOT

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import dist
 
-from geometry.solids import Solid
+from framerunner.geometry.solids import Solid
 from scenarios.models import Scenario, Start, is_over_base
 from sitl.world import World
 

@@ -9,6 +9,9 @@ from dataclasses import replace
 
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
+from framerunner.wire.link import LinkProfile
+from framerunner.wire.transports.sockets import Stream, open_serial
+from framerunner.wire.transports.urls import LinkUrl, is_loopback
 from sitl.faults.link import LinkFault, Way
 from sitl.links import (
     Joined,
@@ -24,9 +27,6 @@ from sitl.links import (
 )
 from sitl.payload.link import PayloadLink, open_payload
 from sitl.server_settings import RequestedLink
-from wire.link import LinkProfile
-from wire.transports.sockets import Stream, open_serial
-from wire.transports.urls import LinkUrl, is_loopback
 
 _INPUT_SHARE = 0.25  # of a core
 _MAX_SAVED_S = 0.004  # processor time that may be saved up while no input is received: one control period

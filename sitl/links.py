@@ -12,8 +12,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from wire.framing import MARKERS
-from wire.transports.sockets import (
+from framerunner.wire.framing import MARKERS
+from framerunner.wire.transports.sockets import (
     Address,
     Stream,
     UdpSocket,
@@ -21,7 +21,7 @@ from wire.transports.sockets import (
     listen_tcp,
     resolved_ipv4,
 )
-from wire.transports.urls import LinkError
+from framerunner.wire.transports.urls import LinkError
 
 Receive = Callable[[bytes], None]
 Joined = Callable[["StreamLink"], Receive]  # called with a new connection; returns the receiver of its bytes

@@ -17,9 +17,9 @@ from pathlib import Path
 from struct import pack, unpack
 from threading import Lock
 
-from errors import UserError
-from errors.files import TextError, decode_text, read_bytes, replace_file
 from firmware_py.parameters import Parameter, ParameterError, Parameters
+from framerunner.errors import UserError
+from framerunner.files.text_file import TextError, decode_text, read_bytes, replace_file
 
 SAVE_DELAY_S = 0.5  # changes within this time are saved together
 

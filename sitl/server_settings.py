@@ -7,11 +7,19 @@ from math import inf
 from pathlib import Path
 
 from firmware_py.mavlink.telemetry.profiles import GROUND, NORMAL, ONBOARD
+from framerunner.wire.link import LinkProfile
+from framerunner.wire.signing import SigningKey
+from framerunner.wire.transports.sockets import Address, resolved_ipv4
+from framerunner.wire.transports.urls import (
+    MAX_PORT,
+    LinkError,
+    LinkUrl,
+    UrlRules,
+    host_and_port,
+    is_loopback,
+    parse_url,
+)
 from sitl.links import UdpAddresses
-from wire.link import LinkProfile
-from wire.signing import SigningKey
-from wire.transports.sockets import Address, resolved_ipv4
-from wire.transports.urls import MAX_PORT, LinkError, LinkUrl, UrlRules, host_and_port, is_loopback, parse_url
 
 _LAST_ONBOARD_PORT = 14549  # PX4 sends all instances beyond the tenth there
 _GROUND_PORT = 14550  # of every instance, so that one ground station sees them all

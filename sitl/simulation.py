@@ -5,14 +5,13 @@ No clock, socket or thread: the real-time server and lockstep flights both drive
 
 from __future__ import annotations
 
-from firmware_py.airframe import Airframe
 from firmware_py.autopilot import Autopilot
-from firmware_py.estimation.earth_field import earth_field_ned_gauss
 from firmware_py.estimation.inertial_estimator import InertialEstimator
-from firmware_py.geodesy import LocalProjection
-from firmware_py.types import GeodeticPoint
-from geometry.axes import flip_vector
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.axes import flip_vector
+from framerunner.geometry.vectors import ZERO3, Vec3
+from framerunner.vehicle.airframe import Airframe
+from framerunner.vehicle.earth_field import earth_field_ned_gauss
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
 from scenarios.models import Scenario
 from sitl.sensors.assumptions import estimator_settings
 from sitl.sensors.specs import SuiteSpec

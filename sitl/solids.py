@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, sin, sqrt
 
-from geometry.rotations import RotationRows
-from geometry.solids import Solid
-from geometry.vectors import Vec3
+from framerunner.geometry.rotations import RotationRows
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import Vec3
 from scenarios.models import UprightFrame
 
 _CYCLES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))

@@ -15,8 +15,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path as DiskPath
 
-from errors import UserError
 from firmware_py.storage import Entry, Path, refuse, sound_name
+from framerunner.errors import UserError
 
 MEBIBYTE = 1 << 20
 

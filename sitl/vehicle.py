@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from firmware_py.airframe import Airframe, load_airframe
-from firmware_py.geodesy import LocalProjection
-from firmware_py.measurements import ExternalPose, Readings
 from firmware_py.parameters import Parameters
-from firmware_py.types import GeodeticPoint, MotorSpeeds, Sensors
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.airframe import Airframe, load_airframe
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from framerunner.vehicle.measurements import ExternalPose, MotorSpeeds, Readings, Sensors
 from scenarios.models import Scenario, ground_height
 from scenarios.referee import Referee
 from scenarios.result import BegunFault, FailsafeText, FaultFacts

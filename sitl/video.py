@@ -20,11 +20,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from errors import UserError
-from wire.finite_json import finite
-from wire.mjpeg import STREAM_HEADERS, STREAM_START, write_part
-from wire.simulator_api import VIDEO_PATH
-from wire.transports.urls import in_url
+from framerunner.errors import UserError
+from framerunner.wire.finite_json import finite
+from framerunner.wire.mjpeg import STREAM_HEADERS, STREAM_START, write_part
+from framerunner.wire.simulator_api import VIDEO_PATH
+from framerunner.wire.transports.urls import in_url
 
 if TYPE_CHECKING:
     from aiohttp import web

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import dist, hypot, isfinite, sqrt
 
-from firmware_py.airframe import GRAVITY_M_S2, Airframe
-from firmware_py.types import MotorSpeeds, Sensors
-from geometry.axes import flip_quaternion, flip_vector, flip_yaw
-from geometry.rotations import rotation, rotation_rows, to_body, to_world, yaw_of
-from geometry.solids import Solid
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.axes import flip_quaternion, flip_vector, flip_yaw
+from framerunner.geometry.rotations import rotation, rotation_rows, to_body, to_world, yaw_of
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import ZERO3, Vec3
+from framerunner.vehicle.airframe import GRAVITY_M_S2, Airframe
+from framerunner.vehicle.measurements import MotorSpeeds, Sensors
 from scenarios.models import Scenario, TrueState, is_over_base, start_position
 from sitl.air.wind import SimulatedWind
 from sitl.dynamics import Dynamics, DynamicsError

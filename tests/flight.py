@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import asin, atan2, cos, hypot, sin
 
-from firmware_py.airframe import Airframe, load_airframe
 from firmware_py.commands import ControlCommand
 from firmware_py.control.stabiliser import Stabiliser
 from firmware_py.types import MotorOutput, VehicleState
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.airframe import Airframe, load_airframe
 from sitl.dynamics import Dynamics
 
 PERIOD_S = 0.004

@@ -15,7 +15,7 @@ from math import atan2, copysign, cos, hypot, isfinite, pi, sqrt
 import cv2
 import numpy as np
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from vision.frame_model import AXES_CORNERS, AXES_HEIGHT_M, AXES_WIDTH_M, Floats, ModelPose, Point
 from vision.types import FramePose
 

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from pydantic import Field
 from pydantic.config import JsonDict
 
-from errors import UserError
-from geometry.vectors import Vec3
+from framerunner.errors import UserError
+from framerunner.geometry.vectors import Vec3
 
 Image = npt.NDArray[np.uint8]
 Vision = Literal["boxes", "frames"]

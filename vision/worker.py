@@ -27,9 +27,9 @@ from enum import IntEnum
 import cv2
 import numpy as np
 
+from framerunner.wire.h264_rtp import describe_h264_rtp
 from vision.streams.stream_clock import StreamClock
 from vision.types import Image
-from wire.h264_rtp import describe_h264_rtp
 
 MAX_IMAGE_BYTES = 3 * 4096 * 4096
 MEMORY_LIMIT_BYTES = 4 << 30

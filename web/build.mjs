@@ -1,5 +1,5 @@
 /**
- * Bundles the pages into ../monitor/static: each folder of src/ with a main.js or main.css is an entry, `lib/` is shared.
+ * Bundles the pages into ../framerunner/monitor/static: each folder of src/ with a main.js or main.css is an entry, `lib/` is shared.
  * The same sources and package-lock.json give the same bytes; `make web-check` compares them with what is committed.
  *
  *     node build.mjs [OUTPUT_FOLDER]

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm, solve_discrete_are
 
-from firmware_py.airframe import GRAVITY_M_S2, Airframe
+from framerunner.vehicle.airframe import GRAVITY_M_S2, Airframe
 
 Array = npt.NDArray[np.float64]
 

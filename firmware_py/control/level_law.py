@@ -15,12 +15,12 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.commands import FlightLimits, VelocityCommand
 from firmware_py.control.design import design
 from firmware_py.control.mixer import Mixer
 from firmware_py.types import MotorOutput, VehicleState
-from geometry.vectors import ZERO3
+from framerunner.geometry.vectors import ZERO3
+from framerunner.vehicle.airframe import GRAVITY_M_S2, Airframe
 
 _MIN_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees
 # How much of a reference acts at once, 0..1.

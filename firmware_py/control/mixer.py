@@ -7,8 +7,9 @@ from math import sqrt
 import numpy as np
 import numpy.typing as npt
 
-from firmware_py.airframe import Airframe
-from firmware_py.types import MotorOutput, MotorSpeeds
+from firmware_py.types import MotorOutput
+from framerunner.vehicle.airframe import Airframe
+from framerunner.vehicle.measurements import MotorSpeeds
 
 _IDLE_SHARE = 0.25  # of hover speed, the slowest in flight: motors must not stop in the air
 _QUAD = 4

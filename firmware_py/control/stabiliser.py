@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from math import radians
 
-from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand, FlightLimits, VelocityCommand
 from firmware_py.control.level_law import LevelLaw
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.vector_law import VectorLaw
 from firmware_py.types import MotorOutput, VehicleState
+from framerunner.vehicle.airframe import Airframe
 
 _LEVEL_LAW_TILT_RAD = radians(35.0)  # airframes that never tilt farther follow velocities by the level law
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.commands import (
     AccelerationCommand,
     AttitudeCommand,
@@ -24,8 +23,9 @@ from firmware_py.commands import (
 from firmware_py.control.design import design_bandwidths
 from firmware_py.control.mixer import Mixer
 from firmware_py.types import MotorOutput, VehicleState
-from geometry.rotations import Rotation, rotation, tilt_error, to_body, to_world
-from geometry.vectors import Vec3
+from framerunner.geometry.rotations import Rotation, rotation, tilt_error, to_body, to_world
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.airframe import GRAVITY_M_S2, Airframe
 
 _MIN_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and decreases to none from there to 90
 _MIN_LIFT = 0.2  # share of the weight: a thrust for attitude control in descent, if MPC_THR_MIN is not less

@@ -10,9 +10,9 @@ from firmware_py.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, 
 from firmware_py.estimation.navigation_filter import NavigationFilter
 from firmware_py.estimation.settings import InertialNoise
 from firmware_py.estimation.strapdown import GRAVITY_M_S2
-from firmware_py.measurements import ImuSample
-from geometry.rotations import quaternion_from_euler, rotation
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.rotations import quaternion_from_euler, rotation
+from framerunner.geometry.vectors import ZERO3, Vec3
+from framerunner.vehicle.measurements import ImuSample
 
 _SAMPLES = 100
 _MAX_RATE_RAD_S = 0.3

@@ -14,8 +14,8 @@ from math import exp, inf
 import numpy as np
 import numpy.typing as npt
 
-from geometry.rotations import Rotation
-from geometry.vectors import Vec3
+from framerunner.geometry.rotations import Rotation
+from framerunner.geometry.vectors import Vec3
 
 Matrix = npt.NDArray[np.float64]
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 from math import isfinite, isnan
 
 from firmware_py.estimation.report import EstimatorReport
-from firmware_py.geodesy import LocalProjection
-from firmware_py.measurements import ExternalPose, Readings
-from firmware_py.types import GeodeticPoint, Sensors, VehicleState
-from geometry.rotations import euler_from_quaternion, rotation, to_world
-from geometry.vectors import Vec3
+from firmware_py.types import VehicleState
+from framerunner.geometry.rotations import euler_from_quaternion, rotation, to_world
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from framerunner.vehicle.measurements import ExternalPose, Readings, Sensors
 
 _MAX_GAP_S = 0.1  # between samples, for dead reckoning
 _NORM_TOLERANCE = 0.05  # of the attitude quaternion's squared length; more than rounding, so it is a fault

@@ -18,10 +18,11 @@ from firmware_py.estimation.output import OutputPredictor
 from firmware_py.estimation.report import IMU, NO_FIX, NO_HEIGHT, NOT_ALIGNED, EstimatorReport, Sensor
 from firmware_py.estimation.settings import EstimatorSettings
 from firmware_py.estimation.watch import watch_sensors
-from firmware_py.measurements import ExternalPose, FixType, ImuSample, Readings
-from firmware_py.types import GeodeticPoint, Sensors, VehicleState
-from geometry.rotations import euler_from_quaternion, yaw_of
-from geometry.vectors import Vec3
+from firmware_py.types import VehicleState
+from framerunner.geometry.rotations import euler_from_quaternion, yaw_of
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import ExternalPose, FixType, ImuSample, Readings, Sensors
 
 _MAX_WAITING = 64
 _MAX_LATE_US = 100_000

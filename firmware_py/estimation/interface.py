@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Protocol
 
 from firmware_py.estimation.report import EstimatorReport
-from firmware_py.measurements import ExternalPose, Readings
-from firmware_py.types import GeodeticPoint, Sensors, VehicleState
+from firmware_py.types import VehicleState
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import ExternalPose, Readings, Sensors
 
 
 class StateEstimator(Protocol):

@@ -20,8 +20,8 @@ from firmware_py.estimation.error_state import (
 )
 from firmware_py.estimation.settings import InertialNoise
 from firmware_py.estimation.strapdown import Increments, NavigationState
-from geometry.rotations import rotation
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.rotations import rotation
+from framerunner.geometry.vectors import ZERO3, Vec3
 
 _MAX_PREDICTION_S = 0.0199
 _PREDICTIONS_TO_SYMMETRISE = 100

@@ -11,8 +11,8 @@ from collections import deque
 from firmware_py.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from firmware_py.estimation.navigation_filter import NavigationFilter
 from firmware_py.estimation.strapdown import GRAVITY_M_S2, NavigationState
-from geometry.rotations import rotation, to_world
-from geometry.vectors import Vec3
+from framerunner.geometry.rotations import rotation, to_world
+from framerunner.geometry.vectors import Vec3
 
 ImuRecord = tuple[int, float, Vec3, Vec3]
 """End (us) and length (s) of a sample of the IMU, its rate and specific force."""

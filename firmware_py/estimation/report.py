@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from math import nan
 
-from firmware_py.measurements import Readings
-from geometry.vectors import NAN3, Vec3
+from framerunner.geometry.vectors import NAN3, Vec3
+from framerunner.vehicle.measurements import Readings
 
 
 class Sensor(Enum):

@@ -8,7 +8,7 @@ second order (sculling); the position by the trapezoidal rule.
 
 from __future__ import annotations
 
-from geometry.vectors import ZERO3, Quaternion, Vec3
+from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
 
 GRAVITY_M_S2 = 9.80665
 

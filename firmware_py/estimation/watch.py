@@ -9,7 +9,7 @@ from __future__ import annotations
 from firmware_py.estimation.aiding.aid import NEVER_US
 from firmware_py.estimation.report import IMU, Sensor, silent, stuck
 from firmware_py.estimation.settings import EstimatorSettings
-from firmware_py.measurements import ImuSample
+from framerunner.vehicle.measurements import ImuSample
 
 _TIMEOUTS_US = {
     Sensor.MAGNETOMETER: 500_000,

@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from firmware_py.estimation.strapdown import GRAVITY_M_S2
-from geometry.rotations import rotation, to_body
+from framerunner.geometry.rotations import rotation, to_body
 
 if TYPE_CHECKING:
-    from firmware_py.airframe import Airframe
     from firmware_py.types import VehicleState
+    from framerunner.vehicle.airframe import Airframe
 
 _TICKS = 50  # averaged for an update: 0.2 s
 _WALK_M_S = 0.2  # by which the wind changes in a second, 1 sigma

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from math import hypot, isnan, nan, radians, tan
 
-from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand, TiltCommand
 from firmware_py.guidance.limits import clamp, velocity_command, velocity_towards, yaw_rate
 from firmware_py.guidance.mode import Mode, ModeEntry, TrajectoryMode
@@ -17,7 +16,8 @@ from firmware_py.missions.flight import Leg
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.types import VehicleState
-from geometry.vectors import NAN3, ZERO3, Vec3
+from framerunner.geometry.vectors import NAN3, ZERO3, Vec3
+from framerunner.vehicle.airframe import Airframe
 
 _REACHED_M = 0.15
 _ABOVE_M = 0.5  # the vehicle leaves the ground for a target so much higher

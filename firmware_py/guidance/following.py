@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import atan2, cos, hypot, isnan, radians, remainder, sin, tau
 
-from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand
 from firmware_py.guidance.limits import clamp
 from firmware_py.guidance.mode import ModeContext, ModeEntry, TrajectoryMode
 from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.vectors import ZERO3, Vec3
+from framerunner.vehicle.airframe import Airframe
 
 _COURSE_M_S = 1.0  # slower than this, the target's course is noise
 _MAX_DELAY_S = 5.0  # filter time of the target's velocity for FLW_TGT_RS = 1

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import cos, hypot, inf, isnan, nan, radians, remainder, sin, sqrt, tau
 
-from firmware_py.airframe import Airframe
 from firmware_py.commands import VelocityCommand
 from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.airframe import Airframe
 
 VELOCITY_GAIN = 5.0
 """Acceleration of a reference point per velocity error where that is small, 1/s."""

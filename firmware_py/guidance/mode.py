@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from math import atan2, hypot
 from typing import ClassVar
 
-from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand, VelocityCommand
 from firmware_py.guidance.limits import SpeedLimits, clamp, level_pair, yaw_rate
 from firmware_py.guidance.orbit import Orbit
@@ -15,7 +14,8 @@ from firmware_py.guidance.trajectory import Trajectory
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import Setpoint, TrajectorySetpoint
 from firmware_py.types import ManualInput, VehicleState
-from geometry.vectors import NAN3, ZERO3, Vec3
+from framerunner.geometry.vectors import NAN3, ZERO3, Vec3
+from framerunner.vehicle.airframe import Airframe
 
 _FACING_M = 0.5  # nearer than this, the direction of a region of interest is not used
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from math import nan
 
-from firmware_py.airframe import Airframe
 from firmware_py.commander_table import State
 from firmware_py.commands import ControlCommand
 from firmware_py.guidance.auto_modes import (
@@ -25,7 +24,8 @@ from firmware_py.missions.flight import Leg, LegKind
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import Setpoint
 from firmware_py.types import ManualInput, VehicleState
-from geometry.vectors import NAN3, Vec3
+from framerunner.geometry.vectors import NAN3, Vec3
+from framerunner.vehicle.airframe import Airframe
 
 
 class OffboardMode(Mode):

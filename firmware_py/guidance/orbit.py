@@ -8,7 +8,7 @@ from math import atan2, hypot, nan, pi
 
 from firmware_py.guidance.limits import AccelerationLimits, clamp
 from firmware_py.types import VehicleState
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 
 _MIN_DISTANCE_M = 0.5  # nearer to the centre than this, its direction is not used
 _MAX_CENTRIPETAL_M_S2 = 2.0  # as in PX4

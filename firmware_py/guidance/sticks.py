@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import cos, hypot, radians, sin
 
-from firmware_py.airframe import Airframe
 from firmware_py.commands import (
     AttitudeCommand,
     BodyRateCommand,
@@ -19,6 +18,7 @@ from firmware_py.guidance.trajectory import Reference
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.types import ManualInput, VehicleState
+from framerunner.vehicle.airframe import Airframe
 
 _FULL_THRUST = 1.0
 

@@ -11,8 +11,8 @@ from math import atan2, hypot, inf, isnan, nan, pi, remainder, sqrt, tau
 
 from firmware_py.guidance.limits import VELOCITY_GAIN, AccelerationLimits, SpeedLimits, clamp
 from firmware_py.types import VehicleState
-from geometry.rotations import rotation, to_world
-from geometry.vectors import NAN3, ZERO3, Vec3
+from framerunner.geometry.rotations import rotation, to_world
+from framerunner.geometry.vectors import NAN3, ZERO3, Vec3
 
 _STANDING_M_S = 0.02  # below it, the vehicle is at rest
 _ARRIVED_M = 1e-3  # and the same number of m/s

@@ -17,13 +17,13 @@ from math import hypot, isfinite, nan
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
 from firmware_py.mavlink.time_sync import Clocks
-from firmware_py.measurements import ExternalPose
 from firmware_py.parameters import Parameters
-from geometry.rotations import normalized, quaternion_from_euler
-from geometry.vectors import NAN3, Quaternion, Vec3
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.geometry.rotations import normalized, quaternion_from_euler
+from framerunner.geometry.vectors import NAN3, Quaternion, Vec3
+from framerunner.vehicle.measurements import ExternalPose
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 _NORM_TOLERANCE = 1e-5  # of a quaternion's length, PX4's
 _REPEAT_TEXT_US = 1_000_000

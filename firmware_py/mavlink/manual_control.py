@@ -5,9 +5,9 @@ from __future__ import annotations
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
 from firmware_py.types import ManualInput
-from wire.dialect import BROADCAST, Message, boot_ms, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.wire.dialect import BROADCAST, Message, boot_ms, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 _FULL = 1000
 _HALF = 500

@@ -44,10 +44,10 @@ from firmware_py.mavlink.telemetry.streams import AutopilotSource, AutopilotTele
 from firmware_py.mavlink.time_sync import Clocks
 from firmware_py.storage import Storage
 from firmware_py.types import StatusText
-from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
-from wire.exchange import Exchange
-from wire.link import Link, LinkProfile
-from wire.signing import Signing, SigningKey
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link, LinkProfile
+from framerunner.wire.signing import Signing, SigningKey
 
 
 @dataclass(frozen=True, slots=True)

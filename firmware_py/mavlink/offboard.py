@@ -19,11 +19,11 @@ from firmware_py.offboard_requests import (
     setpoint_from_target,
 )
 from firmware_py.setpoints import Setpoint
-from firmware_py.types import GeodeticPoint
-from geometry.vectors import NAN3, Vec3
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.geometry.vectors import NAN3, Vec3
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 _REPEAT_TEXT_US = 1_000_000
 _IS_RELATIVE = {mavlink.MAV_FRAME_GLOBAL_INT: False, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True}

@@ -18,9 +18,9 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.parameters import Parameter, ParameterError
 from firmware_py.status import CommandResult
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 HASH_NAME = "_HASH_CHECK"
 _HASH_POSITION = -1  # in a list

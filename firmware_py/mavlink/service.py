@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
-from firmware_py.types import GeodeticPoint
-from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
-from wire.link import Link
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
+from framerunner.wire.link import Link
 
 _NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT
 _RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)

@@ -7,7 +7,7 @@ from math import atan2, dist, hypot, isfinite, nan, radians, remainder, tau
 from firmware_py.missions.flight import IssuedCommand, View
 from firmware_py.missions.items import ROI_LOCATION, ROI_WPNEXT, Do, MissionItem
 from firmware_py.types import WARNING, StatusText
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.vectors import ZERO3, Vec3
 
 _CAMERA = frozenset(
     {

@@ -7,7 +7,7 @@ from math import hypot, isfinite, isnan, nan, radians, remainder, tau
 from firmware_py.missions.flight import Leg, View
 from firmware_py.missions.items import Do, MissionItem
 from firmware_py.parameters import Parameters
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 
 
 class Arrival:

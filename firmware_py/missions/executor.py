@@ -14,7 +14,7 @@ from firmware_py.missions.items import Do, MissionItem
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.types import CRITICAL, INFO, StatusText
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.vectors import ZERO3, Vec3
 
 _MIN_CLIMB_M = 0.5  # a first place no higher than this gives no climb: it is MIS_TAKEOFF_ALT
 _SAME_YAW_RAD = 0.01

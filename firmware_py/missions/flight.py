@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from enum import Enum
 from math import isfinite, nan
 
-from firmware_py.geodesy import LocalProjection
 from firmware_py.missions.items import MissionItem
-from firmware_py.types import GeodeticPoint
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
 
 SevenParams = tuple[float, float, float, float, float, float, float]
 

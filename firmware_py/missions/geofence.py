@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import hypot, isfinite
 
-from firmware_py.geodesy import LocalProjection
 from firmware_py.missions.flight import View
 from firmware_py.missions.items import CIRCLES, POLYGONS, Do, MissionItem
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.types import CRITICAL, StatusText
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.geodesy import LocalProjection
 
 MIN_VERTICES = 3
 """Of a polygon."""

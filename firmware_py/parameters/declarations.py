@@ -10,8 +10,8 @@ from typing import Any, Literal, Self
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from errors import UserError
-from errors.files import decode_text
+from framerunner.errors import UserError
+from framerunner.files.text_file import decode_text
 
 
 class ParameterError(UserError):

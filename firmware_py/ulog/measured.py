@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from math import atan2, hypot, nan, sqrt
 
-from firmware_py.atmosphere import pressure_altitude_m
 from firmware_py.estimation.report import EstimatorReport, Sensor
+from framerunner.vehicle.atmosphere import pressure_altitude_m
 
 Values = tuple[float, ...]
 

@@ -10,16 +10,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, hypot, isfinite, nan
 
-from firmware_py.atmosphere import pressure_hpa, temperature_k
 from firmware_py.autopilot import Autopilot
 from firmware_py.estimation.report import EstimatorReport
 from firmware_py.mavlink.telemetry.health import solution_flags
 from firmware_py.mavlink.telemetry.sensing import earth_field_frd_gauss
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint
 from firmware_py.status import NAVIGATION_STATES, LandedState
-from firmware_py.types import GeodeticPoint
 from firmware_py.ulog import measured
 from firmware_py.ulog.messages import Topic
+from framerunner.vehicle.atmosphere import pressure_hpa, temperature_k
+from framerunner.vehicle.geodesy import GeodeticPoint
 
 Values = tuple[float, ...]
 

@@ -11,9 +11,9 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from errors import SettingError, write_advice
 from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.camera_calibration.collect import Collection, collect
+from framerunner.errors import SettingError, write_advice
 from vision.calibration.board import Board, CalibrationReport
 
 _SHADES = " ░▒▓█"

@@ -8,12 +8,12 @@ from typing import Any
 
 import yaml
 
-from errors import SettingError, write_advice
-from errors.files import TextError, decode_text, replace_file
 from framerunner.camera_calibration.foreign_calibration import foreign_format, read_foreign
+from framerunner.errors import SettingError, write_advice
+from framerunner.files.text_file import TextError, decode_text, replace_file
+from framerunner.wire.finite_json import finite
 from scenarios.yaml_file import FileKind
 from vision.calibration.model import Calibration, CalibrationError
-from wire.finite_json import finite
 
 _FILES = FileKind("calibration", Calibration, CalibrationError, folder="")
 _DECIMALS = 6

@@ -9,8 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from errors import SettingError
 from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
+from framerunner.errors import SettingError
 from vision.calibration.colours import learn_colours, share_seen, swatch_of
 from vision.calibration.model import CalibrationError
 from vision.colour_regions import PRIMARIES

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
 
-from errors import SettingError, write_advice
+from framerunner.errors import SettingError, write_advice
 from vision.calibration.latency import (
     MAX_DELAY_S,
     Latency,

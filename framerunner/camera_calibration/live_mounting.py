@@ -12,16 +12,10 @@ from contextlib import closing
 from typing import TYPE_CHECKING
 
 from framerunner.camera_calibration.mounting_report import MountingSearch, search_mounting
+from framerunner.geometry.axes import flip_quaternion, flip_vector
+from framerunner.geometry.vectors import Vec3
 from framerunner.preflight.session import open_link
-from geometry.axes import flip_quaternion, flip_vector
-from geometry.vectors import Vec3
-from offboard.drone import DroneError
-from offboard.link.telemetry import least_lag
-from vision.calibration.motion import MotionReport
-from vision.detectors import new_detector
-from vision.sources import open_source
-from vision.types import CameraFrame, Detections
-from wire.dialect import (
+from framerunner.wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
     Message,
     companion_heartbeat,
@@ -29,13 +23,19 @@ from wire.dialect import (
     mavlink,
     request_rate,
 )
-from wire.simulator_api import SimulatorApi
-from wire.vehicle_telemetry import VehicleTelemetry
+from framerunner.wire.simulator_api import SimulatorApi
+from framerunner.wire.vehicle_telemetry import VehicleTelemetry
+from offboard.drone import DroneError
+from offboard.link.telemetry import least_lag
+from vision.calibration.motion import MotionReport
+from vision.detectors import new_detector
+from vision.sources import open_source
+from vision.types import CameraFrame, Detections
 
 if TYPE_CHECKING:
+    from framerunner.wire.transports.vehicle_link import VehicleLink
     from scenarios.task import Task
     from vision.calibration.model import Calibration
-    from wire.transports.vehicle_link import VehicleLink
 
 _RECEIVE_S = 0.05
 _BEAT_S = 1.0

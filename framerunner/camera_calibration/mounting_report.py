@@ -10,8 +10,8 @@ from pathlib import Path
 
 from framerunner.camera_calibration.calibration_file import save_calibration
 from framerunner.camera_calibration.camera_delay import CAMERA_DELAY_S
-from geometry.rotations import MAX_MOUNTING_RAD
-from geometry.vectors import Vec3
+from framerunner.geometry.rotations import MAX_MOUNTING_RAD
+from framerunner.geometry.vectors import Vec3
 from vision.calibration.model import Calibration, CalibrationError, Mounting
 from vision.calibration.motion import Motion, MotionReport
 from vision.calibration.mounting import MountingFit, fit_mounting

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from errors import SettingError
 from framerunner.camera_calibration.calibration_file import load_calibration
 from framerunner.camera_calibration.mounting_report import MountingSearch, search_mounting
+from framerunner.errors import SettingError
 from framerunner.flying.detector import true_calibration
 from framerunner.recording.events import RecordedImage
 from framerunner.recording.open_recording import recorded_flight
@@ -20,7 +20,7 @@ from vision.calibration.motion import MotionReport
 from vision.detectors import new_detector
 
 if TYPE_CHECKING:
-    from geometry.vectors import Vec3
+    from framerunner.geometry.vectors import Vec3
     from offboard.drone import DroneState
     from scenarios.models import Scenario
     from vision.calibration.model import Calibration

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
 
-from errors import SettingError
+from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from offboard.mission import Mission

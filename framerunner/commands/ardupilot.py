@@ -35,7 +35,7 @@ def params(
 
         framerunner ardupilot params abejorro > abejorro.parm
     """
-    from firmware_py.airframe import load_airframe
+    from framerunner.vehicle.airframe import load_airframe
     from sitl.ardupilot.parameters import all_parameters, file_of
     from sitl.sensors.suite import load_suite
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from errors import SettingError
 from framerunner.commands import say
+from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from scenarios.models import MissionClass

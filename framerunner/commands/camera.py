@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from errors import SettingError
 from framerunner.commands import ShowLayout, WholeNumber, check_range, say
+from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from vision.calibration.board import Board
@@ -62,9 +62,9 @@ def camera(
 
     from framerunner.virtual_camera.camera import VirtualCamera
     from framerunner.virtual_camera.server import COMPONENT_ID, SYSTEM_ID, CameraServer
+    from framerunner.wire.transports.vehicle_link import VehicleLink
     from scenarios.loader import load_scenario
     from sitl.video import VideoServer
-    from wire.transports.vehicle_link import VehicleLink
 
     loaded = load_scenario(scenario)
     link = VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from errors import SettingError
-from errors.files import make_file
 from framerunner.commands import load_mission_with, say
+from framerunner.errors import SettingError
+from framerunner.files.text_file import make_file
 
 app = App(
     name="course", help="Five short lessons: take off, fly to points, look, cross, the whole challenge."

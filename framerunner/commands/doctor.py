@@ -67,7 +67,7 @@ def _examine(drone: str, seconds: float, camera: str | None, calibration: Calibr
     from framerunner.doctor.checks import can_fly, examine
     from framerunner.doctor.listen import COMPONENT_ID, FIND_S, SYSTEM_ID, Record, find, listen
     from framerunner.doctor.page import findings_table, print_page
-    from wire.transports.vehicle_link import VehicleLink
+    from framerunner.wire.transports.vehicle_link import VehicleLink
 
     record = Record()
     errors, page = Console(stderr=True), Console(highlight=False)

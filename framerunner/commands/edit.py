@@ -12,9 +12,9 @@ from urllib.parse import quote
 
 from cyclopts import Parameter
 
-from errors import SettingError
 from framerunner.commands import WholeNumber, check_range, say
 from framerunner.commands.monitor import PilotOption
+from framerunner.errors import SettingError
 
 _Drone = Annotated[
     str | None,
@@ -53,8 +53,8 @@ def edit(
     check_range("--port", port, 0, 65535)
     from framerunner.commands.monitor import equipment, prepare_server
     from framerunner.editing.documents.desk import EditorDesk
-    from monitor.run import serve
-    from monitor.settings import MonitorSettings
+    from framerunner.monitor.run import serve
+    from framerunner.monitor.settings import MonitorSettings
 
     url = _drone_url(drone)
     folder = Path(".") if mission is None else mission.parent
@@ -84,7 +84,7 @@ def edit(
 def _database() -> str:
     """The contest's, or one in memory if a monitor uses that: an editor is useful without it."""
     from framerunner.commands.monitor import DATABASE, DATABASE_FILE
-    from monitor.competition.sole_user import user_of
+    from framerunner.monitor.competition.sole_user import user_of
 
     with contextlib.suppress(OSError):  # opening the database tells why
         if user := user_of(DATABASE_FILE):
@@ -101,7 +101,7 @@ def _drone_url(given: str | None) -> str:
         SettingError: its port is taken.
     """
     from framerunner.editing.live import GROUND_PORT, is_free
-    from wire.transports.urls import parse_url
+    from framerunner.wire.transports.urls import parse_url
 
     if given is None:
         if is_free(GROUND_PORT, socket.SOCK_DGRAM):

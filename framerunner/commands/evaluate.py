@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from errors import SettingError
 from framerunner.commands import (
     DEFAULT_MISSION,
     Sensors,
@@ -19,6 +18,7 @@ from framerunner.commands import (
     say,
     with_sensors,
 )
+from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from framerunner.evaluation.backends import Backend, Pool

@@ -8,8 +8,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from errors import SettingError
 from framerunner.commands import check_range
+from framerunner.errors import SettingError
 
 _Size = Annotated[
     str | None, Parameter(help="width and height in pixels; 960x540, of a GIF 640x360 if not given")

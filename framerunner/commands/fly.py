@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from errors import SettingError
 from framerunner.camera_calibration.camera_delay import delay_of
 from framerunner.commands import (
     DEFAULT_MISSION,
@@ -25,14 +24,15 @@ from framerunner.commands import (
     with_sensors,
 )
 from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
+from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from framerunner.flying.run import FlightSettings
     from framerunner.flying.simulator_process import GenuineAutopilot
+    from framerunner.wire.simulator_api import SimulatorApi
     from offboard.mission import Mission
     from scenarios.models import Scenario
-    from wire.simulator_api import SimulatorApi
 
 _Drone = Annotated[
     str | None, Parameter(help="MAVLink URL of a running drone; without it a simulated one is started")
@@ -310,7 +310,7 @@ def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
         return None
     if drone is None:
         raise SettingError("--simulator: is for a drone that is running already; name it with --drone")
-    from wire.simulator_api import SimulatorApi
+    from framerunner.wire.simulator_api import SimulatorApi
 
     try:
         return SimulatorApi.at(url)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from errors import SettingError
-from errors.files import make_file
 from framerunner.commands import load_mission_with, say
+from framerunner.errors import SettingError
+from framerunner.files.text_file import make_file
 
 if TYPE_CHECKING:
     from offboard.mission import NewMission

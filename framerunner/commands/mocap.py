@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from errors import SettingError
 from framerunner.commands import check_range
+from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from framerunner.mocap.facts import Origin, SendSettings
@@ -146,7 +146,7 @@ def _send(
     from framerunner.mocap.run import run_session
     from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID
     from framerunner.mocap.sources import open_source
-    from wire.transports.vehicle_link import VehicleLink
+    from framerunner.wire.transports.vehicle_link import VehicleLink
 
     frame, body = frame_and_body
     with (

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from errors import SettingError
 from framerunner.commands import WholeNumber, check_range, say
+from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from monitor.ports import Equipment
+    from framerunner.monitor.ports import Equipment
     from scenarios.models import Scenario
 
 MISSIONS = Path("missions")
@@ -103,10 +103,10 @@ def monitor(
     """
     check_range("--port", port, 0, 65535)
     from framerunner.child_process import until_standard_input_ends
-    from monitor.run import serve
-    from monitor.settings import MonitorSettings
+    from framerunner.monitor.run import serve
+    from framerunner.monitor.settings import MonitorSettings
+    from framerunner.wire.transports.urls import parse_url
     from scenarios.loader import load_scenario
-    from wire.transports.urls import parse_url
 
     parse_url(drone)
     flown = None if scenario is None else load_scenario(scenario)
@@ -153,13 +153,13 @@ def equipment(
     from framerunner.editing.service import EditingSettings
     from framerunner.editing.web import EditingDoor
     from framerunner.flying.plan import FlightPlan
+    from framerunner.monitor.ports import Equipment
+    from framerunner.monitor.visitors.pupils import PupilBook
     from framerunner.monitoring.run_library import RunFolders
     from framerunner.monitoring.scenario_library import ScenarioLibrary
-    from monitor.ports import Equipment
-    from monitor.visitors.pupils import PupilBook
+    from framerunner.wire.transports.vehicle_link import VehicleLink
     from offboard.pilot import Pilot
     from offboard.pilot_file import read_pilot
-    from wire.transports.vehicle_link import VehicleLink
 
     if missions != MISSIONS and not missions.is_dir():  # the default is made when the first mission is
         raise SettingError(f"--missions {missions}: is not a folder; make it (mkdir -p), or choose another")

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from math import pi
 from typing import TYPE_CHECKING
 
-from errors import SettingError
 from framerunner.commands import check_range
+from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from framerunner.flying.response import Response
-    from geometry.vectors import Vec3
+    from framerunner.geometry.vectors import Vec3
     from offboard.limits import CommandLimits
 
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from errors import SettingError
 from framerunner.camera_calibration.camera_delay import delay_of
 from framerunner.commands import DEFAULT_MISSION, check_range, load_mission_with
+from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan

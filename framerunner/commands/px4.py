@@ -41,7 +41,7 @@ def params(
 
         framerunner px4 params abejorro --sensors outdoor --env
     """
-    from firmware_py.airframe import load_airframe
+    from framerunner.vehicle.airframe import load_airframe
     from sitl.autopilots.parameters import text_of
     from sitl.px4.build import environment
     from sitl.px4.parameters import all_parameters

@@ -8,8 +8,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from errors import SettingError
 from framerunner.commands import WholeNumber, check_range
+from framerunner.errors import SettingError
 
 
 def replay(

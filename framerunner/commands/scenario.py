@@ -8,8 +8,8 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from errors import SettingError
 from framerunner.commands import WholeNumber, say
+from framerunner.errors import SettingError
 
 app = App(name="scenario", help="List, show and check scenarios.")
 

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
 from cyclopts import Parameter
 
-from errors import SettingError
-from errors.files import TextError, read_text
 from framerunner.commands import (
     Faults,
     Sensors,
@@ -24,15 +22,17 @@ from framerunner.commands import (
 )
 from framerunner.commands.ardupilot import ardupilot_server
 from framerunner.commands.px4 import px4_server
+from framerunner.errors import SettingError
 from framerunner.extras import install_advice, is_installed
+from framerunner.files.text_file import TextError, read_text
 from sitl.autopilots import TITLES
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
+    from framerunner.wire.signing import SigningKey
     from sitl.pacing.time_grants import TimeGrants
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
-    from wire.signing import SigningKey
 
 _MAX_INSTANCES = 10  # as PX4: the apps' port of an eleventh is the ground stations' port of the first
 
@@ -323,7 +323,7 @@ def _settings(
 def _simulations(
     name: str, sensors: str | None, fault: tuple[str, ...], *, count: int, seed: int
 ) -> list[Simulation]:
-    from firmware_py.airframe import load_airframe
+    from framerunner.vehicle.airframe import load_airframe
     from scenarios.loader import load_scenario
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
@@ -344,7 +344,7 @@ def _read_key(path: Path | None) -> SigningKey | None:
     """Read the key in a file; the file's content is never shown."""
     if path is None:
         return None
-    from wire.signing import SigningKey
+    from framerunner.wire.signing import SigningKey
 
     try:
         return SigningKey.from_text(read_text(path))

@@ -25,8 +25,6 @@ from fastapi import APIRouter, Body, HTTPException, Request
 from starlette.requests import HTTPConnection
 from starlette.responses import Response, StreamingResponse
 
-from errors import UserError
-from errors.files import make_file
 from framerunner.course.lessons import Lesson, find_lesson, load_lessons
 from framerunner.course.progress import (
     CourseEvent,
@@ -39,8 +37,10 @@ from framerunner.course.progress import (
 from framerunner.editing.messages import MAX_TEXT, StartBatch
 from framerunner.editing.service import EditingService, EditingSettings
 from framerunner.editing.words import Language, Said, language_of, reason, say
-from monitor.access import Role, Visitor
-from monitor.visitors.pupils import PupilBook, file_key
+from framerunner.errors import UserError
+from framerunner.files.text_file import make_file
+from framerunner.monitor.access import Role, Visitor
+from framerunner.monitor.visitors.pupils import PupilBook, file_key
 
 _NOT_STORED = {"Cache-Control": "no-store"}
 
@@ -52,7 +52,7 @@ _Text = Annotated[str, Body(max_length=MAX_TEXT)]
 
 
 class CourseDoor:
-    """Addresses of the course; implements `monitor.ports.Extension`.
+    """Addresses of the course; implements `framerunner.monitor.ports.Extension`.
 
     Args:
         folder: of the pupils' missions; the class's progress is kept there, too.

@@ -13,8 +13,8 @@ from typing import Literal, get_args
 
 from pydantic import Field
 
-from errors import UserError
-from errors.files import decode_text, read_text
+from framerunner.errors import UserError
+from framerunner.files.text_file import decode_text, read_text
 from offboard.mission import MISSIONS
 from scenarios.loader import parse_scenario
 from scenarios.models import Scenario

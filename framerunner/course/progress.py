@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from errors import SettingError
-from errors.files import append_in_folder, read_in_folder
-from monitor.competition.views import csv_text
+from framerunner.errors import SettingError
+from framerunner.files.text_file import append_in_folder, read_in_folder
+from framerunner.monitor.competition.views import csv_text
 
 EventKind = Literal["opened", "flown", "passed", "reset"]
 MAX_LEARNER = 60  # characters of a name

@@ -9,9 +9,14 @@ from __future__ import annotations
 from framerunner.doctor.findings import Findings, Level
 from framerunner.doctor.listen import Record
 from framerunner.doctor.subjects import Subject, finding, good, missing, note
-from wire import ardupilot_modes
-from wire.ardupilot_messages import EKF_ATTITUDE, EKF_POS_VERT_ABS, EXTERNAL_NAVIGATION, has_position
-from wire.dialect import mavlink
+from framerunner.wire import ardupilot_modes
+from framerunner.wire.ardupilot_messages import (
+    EKF_ATTITUDE,
+    EKF_POS_VERT_ABS,
+    EXTERNAL_NAVIGATION,
+    has_position,
+)
+from framerunner.wire.dialect import mavlink
 
 _GUIDE = "docs/ardupilot.md, section 5"
 _GPS = 3

@@ -17,8 +17,8 @@ from framerunner.doctor.subjects import finding as _finding
 from framerunner.doctor.subjects import good as _good
 from framerunner.doctor.subjects import missing as _missing
 from framerunner.doctor.subjects import note as _note
-from wire.dialect import Message, mavlink
-from wire.px4_modes import OFFBOARD
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.px4_modes import OFFBOARD
 
 WANTED_HZ = 50.0  # as `fly` and `camera` request
 LOW_HZ = 20.0  # the mission's own rate

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from math import dist, inf, isfinite
 
 from framerunner.doctor.senders import Senders
-from wire import ardupilot_modes
-from wire.ardupilot_messages import EKF_STATUS_REPORT_ID, add_ardupilot_messages
-from wire.dialect import (
+from framerunner.wire import ardupilot_modes
+from framerunner.wire.ardupilot_messages import EKF_STATUS_REPORT_ID, add_ardupilot_messages
+from framerunner.wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
     Message,
     command_long,
@@ -27,11 +27,11 @@ from wire.dialect import (
     request_message,
     request_rate,
 )
-from wire.framing import missing_before
-from wire.px4_modes import mode_words
-from wire.status_text import TextAssembler
-from wire.transports.vehicle_link import VehicleLink
-from wire.vehicle_telemetry import VehicleTelemetry
+from framerunner.wire.framing import missing_before
+from framerunner.wire.px4_modes import mode_words
+from framerunner.wire.status_text import TextAssembler
+from framerunner.wire.transports.vehicle_link import VehicleLink
+from framerunner.wire.vehicle_telemetry import VehicleTelemetry
 
 SYSTEM_ID = 247
 COMPONENT_ID = 190

@@ -13,8 +13,8 @@ from rich.text import Text
 from framerunner.doctor.checks import can_fly
 from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import Record
-from wire.dialect import mavlink
-from wire.px4_modes import mode_words
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.px4_modes import mode_words
 
 _MARKS = {Level.GOOD: "[green]ok[/]", Level.NOTE: "[yellow]note[/]", Level.MISSING: "[red]MISSING[/]"}
 _STREAMS = (

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from wire.dialect import Message
-from wire.vehicle_identity import vehicle_uid
+from framerunner.wire.dialect import Message
+from framerunner.wire.vehicle_identity import vehicle_uid
 
 MIN_RETURNS = 20
 MIN_RETURN_SHARE = 0.02

@@ -17,11 +17,11 @@ from framerunner.evaluation.rows import Row
 from framerunner.evaluation.runner import Terms, fly_all
 from framerunner.flying.cause import lost_in
 from framerunner.runs.track import Track
+from framerunner.wire.finite_json import finite
 from offboard.mission import Mission
 from scenarios.models import Scenario
 from scenarios.random_numbers import LevelError
 from scenarios.verdict import Verdict
-from wire.finite_json import finite
 
 _RANKS = {verdict: rank for rank, verdict in enumerate(reversed(Verdict))}
 

@@ -16,13 +16,13 @@ from tempfile import TemporaryDirectory
 
 from pydantic import BaseModel
 
-from errors import UserError
 from framerunner.child_process import ChildProcess
 from framerunner.editing import messages
 from framerunner.editing.places import find_scenario
 from framerunner.editing.words import Said, reason
+from framerunner.errors import UserError
+from framerunner.wire.transports.urls import parse_url
 from scenarios.loader import dump_yaml
-from wire.transports.urls import parse_url
 
 INSTANCES = 10
 GROUND_PORT = 14550  # to which simulators always send

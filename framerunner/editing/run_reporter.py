@@ -11,11 +11,11 @@ from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.guard_reporter import plain_value
 from framerunner.flying.run_control import RunStanding
 from framerunner.runs.chart_record import ChartRecord, StateSpan
+from framerunner.wire.finite_json import finite
 from offboard.app import Moment
 from offboard.drone import DroneState
 from offboard.engine import MissionEngine, TransitionTaken
 from scenarios.models import TrueState
-from wire.finite_json import finite
 
 PERIOD_S = 0.04  # wall time between two messages of a flight that is not paused
 TRAIL_US = 100_000  # vehicle time between two places of the trail

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from errors import UserError
+from framerunner.errors import UserError
 from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.plan import FlightPlan
 from framerunner.runs.run_folder import RunFolder

@@ -63,8 +63,8 @@ from framerunner.editing import messages
 from framerunner.editing.places import lesson_names, level_names, scenario_names
 from framerunner.editing.service import EditingService, EditingSettings
 from framerunner.editing.words import Language, Said, language_of, say
-from monitor.access import Visitor, refuse
-from monitor.pilot_channel import Allowance
+from framerunner.monitor.access import Visitor, refuse
+from framerunner.monitor.pilot_channel import Allowance
 from scenarios.result import first_error
 
 TOO_SLOW_CODE, TOO_MANY_CODE = 1013, 4429
@@ -73,7 +73,7 @@ _MAX_MESSAGE = 4 * messages.MAX_TEXT
 
 
 class EditingDoor:
-    """The editor's addresses; implements `monitor.ports.Extension`.
+    """The editor's addresses; implements `framerunner.monitor.ports.Extension`.
 
     Args:
         settings: what browsers may start.

@@ -7,7 +7,7 @@ from typing import Literal
 
 from starlette.requests import HTTPConnection
 
-from errors import UserError
+from framerunner.errors import UserError
 from offboard.authoring import EDIT_SPANISH, SPANISH, EditError
 from offboard.chart.messages import ENGLISH, Message
 from offboard.chart.problems import MAX_REPORTED, MissionError

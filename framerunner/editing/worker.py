@@ -20,7 +20,6 @@ from typing import TextIO
 
 from pydantic import BaseModel, ValidationError
 
-from errors import UserError
 from framerunner.child_process import end_with_standard_input, limit_resources
 from framerunner.editing import messages
 from framerunner.editing.batch import fly_batch
@@ -28,6 +27,7 @@ from framerunner.editing.places import find_scenario
 from framerunner.editing.run_reporter import RunReporter
 from framerunner.editing.session_runs import KeptFlight
 from framerunner.editing.words import Language, Said, SaidError, reasons, say
+from framerunner.errors import UserError
 from framerunner.evaluation.runner import processor_limit
 from framerunner.flying.lockstep import lockstep_flight
 from framerunner.flying.plan import FlightPlan

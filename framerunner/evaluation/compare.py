@@ -8,7 +8,7 @@ from math import sqrt
 from pathlib import Path
 from statistics import fmean, stdev
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import CONFIDENCE, Rate, wilson

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
 from framerunner.evaluation.genuine_flight import GenuineUse

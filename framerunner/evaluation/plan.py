@@ -12,10 +12,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from errors import SettingError
-from firmware_py.airframe import AirframeError, load_airframe
+from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
+from framerunner.vehicle.airframe import AirframeError, load_airframe
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario

@@ -21,12 +21,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from errors.files import TextError, read_text
 from framerunner.evaluation.compare import Comparison
 from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import Summary, crossing_offsets_m, mean_seconds_in_state
 from framerunner.evaluation.store import REPORT, EvaluationFolder
 from framerunner.evaluation.terminal import comparison_lines, spread_cells
+from framerunner.files.text_file import TextError, read_text
 from framerunner.flying.simulator_process import GenuineAutopilot
 from framerunner.runs.plots import draw_track
 from scenarios.loader import load_scenario

@@ -16,10 +16,10 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from errors import SettingError, write_advice
-from errors.files import replace_file
+from framerunner.errors import SettingError, write_advice
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
+from framerunner.files.text_file import replace_file
 from framerunner.runs.track import Track
 from offboard.navigation.frames.frame_estimate import FrameEstimate
 from scenarios.loader import dump_yaml

@@ -15,12 +15,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from firmware_py.airframe import Airframe, load_airframe
 from framerunner.film import style
 from framerunner.film.style import Bgr
 from framerunner.film.timeline import Floats, Instant, Timeline
 from framerunner.film.viewpoint import Viewpoint
 from framerunner.runs.plots import STATE_COLOURS
+from framerunner.vehicle.airframe import Airframe, load_airframe
 from scenarios.models import Light
 from sitl.camera_scene import PaintTree, build_scene
 from vision.types import Image

@@ -14,7 +14,7 @@ import numpy as np
 from av.codec import Codec
 from av.filter import Graph
 
-from errors import UserError
+from framerunner.errors import UserError
 from vision.types import Image
 
 if TYPE_CHECKING:

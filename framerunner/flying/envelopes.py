@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import floor, sqrt
 
-from errors import UserError
+from framerunner.errors import UserError
 from framerunner.flying.plan import FlightPlan
 from scenarios.bound import Bound, Envelope, Fall, Reach, lower_bound
 from scenarios.models import MissionClass

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState
 from sitl.faults.link import LinkFault, Way
 from sitl.simulation import Simulation

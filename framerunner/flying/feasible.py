@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from math import ceil, hypot, pi
 
 from framerunner.flying.plan import FlightPlan, airframe_limits
-from geometry.solids import Solid
-from geometry.vectors import Vec3
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import Vec3
 from offboard.limits import CONTEST
 from offboard.navigation.goals import FlightStyle, Gate, Motion, Obstacles, Point, Refusal, style_of
 from offboard.navigation.path import Path

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Protocol
 
 from pydantic import ValidationError
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
+from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import Moment
 from scenarios.models import Scenario, TrueState
 from scenarios.referee import Referee
@@ -23,7 +24,6 @@ from scenarios.result import (
     StandingPlace,
     first_error,
 )
-from wire.simulator_api import SimulatorApi
 
 if TYPE_CHECKING:  # a flight in lockstep needs no HTTP
     import aiohttp

@@ -23,9 +23,9 @@ from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
 from framerunner.flying.faulty_link import FaultyLink
 from framerunner.flying.response import LateResponse
-from geometry.axes import Alignment, Pose
-from geometry.rotations import normalized, quaternion_from_euler
-from geometry.vectors import Vec3
+from framerunner.geometry.axes import Alignment, Pose
+from framerunner.geometry.rotations import normalized, quaternion_from_euler
+from framerunner.geometry.vectors import Vec3
 from offboard.arming import Arming
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.link.gimbal_feed import GimbalAttitude

@@ -9,14 +9,7 @@ from typing import Any
 
 from framerunner.flying.guard_reporter import GuardReporter, plain_value
 from framerunner.flying.navigation_reporter import NavigationReporter
-from offboard.app import Moment
-from offboard.drone import DroneState
-from offboard.engine import MissionEngine, TransitionTaken
-from offboard.link.companion import Companion
-from offboard.mission import Mission, mermaid
-from scenarios.result import FlightResult
-from vision.types import CameraFrame, Detection, Detections
-from wire.mission_tunnel import (
+from framerunner.wire.mission_tunnel import (
     TEXT_PREFIX,
     Box,
     DocumentKind,
@@ -25,6 +18,13 @@ from wire.mission_tunnel import (
     PayloadError,
     split_document,
 )
+from offboard.app import Moment
+from offboard.drone import DroneState
+from offboard.engine import MissionEngine, TransitionTaken
+from offboard.link.companion import Companion
+from offboard.mission import Mission, mermaid
+from scenarios.result import FlightResult
+from vision.types import CameraFrame, Detection, Detections
 
 STATE_TICKS = 2  # 10 Hz of vehicle time
 HISTORY = 10

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
-from firmware_py.airframe import Airframe, load_airframe
 from framerunner.flying.response import Response
+from framerunner.vehicle.airframe import Airframe, load_airframe
 from offboard.keep_in_box import Box, flight_box
 from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.surroundings import Surroundings

@@ -10,19 +10,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from errors import SettingError
-from errors.files import read_text
 from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
+from framerunner.errors import SettingError
+from framerunner.files.text_file import read_text
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.timing import flight_timing
 from framerunner.runs.recorder import RecordingCamera, RunRecords
 from framerunner.runs.run_folder import RunFolder, warn
+from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import MissionEnd
 from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.result import Timing
 from vision.types import CameraFrame
-from wire.simulator_api import SimulatorApi
 
 if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow to import
     import aiohttp

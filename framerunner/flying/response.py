@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from math import cos, exp, sin, tau
 from random import Random
 
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.vectors import ZERO3, Vec3
 
 WANDER_PERIODS_S = (8.0, 15.0)
 """Between these, each of the two sine waves of the height has its period."""

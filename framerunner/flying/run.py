@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from errors import UserError
+from framerunner.errors import UserError
 from framerunner.flying.display import LockstepProgress, dry_run_line, result_lines
 from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings, flight_guard, fly_in_real_time
 from framerunner.runs.recorder import RunRecords, VideoFile
 from framerunner.runs.run_folder import RunFolder, left_lines, warn, write_outcome
+from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import INTERRUPTED
 from vision.types import Image
-from wire.simulator_api import SimulatorApi
 
 if TYPE_CHECKING:
     from framerunner.recording.mcap_writer import FlightRecording

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self
 
-from errors import SettingError, UserError
 from framerunner.child_process import ChildProcess
+from framerunner.errors import SettingError, UserError
 from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate, single
+from framerunner.wire.simulator_api import SimulatorApi
 from offboard.drone import DroneError, VelocityCommand
 from offboard.perception import IMAGES_KEPT, CameraPerception
 from sitl.autopilots import TITLES, WARNING
@@ -27,7 +28,6 @@ from sitl.pacing.time_grants import FREE_US, Grant, Held, SentImage, Velocity, p
 from sitl.server_settings import VIDEO_PORT
 from sitl.world import CONTROL_PERIOD_US
 from vision.types import CameraError, CameraFrame
-from wire.simulator_api import SimulatorApi
 
 START_S = 60.0  # on the busiest machine
 ANSWER_S = 20.0  # wall time in which a simulator runs 50 ms, on the busiest machine

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from framerunner.gym.flight import SteppedFlight, final_reward
 from offboard.drone import DroneState, VelocityCommand

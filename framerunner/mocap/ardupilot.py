@@ -25,13 +25,13 @@ from framerunner.mocap.facts import (
 )
 from framerunner.mocap.messages import odometry, vision_position
 from framerunner.mocap.poses import Pose
-from wire.ardupilot_messages import (
+from framerunner.wire.ardupilot_messages import (
     EKF_STATUS_REPORT_ID,
     EXTERNAL_NAVIGATION,
     POSE_ARRIVAL_EARLY_MS,
     has_position,
 )
-from wire.dialect import Message, mavlink
+from framerunner.wire.dialect import Message, mavlink
 
 _FAR_DELAY_S = 0.05  # 5 cm at 1 m/s
 _MAX_DELAY_MS = 250.0

@@ -14,7 +14,7 @@ from framerunner.mocap.ardupilot import ArduPilotPoses
 from framerunner.mocap.facts import Facts, SendSettings
 from framerunner.mocap.poses import Pose
 from framerunner.mocap.px4 import Px4Poses
-from wire.dialect import Message
+from framerunner.wire.dialect import Message
 
 
 class PoseDialect(Protocol):

@@ -8,7 +8,7 @@ from functools import partial
 from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import Record
 from framerunner.mocap.motion import PoseComparison
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 NEAR_M, FAR_M = 0.10, 0.5
 DELAY_S = 0.02  # difference that matters

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import nan
 
+from framerunner.geometry.rotations import euler_from_quaternion
 from framerunner.mocap.facts import SendSettings
 from framerunner.mocap.motion import body_velocity
 from framerunner.mocap.poses import Pose
-from geometry.rotations import euler_from_quaternion
-from wire.dialect import Message, mavlink
+from framerunner.wire.dialect import Message, mavlink
 
 _DIAGONAL = (0, 6, 11, 15, 18, 20)
 _QUALITY = 100

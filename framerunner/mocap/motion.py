@@ -15,9 +15,9 @@ from math import acos, degrees, hypot, nan, remainder
 import numpy as np
 import numpy.typing as npt
 
-from geometry.rotations import Rotation, multiply, rotation, to_world, yaw_of
-from geometry.vectors import Quaternion, Vec3
-from wire.vehicle_telemetry import VehiclePose, VehicleTelemetry
+from framerunner.geometry.rotations import Rotation, multiply, rotation, to_world, yaw_of
+from framerunner.geometry.vectors import Quaternion, Vec3
+from framerunner.wire.vehicle_telemetry import VehiclePose, VehicleTelemetry
 
 Array = npt.NDArray[np.float64]
 

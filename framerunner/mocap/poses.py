@@ -17,11 +17,11 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from errors import UserError
-from errors.files import TextError, decode_text, read_text
-from geometry.axes import flip_quaternion, flip_vector
-from geometry.rotations import multiply, normalized
-from geometry.vectors import Quaternion, Vec3
+from framerunner.errors import UserError
+from framerunner.files.text_file import TextError, decode_text, read_text
+from framerunner.geometry.axes import flip_quaternion, flip_vector
+from framerunner.geometry.rotations import multiply, normalized
+from framerunner.geometry.vectors import Quaternion, Vec3
 
 _HALF = sqrt(0.5)
 _ENU_TO_NED: Quaternion = (0.0, _HALF, _HALF, 0.0)  # half a turn about (1, 1, 0)

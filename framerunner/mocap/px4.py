@@ -9,7 +9,7 @@ from framerunner.doctor.findings import Findings
 from framerunner.mocap.facts import DELAY_S, FAR_M, NEAR_M, VISION, Facts, SendSettings, good, note
 from framerunner.mocap.messages import odometry
 from framerunner.mocap.poses import Pose
-from wire.dialect import Message, mavlink
+from framerunner.wire.dialect import Message, mavlink
 
 _POSITION, _HEIGHT, _VELOCITY, _YAW = 1, 2, 4, 8  # bits of EKF2_EV_CTRL
 _WANTED = _POSITION | _HEIGHT | _VELOCITY | _YAW

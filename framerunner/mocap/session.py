@@ -12,7 +12,7 @@ from framerunner.mocap.motion import MotionCheck, PoseComparison, SentPose
 from framerunner.mocap.poses import with_forward
 from framerunner.mocap.sources import PoseSource, TimedPose
 from framerunner.mocap.vehicle import Vehicle
-from wire.dialect import Message, mavlink
+from framerunner.wire.dialect import Message, mavlink
 
 SYSTEM_ID = 248  # the doctor has 247
 COMPONENT_ID = mavlink.MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY

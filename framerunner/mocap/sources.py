@@ -13,13 +13,13 @@ from subprocess import DEVNULL, PIPE, Popen, TimeoutExpired
 from typing import Protocol
 
 from framerunner.extras import install_advice, is_installed
+from framerunner.geometry.rotations import multiply, normalized
+from framerunner.geometry.vectors import Quaternion, Vec3
 from framerunner.mocap.capture import KINDS
 from framerunner.mocap.poses import Axes, Pose, PoseError, parse_line, read_poses
-from geometry.rotations import multiply, normalized
-from geometry.vectors import Quaternion, Vec3
-from wire.dialect import Message, mavlink
-from wire.transports.sockets import UdpSocket, bind_udp
-from wire.transports.urls import UrlRules, parse_url
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.transports.sockets import UdpSocket, bind_udp
+from framerunner.wire.transports.urls import UrlRules, parse_url
 
 _METRES = 111_319.5e-7  # a unit of latitude, 1e-7 degrees
 _SPAN_S = 0.4  # in which a step of the source's clock is followed

@@ -9,8 +9,8 @@ from statistics import median
 from framerunner.doctor.listen import Record
 from framerunner.mocap.dialects import PoseDialect, dialect_of
 from framerunner.mocap.facts import Origin
-from wire.ardupilot_messages import add_ardupilot_messages
-from wire.dialect import (
+from framerunner.wire.ardupilot_messages import add_ardupilot_messages
+from framerunner.wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
     Message,
     companion_heartbeat,

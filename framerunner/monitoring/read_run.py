@@ -19,8 +19,8 @@ from typing import Any
 
 import cv2
 
-from errors.files import TextError, read_text
 from framerunner.child_process import end_with_standard_input, limit_resources
+from framerunner.files.text_file import TextError, read_text
 from framerunner.flying.navigation_reporter import navigation_json
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.events import RecordingError

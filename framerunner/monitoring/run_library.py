@@ -18,8 +18,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from framerunner.monitor.ports import RunError, RunInfo, RunNotReadError
 from framerunner.monitoring.read_run import IMAGES, RECORDING, SPANS
-from monitor.ports import RunError, RunInfo, RunNotReadError
 from scenarios.result import MAX_RESULT_BYTES, FlightResult
 
 KEPT_RUNS = 6
@@ -69,7 +69,7 @@ class _Failed:
 class RunFolders:
     """The run folders in a folder, which need not exist yet; may be used from several threads.
 
-    Implements `monitor.ports.RunLibrary`, which says what is returned and raised.
+    Implements `framerunner.monitor.ports.RunLibrary`, which says what is returned and raised.
 
     Args:
         path: of the folder.

@@ -5,9 +5,14 @@ from __future__ import annotations
 from math import isnan
 
 from framerunner.doctor.listen import Record
+from framerunner.wire.ardupilot_messages import (
+    EKF_ATTITUDE,
+    EKF_POS_HORIZ_ABS,
+    EKF_POS_VERT_ABS,
+    has_position,
+)
+from framerunner.wire.dialect import mavlink
 from offboard.safety.vehicle_checks import EstimatorFacts
-from wire.ardupilot_messages import EKF_ATTITUDE, EKF_POS_HORIZ_ABS, EKF_POS_VERT_ABS, has_position
-from wire.dialect import mavlink
 
 
 def estimator_facts(record: Record, autopilot: str) -> EstimatorFacts:

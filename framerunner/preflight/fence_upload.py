@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import partial
 
 from framerunner.preflight.session import VehicleSession
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from offboard.drone import DroneError
-from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 
 FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 _INCLUSION = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION

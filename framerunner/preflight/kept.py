@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
-from errors import SettingError
-from errors.files import TextError, read_text
+from framerunner.errors import SettingError
+from framerunner.files.text_file import TextError, read_text
 from framerunner.preflight.fence_upload import MAX_ITEMS, FenceItem, upload_fence
 from framerunner.preflight.parameters import ParameterValue, set_parameter
 from framerunner.preflight.session import VehicleSession
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 from offboard.drone import DroneError
-from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 
 OPTION = "--restore-parameters"
 OVERRIDE = "--any-vehicle"

@@ -1,7 +1,7 @@
 """A flight's connection to the monitor, whose pages have the operator's buttons.
 
-The monitor listens on a local socket that only its user may open; see `wire/operator_messages.py`. The
-connection is opened again when it is lost.
+The monitor listens on a local socket that only its user may open; see
+`framerunner/wire/operator_messages.py`. The connection is opened again when it is lost.
 """
 
 from __future__ import annotations
@@ -15,11 +15,9 @@ from pathlib import Path
 
 from pydantic import BaseModel, ValidationError
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.preflight.card import FlightCard
-from offboard.safety.operator import Operator
-from offboard.safety.operator_pages import BEAT_S, OperatorPages
-from wire.operator_messages import (
+from framerunner.wire.operator_messages import (
     MAX_LINE_BYTES,
     AnswerMessage,
     BeatMessage,
@@ -29,6 +27,8 @@ from wire.operator_messages import (
     PageMessage,
     Row,
 )
+from offboard.safety.operator import Operator
+from offboard.safety.operator_pages import BEAT_S, OperatorPages
 
 _AGAIN_S = 1.0
 _REFUSAL_S = 0.5  # in which a monitor that has a flight closes another one's connection

@@ -9,8 +9,8 @@ from functools import partial
 
 from framerunner.doctor.listen import parameter_value
 from framerunner.preflight.session import VehicleSession
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from offboard.drone import DroneError
-from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 
 _FLOAT = mavlink.MAV_PARAM_TYPE_REAL32
 _SAME = 1e-6  # of a value that was set and read back, relative

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import closing
 from datetime import datetime
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from framerunner.preflight.card import FlightCard, make_card
 from framerunner.preflight.card_files import HTML_NAME, write_card
@@ -17,11 +17,11 @@ from framerunner.preflight.keys import HINT, has_terminal
 from framerunner.preflight.run import PreflightSettings, run_preflight, tell
 from framerunner.preflight.session import VehicleSession, open_link
 from framerunner.preflight.settings import HardwareSettings
+from framerunner.wire.transports.urls import parse_url
 from offboard.safety.check import failures
 from offboard.safety.operator import Operator
 from offboard.safety.rules import SafetyRules
 from vision.sources import open_source
-from wire.transports.urls import parse_url
 
 PAGE_HINT = "on the monitor's page Operator hold Go, Land lands, then Stop motors stops them"
 

@@ -11,15 +11,14 @@ from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 
-from errors import UserError
-from firmware_py.geodesy import LocalProjection
-from firmware_py.types import GeodeticPoint
 from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
 from framerunner.doctor.camera_times import CameraTimes, calibration_facts, measure_camera
 from framerunner.doctor.checks import examine
 from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import Record
+from framerunner.errors import UserError
 from framerunner.flying.plan import FlightPlan
+from framerunner.geometry.axes import Alignment, Pose
 from framerunner.preflight.check_names import CHECK_NAMES, RENAMED, REPLACED
 from framerunner.preflight.estimator import estimator_facts, has_global_position
 from framerunner.preflight.fence_upload import (
@@ -33,7 +32,8 @@ from framerunner.preflight.fence_upload import (
 from framerunner.preflight.kept import OPTION, KeptState, write_kept
 from framerunner.preflight.parameters import ParameterValue, read_parameters, set_parameter
 from framerunner.preflight.session import TIME_REQUESTS, VehicleSession, open_link
-from geometry.axes import Alignment, Pose
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from framerunner.wire.dialect import degrees_e7
 from offboard.drone import DroneError
 from offboard.safety.check import Check, Outcome, accept, check_names, failures, passed
 from offboard.safety.failsafes import failsafe_checks, failsafe_rows, rows_by_known_names, values_to_set
@@ -48,7 +48,6 @@ from offboard.safety.vehicle_checks import (
     estimator_check,
     link_checks,
 )
-from wire.dialect import degrees_e7
 
 LISTEN_S = 5.0
 FENCED = ("px4", "ardupilot")

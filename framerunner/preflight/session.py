@@ -8,8 +8,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from framerunner.doctor.listen import COMPONENT_ID, FIND_S, Record, find, listen
-from offboard.drone import DroneError
-from wire.dialect import (
+from framerunner.wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
     Message,
     companion_heartbeat,
@@ -17,8 +16,9 @@ from wire.dialect import (
     mavlink,
     request_message,
 )
-from wire.transports.vehicle_link import VehicleLink
-from wire.vehicle_identity import is_simulator, vehicle_uid
+from framerunner.wire.transports.vehicle_link import VehicleLink
+from framerunner.wire.vehicle_identity import is_simulator, vehicle_uid
+from offboard.drone import DroneError
 
 SYSTEM_ID = 245
 """MAVSDK's, so the app's: ArduPilot does not arm while it misses the ground station that flew it last."""

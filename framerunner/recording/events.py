@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from errors import UserError
+from framerunner.errors import UserError
 from offboard.app import Moment
 from scenarios.result import FlightResult
 from vision.types import Image

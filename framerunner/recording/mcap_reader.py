@@ -17,6 +17,8 @@ from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.writer import MCAP0_MAGIC
 
+from framerunner.geometry.rotations import quaternion_from_yaw
+from framerunner.geometry.vectors import Vec3
 from framerunner.recording.events import Crossed, Event, RecordedImage, RecordingError
 from framerunner.recording.mcap_file import (
     MAX_CHUNK_BYTES,
@@ -36,8 +38,6 @@ from framerunner.recording.schemas import (
     SETPOINT,
     TELEMETRY,
 )
-from geometry.rotations import quaternion_from_yaw
-from geometry.vectors import Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken

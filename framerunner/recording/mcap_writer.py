@@ -15,7 +15,7 @@ from pathlib import Path
 import cv2
 from mcap.writer import CompressionType, Writer
 
-from errors.files import read_text
+from framerunner.files.text_file import read_text
 from framerunner.recording import messages, schemas
 from framerunner.recording.events import RecordingError
 from offboard.app import Moment

@@ -10,10 +10,10 @@ from itertools import pairwise
 from math import cos, isfinite, sin
 from typing import Any
 
-from firmware_py.airframe import load_airframe
-from geometry.rotations import mounting_flu, multiply, quaternion_from_yaw
-from geometry.solids import Solid
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import mounting_flu, multiply, quaternion_from_yaw
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import Quaternion, Vec3
+from framerunner.vehicle.airframe import load_airframe
 from offboard.app import Moment
 from offboard.drone import DroneState
 from offboard.navigation.frames.frame_estimate import FrameEstimate

@@ -11,17 +11,17 @@ from pathlib import Path
 import cv2
 
 from framerunner.flying.plan import FlightPlan
+from framerunner.geometry.axes import Alignment, Pose
 from framerunner.recording.events import Crossed, Event, RecordedImage, RecordingError, time_of_event
-from geometry.axes import Alignment, Pose
+from framerunner.wire.dialect import Message, is_vehicle, mavlink
+from framerunner.wire.px4_modes import OFFBOARD, px4_name
+from framerunner.wire.vehicle_telemetry import AttitudeReport, PositionReport, VehicleTelemetry
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from scenarios.models import Scenario
 from scenarios.result import FlightResult
 from vision.jpeg import MAX_PIXELS
 from vision.types import Detections
-from wire.dialect import Message, is_vehicle, mavlink
-from wire.px4_modes import OFFBOARD, px4_name
-from wire.vehicle_telemetry import AttitudeReport, PositionReport, VehicleTelemetry
 
 TICK_US = 50_000
 _READ = ["HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "COMMAND_LONG"]

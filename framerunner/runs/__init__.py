@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from errors import UserError
+from framerunner.errors import UserError
 
 PLOT_SUFFIXES = (".png", ".svg", ".pdf")
 

@@ -19,9 +19,9 @@ from matplotlib.patches import Ellipse, Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
+from framerunner.geometry.vectors import Vec3
 from framerunner.runs import PlotError, check_plot_format
 from framerunner.runs.track import Track
-from geometry.vectors import Vec3
 from offboard.navigation.frames.frame_estimate import FrameEstimate
 from scenarios.models import Frame, Scenario, UprightFrame, start_position
 from scenarios.result import FlightResult

@@ -10,9 +10,9 @@ from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
-from errors import SettingError, write_advice
-from errors.files import replace_file
+from framerunner.errors import SettingError, write_advice
 from framerunner.extras import install_advice
+from framerunner.files.text_file import replace_file
 from framerunner.runs import PlotError
 from framerunner.runs.track import Track
 from offboard.mission import Mission

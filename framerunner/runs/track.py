@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.app import Moment
 from offboard.navigation.frames.frame_estimate import FrameEstimate
 

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from math import atan2, cos, sin
 
 from framerunner.flying.plan import FlightPlan
-from geometry.axes import ORIGIN, Alignment, Pose
-from geometry.rotations import quaternion_from_yaw, yaw_of
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.axes import ORIGIN, Alignment, Pose
+from framerunner.geometry.rotations import quaternion_from_yaw, yaw_of
+from framerunner.geometry.vectors import Quaternion, Vec3
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.vehicle_telemetry import AHEAD_US, VehiclePose, VehicleTelemetry
 from offboard.link.gimbal_feed import GimbalAttitude, gimbal_attitude
 from scenarios.models import Scenario, TrueState
 from scenarios.result import LocalFrame, Standing
 from sitl.camera import FIRST_EXPOSURE_US, Camera, Motion
 from sitl.optics.painter import Image
-from wire.dialect import Message, mavlink
-from wire.vehicle_telemetry import AHEAD_US, VehiclePose, VehicleTelemetry
 
 REFEREE_STEP_US = 20_000
 REPORT_GAP_US = 20_000  # between two reports: the one after an exposure is received so much later

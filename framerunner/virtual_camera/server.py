@@ -9,9 +9,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 
 from framerunner.virtual_camera.camera import VirtualCamera
-from scenarios.task import Task
-from sitl.video import VideoServer
-from wire.dialect import (
+from framerunner.wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
     Message,
     companion_heartbeat,
@@ -19,9 +17,11 @@ from wire.dialect import (
     mavlink,
     request_rate,
 )
-from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
-from wire.transports.urls import LinkError
-from wire.transports.vehicle_link import VehicleLink
+from framerunner.wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
+from framerunner.wire.transports.urls import LinkError
+from framerunner.wire.transports.vehicle_link import VehicleLink
+from scenarios.task import Task
+from sitl.video import VideoServer
 
 STALE_S = 0.5  # wall time without attitude or position, after which no image is served
 SYSTEM_ID = 246  # MAVSDK has 245, ground stations 255

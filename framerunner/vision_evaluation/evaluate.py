@@ -11,7 +11,7 @@ import cv2
 from rich.console import Console
 from rich.progress import track
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.extras import install_advice, is_installed
 from framerunner.vision_evaluation.labelled_images import Disturbance, LabelledImage, labelled_images
 from framerunner.vision_evaluation.scores import (
@@ -26,8 +26,8 @@ from framerunner.vision_evaluation.scores import (
     rows_by,
 )
 from framerunner.vision_evaluation.terminal import print_scores
+from framerunner.wire.finite_json import finite
 from scenarios.random_scenarios import Level
-from wire.finite_json import finite
 
 REPORT, PICTURE, LABELS = "vision.json", "vision.png", "labels.json"
 

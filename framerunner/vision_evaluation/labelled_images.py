@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.flying.detector import true_calibration
-from geometry.rotations import mounting_flu, quaternion_from_euler, rotation, rotation_rows
-from geometry.solids import Solid
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import mounting_flu, quaternion_from_euler, rotation, rotation_rows
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import Quaternion, Vec3
 from scenarios.models import Scenario, UprightFrame
 from scenarios.random_scenarios import Level, random_scenario
 from sitl.camera import STILL, Camera, Motion

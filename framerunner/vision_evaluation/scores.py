@@ -10,8 +10,8 @@ from math import acos, asin, degrees, hypot, inf, isfinite, sqrt
 
 import numpy as np
 
+from framerunner.geometry.vectors import Vec3
 from framerunner.vision_evaluation.labelled_images import FrameLabel, LabelledImage
-from geometry.vectors import Vec3
 from vision.calibration.model import Calibration
 from vision.detectors import Detector, new_detector
 from vision.types import Detection, Detections, FrameSighting, Image, Vision

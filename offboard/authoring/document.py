@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from errors.files import TextError, decode_text, read_bytes
+from framerunner.files.text_file import TextError, decode_text, read_bytes
 from offboard.authoring.outline import Outline
 from offboard.authoring.text import MissionText, Positions
 from offboard.chart.messages import Message

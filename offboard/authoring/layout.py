@@ -12,8 +12,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError
 
-from errors import UserError
-from errors.files import TextError, decode_text, read_in_folder, replace_file
+from framerunner.errors import UserError
+from framerunner.files.text_file import TextError, decode_text, read_in_folder, replace_file
 from offboard.authoring.document import Document
 from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState, StrictModel
 from offboard.authoring.references import chart_ids, instances, prefix_change

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from errors import UserError
+from framerunner.errors import UserError
 from offboard.chart.messages import Message
 
 EDIT_ENGLISH: Mapping[str, str] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from errors import UserError
+from framerunner.errors import UserError
 
 MAX_XML_BYTES = 1_000_000
 MAX_ELEMENTS = 20_000

@@ -10,7 +10,7 @@ from enum import Enum
 from math import inf
 from typing import get_args, get_origin
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.chart.messages import Message
 from offboard.chart.problems import cut
 from offboard.chart.vocabulary import Vocabulary, choices_of, path_of

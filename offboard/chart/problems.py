@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Literal
 
-from errors import UserError
+from framerunner.errors import UserError
 from offboard.chart.messages import ENGLISH, Message, as_message
 
 MAX_REPORTED = 50

@@ -24,12 +24,12 @@ from typing import Any
 
 from mavsdk.asyncio import MavsdkError
 
+from framerunner.wire import ardupilot_modes
+from framerunner.wire.dialect import mavlink
 from offboard.drone import ResponsePrior, VelocityCommand
 from offboard.link.dialect import ModeNames
 from offboard.link.direct import DirectMessages
 from offboard.link.telemetry import TelemetryFeed
-from wire import ardupilot_modes
-from wire.dialect import mavlink
 
 READY_LIMIT_S = 90.0  # wall time; its estimator uses GPS some 40 s after its start
 TAKEOFF_HEIGHT_M = 1.0  # requested; velocities take over as soon as the drone is off the ground

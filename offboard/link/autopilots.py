@@ -11,13 +11,13 @@ from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.info import InfoAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 
+from framerunner.wire.vehicle_identity import is_simulator
 from offboard.drone import DroneError, ResponsePrior
 from offboard.link.ardupilot import ArduPilotDialect
 from offboard.link.dialect import Dialect, Px4Dialect
 from offboard.link.stepped_ardupilot import SteppedArduPilotDialect
 from offboard.link.stepped_px4 import SteppedPx4Dialect
 from offboard.link.telemetry import TelemetryFeed
-from wire.vehicle_identity import is_simulator
 
 _IDENTITY_TRIES = 15
 _IDENTITY_AGAIN_S = 0.2  # wall time; MAVSDK requests the identity itself when it finds a vehicle

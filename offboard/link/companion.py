@@ -18,9 +18,9 @@ from collections import deque
 from math import inf
 from typing import Any
 
-from wire.dialect import AUTOPILOT_COMPONENT_ID, companion_heartbeat, mavlink
-from wire.framing import packed
-from wire.mission_tunnel import (
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, companion_heartbeat, mavlink
+from framerunner.wire.framing import packed
+from framerunner.wire.mission_tunnel import (
     COMPONENT_ID,
     DETECTIONS_TYPE,
     DOCUMENT_TYPE,

@@ -10,12 +10,12 @@ import mavsdk.logging as native_log
 from mavsdk.asyncio import Configuration, ForwardingOption, Mavsdk, MavsdkError
 from mavsdk.asyncio.component_type import ComponentType
 
+from framerunner.wire.status_text import plain
+from framerunner.wire.transports.sockets import check_free
+from framerunner.wire.transports.urls import LinkError, LinkUrl
 from offboard.drone import DroneError
 from offboard.link.companion import Companion
 from offboard.link.tlog import TlogRecorder
-from wire.status_text import plain
-from wire.transports.sockets import check_free
-from wire.transports.urls import LinkError, LinkUrl
 
 logger = logging.getLogger(__name__)
 

@@ -8,9 +8,9 @@ from typing import Any
 from mavsdk.asyncio import MavsdkError
 from mavsdk.plugins.mavlink_direct import MavlinkMessage
 
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 from offboard.drone import VelocityCommand
 from offboard.link.commands import synchronous
-from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 
 _VELOCITY_AND_YAW_RATE = (
     mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from math import isfinite, nan
 from typing import Any
 
-from geometry.rotations import multiply, normalized, quaternion_from_yaw
-from geometry.vectors import Quaternion
+from framerunner.geometry.rotations import multiply, normalized, quaternion_from_yaw
+from framerunner.geometry.vectors import Quaternion
 
 _YAW_LOCK, _YAW_IN_VEHICLE_FRAME, _YAW_IN_EARTH_FRAME = 16, 32, 64  # GIMBAL_DEVICE_FLAGS
 _MIN_LENGTH = 0.5  # of a quaternion that is one

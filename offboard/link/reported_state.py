@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from geometry.axes import Alignment, Pose
+from framerunner.geometry.axes import Alignment, Pose
 from offboard.drone import DroneState
 from offboard.link.dialect import Dialect
 from offboard.link.telemetry import Sample, TelemetryFeed

@@ -17,12 +17,12 @@ from typing import Any
 
 from mavsdk.asyncio import MavsdkError
 
-from geometry.axes import Alignment, Pose
-from geometry.rotations import rotation, to_world, yaw_of
-from geometry.vectors import Vec3
+from framerunner.geometry.axes import Alignment, Pose
+from framerunner.geometry.rotations import rotation, to_world, yaw_of
+from framerunner.geometry.vectors import Vec3
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
+from framerunner.wire.vehicle_telemetry import MessageOrder
 from offboard.drone import DroneError
-from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
-from wire.vehicle_telemetry import MessageOrder
 
 RATE_HZ = 10.0
 MAX_STEP_S = 0.3  # between two reports, from which a jump can be told from motion

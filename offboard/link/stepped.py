@@ -14,11 +14,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Awaitable
 from typing import Any, ClassVar
 
+from framerunner.wire.dialect import mavlink
 from offboard.drone import DroneError, VelocityCommand
 from offboard.link.commands import synchronous
 from offboard.link.dialect import TickExchange
 from offboard.link.direct import CommandRefusedError, DirectMessages
-from wire.dialect import mavlink
 
 ECHO_LIMIT_S = 20.0  # wall time for the answer to a PING, on the busiest machine
 _ECHO_AGAIN_S = 0.5  # wall time after which another one is sent

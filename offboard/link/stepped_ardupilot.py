@@ -13,12 +13,12 @@ from typing import Any
 
 from mavsdk.asyncio import MavsdkError
 
+from framerunner.wire import ardupilot_modes
+from framerunner.wire.dialect import mavlink
 from offboard.drone import ResponsePrior, VelocityCommand
 from offboard.link.ardupilot import ARDUPILOT_MODES, READY_LIMIT_S, STREAMS_HZ, Setpoints
 from offboard.link.stepped import SteppedDialect
 from offboard.link.telemetry import TelemetryFeed
-from wire import ardupilot_modes
-from wire.dialect import mavlink
 
 
 class SteppedArduPilotDialect(SteppedDialect):

@@ -7,12 +7,12 @@ from collections.abc import Awaitable, Mapping
 from types import MappingProxyType
 from typing import Any
 
+from framerunner.wire import px4_modes
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.px4_modes import Px4Mode
 from offboard.drone import ResponsePrior
 from offboard.link.dialect import PX4_MODES, PX4_READY_LIMIT_S
 from offboard.link.stepped import SteppedDialect
-from wire import px4_modes
-from wire.dialect import mavlink
-from wire.px4_modes import Px4Mode
 
 _TAKEN_S = 0.3  # wall time in which PX4 takes a request that it cannot return a PING after
 _POSITIONS_HZ = 50.0

@@ -21,15 +21,15 @@ from functools import partial
 from math import nan, radians
 from typing import Any
 
-from geometry.axes import Pose
-from geometry.rotations import quaternion_from_euler
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.axes import Pose
+from framerunner.geometry.rotations import quaternion_from_euler
+from framerunner.geometry.vectors import Quaternion, Vec3
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID
+from framerunner.wire.mission_tunnel import TEXT_PREFIX
+from framerunner.wire.status_text import plain
+from framerunner.wire.vehicle_telemetry import MessageOrder
 from offboard.arming import Arming
 from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
-from wire.dialect import AUTOPILOT_COMPONENT_ID
-from wire.mission_tunnel import TEXT_PREFIX
-from wire.status_text import plain
-from wire.vehicle_telemetry import MessageOrder
 
 TICK_US = 50_000
 LAG_GROWTH_S = 2e-5  # with each attitude: 1 ms a second, more than clocks differ

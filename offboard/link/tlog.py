@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 from typing import BinaryIO, cast
 
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 LOGGER_COMPONENT = 155  # MAV_COMP_ID_LOG
 RECEIVE_BUFFER_BYTES = 4 << 20

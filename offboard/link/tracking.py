@@ -15,7 +15,7 @@ from collections import deque
 from dataclasses import dataclass
 from math import cos, exp, hypot, pi, remainder, sin
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 
 MODEL_LAG_S = 0.15  # as of the simulated drone

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from math import tan
 from typing import Self
 
-from geometry.rotations import Rotation, mounting_flu, rotation, to_body, to_world
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import Rotation, mounting_flu, rotation, to_body, to_world
+from framerunner.geometry.vectors import Quaternion, Vec3
 from scenarios.models import Camera
 
 NEAREST_M = 0.05  # points nearer than this are not projected

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, dist, hypot, inf, pi, remainder, sin
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import Point
 from offboard.navigation.path import Crossing, Path

@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from geometry.axes import Pose
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.axes import Pose
+from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import FlightStyle
 from offboard.navigation.search.coverage import Coverage

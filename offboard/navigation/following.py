@@ -11,7 +11,7 @@ from collections import deque
 from dataclasses import replace
 from math import hypot, pi, remainder
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits, clamped
 from offboard.navigation.control.late_following import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import inf
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.limits import CommandLimits
 from offboard.response import Response
 from scenarios.models import Base

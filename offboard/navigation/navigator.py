@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import dist, hypot
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.crossing_attempt import CrossingAttempt

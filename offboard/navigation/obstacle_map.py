@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel, CameraPose
 from offboard.navigation.search.floor_points import COLUMN_PX, Doubles, FloorPoints
 from scenarios.models import Arena

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import dist, pi, remainder
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.goals import Gate, Motion
 
 _SHORTEST_S = 0.005  # knots are not nearer to each other than this

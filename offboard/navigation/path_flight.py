@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import dist, hypot, pi, remainder
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CommandLimits
 from offboard.navigation.control.stuck_detector import StuckDetector

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from math import acos, hypot
 from typing import Generic, TypeVar
 
-from geometry.rotations import interpolated, multiply
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import interpolated, multiply
+from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.exploration import Explorer, Pace, Viewpoint

@@ -10,7 +10,7 @@ import logging
 from dataclasses import dataclass, replace
 from math import hypot, inf
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from offboard.drone import DroneState, VelocityCommand
 from offboard.keep_in_box import FLOOR_M, Box, confine
 from offboard.limits import CommandLimits, clamped

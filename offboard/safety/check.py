@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from enum import Enum
 
-from errors import SettingError
+from framerunner.errors import SettingError
 
 ALL = "all"
 """Instead of a name: accepts every check that fails."""

@@ -13,7 +13,7 @@ from typing import Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from errors.files import read_text
+from framerunner.files.text_file import read_text
 from offboard.safety.check import Check, Outcome
 from offboard.safety.fence import FlightFence
 from offboard.safety.rules import AbortAction

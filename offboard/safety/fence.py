@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import hypot
 
-from geometry.axes import Alignment
-from geometry.vectors import Vec3
+from framerunner.geometry.axes import Alignment
+from framerunner.geometry.vectors import Vec3
 from offboard.keep_in_box import Box
 
 BEYOND_BOX_M = 0.3

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from framerunner.wire.operator_messages import PageMessage, PageState
 from offboard.safety.operator import Controls, Operator
-from wire.operator_messages import PageMessage, PageState
 
 BEAT_S = 0.2
 GO_GAP_S = 0.4

@@ -6,7 +6,7 @@ import re
 
 from pydantic import ValidationError
 
-from errors import UserError
+from framerunner.errors import UserError
 from scenarios.faults.declaration import SIZES, Fault, FaultKind, FaultPart
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

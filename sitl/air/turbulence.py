@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from scenarios.random_numbers import random_stream
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import cos, hypot, log1p, pi, sin, tau
 
-from geometry.axes import flip_vector
-from geometry.vectors import Vec3
+from framerunner.geometry.axes import flip_vector
+from framerunner.geometry.vectors import Vec3
 from scenarios.air import Wind
 from scenarios.random_numbers import random_stream
 from sitl.air.turbulence import Turbulence

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from errors import SettingError
-from firmware_py.types import GeodeticPoint
+from framerunner.errors import SettingError
+from framerunner.vehicle.geodesy import GeodeticPoint
 from sitl.ardupilot.json_interface import PORTS_AN_INSTANCE
 from sitl.ardupilot.parameters import file_of
 from sitl.ardupilot.poses import POSE_PORT

@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.vectors import Quaternion, Vec3
 
 FIRST_PORT = 9002  # of ArduPilot's instance 0
 PORTS_AN_INSTANCE = 10

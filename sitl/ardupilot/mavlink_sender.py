@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 from sitl.autopilots.sole_sender import Sign, SoleSender
-from wire.dialect import mavlink
-from wire.framing import PacketReader
 
 
 def mavlink_sender(port: int, system_id: int, notice: Callable[[str], None]) -> SoleSender[bytes]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from math import sqrt
 
-from errors import SettingError
-from firmware_py.airframe import Airframe
+from framerunner.errors import SettingError
+from framerunner.vehicle.airframe import Airframe
+from framerunner.wire.ardupilot_messages import EXTERNAL_NAVIGATION, POSE_ARRIVAL_EARLY_MS
 from sitl.ardupilot.simulation import PULSE_MAX_US, PULSE_MIN_US
 from sitl.autopilots.parameters import Value, text_of
 from sitl.sensors.specs import SuiteSpec
 from sitl.world import PHYSICS_RATE_HZ
-from wire.ardupilot_messages import EXTERNAL_NAVIGATION, POSE_ARRIVAL_EARLY_MS
 
 _HOVER_SHARE = 0.25  # of full thrust, at least; ArduCopter's estimate of it has a lower limit of 0.125
 _RATE_BANDWIDTH_RAD_S = 20.0  # of roll and pitch, with motors that are fast enough

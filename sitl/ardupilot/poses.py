@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from firmware_py.measurements import ExternalPose
-from firmware_py.types import GeodeticPoint
-from geometry.rotations import euler_from_quaternion
+from framerunner.geometry.rotations import euler_from_quaternion
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import ExternalPose
+from framerunner.wire.dialect import Message, degrees_e7, mavlink, millimetres
+from framerunner.wire.framing import packed
+from framerunner.wire.transports.sockets import bind_udp
 from sitl.ardupilot.mavlink_sender import mavlink_sender
-from wire.dialect import Message, degrees_e7, mavlink, millimetres
-from wire.framing import packed
-from wire.transports.sockets import bind_udp
 
 POSE_PORT = 9006
 """UDP port of instance 0, between those of the JSON interface."""

@@ -6,6 +6,7 @@ import asyncio
 import time
 from collections.abc import Callable
 
+from framerunner.wire.transports.sockets import Address, UdpSocket, bind_udp
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
 from sitl.ardupilot.mavlink_sender import mavlink_sender
 from sitl.ardupilot.poses import POSE_PORT, PoseLink
@@ -17,7 +18,6 @@ from sitl.autopilots.sole_sender import SoleSender
 from sitl.pacing.pacer import Pacer
 from sitl.pacing.time_grants import FREE_US, TimeGrants
 from sitl.server_settings import ServerSettings
-from wire.transports.sockets import Address, UdpSocket, bind_udp
 
 _SILENCE_S = 2.0  # wall time without a frame that is reported
 _LOST_S = 0.5  # wall time after which an answer to a frame that is repeated was lost

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import isnan
 
-from firmware_py.airframe import Airframe
-from firmware_py.measurements import ExternalPose, ImuSample
-from firmware_py.types import GeodeticPoint, Sensors
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.vectors import ZERO3, Vec3
+from framerunner.vehicle.airframe import Airframe
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import ExternalPose, ImuSample, Sensors
 from scenarios.models import Scenario
 from sitl.ardupilot.json_interface import encode_state
 from sitl.vehicle import SimulatedVehicle

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from errors import SettingError, UserError
+from framerunner.errors import SettingError, UserError
 from sitl.autopilots.temporary_folder import TemporaryFolder
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG

@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
+from framerunner.wire.transports.urls import in_url
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.pacing.pacer import BURST_TICKS, Pacer
 from sitl.pacing.time_grants import FREE_US, TimeGrants
@@ -15,7 +16,6 @@ from sitl.server_settings import ServerSettings
 from sitl.streaming.drone_video import DroneVideo
 from sitl.vehicle import SimulatedVehicle
 from sitl.world import CONTROL_PERIOD_US
-from wire.transports.urls import in_url
 
 FALL_US = 3_000_000
 """For which a drone without its autopilot is simulated on."""

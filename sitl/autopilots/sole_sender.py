@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from math import inf
 from typing import Generic, TypeVar
 
+from framerunner.wire.transports.sockets import Address
+from framerunner.wire.transports.urls import in_url
 from sitl.autopilots import WARNING
-from wire.transports.sockets import Address
-from wire.transports.urls import in_url
 
 T = TypeVar("T")
 

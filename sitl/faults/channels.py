@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from math import cos, radians
 from typing import Any, Generic, TypeVar
 
-from firmware_py.measurements import (
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.measurements import (
     BarometerSample,
     ExternalPose,
     FlowSample,
@@ -15,7 +16,6 @@ from firmware_py.measurements import (
     MagnetometerSample,
     RangeSample,
 )
-from geometry.vectors import Vec3
 from scenarios.faults.declaration import FaultPart
 
 Numbers = tuple[float, ...]

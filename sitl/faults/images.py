@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from geometry.solids import Solid
+from framerunner.geometry.solids import Solid
 from scenarios.faults.declaration import Fault, FaultKind, FaultPart
 from scenarios.models import Scenario, TrueState
 from sitl.camera import CameraFeed, Exposure

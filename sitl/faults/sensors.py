@@ -6,9 +6,8 @@ from dataclasses import replace
 from math import nan
 from typing import Any, TypeVar
 
-from firmware_py.measurements import ExternalPose, ImuSample, Readings
-from firmware_py.types import Sensors
-from geometry.vectors import NAN3, Vec3
+from framerunner.geometry.vectors import NAN3, Vec3
+from framerunner.vehicle.measurements import ExternalPose, ImuSample, Readings, Sensors
 from scenarios.faults.declaration import Fault, FaultPart
 from sitl.faults.channels import CHANNELS, IDEAL_POSITION
 from sitl.faults.effects import Effect, new_effect

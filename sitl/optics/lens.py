@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from geometry.lens import NO_DISTORTION, rays_of_pixels
+from framerunner.geometry.lens import NO_DISTORTION, rays_of_pixels
 from scenarios.models import Camera
 
 Image = npt.NDArray[np.uint8]

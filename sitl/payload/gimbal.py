@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import copysign, isfinite, remainder, tau
 
 from firmware_py.mavlink.gimbal.model import GimbalLimits, GimbalTarget
-from geometry.rotations import yaw_of
-from geometry.vectors import Quaternion
+from framerunner.geometry.rotations import yaw_of
+from framerunner.geometry.vectors import Quaternion
 from scenarios.gimbal import Gimbal
 from scenarios.models import CameraMotion
 

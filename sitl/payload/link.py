@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import asyncio
 
+from framerunner.wire.transports.sockets import Address, bind_udp, resolved_ipv4
+from framerunner.wire.transports.urls import LinkError, is_loopback
 from sitl.links import Receive, UdpAddresses, UdpLink
-from wire.transports.sockets import Address, bind_udp, resolved_ipv4
-from wire.transports.urls import LinkError, is_loopback
 
 _EVERYWHERE = "0.0.0.0"  # where MAVSDK binds: a more specific address would receive before it
 

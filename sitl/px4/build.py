@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from sitl.autopilots.parameters import Value, text_of
 from sitl.autopilots.process import AutopilotProcess
 

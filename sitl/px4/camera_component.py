@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from firmware_py.mavlink.camera.messages import stream_information
 from firmware_py.mavlink.camera.model import VideoStream
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 COMPONENT_ID = int(mavlink.MAV_COMP_ID_CAMERA)
 _COMMAND = mavlink.mavlink_map[mavlink.MAVLINK_MSG_ID_COMMAND_LONG].unpacker

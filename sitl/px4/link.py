@@ -14,10 +14,10 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
+from framerunner.wire.transports.sockets import Address, Stream, listen_tcp
+from framerunner.wire.transports.urls import in_url
 from sitl.autopilots import WARNING
 from sitl.px4.messages import ActuatorControls, ControlsReader
-from wire.transports.sockets import Address, Stream, listen_tcp
-from wire.transports.urls import in_url
 
 FIRST_PORT = 4560  # of PX4's instance 0
 _SOON_S = 0.004  # for which the event loop waits for an answer; it usually comes in a fraction of this

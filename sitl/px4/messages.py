@@ -10,8 +10,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from struct import Struct
 
-from wire.dialect import mavlink
-from wire.framing import CHECKSUM_BYTES, CRC_EXTRA, HEADER_BYTES_V2, MARKER_V2, SIGNATURE_BYTES, SIGNED
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import (
+    CHECKSUM_BYTES,
+    CRC_EXTRA,
+    HEADER_BYTES_V2,
+    MARKER_V2,
+    SIGNATURE_BYTES,
+    SIGNED,
+)
 
 _HEADER = Struct("<BBBBBBBHB")
 _CHECKSUM = Struct("<H")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from firmware_py.airframe import Airframe
+from framerunner.vehicle.airframe import Airframe
 from sitl.autopilots.parameters import Value
 from sitl.px4.transmitter import CHANNELS
 from sitl.sensors.specs import SuiteSpec

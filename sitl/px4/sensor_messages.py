@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from math import atan2, degrees, hypot, isnan, nan, sqrt
 
-from firmware_py.atmosphere import pressure_altitude_m
-from firmware_py.geodesy import LocalProjection
-from firmware_py.measurements import (
+from framerunner.geometry.vectors import ZERO3
+from framerunner.vehicle.atmosphere import pressure_altitude_m
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from framerunner.vehicle.measurements import (
     ExternalPose,
     FlowSample,
     GpsSample,
     RangeSample,
     Readings,
+    Sensors,
 )
-from firmware_py.types import GeodeticPoint, Sensors
-from geometry.vectors import ZERO3
+from framerunner.wire.dialect import degrees_e7, mavlink, millimetres, whole
 from sitl.px4.messages import Packer
 from sitl.px4.transmitter import Channels
 from sitl.sensors.specs import RangeFinderSpec
-from wire.dialect import degrees_e7, mavlink, millimetres, whole
 
 _ACCELEROMETER, _GYROSCOPE = 0b111, 0b111 << 3
 _MAGNETOMETER = 0b111 << 6

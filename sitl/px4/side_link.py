@@ -15,16 +15,16 @@ from pathlib import Path
 from struct import Struct
 from typing import BinaryIO
 
-from firmware_py.types import BatteryState
+from framerunner.vehicle.measurements import BatteryState
+from framerunner.wire.dialect import degrees_e7, mavlink, whole
+from framerunner.wire.framing import HEADER_BYTES_V2, MARKER_V2
+from framerunner.wire.px4_modes import px4_name
 from scenarios.models import Camera
 from sitl.px4.camera_component import CameraComponent
 from sitl.px4.messages import Packer
 from sitl.px4.simulation import Px4Simulation
 from sitl.server_settings import ServerSettings
 from sitl.streaming.streams import video_streams
-from wire.dialect import degrees_e7, mavlink, whole
-from wire.framing import HEADER_BYTES_V2, MARKER_V2
-from wire.px4_modes import px4_name
 
 PERIOD_US = 100_000
 CAMERA_PORT = 14280  # of PX4's instance 0

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import isfinite
 
-from errors import UserError
-from firmware_py.airframe import Airframe
 from firmware_py.battery import BatteryMonitor
-from firmware_py.types import BatteryState
-from geometry.vectors import ZERO3, Vec3
+from framerunner.errors import UserError
+from framerunner.geometry.vectors import ZERO3, Vec3
+from framerunner.vehicle.airframe import Airframe
+from framerunner.vehicle.measurements import BatteryState
 from scenarios.faults.declaration import FaultKind, FaultPart
 from scenarios.models import Scenario
 from sitl.px4.messages import ActuatorControls

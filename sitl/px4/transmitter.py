@@ -8,7 +8,7 @@ import stat
 from collections.abc import Callable
 from struct import Struct
 
-from errors import SettingError
+from framerunner.errors import SettingError
 
 Channels = tuple[int, ...]
 """Pulse widths in microseconds, 1000 to 2000; the first is channel 1."""

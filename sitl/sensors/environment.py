@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from math import hypot
 
-from firmware_py.atmosphere import pressure_pa, temperature_k
-from firmware_py.estimation.earth_field import earth_field_ned_gauss
-from firmware_py.geodesy import LocalProjection
-from firmware_py.measurements import BarometerSample, FixType, GpsSample, MagnetometerSample
-from firmware_py.types import GeodeticPoint
-from geometry.rotations import rotation, to_body
-from geometry.vectors import ZERO3
+from framerunner.geometry.rotations import rotation, to_body
+from framerunner.geometry.vectors import ZERO3
+from framerunner.vehicle.atmosphere import pressure_pa, temperature_k
+from framerunner.vehicle.earth_field import earth_field_ned_gauss
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from framerunner.vehicle.measurements import BarometerSample, FixType, GpsSample, MagnetometerSample
 from sitl.sensors.noise import Delay, GaussMarkov, SamplingTimes, normal_numbers, normal_vector
 from sitl.sensors.specs import BarometerSpec, GpsSpec, MagnetometerSpec
 from sitl.sensors.truth import TrueMotion

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import hypot, inf, nan, sqrt
 
-from firmware_py.measurements import FlowSample, RangeSample
-from geometry.rotations import rotation, to_body
+from framerunner.geometry.rotations import rotation, to_body
+from framerunner.vehicle.measurements import FlowSample, RangeSample
 from sitl.sensors.noise import SamplingTimes, normal_numbers, normal_vector
 from sitl.sensors.specs import OpticalFlowSpec, RangeFinderSpec
 from sitl.sensors.truth import TrueMotion

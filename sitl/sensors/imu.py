@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import copysign, sqrt
 
-from firmware_py.airframe import Airframe
-from firmware_py.measurements import ImuSample
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.airframe import Airframe
+from framerunner.vehicle.measurements import ImuSample
 from sitl.sensors.noise import GaussMarkov, normal_numbers, normal_vector
 from sitl.sensors.specs import ImuSpec
 from sitl.sensors.truth import TrueMotion

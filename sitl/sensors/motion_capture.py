@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from firmware_py.measurements import ExternalPose
-from geometry.rotations import multiply, normalized, rotation, to_world
-from geometry.vectors import NAN3, Quaternion, Vec3
+from framerunner.geometry.rotations import multiply, normalized, rotation, to_world
+from framerunner.geometry.vectors import NAN3, Quaternion, Vec3
+from framerunner.vehicle.measurements import ExternalPose
 from sitl.sensors.noise import Delay, SamplingTimes, normal_numbers, normal_vector
 from sitl.sensors.specs import ExternalPoseSpec
 from sitl.sensors.truth import TrueMotion

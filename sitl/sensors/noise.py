@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from math import exp, sqrt
 from typing import Generic, TypeVar
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from scenarios.random_numbers import random_stream
 
 _BLOCK = 256  # rows drawn at once; a call of numpy costs as much as many numbers

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from errors import UserError
-from firmware_py.airframe import Airframe
-from firmware_py.measurements import ExternalPose, Readings
-from firmware_py.types import GeodeticPoint
+from framerunner.errors import UserError
+from framerunner.vehicle.airframe import Airframe
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import ExternalPose, Readings
 from scenarios.models import Origin
 from scenarios.yaml_file import FileKind
 from sitl.sensors.battery_monitor import BatteryMonitor

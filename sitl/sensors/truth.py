@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan2, sqrt
 
-from firmware_py.airframe import GRAVITY_M_S2
-from geometry.rotations import rotation, to_body
-from geometry.vectors import ZERO3, Quaternion, Vec3
+from framerunner.geometry.rotations import rotation, to_body
+from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
+from framerunner.vehicle.airframe import GRAVITY_M_S2
 
 _MIN_SINE = 1e-9  # of half a turn's angle, below which the angle equals its sine in double precision
 

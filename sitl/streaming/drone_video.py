@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from geometry.rotations import rotation, yaw_of
-from geometry.solids import Solid
+from framerunner.geometry.rotations import rotation, yaw_of
+from framerunner.geometry.solids import Solid
+from framerunner.wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
 from scenarios.models import TrueState
 from scenarios.result import LocalFrame, Standing, StandingPlace
 from scenarios.task import Task
 from sitl.server_settings import ServerSettings
 from sitl.vehicle import SimulatedVehicle
-from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
 
 if TYPE_CHECKING:
     from sitl.camera import CameraFeed

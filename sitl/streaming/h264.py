@@ -10,8 +10,8 @@ import numpy as np
 from av.container import OutputContainer
 from av.video.stream import VideoStream
 
+from framerunner.wire.h264_rtp import RTP_CLOCK_HZ
 from sitl.optics.painter import Image
-from wire.h264_rtp import RTP_CLOCK_HZ
 
 CLOCK_HZ = RTP_CLOCK_HZ  # of the time stamps
 

@@ -6,10 +6,10 @@ import socket
 from math import degrees
 
 from firmware_py.mavlink.camera.model import VideoEncoding, VideoStream
+from framerunner.wire.simulator_api import VIDEO_PATH
+from framerunner.wire.transports.urls import in_url, is_loopback
 from scenarios.models import Camera
 from sitl.server_settings import ServerSettings
-from wire.simulator_api import VIDEO_PATH
-from wire.transports.urls import in_url, is_loopback
 
 
 def video_streams(settings: ServerSettings, camera: Camera) -> tuple[VideoStream, ...]:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import acos, atan2, degrees, hypot, nan
 
-from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import (
@@ -18,8 +17,11 @@ from firmware_py.setpoints import (
     TrajectorySetpoint,
 )
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from firmware_py.types import GeodeticPoint, ManualInput, Sensors
-from geometry.vectors import Vec3
+from firmware_py.types import ManualInput
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.airframe import load_airframe
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import Sensors
 from scenarios.models import Scenario
 from sitl.world import World
 

@@ -7,13 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.commands import FlightLimits, VelocityCommand
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from firmware_py.types import GeodeticPoint, MotorOutput, Sensors
+from firmware_py.types import MotorOutput
+from framerunner.vehicle.airframe import load_airframe
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import Sensors
 
 AIRFRAME = load_airframe("abejorro")
 ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)

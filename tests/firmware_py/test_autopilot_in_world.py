@@ -4,11 +4,11 @@ from math import hypot
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from firmware_py.types import GeodeticPoint
+from framerunner.vehicle.airframe import load_airframe
+from framerunner.vehicle.geodesy import GeodeticPoint
 from scenarios.models import Scenario
 from sitl.world import World
 

@@ -2,9 +2,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_py.airframe import load_airframe
 from firmware_py.battery import BatteryMonitor, battery_settings, warning
 from firmware_py.parameters import Parameters
+from framerunner.vehicle.airframe import load_airframe
 
 X500 = load_airframe("x500")
 

@@ -8,7 +8,7 @@ import pytest
 from firmware_py.guidance.orbit import Orbit, OrbitYaw
 from firmware_py.missions.items import PlanType
 from firmware_py.status import CommandResult, FlightMode
-from firmware_py.types import GeodeticPoint
+from framerunner.vehicle.geodesy import GeodeticPoint
 from tests.firmware_py.flying import ORIGIN, Flight
 from tests.firmware_py.missions.mission_world import Do, at
 

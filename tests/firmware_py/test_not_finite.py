@@ -5,8 +5,8 @@ from math import inf, isfinite, nan
 
 import pytest
 
-from firmware_py.measurements import ExternalPose, Readings
 from firmware_py.types import MotorOutput
+from framerunner.vehicle.measurements import ExternalPose, Readings
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 

@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from errors import SettingError
 from framerunner.child_process import MonitorProcess
-from monitor.run import FIRST_VIEWER
+from framerunner.errors import SettingError
+from framerunner.monitor.run import FIRST_VIEWER
 from scenarios.loader import load_scenario
 from tests.waiting import until
 

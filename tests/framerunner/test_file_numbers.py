@@ -12,10 +12,10 @@ import pytest
 import yaml
 from pydantic import BaseModel
 
-from errors import UserError
-from firmware_py.airframe import Airframe, load_airframe
+from framerunner.errors import UserError
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
+from framerunner.vehicle.airframe import Airframe, load_airframe
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario

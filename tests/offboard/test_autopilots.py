@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import pytest
 from mavsdk.asyncio import MavsdkError
 
+from framerunner.wire.vehicle_identity import simulator_uid
 from offboard.link.autopilots import is_own_autopilot
-from wire.vehicle_identity import simulator_uid
 
 
 @pytest.mark.parametrize(("uid", "own"), [(simulator_uid(1), True), (simulator_uid(2), False), (77, False)])

@@ -8,11 +8,7 @@ import socket
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from offboard.link import companion as module
-from offboard.link.companion import Companion
-from offboard.link.connections import _log
-from offboard.link.telemetry import TelemetryFeed
-from wire.mission_tunnel import (
+from framerunner.wire.mission_tunnel import (
     DocumentAssembler,
     DocumentKind,
     MissionDetections,
@@ -21,6 +17,10 @@ from wire.mission_tunnel import (
     decode_state,
     split_document,
 )
+from offboard.link import companion as module
+from offboard.link.companion import Companion
+from offboard.link.connections import _log
+from offboard.link.telemetry import TelemetryFeed
 
 SYSTEM = 3
 STATE = MissionState(

@@ -6,13 +6,13 @@ import asyncio
 
 import pytest
 
+from framerunner.wire.mission_tunnel import MissionState
 from offboard.drone import DroneError
 from offboard.link.companion import Companion
 from offboard.mavsdk_drone import MavsdkDrone
 from tests.free_ports import free_port
 from tests.offboard.udp_vehicle import UdpVehicle
 from tests.processes import wait_until
-from wire.mission_tunnel import MissionState
 
 pytestmark = pytest.mark.realtime
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from geometry.rotations import euler_from_quaternion, quaternion_from_euler
+from framerunner.geometry.rotations import euler_from_quaternion, quaternion_from_euler
 from offboard.link.gimbal_feed import GimbalFeed
 
 LOCKED, IN_VEHICLE_FRAME, IN_EARTH_FRAME = 16, 32, 64

@@ -6,8 +6,8 @@ import asyncio
 import json
 from types import SimpleNamespace
 
+from framerunner.wire.vehicle_telemetry import MessageOrder
 from offboard.link.telemetry import SAMPLES_KEPT, TelemetryFeed
-from wire.vehicle_telemetry import MessageOrder
 
 
 def test_what_is_older_is_dropped_and_a_jump_of_seconds_is_a_restart():

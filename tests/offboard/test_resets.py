@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from geometry.axes import Alignment, Pose
+from framerunner.geometry.axes import Alignment, Pose
 from offboard.drone import DroneError
 from offboard.link.resets import ResetFeed, followed
 

@@ -1,10 +1,10 @@
 """ArduCopter's dialect with time that waits, against a protocol fake of MAVSDK's plugin `mavlink_direct`."""
 
+from framerunner.wire.dialect import mavlink
 from offboard.drone import VelocityCommand
 from offboard.link.stepped_ardupilot import SteppedArduPilotDialect
 from offboard.link.telemetry import TelemetryFeed
 from tests.offboard.test_stepped_px4 import FakePlugin
-from wire.dialect import mavlink
 
 UP = VelocityCommand(up_m_s=1.0)
 

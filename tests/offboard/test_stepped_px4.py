@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from framerunner.wire.dialect import mavlink
 from offboard.drone import DroneError, VelocityCommand
 from offboard.link import stepped, stepped_px4
 from offboard.link.direct import CommandRefusedError
 from offboard.link.stepped_px4 import SteppedPx4Dialect
-from wire.dialect import mavlink
 
 FORWARD = VelocityCommand(forward_m_s=1.0, left_m_s=0.5, up_m_s=0.25, yaw_rate_rad_s=0.1)
 

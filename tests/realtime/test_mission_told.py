@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import pytest
 from pymavlink import mavutil
 
+from framerunner.wire.mission_tunnel import DocumentAssembler, DocumentKind, decode_detections, decode_state
 from offboard.mission import load_mission, mermaid
 from tests.processes import bound, free_instance, program
-from wire.mission_tunnel import DocumentAssembler, DocumentKind, decode_detections, decode_state
 
 mavlink = mavutil.mavlink
 pytestmark = [pytest.mark.realtime, pytest.mark.alone]

@@ -10,8 +10,8 @@ import pytest
 
 from scenarios.loader import load_scenario
 from tests.chromium import Complaints, chromium
-from tests.monitor.pilot_server import served
-from tests.monitor.simulated_link import SimulatedLink, equipment
+from tests.framerunner.monitor.pilot_server import served
+from tests.framerunner.monitor.simulated_link import SimulatedLink, equipment
 
 pytestmark = pytest.mark.realtime
 

@@ -12,8 +12,8 @@ from math import isnan, nan
 import pytest
 from pymavlink import mavutil
 
+from framerunner.wire import extra_messages
 from tests.processes import simulator
-from wire import extra_messages
 
 mavlink = mavutil.mavlink
 pytestmark = pytest.mark.realtime

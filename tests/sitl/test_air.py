@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from firmware_py.airframe import AirEffects, load_airframe
+from framerunner.vehicle.airframe import AirEffects, load_airframe
 from scenarios.air import Wind
 from scenarios.models import Base, Scenario, Start
 from sitl.air.turbulence import MIN_AIRSPEED_M_S

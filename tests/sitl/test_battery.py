@@ -1,7 +1,7 @@
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.parameters import Parameters
+from framerunner.vehicle.airframe import load_airframe
 from sitl.battery import Battery
 
 X500 = load_airframe("x500")

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from geometry.solids import Solid
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import Quaternion, Vec3
 from scenarios.models import Arena, Base, Camera, Decoy, Doorway, Frame, Light, Pole, Scenario, Wall
 from sitl.camera import Camera as PaintedCamera
 from sitl.camera_projection import SUBPIXELS, Mesh, Pinhole

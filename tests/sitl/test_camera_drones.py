@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry.solids import Solid
+from framerunner.geometry.solids import Solid
 from scenarios.loader import load_scenario
 from scenarios.models import Base, Doorway, Scenario, Start, Wall
 from sitl.camera import Camera

@@ -4,7 +4,7 @@ from math import cos, exp, sqrt, tanh
 
 import pytest
 
-from firmware_py.airframe import load_airframe
+from framerunner.vehicle.airframe import load_airframe
 from sitl.dynamics import Dynamics
 from tests.flight import ORIGIN
 

@@ -5,7 +5,7 @@ from math import dist
 
 import pytest
 
-from firmware_py.airframe import load_airframe
+from framerunner.vehicle.airframe import load_airframe
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Start, ground_height, is_over_base
 from sitl.fleet import Fleet, side_by_side

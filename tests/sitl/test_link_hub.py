@@ -7,18 +7,18 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.types import GeodeticPoint
+from framerunner.vehicle.airframe import load_airframe
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
+from framerunner.wire.transports.sockets import MAX_UNSENT_BYTES
+from framerunner.wire.transports.urls import LinkError
 from sitl.link_hub import LinkHub
 from sitl.server_settings import parse_link
 from tests.free_ports import free_port
 from tests.processes import bound
-from wire.dialect import mavlink
-from wire.framing import PacketReader
-from wire.transports.sockets import MAX_UNSENT_BYTES
-from wire.transports.urls import LinkError
 
 STATION = mavlink.MAVLink(None, 255, 190)
 BEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)

@@ -2,13 +2,13 @@
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
-from firmware_py.types import GeodeticPoint
+from framerunner.vehicle.airframe import load_airframe
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.wire.dialect import mavlink
 from sitl.link_hub import LinkInput
-from wire.dialect import mavlink
 
 BEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
 TURN_S = 0.0005

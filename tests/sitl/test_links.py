@@ -6,8 +6,8 @@ import socket
 
 import pytest
 
+from framerunner.wire.transports.urls import LinkError
 from sitl.links import MAX_PEERS, UdpAddresses, UdpLink, open_udp
-from wire.transports.urls import LinkError
 
 PACKET = bytes((0xFD, 0, 0))
 

@@ -5,9 +5,9 @@ from math import hypot, pi, sqrt
 import numpy as np
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.commands import VelocityCommand
 from firmware_py.status import FlightMode
+from framerunner.vehicle.airframe import load_airframe
 from scenarios.air import Wind
 from scenarios.models import Frame, Scenario
 from tests.firmware_py.flying import Flight

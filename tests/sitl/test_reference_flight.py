@@ -10,11 +10,11 @@ import pytest
 
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 from tests.node_input import deliver
-from wire.dialect import mavlink
-from wire.framing import PacketReader
 
 COMMANDS = [  # time, command, params
     (8.04, 512, (148, 0, 0, 0, 0, 0, 0)),

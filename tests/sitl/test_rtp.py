@@ -7,10 +7,10 @@ import av
 import numpy as np
 import pytest
 
+from framerunner.wire.transports.urls import LinkError
 from scenarios.models import Camera
 from sitl.streaming.rtp import RtpSender
 from tests.free_ports import free_port
-from wire.transports.urls import LinkError
 
 CAMERA = Camera(width_px=320, height_px=240, rate_hz=10.0)
 RED, GREEN, BLUE = (0, 0, 255), (0, 255, 0), (255, 0, 0)

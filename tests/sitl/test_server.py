@@ -9,6 +9,8 @@ from dataclasses import replace
 import aiohttp
 import pytest
 
+from framerunner.wire.signing import SigningKey
+from framerunner.wire.transports.urls import LinkError
 from scenarios.loader import load_scenario
 from scenarios.task import Task
 from sitl.fleet import side_by_side
@@ -21,8 +23,6 @@ from sitl.video import VideoError
 from sitl.world import CONTROL_PERIOD_US
 from tests.processes import bound, free_instance
 from tests.waiting import until
-from wire.signing import SigningKey
-from wire.transports.urls import LinkError
 
 GREETING = "Ctrl-C stops"
 

@@ -5,8 +5,8 @@ from math import inf
 import pytest
 
 from firmware_py.mavlink.telemetry.profiles import GROUND, NORMAL, ONBOARD
+from framerunner.wire.transports.urls import LinkError
 from sitl.server_settings import parse_link
-from wire.transports.urls import LinkError
 
 
 @pytest.mark.parametrize(

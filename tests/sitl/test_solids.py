@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from geometry.solids import Solid
+from framerunner.geometry.solids import Solid
 from scenarios.models import Frame
 from sitl.solids import frame_solids, touch
 

@@ -4,9 +4,9 @@ from math import hypot, isfinite, pi
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.commands import VelocityCommand
 from firmware_py.control.stabiliser import Stabiliser
+from framerunner.vehicle.airframe import load_airframe
 from scenarios.models import Base, Decoy, Frame, Pole, Scenario, Start, Wall
 from sitl.world import CONTROL_PERIOD_US, MAX_RATE_RAD_S, PHYSICS_RATE_HZ, World
 from tests.flight import state_of

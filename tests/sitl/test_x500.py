@@ -4,8 +4,8 @@ from math import cos, hypot, radians, sin, sqrt, tanh
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.commands import VelocityCommand
+from framerunner.vehicle.airframe import load_airframe
 from scenarios.loader import load_scenario
 from sitl.dynamics import Dynamics
 from sitl.world import World

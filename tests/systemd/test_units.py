@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from errors import SettingError
 from framerunner.cli import build_app
 from framerunner.commands.hardware import SERVICE_VARIABLE, HardwareOptions, hardware_of
+from framerunner.errors import SettingError
 
 FOLDER = Path(__file__).parents[2] / "systemd"
 PROGRAM = "/opt/framerunner/.venv/bin/framerunner"

@@ -5,7 +5,7 @@ from math import acos, atan2, cos, degrees, hypot, inf, pi, sin
 import numpy as np
 import pytest
 
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.vectors import Quaternion, Vec3
 from scenarios.models import Base, Frame, Scenario
 from sitl.camera import Camera
 from vision.detector import detect

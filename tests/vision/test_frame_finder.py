@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from geometry.rotations import quaternion_from_euler
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import quaternion_from_euler
+from framerunner.geometry.vectors import Quaternion, Vec3
 from scenarios.imaging.clutter import Hall, Patch
 from scenarios.imaging.effects import CameraEffects, Lens
 from scenarios.models import Base, Frame, Pole, Scenario

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from errors import UserError
+from framerunner.errors import UserError
 from vision.types import Image
 
 Series = npt.NDArray[np.float64]

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from geometry.lens import distorted, rays_of_pixels
+from framerunner.geometry.lens import distorted, rays_of_pixels
 from vision.calibration.model import Calibration, CalibrationError
 from vision.types import Detection
 

@@ -7,9 +7,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from errors import UserError
-from geometry.lens import Coefficients
-from geometry.rotations import MAX_MOUNTING_RAD
+from framerunner.errors import UserError
+from framerunner.geometry.lens import Coefficients
+from framerunner.geometry.rotations import MAX_MOUNTING_RAD
 
 Coefficient = Annotated[float, Field(ge=-100, le=100)]
 _Weight = Annotated[float, Field(ge=-10, le=10)]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from geometry.rotations import mounting_flu, rotation, rotation_rows
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import mounting_flu, rotation, rotation_rows
+from framerunner.geometry.vectors import Quaternion, Vec3
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

@@ -21,7 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from vision.calibration.motion import Bools, Floats, Motion, mounting_matrix
 from vision.calibration.sightings import (
     MIN_OF_A_FRAME,

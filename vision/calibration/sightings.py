@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from vision.calibration.motion import Bools, Floats, Motion, mounting_matrix
 from vision.types import Detections, FrameSighting
 

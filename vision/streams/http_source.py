@@ -11,10 +11,10 @@ from typing import Generic, Self, TypeVar
 
 import aiohttp
 
+from framerunner.wire.mjpeg import MjpegReader, Part, StreamError
 from vision.decoder import ImageDecoder
 from vision.jpeg import ImageError
 from vision.types import CameraError, CameraFrame, shown_url
-from wire.mjpeg import MjpegReader, Part, StreamError
 
 _FEED_BYTES = 16 * 1024  # of the stream, between which other tasks run
 _MAX_PARTS_PER_S = 1000

@@ -13,7 +13,9 @@ from firmware_py.estimation.aiding.target import Target
 from firmware_py.estimation.error_state import POSITION, VELOCITY
 from firmware_py.estimation.report import Ratios, Sensor
 from firmware_py.estimation.settings import EstimatorSettings
-from firmware_py.measurements import (
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import (
     BarometerSample,
     ExternalPose,
     FlowSample,
@@ -21,8 +23,6 @@ from firmware_py.measurements import (
     MagnetometerSample,
     RangeSample,
 )
-from firmware_py.types import GeodeticPoint
-from geometry.vectors import Vec3
 
 Sample = ExternalPose | GpsSample | MagnetometerSample | BarometerSample | RangeSample | FlowSample
 

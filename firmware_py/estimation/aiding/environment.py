@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from math import isfinite
 
-from firmware_py.atmosphere import metres_per_pascal, pressure_altitude_m
 from firmware_py.estimation.aiding.aid import Aid
 from firmware_py.estimation.aiding.target import UNKNOWN_M2, Target
 from firmware_py.estimation.error_state import ATTITUDE, POSITION
 from firmware_py.estimation.settings import EstimatorSettings
-from firmware_py.measurements import BarometerSample, MagnetometerSample
-from geometry.rotations import rotation, to_body
-from geometry.vectors import Vec3
+from framerunner.geometry.rotations import rotation, to_body
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.atmosphere import metres_per_pascal, pressure_altitude_m
+from framerunner.vehicle.measurements import BarometerSample, MagnetometerSample
 
 
 class BarometerAiding:

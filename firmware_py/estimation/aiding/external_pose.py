@@ -11,9 +11,9 @@ from firmware_py.estimation.aiding.target import MAX_RESETS, Target
 from firmware_py.estimation.error_state import ATTITUDE, POSITION, Matrix
 from firmware_py.estimation.joint_update import JointUpdate
 from firmware_py.estimation.settings import EstimatorSettings
-from firmware_py.measurements import ExternalPose
-from geometry.rotations import euler_from_quaternion, rotation, yaw_of
-from geometry.vectors import Vec3
+from framerunner.geometry.rotations import euler_from_quaternion, rotation, yaw_of
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.measurements import ExternalPose
 
 _MAX_PITCH_RAD = 1.3  # beyond, there is no heading
 _HEADING = 3  # index of its row, behind those of the position

@@ -13,10 +13,9 @@ from firmware_py.estimation.aiding.aid import NEVER_US, Aid
 from firmware_py.estimation.aiding.target import MAX_RESETS, UNKNOWN_M2, Target
 from firmware_py.estimation.error_state import POSITION, VELOCITY
 from firmware_py.estimation.settings import EstimatorSettings
-from firmware_py.geodesy import LocalProjection
-from firmware_py.measurements import FixType, GpsSample
-from firmware_py.types import GeodeticPoint
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from framerunner.vehicle.measurements import FixType, GpsSample
 
 _SETTLING_US = 1_000_000  # of good solutions before the first is used
 _MAX_ACCURACY_M = (3.0, 5.0)  # horizontal and vertical; PX4: EKF2_REQ_EPH, EKF2_REQ_EPV

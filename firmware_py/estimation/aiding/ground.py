@@ -13,8 +13,8 @@ from firmware_py.estimation.aiding.aid import NEVER_US, Aid
 from firmware_py.estimation.aiding.target import UNKNOWN_M2, Target
 from firmware_py.estimation.error_state import ATTITUDE, POSITION, VELOCITY
 from firmware_py.estimation.settings import EstimatorSettings
-from firmware_py.measurements import FlowSample, RangeSample
-from geometry.rotations import rotation, to_body
+from framerunner.geometry.rotations import rotation, to_body
+from framerunner.vehicle.measurements import FlowSample, RangeSample
 
 _MIN_DOWN = 0.7  # cosine of the largest tilt at which the ground is measured
 _MOVE_US = 200_000

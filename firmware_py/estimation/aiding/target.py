@@ -18,7 +18,7 @@ from firmware_py.estimation.error_state import (
 )
 from firmware_py.estimation.navigation_filter import NavigationFilter
 from firmware_py.estimation.settings import EstimatorSettings
-from geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.vectors import ZERO3, Vec3
 
 MAX_RESETS = 2
 """So often within 10 s an estimate is set to a source's measurements that do not fit."""

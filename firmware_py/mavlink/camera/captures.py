@@ -9,9 +9,9 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera import messages
 from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink
 from firmware_py.status import CommandResult
-from geometry.vectors import Vec3
-from wire.dialect import Message
-from wire.exchange import Exchange
+from framerunner.geometry.vectors import Vec3
+from framerunner.wire.dialect import Message
+from framerunner.wire.exchange import Exchange
 
 MAX_COUNT = 1_000_000
 _REMEMBERED = 1000  # pictures whose messages can be requested again

@@ -23,8 +23,8 @@ from firmware_py.mavlink.camera.streaming import Streaming
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.exchange import Exchange
 
 _HEARTBEAT_US = 1_000_000
 

@@ -8,8 +8,8 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera.model import CameraModel, PictureSpace, VideoEncoding, VideoStream
 from firmware_py.mavlink.telemetry.connection import OWN_VERSION
 from firmware_py.status import FlightMode
-from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres
-from wire.exchange import Exchange
+from framerunner.wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres
+from framerunner.wire.exchange import Exchange
 
 _STREAMS = mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
 _RECORDS = (  # pictures are taken while video is recorded, and both in each mode

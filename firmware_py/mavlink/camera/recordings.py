@@ -8,7 +8,7 @@ from math import inf
 from firmware_py.mavlink.camera.model import CaptureSink
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
-from wire.exchange import Exchange
+from framerunner.wire.exchange import Exchange
 
 _MIN_REPORT_S = 0.1
 

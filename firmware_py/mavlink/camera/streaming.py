@@ -13,7 +13,7 @@ from firmware_py.mavlink.camera import messages
 from firmware_py.mavlink.camera.model import VideoEncoding, VideoStream
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
-from wire.dialect import Message, mavlink
+from framerunner.wire.dialect import Message, mavlink
 
 
 class Streaming:

@@ -9,9 +9,9 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.guidance.orbit import Orbit, OrbitYaw
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.status import CommandResult, FlightMode
-from firmware_py.types import GeodeticPoint
-from geometry.vectors import NAN3, Vec3
-from wire.dialect import mavlink
+from framerunner.geometry.vectors import NAN3, Vec3
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.wire.dialect import mavlink
 
 FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM
 _STANDARD_MODES = {mode.value.standard: mode for mode in FlightMode if mode.value.standard}

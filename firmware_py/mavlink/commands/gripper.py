@@ -12,7 +12,7 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 _FIRST = 1.0
 

@@ -13,7 +13,7 @@ from typing import Protocol
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.status import CommandResult
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 _MAX_NUMBER = 0xFFFF
 _INFO, _WARNING = mavlink.MAV_SEVERITY_INFO, mavlink.MAV_SEVERITY_WARNING

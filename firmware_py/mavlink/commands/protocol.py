@@ -11,9 +11,9 @@ from math import nan
 
 from firmware_py.mavlink.service import Command, CommandHandler, Handler, Service
 from firmware_py.status import CommandResult
-from wire.dialect import BROADCAST, Message, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.wire.dialect import BROADCAST, Message, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 _TO_EVERYONE = (
     mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION,

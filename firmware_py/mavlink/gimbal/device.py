@@ -12,9 +12,9 @@ from firmware_py.mavlink.gimbal.model import GIMBAL_COMPONENT_ID, GimbalDevice
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.mavlink.telemetry.connection import OWN_VERSION
 from firmware_py.status import CommandResult
-from geometry.rotations import quaternion_from_euler, yaw_of
-from wire.dialect import BROADCAST, Message, boot_ms, mavlink
-from wire.exchange import Exchange
+from framerunner.geometry.rotations import quaternion_from_euler, yaw_of
+from framerunner.wire.dialect import BROADCAST, Message, boot_ms, mavlink
+from framerunner.wire.exchange import Exchange
 
 _HEARTBEAT_US = 1_000_000
 _ATTITUDE_US = 100_000

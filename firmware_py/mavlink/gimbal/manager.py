@@ -14,11 +14,11 @@ from firmware_py.mavlink.gimbal.model import GIMBAL_COMPONENT_ID, GimbalDevice, 
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
-from geometry.rotations import euler_from_quaternion, normalized, yaw_of
-from geometry.vectors import Vec3
-from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, boot_ms, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.geometry.rotations import euler_from_quaternion, normalized, yaw_of
+from framerunner.geometry.vectors import Vec3
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, boot_ms, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 Controller = tuple[int, int]  # system and component id; zeros: nobody
 

@@ -29,9 +29,9 @@ from firmware_py.mavlink.ground_station.event_definitions import (
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import StatusText
-from wire.dialect import Message, boot_ms, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.wire.dialect import Message, boot_ms, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 _FIRST_SEQUENCE = 65525
 _KEPT = 20

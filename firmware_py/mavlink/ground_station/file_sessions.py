@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from struct import Struct
 
 from firmware_py.storage import Path
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 PAYLOAD_BYTES = 251
 DATA_BYTES = 239  # of one payload, after the header

@@ -30,9 +30,9 @@ from firmware_py.mavlink.ground_station.file_sessions import (
 )
 from firmware_py.mavlink.service import Service
 from firmware_py.storage import Entry, Path, Storage, parse_path, refuse, sound_name
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 _BURST_PACKETS = 8  # a link and update: some 480 kB/s at 250 updates a second
 _BURST_BYTES = 35_000  # as PX4

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 
 from firmware_py.mavlink.service import Service
 from firmware_py.storage import LOG_SUFFIX, Path, Storage
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 LOG_FOLDER: Path = ("log",)
 _CHUNK = 90

@@ -24,9 +24,9 @@ from firmware_py.mavlink.ground_station.event_definitions import (
 )
 from firmware_py.mavlink.service import Service
 from firmware_py.parameters import DECLARATIONS, Parameter, Parameters
-from wire.dialect import Message, boot_ms, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.wire.dialect import Message, boot_ms, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 FOLDER = "etc/extras"
 GENERAL_FILE = f"{FOLDER}/component_general.json.xz"

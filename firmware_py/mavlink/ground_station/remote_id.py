@@ -11,9 +11,9 @@ from math import atan2, degrees, hypot
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
 from firmware_py.status import LandedState, VehicleStatus
-from wire.dialect import BROADCAST, Message, degrees_e7, mavlink, whole
-from wire.exchange import Exchange
-from wire.vehicle_identity import simulator_uid
+from framerunner.wire.dialect import BROADCAST, Message, degrees_e7, mavlink, whole
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.vehicle_identity import simulator_uid
 
 _NO_IDENTITY = [0] * 20
 _UNKNOWN_M = -1000.0

@@ -17,9 +17,9 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
 from firmware_py.mavlink.telemetry.connection import FOLLOWED_PX4_VERSION, OWN_VERSION
 from firmware_py.parameters import ParameterError
-from wire.dialect import BROADCAST, Message, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.wire.dialect import BROADCAST, Message, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 _PROMPT = b"nsh> "
 _PIECE_BYTES = 70

@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import isfinite
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.geodesy import LocalProjection
 from firmware_py.mavlink.camera.model import CameraControl
 from firmware_py.mavlink.commands.gripper import GripperService
 from firmware_py.mavlink.gimbal.manager import GimbalManager
@@ -16,9 +15,9 @@ from firmware_py.missions.checks import mission_faults
 from firmware_py.missions.flight import IssuedCommand, View
 from firmware_py.missions.geofence import Geofence
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from firmware_py.types import GeodeticPoint
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.exchange import Exchange
 
 _REPEATS, _REPEAT_US = 10, 1_000_000  # of MISSION_ITEM_REACHED, as PX4
 _NO_TOTAL = 0xFFFF

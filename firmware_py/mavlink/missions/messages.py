@@ -26,7 +26,7 @@ from firmware_py.missions.items import (
     MissionItem,
     PlanType,
 )
-from wire.dialect import Message, mavlink, whole
+from framerunner.wire.dialect import Message, mavlink, whole
 
 _NOT_GIVEN = 0x7FFF_FFFF  # x or y of MISSION_ITEM_INT
 _REGIONS = frozenset({Do.NAV_ROI, Do.SET_ROI})

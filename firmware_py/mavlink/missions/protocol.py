@@ -23,9 +23,9 @@ from firmware_py.mavlink.service import Service
 from firmware_py.missions.geofence import fence_fault
 from firmware_py.missions.items import MissionItem, PlanType
 from firmware_py.missions.store import Plan
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 _RETRY_US = 250_000  # until an item is requested again
 _TIMEOUT_US = 5_000_000  # of the other side

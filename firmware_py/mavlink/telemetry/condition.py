@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
-from firmware_py.types import MotorSpeeds
-from wire.dialect import Message, boot_ms, mavlink, whole
+from framerunner.vehicle.measurements import MotorSpeeds
+from framerunner.wire.dialect import Message, boot_ms, mavlink, whole
 
 _UNKNOWN_16 = 0xFFFF
 _TEMPERATURE_UNKNOWN = 0x7FFF

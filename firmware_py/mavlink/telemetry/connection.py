@@ -14,10 +14,10 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
 from firmware_py.mavlink.time_sync import Clocks
 from firmware_py.status import NAVIGATION_STATES, FlightMode, VehicleStatus
-from wire.dialect import BROADCAST, Message, boot_ms, mavlink
-from wire.exchange import Exchange
-from wire.link import Link
-from wire.vehicle_identity import simulator_uid
+from framerunner.wire.dialect import BROADCAST, Message, boot_ms, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
+from framerunner.wire.vehicle_identity import simulator_uid
 
 FOLLOWED_PX4_VERSION = (1, 17, 0)
 OWN_VERSION = (0, 1, 0)

@@ -12,7 +12,7 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.estimation.report import EstimatorReport, Sensor
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from firmware_py.status import LandedState
-from wire.dialect import Message, mavlink, whole
+from framerunner.wire.dialect import Message, mavlink, whole
 
 _POSITION = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _ATTITUDE = mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION | mavlink.MAV_SYS_STATUS_AHRS

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from math import atan2, degrees, hypot, isfinite, sqrt
 
-from firmware_py.atmosphere import pressure_altitude_m
 from firmware_py.estimation.report import EstimatorReport, Sensor
-from firmware_py.measurements import FixType, MagnetometerSample
-from geometry.vectors import ZERO3, Vec3
-from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, whole
+from framerunner.geometry.vectors import ZERO3, Vec3
+from framerunner.vehicle.atmosphere import pressure_altitude_m
+from framerunner.vehicle.measurements import FixType, MagnetometerSample
+from framerunner.wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, whole
 
 _MILLI_G = 1000.0 / 9.80665  # of 1 m/s²
 _KELVIN = 273.15

@@ -6,17 +6,18 @@ from collections.abc import Callable, Sequence
 from math import degrees, hypot, isfinite, isnan, nan
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.geodesy import LocalProjection
 from firmware_py.mavlink.service import Service
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode
-from firmware_py.types import GeodeticPoint, Sensors, VehicleState
-from geometry.rotations import rotation
-from geometry.vectors import NAN3, Quaternion
-from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, whole
-from wire.exchange import Exchange
-from wire.link import Link
+from firmware_py.types import VehicleState
+from framerunner.geometry.rotations import rotation
+from framerunner.geometry.vectors import NAN3, Quaternion
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from framerunner.vehicle.measurements import Sensors
+from framerunner.wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, whole
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 _COVARIANCE_UNKNOWN = [nan] + [0.0] * 20
 _DIAGONAL = (0, 6, 11, 15, 18, 20)  # of a symmetric matrix of 6 rows, in the rows of its upper triangle

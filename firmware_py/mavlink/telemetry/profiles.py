@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from wire.dialect import mavlink
-from wire.link import LinkProfile
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.link import LinkProfile
 
 # Hz on the onboard link (UDP 14540), the ground station link (UDP 14550) and a radio; 0: not streamed.
 _RATES_HZ: dict[str, tuple[float, float, float]] = {

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from math import atan2, degrees, hypot, nan
 
-from firmware_py.atmosphere import pressure_hpa, temperature_k
 from firmware_py.autopilot import Autopilot
 from firmware_py.estimation.report import Sensor
 from firmware_py.mavlink.telemetry import measured
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
-from geometry.rotations import rotation, to_body
-from geometry.vectors import Quaternion, Vec3
-from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, whole
+from framerunner.geometry.rotations import rotation, to_body
+from framerunner.geometry.vectors import Quaternion, Vec3
+from framerunner.vehicle.atmosphere import pressure_hpa, temperature_k
+from framerunner.wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, whole
 
 # North, east, down at PX4's simulated home (Zurich), gauss; World Magnetic Model 2025, two digits.
 EARTH_FIELD_NED_GAUSS: Vec3 = (0.22, 0.013, 0.43)

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
 from firmware_py.types import StatusText
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.exchange import Exchange
 
 _PIECE = 50
 _KEPT = 8

@@ -13,10 +13,10 @@ from math import isfinite, nan
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Command, CommandHandler, Reply, Service, Source
 from firmware_py.status import CommandResult
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
-from wire.framing import Packet
-from wire.link import Link
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.exchange import Exchange
+from framerunner.wire.framing import Packet
+from framerunner.wire.link import Link
 
 AutopilotSource = Callable[[Autopilot], Message | None]
 """Makes a message from the autopilot's state; None: it has no content yet."""

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 from weakref import WeakValueDictionary
 
-from errors.files import make_file, read_text, resolved_in_folder
 from framerunner.editing.documents.open_document import OpenDocument, write_problem
 from framerunner.editing.words import Language, Said, SaidError
+from framerunner.files.text_file import make_file, read_text, resolved_in_folder
 from offboard.mission import MISSIONS, list_missions, new_mission
 from offboard.pilot import Pilot
 

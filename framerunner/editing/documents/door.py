@@ -16,7 +16,6 @@ from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, Response
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from errors import UserError
 from framerunner.editing.documents.desk import EditorDesk, SharedDocument
 from framerunner.editing.documents.messages import (
     EditMessage,
@@ -35,7 +34,8 @@ from framerunner.editing.documents.messages import (
 )
 from framerunner.editing.documents.open_document import OpenDocument
 from framerunner.editing.words import Language, Said, SaidError, language_of, reason, say
-from monitor.access import REFUSED_CODE, Visitor, refuse
+from framerunner.errors import UserError
+from framerunner.monitor.access import REFUSED_CODE, Visitor, refuse
 from offboard.authoring import Change, export_scxml, import_scxml, mermaid_of, parse_edit
 from offboard.mission import list_missions
 
@@ -52,7 +52,7 @@ logger = logging.getLogger(__name__)
 
 
 class DocumentsDoor:
-    """The editor's addresses for documents; implements `monitor.ports.Extension`.
+    """The editor's addresses for documents; implements `framerunner.monitor.ports.Extension`.
 
     Args:
         desk: of the folder whose missions are edited.

@@ -23,8 +23,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from errors import UserError
 from framerunner.editing.documents.open_document import OpenDocument
+from framerunner.errors import UserError
 from offboard.authoring import (
     SPANISH,
     Change,

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from secrets import token_urlsafe
 
-from errors import UserError, is_disk_full
-from errors.files import read_in_folder, replace_file, resolved_in_folder
 from framerunner.editing.words import Said, SaidError
+from framerunner.errors import UserError, is_disk_full
+from framerunner.files.text_file import read_in_folder, replace_file, resolved_in_folder
 from offboard.authoring import (
     Change,
     Document,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from math import cos, hypot, pi, remainder, sin, sqrt
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState
 from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path

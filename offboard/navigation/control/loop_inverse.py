@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan2, cos, hypot, sin, sqrt
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState
 from offboard.navigation.goals import Motion
 
@@ -52,8 +52,8 @@ class Drag:
     turn: float
 
 
-# Of the airframe abejorro in `firmware_py/airframes/`: gains of `firmware_py.control.design`, weights of
-# `level_law`, by its mass and inertia.
+# Of the airframe abejorro in `framerunner/vehicle/airframes/`: gains of `firmware_py.control.design`, weights
+# of `level_law`, by its mass and inertia.
 TILT = Loop(0.4945, 0.6597, 0.5)
 CLIMB = Loop(12.451, 29.25, 0.8)
 TURN = Loop(15.95, 58.1, 0.8)

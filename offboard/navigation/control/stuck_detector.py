@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from math import atan2, dist
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.goals import Point
 
 OFF_PATH_M = 0.1  # a drone that is so far from its path, and

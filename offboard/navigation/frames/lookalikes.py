@@ -13,8 +13,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from geometry.rotations import to_world
-from geometry.vectors import Vec3
+from framerunner.geometry.rotations import to_world
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.frames.frame_measurement import (
     HALF_HEIGHT_M,
     HALF_WIDTH_M,

@@ -7,7 +7,7 @@ from math import cos, hypot, sin
 import numpy as np
 import numpy.typing as npt
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.goals import FlightStyle, FrameSize, Gate, Obstacles
 from offboard.navigation.planner.legs import Array
 from scenarios.models import Arena

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from geometry.rotations import yaw_of
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import yaw_of
+from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel, CameraPose
 from offboard.navigation.search.floor_points import COLUMN_PX, FloorPoints
 from offboard.navigation.search.frame_visibility import (

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Final
 
-from geometry.rotations import to_world
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import to_world
+from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
 from vision.types import Detection, Detections
 

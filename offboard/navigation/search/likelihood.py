@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.search.frame_visibility import HEADINGS, Bools, Floats, SearchGrid
 from offboard.navigation.search.glimpses import LineOfSight
 

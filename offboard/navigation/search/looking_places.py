@@ -7,7 +7,7 @@ from math import atan2, cos, pi, sin
 
 import numpy as np
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import FlightStyle, Obstacles, Point
 from offboard.navigation.planner.clearance import Clearance

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import atan2, cos, hypot, remainder, sin, tau
 from typing import Final
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.navigation.goals import FlightStyle
 from offboard.navigation.search.viewed_space import ViewedSpace

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.search.frame_visibility import Bools, Floats, SearchGrid
 
 _ROOM_M: Final = 0.1  # beside an obstacle, at least, for the drone to pass

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.search.frame_visibility import HEADINGS, Bools, Floats, SearchGrid, view_qualities
 from scenarios.models import Arena

@@ -4,7 +4,6 @@ from math import hypot, nan, pi, radians
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.commands import (
     AccelerationCommand,
     AttitudeCommand,
@@ -15,6 +14,7 @@ from firmware_py.commands import (
 )
 from firmware_py.control.stabiliser import Stabiliser
 from firmware_py.types import VehicleState
+from framerunner.vehicle.airframe import load_airframe
 from tests.flight import PERIOD_S, Hover
 
 NAMES = ["abejorro", "x500"]

@@ -4,7 +4,6 @@ import control
 import numpy as np
 import pytest
 
-from firmware_py.airframe import GRAVITY_M_S2, load_airframe
 from firmware_py.control.design import (
     cost_matrices,
     design,
@@ -14,6 +13,7 @@ from firmware_py.control.design import (
     with_integrals,
 )
 from firmware_py.control.mixer import allocation
+from framerunner.vehicle.airframe import GRAVITY_M_S2, load_airframe
 
 PERIOD_S = 0.004
 

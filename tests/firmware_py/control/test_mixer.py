@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_py.airframe import load_airframe
 from firmware_py.control.mixer import Mixer, allocation
+from framerunner.vehicle.airframe import load_airframe
 
 AIRFRAME = load_airframe("abejorro")
 MIXER = Mixer(AIRFRAME)

@@ -4,8 +4,8 @@ from math import dist, radians
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.commands import VelocityCommand
+from framerunner.vehicle.airframe import load_airframe
 from tests.flight import fly
 
 HOVER_S = 3.0

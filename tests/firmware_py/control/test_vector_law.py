@@ -4,9 +4,9 @@ from math import cos, degrees, dist, exp, hypot, radians, sin
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.commands import BodyRateCommand, VelocityCommand
 from firmware_py.control.vector_law import DisturbanceObserver
+from framerunner.vehicle.airframe import load_airframe
 from tests.flight import PERIOD_S, Hover
 
 X500 = load_airframe("x500")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from math import dist, nan, pi, sin
 
 from firmware_py.estimation.error_state import ATTITUDE, POSITION, VELOCITY
-from firmware_py.measurements import Readings
 from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
-from firmware_py.types import GeodeticPoint
-from geometry.rotations import multiply
+from framerunner.geometry.rotations import multiply
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import Readings
 from scenarios.loader import load_scenario
 from sitl.sensors.suite import SensorSuite, load_suite
 from sitl.sensors.truth import MotionTracker

@@ -15,7 +15,7 @@ from firmware_py.estimation.error_state import (
     ErrorCovariance,
 )
 from firmware_py.estimation.joint_update import JointUpdate
-from geometry.rotations import quaternion_from_euler, rotation
+from framerunner.geometry.rotations import quaternion_from_euler, rotation
 
 DRIFTS = (Drift(), Drift(0.3), Drift(0.2, 5.0))
 SIZE = INERTIAL_STATES + len(DRIFTS)

@@ -4,7 +4,8 @@ from math import inf, nan
 import pytest
 
 from firmware_py.estimation.ideal_estimator import IdealEstimator
-from firmware_py.types import GeodeticPoint, Sensors
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import Sensors
 
 ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)
 REST = Sensors(

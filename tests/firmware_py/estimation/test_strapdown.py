@@ -5,7 +5,7 @@ from math import cos, pi, sin
 import pytest
 
 from firmware_py.estimation.strapdown import GRAVITY_M_S2, Increments, NavigationState
-from geometry.rotations import euler_from_quaternion, rotation, to_body
+from framerunner.geometry.rotations import euler_from_quaternion, rotation, to_body
 
 PERIOD_S = 0.004
 

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_py.airframe import load_airframe
 from firmware_py.commander_table import State
 from firmware_py.guidance.limits import SpeedLimits, speed_limits
 from firmware_py.guidance.modes import Guidance
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, MotorSetpoint, TrajectorySetpoint
 from firmware_py.types import VehicleState
+from framerunner.vehicle.airframe import load_airframe
 
 LIMITS = SpeedLimits(2.0, 1.5, 1.0, 2.0, 1.2, 0.7)
 AIRFRAME = load_airframe("abejorro")

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_py.airframe import load_airframe
 from firmware_py.guidance.limits import AccelerationLimits, speed_limits, stopping_speed
 from firmware_py.guidance.trajectory import Reference, Trajectory
 from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
+from framerunner.vehicle.airframe import load_airframe
 
 PERIOD_S = 0.004
 X500 = load_airframe("x500")

@@ -4,19 +4,20 @@ from types import SimpleNamespace
 
 import pytest
 
-from firmware_py.airframe import Airframe, load_airframe
 from firmware_py.estimation.report import EstimatorReport
-from firmware_py.geodesy import LocalProjection, is_on_earth
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
-from firmware_py.types import BatteryState, FlightRecord, GeodeticPoint, MotorOutput, StatusText, VehicleState
+from firmware_py.types import FlightRecord, MotorOutput, StatusText, VehicleState
+from framerunner.vehicle.airframe import Airframe, load_airframe
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection, is_on_earth
+from framerunner.vehicle.measurements import BatteryState
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 from tests.firmware_py.mavlink.lossy import LossyPeer
 from tests.node_input import deliver
-from wire.dialect import mavlink
-from wire.framing import PacketReader
 
 HOME = GeodeticPoint(47.397742, 8.545594, 489.0)
 

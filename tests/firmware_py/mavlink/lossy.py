@@ -2,8 +2,8 @@
 
 import random
 
+from framerunner.wire.framing import PacketReader
 from tests.node_input import deliver
-from wire.framing import PacketReader
 
 
 class LossyPipe:

@@ -8,7 +8,7 @@ import pytest
 from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
-from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 
 PAGE = (Path(__file__).parents[3] / "docs" / "px4-compatibility.md").read_text(encoding="utf-8")
 NAMED = set(re.findall(r"[A-Z][A-Z0-9_]{3,}", PAGE))

@@ -3,7 +3,7 @@ from struct import pack, unpack
 import pytest
 
 from firmware_py.parameters import DECLARATIONS
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 INT32, REAL32 = 6, 9
 ACCEPTED, UNSUPPORTED = 0, 1

@@ -9,10 +9,10 @@ from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.mavlink.time_sync import TimeSync
 from firmware_py.status import CommandResult, FlightMode
-from geometry.rotations import quaternion_from_yaw
+from framerunner.geometry.rotations import quaternion_from_yaw
+from framerunner.wire.dialect import mavlink
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
-from wire.dialect import mavlink
 
 NED, FRD = mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_LOCAL_FRD
 ENU, FLU = mavlink.MAV_FRAME_LOCAL_ENU, mavlink.MAV_FRAME_LOCAL_FLU

@@ -14,13 +14,15 @@ from firmware_py.mavlink.camera.model import CameraModel
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.status import FlightMode
-from firmware_py.types import GeodeticPoint, MotorOutput, Sensors
+from firmware_py.types import MotorOutput
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import Sensors
+from framerunner.wire.dialect import mavlink
 from scenarios.gimbal import Gimbal
 from scenarios.loader import load_scenario
 from sitl.payload.gimbal import SimulatedGimbal
 from sitl.simulation import Simulation
 from tests.node_input import deliver
-from wire.dialect import mavlink
 
 LINKS = ("onboard", "ground")
 ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)

@@ -2,8 +2,8 @@
 
 from itertools import pairwise
 
+from framerunner.wire.dialect import mavlink
 from tests.firmware_py.mavlink.lossy import LossyPipe
-from wire.dialect import mavlink
 
 
 def through(pipe, count=10_000):

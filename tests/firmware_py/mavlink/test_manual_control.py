@@ -1,6 +1,6 @@
 import pytest
 
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 
 def joystick(x=0, y=0, z=500, r=0, target=1):

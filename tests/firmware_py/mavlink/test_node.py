@@ -4,8 +4,8 @@ import pytest
 
 from firmware_py.mavlink.service import merged
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
+from framerunner.wire.dialect import mavlink
 from tests.node_input import deliver
-from wire.dialect import mavlink
 
 
 def test_links_come_and_go_while_flying(peer):

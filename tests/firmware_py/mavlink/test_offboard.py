@@ -4,8 +4,8 @@ import pytest
 
 from firmware_py.setpoints import BodyRateSetpoint
 from firmware_py.types import VehicleState
+from framerunner.wire.dialect import mavlink
 from tests.firmware_py.mavlink.conftest import HOME
-from wire.dialect import mavlink
 
 VELOCITY_AND_YAW_RATE = 0x5C7
 

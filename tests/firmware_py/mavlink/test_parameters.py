@@ -5,7 +5,7 @@ import pytest
 
 from firmware_py.parameters import DECLARATIONS
 from firmware_py.status import CommandResult
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 INT32, UINT32, REAL32 = 6, 5, 9
 TAKEOFF_ALTITUDE = b"MIS_TAKEOFF_ALT"

@@ -6,9 +6,9 @@ from hashlib import sha256
 import pytest
 
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.signing import Signing, SigningKey
 from tests.node_input import deliver
-from wire.dialect import mavlink
-from wire.signing import Signing, SigningKey
 
 KEY = SigningKey.from_text("correct horse battery staple")
 OTHER_KEY = SigningKey(bytes(range(1, 33)))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from firmware_py.mavlink.telemetry.profiles import NORMAL, ONBOARD
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 BYTES_S = 2880.0  # half of 57600 baud
 

@@ -2,13 +2,13 @@
 
 from math import atan2, hypot, isnan, nan, remainder, tau
 
-from firmware_py.geodesy import LocalProjection
 from firmware_py.missions.executor import MissionExecutor
 from firmware_py.missions.flight import IssuedCommand, LegKind, View
 from firmware_py.missions.items import Do, Frame, MissionItem, PlanType
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
-from firmware_py.types import GeodeticPoint, StatusText
+from firmware_py.types import StatusText
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
 
 ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)
 PROJECTION = LocalProjection(ORIGIN)

@@ -8,12 +8,13 @@ import pytest
 from pyulog import ULog
 from pyulog.px4 import PX4ULog
 
-from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult
-from firmware_py.types import GeodeticPoint, StatusText
+from firmware_py.types import StatusText
 from firmware_py.ulog import UlogRecorder
+from framerunner.vehicle.airframe import load_airframe
+from framerunner.vehicle.geodesy import GeodeticPoint
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 from sitl.simulation import Simulation

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from errors import SettingError
 from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.camera_calibration.colours import learn
+from framerunner.errors import SettingError
 from vision.calibration.model import Calibration, CalibrationError
 
 PAINT = {"red": (72, 88, 190), "green": (80, 150, 104), "blue": (140, 104, 76)}

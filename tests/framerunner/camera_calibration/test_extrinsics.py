@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from errors import UserError
 from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.camera_calibration.live_mounting import Watched
 from framerunner.camera_calibration.mounting_report import MountingSearch, finish
 from framerunner.commands.camera import extrinsics
 from framerunner.commands.fly import fly
+from framerunner.errors import UserError
 from framerunner.flying.plan import FlightPlan
-from geometry.rotations import quaternion_from_euler
+from framerunner.geometry.rotations import quaternion_from_euler
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 from offboard.drone import DroneError, DroneState
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.pose_history import PoseHistory
@@ -27,7 +28,6 @@ from vision.calibration.mounting import MountingFit
 from vision.calibration.movement import Movement
 from vision.calibration.sightings import Sightings, Values
 from vision.detectors import new_detector
-from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 
 ANGLES = (0.035, 0.087, -0.052)
 TURNS = """\

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from aiohttp import web
 
-from errors import SettingError
 from framerunner.camera_calibration.latency import LedLight, TerminalLight, film
+from framerunner.errors import SettingError
 from vision.calibration.latency import LatencyError
 from vision.types import CameraError
 

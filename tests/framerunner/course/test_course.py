@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from errors import SettingError
 from framerunner.cli import run
 from framerunner.course.lessons import LANGUAGES, LessonError, find_lesson, load_lessons
 from framerunner.course.progress import CourseEvent, CourseProgress, LessonProgress
+from framerunner.errors import SettingError
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission

@@ -10,7 +10,7 @@ from fastapi import FastAPI
 
 from framerunner.course.door import CourseDoor
 from framerunner.course.lessons import load_lessons
-from monitor.access import Role, Visitor
+from framerunner.monitor.access import Role, Visitor
 
 LESSON = load_lessons()[0]
 TEACHER = Visitor(role=Role.ORGANISER)

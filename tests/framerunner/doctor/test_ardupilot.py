@@ -6,8 +6,8 @@ from pymavlink.dialects.v20 import ardupilotmega
 from framerunner.doctor.checks import can_fly, examine
 from framerunner.doctor.findings import Level
 from framerunner.doctor.listen import ARDUPILOT_PARAMETERS, PARAMETERS, open_requests
+from framerunner.wire.dialect import mavlink
 from tests.framerunner.doctor.test_checks import healthy, heartbeat, put, sys_status
-from wire.dialect import mavlink
 
 GOOD = {
     "DISARM_DELAY": 10.0,

@@ -7,7 +7,7 @@ import pytest
 from framerunner.doctor.checks import can_fly, examine
 from framerunner.doctor.findings import Level
 from framerunner.doctor.listen import SUMMARY, Record, event_id
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 GOOD_PARAMETERS = {
     "BAT_CRIT_THR": 0.07,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from framerunner.cli import run
 from framerunner.doctor import listen
 from framerunner.doctor.listen import PARAMETERS, SUMMARY, Record, StreamCounter, parameter_value
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 HARMLESS = {"HEARTBEAT", "COMMAND_LONG", "PARAM_REQUEST_READ"}
 
@@ -265,7 +265,7 @@ class Open(StillVehicle):
 
 def test_the_page_names_what_is_missing_and_the_exit_code_is_one(monkeypatch, capsys):
     monkeypatch.setattr(listen, "time", next(Open.clocks))
-    monkeypatch.setattr("wire.transports.vehicle_link.VehicleLink", Open)
+    monkeypatch.setattr("framerunner.wire.transports.vehicle_link.VehicleLink", Open)
     monkeypatch.setenv("COLUMNS", "160")
     assert run(["doctor", "--drone", "udpin://0.0.0.0:14540"]) == 1
     page = capsys.readouterr().out

@@ -11,7 +11,7 @@ from starlette.testclient import TestClient
 
 from framerunner.editing.documents.desk import EditorDesk
 from framerunner.editing.documents.door import DocumentsDoor
-from monitor.access import Role, Visitor
+from framerunner.monitor.access import Role, Visitor
 
 ORGANISER = Visitor(role=Role.ORGANISER)
 

@@ -21,7 +21,7 @@ from framerunner.editing.documents.door import DocumentsDoor
 from framerunner.editing.documents.messages import catalogue_message, document_message
 from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
 from framerunner.editing.words import SaidError
-from monitor.access import Role, Visitor
+from framerunner.monitor.access import Role, Visitor
 from offboard.authoring import read_layout
 from offboard.authoring.edits import AddState
 from offboard.authoring.messages import EDIT_ENGLISH, EDIT_SPANISH

@@ -22,7 +22,7 @@ from framerunner.editing.web import EditingDoor
 from framerunner.editing.worker_pool import WorkerPool
 from framerunner.evaluation.runner import fly_task
 from framerunner.flying.plan import FlightPlan
-from monitor.access import Role, Visitor
+from framerunner.monitor.access import Role, Visitor
 from offboard.mission import MISSIONS, load_mission
 from scenarios.loader import load_scenario
 

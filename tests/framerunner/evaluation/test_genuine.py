@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from errors import SettingError
 from framerunner import instances
 from framerunner.cli import run
+from framerunner.errors import SettingError
 from framerunner.evaluation import runner
 from framerunner.evaluation.genuine_flight import interrupted_once
 from framerunner.evaluation.plan import plan_files

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.evaluation.plan import plan_files, plan_level
 from framerunner.flying.response import Response
 from offboard.mission import load_mission

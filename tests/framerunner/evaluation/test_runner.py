@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.evaluation import backends
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.plan import plan_files

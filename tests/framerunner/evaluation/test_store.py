@@ -5,7 +5,7 @@ from math import inf
 
 import pytest
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.evaluation.plan import plan_level
 from framerunner.evaluation.store import FLIGHTS, open_folder, read_folder
 from framerunner.runs.track import Track

@@ -13,6 +13,7 @@ from mavsdk.exceptions import MavsdkError
 from firmware_py.status import FlightMode
 from framerunner.flying.plan import FlightPlan
 from framerunner.preflight.keys import KeyReader
+from framerunner.wire.operator_messages import PageMessage
 from offboard.mission import load_mission
 from offboard.pilot import Pilot
 from offboard.safety.caps import Caps
@@ -25,7 +26,6 @@ from scenarios.faults.parse import parse_fault
 from scenarios.loader import load_scenario
 from tests.framerunner.simulated_link import Direction, Impairment, fly_over
 from tests.offboard.fakes import runaway
-from wire.operator_messages import PageMessage
 
 GOOD = Impairment()
 SILENT = Impairment(silent_s=(0.0, 1e9))

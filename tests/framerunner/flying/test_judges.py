@@ -6,15 +6,15 @@ import aiohttp
 import pytest
 from aiohttp import web
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.flying.judges import TelemetryJudge, TruthJudge, ask_referee, choose_judge
 from framerunner.flying.plan import FlightPlan
+from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from scenarios.loader import load_scenario
 from scenarios.result import RefereeReport
 from vision.types import Detections
-from wire.simulator_api import SimulatorApi
 
 SCENARIO = load_scenario("test-case-1")
 PLAN = FlightPlan(SCENARIO)

@@ -11,6 +11,7 @@ import pytest
 
 from framerunner.flying.mission_reporter import HISTORY, MAX_HISTORY_PIECES, MissionReporter
 from framerunner.flying.navigation_reporter import MAX_FRAMES, MAX_POINTS, navigation_json
+from framerunner.wire.mission_tunnel import DocumentAssembler, DocumentKind, split_document
 from offboard.app import Moment, fly_mission
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import MissionEngine, TransitionTaken
@@ -21,7 +22,6 @@ from offboard.pilot import Imu
 from scenarios.result import FlightResult
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone
 from vision.types import CameraFrame, Detection, Detections
-from wire.mission_tunnel import DocumentAssembler, DocumentKind, split_document
 
 MISSION = load_mission("frame_challenge")
 LEAVES = list(MISSION.leaves)

@@ -9,7 +9,7 @@ from contextlib import ExitStack
 import aiohttp
 import pytest
 
-from errors import SettingError, UserError
+from framerunner.errors import SettingError, UserError
 from framerunner.flying.judges import ask_referee
 from framerunner.flying.simulator_process import GenuineAutopilot, SitlProcess
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE

@@ -12,7 +12,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import framerunner.gym
-from errors import SettingError
+from framerunner.errors import SettingError
 from framerunner.gym.environment import FrameChallengeEnv
 from framerunner.gym.flight import CONTACT, CROSSING, FAILURE, LANDING
 from scenarios.models import Scenario, ScenarioError

@@ -4,8 +4,8 @@ from math import isfinite, sin
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from geometry.rotations import euler_from_quaternion, multiply, quaternion_from_euler
-from wire.dialect import mavlink
+from framerunner.geometry.rotations import euler_from_quaternion, multiply, quaternion_from_euler
+from framerunner.wire.dialect import mavlink
 
 TICK_US = 4000
 RIGHT = {

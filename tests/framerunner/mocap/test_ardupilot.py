@@ -6,16 +6,16 @@ from math import cos, nan, pi, sin
 import pytest
 
 from framerunner.doctor.findings import Level
+from framerunner.geometry.rotations import multiply
 from framerunner.mocap.facts import Origin, SendSettings, Unused
 from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison
 from framerunner.mocap.poses import Pose
 from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession
 from framerunner.mocap.sources import SitlSource, TimedPose
-from geometry.rotations import multiply
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 from tests.framerunner.mocap.arducopter import TICK_US, FakeArduCopter
-from wire.dialect import mavlink
-from wire.framing import PacketReader
 
 AHEAD_S = 7.0  # of vehicle time, by this program's clock
 HALL = Origin(40.4168, -3.7038, 650.0)

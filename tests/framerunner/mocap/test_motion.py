@@ -5,11 +5,11 @@ from math import cos, isnan, sin
 
 import pytest
 
+from framerunner.geometry.rotations import quaternion_from_euler, rotated_by_rate
 from framerunner.mocap.motion import MotionCheck, SentPose
 from framerunner.mocap.poses import Axes, Pose, in_ned, with_forward
-from geometry.rotations import quaternion_from_euler, rotated_by_rate
-from wire.dialect import mavlink
-from wire.vehicle_telemetry import VehicleTelemetry
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.vehicle_telemetry import VehicleTelemetry
 
 SECONDS = 12.0
 NED = Axes.NED
@@ -131,7 +131,7 @@ def test_poses_tilted_by_a_body_that_was_not_level():
     tilt = quaternion_from_euler(0.0, 0.3, 0.0)
 
     def tilted(pose):
-        from geometry.rotations import multiply
+        from framerunner.geometry.rotations import multiply
 
         return Pose(pose.time_s, pose.position_ned_m, multiply(pose.attitude, tilt))
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from framerunner.geometry.rotations import euler_from_quaternion, quaternion_from_euler, rotation, to_world
 from framerunner.mocap.poses import Axes, Pose, PoseError, in_ned, parse_line, read_poses, with_forward
 from framerunner.mocap.sources import (
     MAX_LATE_S,
@@ -21,10 +22,9 @@ from framerunner.mocap.sources import (
     UdpSource,
     open_source,
 )
-from geometry.rotations import euler_from_quaternion, quaternion_from_euler, rotation, to_world
-from wire.dialect import mavlink
-from wire.transports.sockets import UdpSocket
-from wire.transports.urls import LinkError
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.transports.sockets import UdpSocket
+from framerunner.wire.transports.urls import LinkError
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 CSV = "time_s,x,y,z,qw,qx,qy,qz\n0.0,1,2,3,1,0,0,0\n0.5,1,2,4,1,0,0,0\n"

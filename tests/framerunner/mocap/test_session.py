@@ -19,10 +19,10 @@ from framerunner.mocap.poses import Pose
 from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession
 from framerunner.mocap.sources import SitlSource, TimedPose
 from framerunner.mocap.vehicle import Vehicle
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
-from wire.dialect import mavlink
-from wire.framing import PacketReader
 
 AHEAD_S = 3.0  # of vehicle time, by this program's clock
 

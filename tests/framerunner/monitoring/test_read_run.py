@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from framerunner.monitor.ports import RunError
 from framerunner.monitoring import run_library
 from framerunner.monitoring.read_run import RECORDING, read_run
 from framerunner.monitoring.run_library import RunFolders
 from framerunner.recording.mcap_writer import FlightRecording
-from monitor.ports import RunError
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken

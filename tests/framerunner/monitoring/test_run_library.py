@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from framerunner.cli import run
+from framerunner.monitor.ports import RunError
 from framerunner.monitoring import run_library
 from framerunner.monitoring.run_library import RunFolders
 from framerunner.runs.recorder import VideoFile
-from monitor.ports import RunError
 from scenarios.loader import load_scenario
 from tests.framerunner.recording.logs import write_log
 

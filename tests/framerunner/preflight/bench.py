@@ -6,10 +6,10 @@ from random import Random
 
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 from sitl.simulation import Simulation
 from tests.node_input import deliver
-from wire.dialect import mavlink
-from wire.framing import PacketReader
 
 
 class BenchLink:

@@ -2,9 +2,8 @@
 
 import pytest
 
-from errors import SettingError
 from firmware_py.missions.items import PlanType
-from firmware_py.types import GeodeticPoint
+from framerunner.errors import SettingError
 from framerunner.preflight import parameters
 from framerunner.preflight.check_names import CHECK_NAMES
 from framerunner.preflight.fence_upload import FenceItem, download_fence, is_same_fence, upload_fence
@@ -13,9 +12,10 @@ from framerunner.preflight.parameters import read_parameters, set_parameter
 from framerunner.preflight.prepare import own_simulator_id
 from framerunner.preflight.run import NotArmedError, PreflightSettings, run_preflight
 from framerunner.preflight.session import VehicleSession
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.wire.dialect import mavlink
 from offboard.drone import DroneError
 from offboard.safety.check import Outcome
-from wire.dialect import mavlink
 
 FAILING = ["COM_OBL_RC_ACT", "NAV_RCL_ACT", "COM_LOW_BAT_ACT", "GF_MAX_VER_DIST", "GF_MAX_HOR_DIST"]
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from errors import SettingError, UserError
+from framerunner.errors import SettingError, UserError
 from framerunner.flying import run
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings

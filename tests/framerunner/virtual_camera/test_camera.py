@@ -12,15 +12,15 @@ from pymavlink.dialects.v20 import common as mavlink
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.profiles import GROUND
 from framerunner.flying.plan import FlightPlan
+from framerunner.geometry.axes import Pose
+from framerunner.geometry.rotations import multiply, quaternion_from_euler, quaternion_from_yaw
 from framerunner.virtual_camera.camera import HELD_AFTER_FLIGHT_US, Placement, VirtualCamera
-from geometry.axes import Pose
-from geometry.rotations import multiply, quaternion_from_euler, quaternion_from_yaw
+from framerunner.wire.vehicle_telemetry import VehiclePose
 from scenarios.loader import load_scenario
 from sitl.camera import Camera, CameraFeed
 from sitl.simulation import Simulation
 from tests.node_input import deliver
 from vision.detector import detect
-from wire.vehicle_telemetry import VehiclePose
 
 SCENARIO = load_scenario("test-case-1")
 START_POSE = FlightPlan(SCENARIO).start_pose

@@ -10,12 +10,12 @@ import pytest
 
 from framerunner.virtual_camera.camera import VirtualCamera
 from framerunner.virtual_camera.server import CameraServer
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.transports.urls import LinkError
 from scenarios.loader import load_scenario
 from scenarios.task import Task
 from sitl.video import VideoServer
 from tests.waiting import until
-from wire.dialect import mavlink
-from wire.transports.urls import LinkError
 
 SCENARIO = load_scenario("test-case-1")
 

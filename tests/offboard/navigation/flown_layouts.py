@@ -11,8 +11,8 @@ import numpy as np
 from framerunner.flying.lockstep import LockstepVehicle
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
-from geometry.solids import Solid
-from geometry.vectors import Vec3
+from framerunner.geometry.solids import Solid
+from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.keep_in_box import KeepInBox
 from offboard.navigation.following import PathFollower

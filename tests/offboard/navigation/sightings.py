@@ -7,8 +7,8 @@ from math import cos, pi, sin
 import numpy as np
 import numpy.typing as npt
 
-from geometry.rotations import multiply, normalized, quaternion_from_euler
-from geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.rotations import multiply, normalized, quaternion_from_euler
+from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.frames.frame_map import FrameMap
 from offboard.navigation.pose_history import DronePose

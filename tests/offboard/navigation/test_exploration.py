@@ -7,7 +7,7 @@ from math import cos, hypot, pi, radians, remainder, sin, tau
 
 import pytest
 
-from geometry.rotations import quaternion_from_yaw
+from framerunner.geometry.rotations import quaternion_from_yaw
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.exploration import Explorer, Viewpoint
 from offboard.navigation.search.glimpses import Glimpses, LineOfSight

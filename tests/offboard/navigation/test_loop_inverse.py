@@ -6,10 +6,10 @@ from math import hypot
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.control import level_law
 from firmware_py.control.design import design
-from geometry.vectors import ZERO3
+from framerunner.geometry.vectors import ZERO3
+from framerunner.vehicle.airframe import load_airframe
 from offboard.drone import DroneState
 from offboard.navigation.control import loop_inverse
 from offboard.navigation.control.loop_inverse import HOLD_S, LoopInverse, Own

@@ -7,7 +7,7 @@ from math import atan2, hypot, pi, sqrt
 import numpy as np
 import pytest
 
-from geometry.rotations import quaternion_from_euler, quaternion_from_yaw
+from framerunner.geometry.rotations import quaternion_from_euler, quaternion_from_yaw
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.obstacle_map import ObstacleMap
 from scenarios.models import Arena, Camera

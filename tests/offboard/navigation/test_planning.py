@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planner.clearance import Clearance

@@ -4,7 +4,7 @@ from math import cos, radians, sin
 
 import pytest
 
-from geometry.rotations import euler_from_quaternion, quaternion_from_euler
+from framerunner.geometry.rotations import euler_from_quaternion, quaternion_from_euler
 from offboard.drone import DroneState
 from offboard.navigation.pose_history import PoseHistory
 

@@ -7,7 +7,7 @@ from math import atan2, cos, dist, hypot, pi, sin
 
 import pytest
 
-from geometry.rotations import quaternion_from_yaw
+from framerunner.geometry.rotations import quaternion_from_yaw
 from offboard.drone import DroneState
 from offboard.limits import CONTEST as CONTEST_LIMITS
 from offboard.navigation.camera_model import CameraModel

@@ -9,7 +9,7 @@ from math import dist, inf
 import numpy as np
 import pytest
 
-from geometry.rotations import quaternion_from_euler, rotation, to_world
+from framerunner.geometry.rotations import quaternion_from_euler, rotation, to_world
 from offboard.drone import DroneState
 from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import CONTEST

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from offboard.drone import DroneState, VelocityCommand
 from offboard.keep_in_box import Box
 from offboard.safety.caps import CapKeeper, Caps

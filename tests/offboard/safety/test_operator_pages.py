@@ -2,9 +2,9 @@
 
 import pytest
 
+from framerunner.wire.operator_messages import PageMessage
 from offboard.safety.operator import Operator
 from offboard.safety.operator_pages import LOST, OperatorPages
-from wire.operator_messages import PageMessage
 
 FLIGHT = "test-case-1 7"
 

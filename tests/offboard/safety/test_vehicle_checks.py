@@ -3,7 +3,7 @@ from math import nan
 
 import pytest
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from offboard.safety.check import Check, Outcome, accept, check_names, failures
 from offboard.safety.vehicle_checks import (
     BatteryFacts,

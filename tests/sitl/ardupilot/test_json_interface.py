@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from errors import SettingError
-from firmware_py.airframe import load_airframe
 from framerunner.cli import run
+from framerunner.errors import SettingError
+from framerunner.vehicle.airframe import load_airframe
 from scenarios.loader import load_scenario
 from sitl.ardupilot.json_interface import ServoFrame, decode_frame, encode_state
 from sitl.ardupilot.parameters import all_parameters

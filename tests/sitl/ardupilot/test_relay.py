@@ -5,11 +5,11 @@ from contextlib import ExitStack, closing
 
 import pytest
 
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
+from framerunner.wire.transports.sockets import bind_udp
 from sitl.ardupilot.relay import AppRelay
 from sitl.autopilots.sole_sender import SoleSender
-from wire.dialect import mavlink
-from wire.framing import PacketReader
-from wire.transports.sockets import bind_udp
 
 APP = mavlink.MAVLink(None, srcSystem=245, srcComponent=190)
 HEARTBEAT = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)

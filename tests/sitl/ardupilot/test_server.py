@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from firmware_py.types import GeodeticPoint
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 from scenarios.loader import load_scenario
 from sitl.ardupilot.build import ArduPilotProcess, find_build
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE
@@ -23,8 +25,6 @@ from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.sitl.ardupilot.fake_ardupilot import FakeArduPilot
 from tests.waiting import stopped, until
-from wire.dialect import mavlink
-from wire.framing import PacketReader
 
 STILL, CLIMB = [1000] * 4, [1400] * 4
 FAKE = Path(__file__).with_name("fake_ardupilot.py")

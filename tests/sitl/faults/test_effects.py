@@ -6,7 +6,7 @@ from statistics import pstdev
 
 import pytest
 
-from firmware_py.measurements import (
+from framerunner.vehicle.measurements import (
     BarometerSample,
     ExternalPose,
     FixType,
@@ -16,8 +16,8 @@ from firmware_py.measurements import (
     MagnetometerSample,
     RangeSample,
     Readings,
+    Sensors,
 )
-from firmware_py.types import Sensors
 from scenarios.faults.declaration import SIZES, Fault, FaultKind, FaultPart
 from sitl.faults.sensors import SensorFaults
 

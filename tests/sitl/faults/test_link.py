@@ -5,11 +5,11 @@ import socket
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
-from firmware_py.types import GeodeticPoint
+from framerunner.vehicle.airframe import load_airframe
+from framerunner.vehicle.geodesy import GeodeticPoint
 from scenarios.faults.parse import parse_fault
 from sitl.faults.link import LinkFault
 from sitl.link_hub import LinkHub

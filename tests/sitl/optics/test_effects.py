@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from geometry.rotations import quaternion_from_euler
+from framerunner.geometry.rotations import quaternion_from_euler
 from scenarios.imaging.clutter import Hall, Patch
 from scenarios.imaging.effects import CameraEffects, Lens
 from scenarios.models import Camera, Light, Pole, Scenario

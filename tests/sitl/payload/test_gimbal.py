@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from firmware_py.mavlink.gimbal.model import GimbalTarget
-from geometry.rotations import quaternion_from_euler, yaw_of
+from framerunner.geometry.rotations import quaternion_from_euler, yaw_of
 from scenarios.gimbal import Gimbal
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario

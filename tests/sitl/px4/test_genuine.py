@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
+from framerunner.wire.px4_modes import px4_name
 from scenarios.loader import load_scenario
 from sitl.autopilots.process import AutopilotStart
 from sitl.autopilots.sensors import with_estimable_sensors
@@ -21,7 +22,6 @@ from sitl.sensors.suite import load_suite
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.waiting import stopped
-from wire.px4_modes import px4_name
 
 PX4_DIR = os.environ.get("FRAMERUNNER_PX4_DIR", "")
 pytestmark = pytest.mark.skipif(not PX4_DIR, reason="no genuine PX4: make test-px4 PX4_DIR=PX4-Autopilot")

@@ -6,8 +6,16 @@ import struct
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from firmware_py.measurements import BarometerSample, ExternalPose, FixType, GpsSample, ImuSample, Readings
-from firmware_py.types import GeodeticPoint, Sensors
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import (
+    BarometerSample,
+    ExternalPose,
+    FixType,
+    GpsSample,
+    ImuSample,
+    Readings,
+    Sensors,
+)
 from sitl.px4.messages import ControlsReader, Packer, checksum
 from sitl.px4.sensor_messages import SensorMessages
 

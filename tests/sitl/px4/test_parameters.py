@@ -2,8 +2,8 @@
 
 import pytest
 
-from firmware_py.airframe import load_airframe
 from framerunner.cli import run
+from framerunner.vehicle.airframe import load_airframe
 from sitl.px4.parameters import airframe_parameters, suite_parameters
 from sitl.sensors.suite import load_suite
 

@@ -15,7 +15,8 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from errors import SettingError
+from framerunner.errors import SettingError
+from framerunner.wire.transports.urls import LinkError
 from scenarios.loader import load_scenario
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.autopilots.sensors import with_estimable_sensors
@@ -29,7 +30,6 @@ from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.sitl.px4.fake_px4 import FakePx4, connect
 from tests.waiting import stopped, until
-from wire.transports.urls import LinkError
 
 FAKE = Path(__file__).with_name("fake_px4.py")
 

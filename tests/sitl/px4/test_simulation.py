@@ -6,7 +6,7 @@ import struct
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from errors import SettingError
+from framerunner.errors import SettingError
 from scenarios.faults.parse import FaultError, parse_fault
 from scenarios.loader import load_scenario
 from sitl.ardupilot.simulation import ArduPilotSimulation

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from firmware_py.airframe import GRAVITY_M_S2, load_airframe
-from firmware_py.types import GeodeticPoint
-from geometry.vectors import ZERO3
+from framerunner.geometry.vectors import ZERO3
+from framerunner.vehicle.airframe import GRAVITY_M_S2, load_airframe
+from framerunner.vehicle.geodesy import GeodeticPoint
 from sitl.sensors.truth import TrueMotion
 
 AIRFRAME = load_airframe("abejorro")

@@ -5,12 +5,11 @@ from math import pi
 import numpy as np
 import pytest
 
-from firmware_py.atmosphere import pressure_altitude_m, temperature_k
-from firmware_py.estimation.earth_field import earth_field_ned_gauss
-from firmware_py.geodesy import LocalProjection
-from firmware_py.measurements import FixType
-from firmware_py.types import GeodeticPoint
-from geometry.rotations import quaternion_from_euler
+from framerunner.geometry.rotations import quaternion_from_euler
+from framerunner.vehicle.atmosphere import pressure_altitude_m, temperature_k
+from framerunner.vehicle.earth_field import earth_field_ned_gauss
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from framerunner.vehicle.measurements import FixType
 from sitl.sensors.environment import Barometer, Gps, Magnetometer
 from sitl.sensors.suite import load_suite
 from tests.sitl.sensors.statistics import ORIGIN, TICK_US, autocorrelation, motion, samples, without_errors

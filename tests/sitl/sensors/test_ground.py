@@ -5,7 +5,7 @@ from math import cos, isnan, pi
 import numpy as np
 import pytest
 
-from geometry.rotations import quaternion_from_euler, rotated_by_rate, rotation, to_body, to_world
+from framerunner.geometry.rotations import quaternion_from_euler, rotated_by_rate, rotation, to_body, to_world
 from sitl.sensors.ground import OpticalFlow, RangeFinder
 from sitl.sensors.suite import load_suite
 from tests.sitl.sensors.statistics import TICK_US, motion, samples, without_errors

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from firmware_py.airframe import GRAVITY_M_S2
+from framerunner.vehicle.airframe import GRAVITY_M_S2
 from sitl.sensors.imu import Imu, InertialTriad
 from sitl.sensors.suite import load_suite
 from tests.sitl.sensors.statistics import (

@@ -5,7 +5,7 @@ from math import isnan, pi
 import numpy as np
 import pytest
 
-from geometry.rotations import multiply, quaternion_from_euler
+from framerunner.geometry.rotations import multiply, quaternion_from_euler
 from sitl.sensors.motion_capture import MotionCapture
 from sitl.sensors.suite import load_suite
 from tests.sitl.sensors.statistics import TICK_US, motion, samples, without_errors

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_py.measurements import Readings
+from framerunner.vehicle.measurements import Readings
 from scenarios.models import Origin
 from sitl.sensors.suite import SensorSuite, SuiteError, list_suites, load_suite
 from tests.sitl.sensors.statistics import AIRFRAME, ORIGIN, TICK_US, motion

@@ -4,11 +4,11 @@ from math import acos, cos, degrees, dist, pi, sin
 
 import pytest
 
-from firmware_py.airframe import GRAVITY_M_S2, load_airframe
 from firmware_py.commands import VelocityCommand
 from firmware_py.control.stabiliser import Stabiliser
-from geometry.rotations import quaternion_from_euler, rotated_by_rate, rotation, to_world
-from geometry.vectors import ZERO3
+from framerunner.geometry.rotations import quaternion_from_euler, rotated_by_rate, rotation, to_world
+from framerunner.geometry.vectors import ZERO3
+from framerunner.vehicle.airframe import GRAVITY_M_S2, load_airframe
 from scenarios.models import Base, Frame, Pole, Scenario, Start, ground_height
 from sitl.sensors.truth import MotionTracker
 from sitl.world import CONTROL_PERIOD_US, World

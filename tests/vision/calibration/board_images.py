@@ -7,7 +7,7 @@ from math import cos, radians, sin
 import cv2
 import numpy as np
 
-from geometry.lens import rays_of_pixels
+from framerunner.geometry.lens import rays_of_pixels
 from vision.calibration.board import Board
 from vision.calibration.model import Calibration
 

@@ -6,7 +6,7 @@ from math import cos, radians, sin
 
 import numpy as np
 
-from geometry.rotations import quaternion_from_euler
+from framerunner.geometry.rotations import quaternion_from_euler
 from vision.calibration.motion import Motion, MotionReport, matrices, mounting_matrix
 from vision.calibration.sightings import Sightings, Values, sightings_of
 from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from geometry.lens import distorted
+from framerunner.geometry.lens import distorted
 from tests.vision.calibration.board_images import BOARD, TRUE, board_image, board_images
 from vision.calibration.board import Board
 from vision.calibration.model import CalibrationError

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from firmware_py.mavlink.camera.component import CameraComponent
 from firmware_py.mavlink.camera.model import CameraModel, PictureSpace, VideoEncoding, VideoStream
 from firmware_py.status import CommandResult, FlightMode
-from firmware_py.types import GeodeticPoint, VehicleState
-from wire.dialect import mavlink
+from firmware_py.types import VehicleState
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.wire.dialect import mavlink
 
 MODEL = CameraModel(320, 240, radians(90.0), 10.0)
 STREAMS = (

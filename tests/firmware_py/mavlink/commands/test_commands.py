@@ -4,9 +4,9 @@ import pytest
 
 from firmware_py.guidance.orbit import OrbitYaw
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
-from firmware_py.types import GeodeticPoint
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.wire.dialect import mavlink
 from tests.firmware_py.mavlink.conftest import HOME
-from wire.dialect import mavlink
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 ARM, SET_MODE, TAKEOFF, LAND = 400, 176, 22, 21

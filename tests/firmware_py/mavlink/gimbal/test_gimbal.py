@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from firmware_py.mavlink.gimbal.model import GimbalLimits, GimbalTarget
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.types import VehicleState
-from geometry.rotations import quaternion_from_euler
-from wire.dialect import mavlink
+from framerunner.geometry.rotations import quaternion_from_euler
+from framerunner.wire.dialect import mavlink
 
 GIMBAL, MANAGER = (1, 154), (1, 1)
 ACCEPTED, DENIED = 0, 2

@@ -5,7 +5,7 @@ It runs in vehicle time over a `LossyPeer`, so a bad link costs no waiting.
 
 from struct import pack, unpack_from
 
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 NONE, TERMINATE, RESET, LIST, OPEN, READ, CREATE, WRITE = range(8)
 REMOVE, MAKE_FOLDER, REMOVE_FOLDER, OPEN_WRITE, TRUNCATE, RENAME, CRC, BURST = range(8, 16)

@@ -16,8 +16,8 @@ from firmware_py.mavlink.ground_station.metadata import EVENTS_FILE, ExtraFiles
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from firmware_py.status import FlightMode
-from wire.dialect import mavlink
-from wire.framing import PacketReader
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 
 INFO, PROTOCOL = 6, 8
 NUMBERED = ("EVENT", "CURRENT_EVENT_SEQUENCE")

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from framerunner.wire.dialect import mavlink
 from sitl.storage import MemoryStorage, StorageLimits
 from tests.firmware_py.mavlink.ground_station import ftp_client as ftp
 from tests.firmware_py.mavlink.ground_station.ftp_client import FtpClient, RefusedError, Reply, request
 from tests.firmware_py.mavlink.lossy import LossyPeer
 from tests.node_input import deliver
-from wire.dialect import mavlink
 
 FIRMWARE = {"etc/extras/general.json.xz": b"general", "etc/extras/parameters.json.xz": b"p" * 5000}
 PERFECT = {"loss": 0.0, "duplicate": 0.0, "reorder": 0.0}
@@ -31,7 +31,7 @@ def peer(autopilot, make_peer, storage):
 @pytest.fixture
 def quiet_link(peer):
     """A link without streams: only answers."""
-    from wire.link import LinkProfile
+    from framerunner.wire.link import LinkProfile
 
     for name in ("onboard", "ground"):
         peer.node.add_link(LinkProfile(name, {}))
@@ -198,7 +198,7 @@ def test_a_burst_pauses_after_35_kb_and_reports_the_end(quiet_link, storage):
 
 
 def test_a_burst_leaves_a_slow_link_air(autopilot, make_peer, storage):
-    from wire.link import LinkProfile
+    from framerunner.wire.link import LinkProfile
 
     storage.create(("a",))
     storage.write(("a",), 0, content(2, 40_000))

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.link import LinkProfile
 from sitl.storage import MemoryStorage
 from tests.firmware_py.mavlink.lossy import LossyPeer
-from wire.dialect import mavlink
-from wire.link import LinkProfile
 
 SIZES = (40_000, 90 * 100, 1)
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from wire.dialect import mavlink
-from wire.link import LinkProfile
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.link import LinkProfile
 
 SHELL, REPLY, RESPOND = 10, 1, 2
 LINKS = (LinkProfile("onboard", {}),)

@@ -5,14 +5,14 @@ from math import isfinite
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from firmware_py.geodesy import LocalProjection
 from firmware_py.missions.executor import MissionExecutor
 from firmware_py.missions.flight import View
 from firmware_py.missions.geofence import Geofence
 from firmware_py.missions.items import PlanType, opaque_id
 from firmware_py.navigator import return_place
+from framerunner.vehicle.geodesy import LocalProjection
+from framerunner.wire.dialect import mavlink
 from tests.firmware_py.mavlink.conftest import HOME, FakeAutopilot
-from wire.dialect import mavlink
 
 FLOATS = st.one_of(
     st.sampled_from([0.0, -0.0, 1.0, -1.0, 3.0, 5.0, 1e-40, 3e38, -3e38, float("nan"), float("inf")]),

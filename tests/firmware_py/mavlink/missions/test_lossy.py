@@ -3,7 +3,7 @@
 import pytest
 
 from firmware_py.missions.items import PlanType
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 RETRY_S, RETRIES = 0.5, 5
 STEP_S = 0.02

@@ -7,7 +7,7 @@ import pytest
 
 from firmware_py.missions.items import PlanType
 from firmware_py.status import CommandResult, FlightMode
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 MISSION, FENCE, RALLY = PlanType
 LATITUDE, LONGITUDE = 473977420, 85455940

@@ -1,7 +1,7 @@
 import pytest
 
+from framerunner.wire.dialect import mavlink
 from tests.node_input import deliver
-from wire.dialect import mavlink
 
 
 def test_timesync_requests_are_answered_in_nanoseconds(peer):

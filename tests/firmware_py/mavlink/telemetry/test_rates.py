@@ -5,7 +5,7 @@ from collections import Counter
 import pytest
 
 from firmware_py.setpoints import TrajectorySetpoint
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 SECONDS = 30.0
 

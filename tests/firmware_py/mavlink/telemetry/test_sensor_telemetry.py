@@ -8,13 +8,13 @@ from firmware_py.estimation.report import EstimatorReport, Ratios, Sensor
 from firmware_py.mavlink.ground_station.events import assess
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
-from firmware_py.measurements import BarometerSample, FixType, GpsSample, Readings
 from firmware_py.status import VehicleStatus
+from framerunner.vehicle.measurements import BarometerSample, FixType, GpsSample, Readings
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 from tests.firmware_py.mavlink.conftest import HOME
-from wire.dialect import mavlink
-from wire.framing import PacketReader
 
 GPS_BIT = mavlink.MAV_SYS_STATUS_SENSOR_GPS
 VISION_BIT = mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION

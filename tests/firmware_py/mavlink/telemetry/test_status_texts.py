@@ -1,7 +1,7 @@
 import pytest
 
 from firmware_py.types import StatusText
-from wire.dialect import mavlink
+from framerunner.wire.dialect import mavlink
 
 
 def texts(received, link="ground"):

@@ -4,22 +4,18 @@ from types import SimpleNamespace
 
 import pytest
 
-from firmware_py.atmosphere import pressure_hpa, temperature_k
 from firmware_py.estimation.wind import WindEstimate
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from firmware_py.mavlink.telemetry.sensing import EARTH_FIELD_NED_GAUSS, earth_field_frd_gauss
 from firmware_py.setpoints import AttitudeSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode, LandedState, VehicleStatus
-from firmware_py.types import (
-    BatteryState,
-    FlightRecord,
-    GeodeticPoint,
-    MotorOutput,
-    VehicleState,
-)
-from wire.dialect import mavlink
-from wire.framing import PacketReader
+from firmware_py.types import FlightRecord, MotorOutput, VehicleState
+from framerunner.vehicle.atmosphere import pressure_hpa, temperature_k
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import BatteryState
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 
 
 def latest(peer, name, link="onboard"):

@@ -6,8 +6,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from geometry.rotations import quaternion_from_euler
-from geometry.vectors import Vec3
+from framerunner.geometry.rotations import quaternion_from_euler
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.frames.frame_filter import half_turn
 from offboard.navigation.frames.frame_measurement import Prior, View, predicted, solutions, view_of
 from offboard.navigation.pose_history import DronePose

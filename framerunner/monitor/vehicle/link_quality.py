@@ -1,0 +1,125 @@
+"""How well a vehicle is received, and requests for messages that it does not send often enough."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+from framerunner.wire.dialect import Message, mavlink, request_rate
+from framerunner.wire.framing import missing_before
+
+_SPAN_S = 10
+_MAX_MISSING = 200  # a sequence number that is farther ahead belongs to a packet that was overtaken
+
+STALE_S = 1.0
+LOST_S = 3.0
+_REPEAT_S = 2.0
+_MAX_RATE_REQUESTS = 5
+_RATE_SPAN_S = 3.0  # over which rates are measured
+_ENOUGH_HZ = 15.0
+_REQUESTED_HZ = 25.0
+
+
+@dataclass(slots=True)
+class _Second:
+    began_s: float
+    heard: int = 0
+    lost: int = 0
+
+
+class LinkQuality:
+    """Age, rate and losses of the autopilot's packets over the last ten seconds.
+
+    Attributes:
+        heard_s: when the last one was received, loop time.
+    """
+
+    def __init__(self, now_s: float) -> None:
+        self.heard_s = now_s
+        self._sequence: int | None = None
+        self._seconds: deque[_Second] = deque([_Second(now_s)], maxlen=_SPAN_S)
+
+    def count(self, sequence: int, now_s: float) -> None:
+        """Count a packet with a sequence number of 0 to 255."""
+        self.heard_s = now_s
+        second = self._seconds[-1]
+        if now_s - second.began_s >= 1.0:
+            second = _Second(now_s)
+            self._seconds.append(second)
+        second.heard += 1
+        if self._sequence is not None:
+            missing = missing_before(sequence, self._sequence, _MAX_MISSING)
+            second.lost += missing  # -1: counted as missing before, and received now
+            if missing < 0:
+                return
+        self._sequence = sequence
+
+    def forget_sequence(self) -> None:
+        """Accept any next sequence number: the vehicle has restarted."""
+        self._sequence = None
+
+    def age_s(self, now_s: float) -> float:
+        """Time since the last packet."""
+        return max(0.0, now_s - self.heard_s)
+
+    def state(self, now_s: float) -> str:
+        """One of "live", "stale" and "lost"."""
+        age_s = self.age_s(now_s)
+        return "live" if age_s < STALE_S else "stale" if age_s < LOST_S else "lost"
+
+    def as_dict(self, now_s: float) -> dict[str, object]:
+        """The field `link` of the message "status"."""
+        recent = [second for second in self._seconds if now_s - second.began_s < _SPAN_S]
+        heard = sum(second.heard for second in recent)
+        lost = max(0, sum(second.lost for second in recent))
+        span_s = max(1.0, now_s - recent[0].began_s) if recent else 1.0
+        return {
+            "state": self.state(now_s),
+            "age_s": round(self.age_s(now_s), 1),
+            "loss_percent": round(100 * lost / (heard + lost), 1) if heard else 0.0,
+            "rate_hz": round(heard / span_s, 1),
+        }
+
+
+class RepeatedRequest:
+    """A request that is sent every two seconds while it is not answered, `count` times at most."""
+
+    def __init__(self, message: Message, count: int) -> None:
+        self._message = message
+        self._left = count
+        self._sent_s = -1e9
+
+    def due(self, now_s: float) -> Message | None:
+        """The message, if it is to be sent now."""
+        if not self._left or now_s - self._sent_s < _REPEAT_S:
+            return None
+        self._sent_s = now_s
+        self._left -= 1
+        return self._message
+
+
+class RateWatch:
+    """Requests more attitudes and positions where they are too slow for a smooth display."""
+
+    def __init__(self, system_id: int, now_s: float) -> None:
+        self._id = system_id
+        self._since_s = now_s
+        self._counts = (0, 0)
+        self._requests = 0
+
+    def requests(self, counts: tuple[int, int], now_s: float) -> list[Message]:
+        """The messages to send now, by the numbers of attitudes and positions so far."""
+        span_s = now_s - self._since_s
+        if span_s < _RATE_SPAN_S:
+            return []
+        rates_hz = [(now - then) / span_s for now, then in zip(counts, self._counts, strict=True)]
+        self._since_s, self._counts = now_s, counts
+        if not any(counts) or min(rates_hz) >= _ENOUGH_HZ or self._requests >= _MAX_RATE_REQUESTS:
+            return []
+        self._requests += 1
+        numbers = (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
+        return [
+            request_rate(self._id, number, _REQUESTED_HZ)
+            for number, rate_hz in zip(numbers, rates_hz, strict=True)
+            if rate_hz < _ENOUGH_HZ
+        ]
