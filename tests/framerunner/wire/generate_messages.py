@@ -1,4 +1,4 @@
-"""`make messages`: pymavlink's generator makes `framerunner/wire/extra_messages.py` of the XML file beside it."""
+"""`make messages`: pymavlink's generator makes `framerunner/wire/extra_messages.py` of the XML beside it."""
 
 from contextlib import redirect_stdout
 from io import StringIO
