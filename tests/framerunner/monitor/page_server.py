@@ -17,7 +17,7 @@ from framerunner.monitor.pages.static_files import STATIC
 from framerunner.monitor.pages.table import PAGES, render_page
 from framerunner.monitor.security import CONTENT_POLICY
 
-SOURCES = Path(__file__).parents[2] / "web" / "src"
+SOURCES = Path(__file__).parents[3] / "web" / "src"
 SERVED = {page.path: page for page in PAGES if page.path in ("/", "/chart", "/stage", "/ranking")}
 JPEG = cv2.imencode(".jpg", np.full((240, 320, 3), (56, 176, 226), np.uint8))[1].tobytes()
 REPEAT_S = 1.0  # a page takes a monitor that says nothing for four seconds for lost

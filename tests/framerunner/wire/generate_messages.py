@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 
 from pymavlink.generator.mavgen import Opts, mavgen
 
-WIRE = Path(__file__).parents[2] / "wire"
+WIRE = Path(__file__).parents[3] / "framerunner" / "wire"
 DEFINITIONS = WIRE / "extra_messages.xml"
 MODULE = WIRE / "extra_messages.py"
 

@@ -37,7 +37,7 @@ asyncio.run(main())
 async def test_no_judged_try_is_lost(database_url):
     server = await asyncio.create_subprocess_exec(
         sys.executable, "-c", PROGRAM, database_url,
-        stdout=asyncio.subprocess.PIPE, cwd=Path(__file__).parents[3],
+        stdout=asyncio.subprocess.PIPE, cwd=Path(__file__).parents[4],
     )  # fmt: skip
     try:
         async with asyncio.timeout(60):
