@@ -119,8 +119,8 @@ class Search:
         """What was found.
 
         Args:
-            start: where the drone is going to be now, if the search has taken some time; the search's own start
-                if the drone stands there still.
+            start: where the drone is going to be now, if the search has taken some time; if it stands still,
+                the path begins where the search did.
 
         Returns:
             The path, why there is none, or None if what was found is of no use from there.
