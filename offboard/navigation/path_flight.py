@@ -42,8 +42,8 @@ AHEAD_STEP_S = 0.1
 CHECK_S = 0.2  # between two checks that a path is free, if neither it nor the obstacles have changed
 WAITING_REPLAN_S = 0.2  # between two attempts to go on
 TICK_WORK = 160_000
-"""Of planning in one tick, in the unit of `LegFinder`: some milliseconds of a processor. Then planning pauses,
-so that no command is late; most paths need less."""
+"""Of planning in one tick, in the unit of `LegFinder`: some milliseconds of a processor. Then it pauses, so
+that no command is late; most paths need less."""
 MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
 LOOKED_AT_RAD = 0.3
 LOOK_GAIN_PER_S = 2.0
