@@ -29,7 +29,7 @@ AHEAD_STD_M = 0.3  # of a next frame; if it is known less well, it is not planne
 SPACED_S = 0.15  # in which one image is enough: one from nearly the same place adds little to the map
 SPACED_M_S = 1.5  # up to this speed
 NEAR_GATE_M = 1.5  # nearer to a frame to be crossed that is not certain yet, no image is left out
-VIEWPOINT_WORK = 100_000  # of choosing where to look next, in the unit of `PathFlight.work`
+VIEWPOINT_WORK = 85_000  # of choosing where to look next, in the unit of `PathFlight.work`
 SEARCH_AFTER_M = 2.0  # from behind a frame to the drone, when it is chosen where to look from there
 
 

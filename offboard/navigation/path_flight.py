@@ -41,10 +41,9 @@ LOOK_AHEAD_S = 2.0  # likewise; the drone turns in flight to look at what it has
 AHEAD_STEP_S = 0.1
 CHECK_S = 0.2  # between two checks that a path is free, if neither it nor the obstacles have changed
 WAITING_REPLAN_S = 0.2  # between two attempts to go on
-TICK_WORK = 130_000
-"""Of searching for a path in one tick, in the unit of `LegFinder`: some milliseconds of a processor. Then the
-search pauses, so that no command is late; most paths need less."""
-PATH_WORK = 40_000  # of making the path that was found, in the same unit
+TICK_WORK = 160_000
+"""Of planning in one tick, in the unit of `LegFinder`: some milliseconds of a processor. Then it pauses, so
+that no command is late; most paths need less."""
 MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
 LOOKED_AT_RAD = 0.3
 LOOK_GAIN_PER_S = 2.0
@@ -267,7 +266,7 @@ class PathFlight:
         self._go_on(search, state, begun=True)
 
     def _go_on(self, search: Search, state: DroneState, *, begun: bool = False) -> None:
-        """Search on for this tick; take the path when there is one.
+        """Plan on for this tick; take the path when there is one.
 
         Args:
             search: for a path.
@@ -278,10 +277,11 @@ class PathFlight:
         search.advance(TICK_WORK - self.work)
         searched = search.work - before
         self.work += searched
-        pauses = not search.over or (searched > 0 and self.work > TICK_WORK - PATH_WORK)
+        pauses = not search.over or (searched > 0 and self.work + search.path_work > TICK_WORK)
         self.search = search if pauses else None
         if pauses:
             return
+        self.work += search.path_work
         start, restarts = self._start(state)
         found = search.path(None if begun else start)
         if found is None:  # the drone is elsewhere by now

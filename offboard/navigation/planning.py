@@ -32,6 +32,8 @@ STOPPING_SHARES = np.array([1.0, 0.7, 0.5, 0.3, 0.15])  # or in the largest of t
 USED_MARGIN_M = 0.05  # of the margin to obstacles, while a path is flown
 MAX_ROUTES = 6  # for which legs are sought
 SLOWER_S = 0.3  # legs slower than expected by this make another route worth a look
+PATH_WORK = 15_000  # of making the path that was found, in the unit of `LegFinder`,
+PATH_WORK_PER_S = 4_000  # and of each second of it
 SAME_START_M = 0.02  # a drone that stands drifts less while a path is sought,
 SAME_START_M_S = 0.05  # and moves more slowly
 
@@ -105,6 +107,14 @@ class Search:
     def work(self) -> int:
         """See the class."""
         return self._legs.work
+
+    @property
+    def path_work(self) -> int:
+        """Of `path`, once the search is over."""
+        if self._found is None or isinstance(self._found, Refusal):
+            return 0
+        duration_s = sum(step.leg.duration_s for steps in self._found[1] for step in steps or ())
+        return PATH_WORK + round(PATH_WORK_PER_S * duration_s)
 
     def advance(self, work: int) -> None:
         """Go on until this much work is done, and little more, or the search is over."""

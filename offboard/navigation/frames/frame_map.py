@@ -129,10 +129,11 @@ class FrameMap:
 
     def _estimate(self) -> None:
         """Note what is known of each frame now: it is asked for far more often than images come."""
-        self._frames = tuple(track.estimate() for track in self._tracks)
+        tracks = [track for track in self._tracks if track.is_inside(self._arena)]
+        self._frames = tuple(track.estimate() for track in tracks)
         self._best = {}
         best: dict[str, FrameTrack] = {}
-        for track, estimate in zip(self._tracks, self._frames, strict=True):
+        for track, estimate in zip(tracks, self._frames, strict=True):
             other = best.get(track.colour)
             if other is None or track.rank > other.rank:
                 best[track.colour], self._best[track.colour] = track, estimate

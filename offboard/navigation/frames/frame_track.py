@@ -19,6 +19,7 @@ GATES = (0.0, 20.7, 27.7, 33.7, 39.2)
 NOVEL_PX = 0.5  # root mean square of the corners' shift from which on a view has errors of its own
 NOVEL_US = 1_000_000  # or this long after the last one
 OUTSIDE_M = 0.5  # a frame farther outside the arena is none
+BEYOND_M = 0.05  # one that is by this, and by a standard deviation, is somewhere else
 
 # Belief: an image that shows a frame adds this much, one that should and does not takes 1.
 SEEN_BELIEF = 2
@@ -181,6 +182,17 @@ class FrameTrack:
             and -OUTSIDE_M <= hypothesis.state[2] <= arena.height_m + OUTSIDE_M
         ]
         return bool(self._hypotheses)
+
+    def is_inside(self, arena: Arena) -> bool:
+        """Whether the frame is in the arena by its estimate: one that is surely outside was seen badly."""
+        x, y, z, _ = self.state.tolist()
+        vx, vy, vz, _ = self.covariance.diagonal().tolist()
+        beyond_m = (
+            (abs(x) - arena.length_x_m / 2, vx),
+            (abs(y) - arena.width_y_m / 2, vy),
+            (max(z - arena.height_m, -z), vz),
+        )
+        return all(away_m < BEYOND_M + sqrt(variance_m2) for away_m, variance_m2 in beyond_m)
 
     def estimate(self) -> FrameEstimate:
         """What is known of the frame."""

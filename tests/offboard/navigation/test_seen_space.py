@@ -10,6 +10,7 @@ import pytest
 from framerunner.geometry.rotations import quaternion_from_yaw
 from offboard.drone import DroneState
 from offboard.limits import CONTEST as CONTEST_LIMITS
+from offboard.navigation import path_flight
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import CONTEST, Gate, Obstacles, Point
 from offboard.navigation.path_flight import TICK_WORK, PathFlight
@@ -156,6 +157,35 @@ def test_where_obstacles_block_a_gate_no_tick_searches_for_long():
     assert flight.refusal == "obstacles block the way to gate 1"
     assert sum(works) > 4 * TICK_WORK  # what a tick would do without a limit
     assert max(works) < 2.5 * TICK_WORK
+
+
+def test_a_drone_that_stands_in_an_opening_finds_a_path_in_several_ticks(monkeypatch):
+    monkeypatch.setattr(path_flight, "TICK_WORK", 1)
+    seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
+    gate = Gate((2.0, 0.0, 1.5), 0.0)
+    for tick in range(10):
+        state = DroneState(50_000 * tick, 1.9, 0.002 * (tick % 2), 1.5, yaw=0.0)
+        flight.fly([gate], Obstacles((gate,)), state, seen, VIEWED)
+        if flight.path is not None:
+            break
+    assert tick > 0
+    assert flight.path is not None
+
+
+def test_a_path_is_made_at_the_next_tick_if_it_does_not_fit_into_this_one(monkeypatch):
+    """The work of making it counts: a search that just fits leaves no room for it."""
+    goals, state = [Point((2.0, 0.0, 1.0))], DroneState(0, *HERE, yaw=0.0)
+    works = {}
+    for limit in (10**6, None):
+        seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
+        monkeypatch.setattr(path_flight, "TICK_WORK", limit or sum(works[10**6]) - 1)
+        works[limit] = []
+        while flight.path is None:
+            flight.fly(goals, Obstacles(), replace(state, time_us=50_000 * len(works[limit])), seen, VIEWED)
+            works[limit].append(flight.work)
+    assert len(works[10**6]) == 1
+    assert len(works[None]) == 2
+    assert sum(works[None]) == sum(works[10**6])
 
 
 def height_after_a_metre(gate: Gate, *, needed: bool) -> float:

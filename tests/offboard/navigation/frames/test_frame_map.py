@@ -170,6 +170,19 @@ def test_frame_far_outside_the_arena_is_none() -> None:
     assert flight.map.frames() == ()
 
 
+def test_frame_that_seems_to_be_outside_is_on_the_map_when_it_is_seen_inside() -> None:
+    """Where something hides a part of a frame, it looks smaller and farther away than it is."""
+    flight = Flight(3)
+    for step in range(8):
+        flight.look([frame_at(5.4, 0.0, 1.5, 0.0)], (2.0 + 0.1 * step, 0.0, 1.5), 0.0)
+    assert flight.map.best("red") is None
+    for step in range(8):
+        flight.look([frame_at(4.9, 0.0, 1.5, 0.0)], (2.8 + 0.1 * step, 0.0, 1.5), 0.0)
+    (estimate,) = flight.map.frames()
+    assert estimate == flight.map.best("red")
+    assert errors(estimate, frame_at(4.9, 0.0, 1.5, 0.0))[0] < 0.1
+
+
 def test_outline_that_is_partly_hidden_does_not_replace_a_known_frame() -> None:
     frame = frame_at(0.0, 0.0, 1.5, 0.3)
     flight = Flight(2)
