@@ -211,8 +211,12 @@ class Legs:
         """Positions at shares of each leg's duration, shape (n, shares, 3)."""
         motions = self.motions
         times = motions.durations_s[:, None, None] * shares[None, :, None]
-        each = (motions.before_m_s[:, None], motions.accelerations_m_s2[:, None], self.phases_s[:, :, None])
-        moved, _ = _moved(times, *each)
+        moved, _ = _moved(
+            times,
+            speeds=motions.before_m_s[:, None],
+            a=motions.accelerations_m_s2[:, None],
+            phases=self.phases_s[:, :, None],
+        )
         return self.starts_m[:, None] + rotate(moved, self.cosines[:, None], self.sines[:, None])
 
 
