@@ -312,8 +312,19 @@ class _Flight:
         engine, flight_time_s, remark = self._engine, self._flight_time_s(), self._remark
         if self._flying and not self._paused and self._silent_us is None:
             remark = "" if self._keeper is None else self._keeper.remark
-        what = (state, command, detections, engine.state, flight_time_s, engine.transition)
-        self._observer(Moment(*what, self._paused, remark, self._navigation_at(state.time_us)))
+        self._observer(
+            Moment(
+                state,
+                command,
+                detections,
+                mission_state=engine.state,
+                flight_time_s=flight_time_s,
+                transition=engine.transition,
+                paused=self._paused,
+                remark=remark,
+                navigation=self._navigation_at(state.time_us),
+            )
+        )
 
     def _navigation_at(self, time_us: int) -> NavigationView | None:
         """The navigator's map and plan, at most `NAVIGATION_US` old."""
@@ -401,9 +412,16 @@ class _Flight:
                     end_us = state.time_us + REST_US
                 if self._observer is not None:
                     since_us = state.time_us if self._started_us is None else self._started_us
-                    flight_time_s = (state.time_us - since_us) / MICROSECONDS
-                    what = (state, STILL, Detections(), self._engine.state, flight_time_s)
-                    self._observer(Moment(*what, navigation=self._navigation))
+                    self._observer(
+                        Moment(
+                            state,
+                            STILL,
+                            Detections(),
+                            mission_state=self._engine.state,
+                            flight_time_s=(state.time_us - since_us) / MICROSECONDS,
+                            navigation=self._navigation,
+                        )
+                    )
                 if state.time_us >= end_us:
                     break
         except DroneError:

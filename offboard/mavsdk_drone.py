@@ -447,8 +447,9 @@ class MavsdkDrone:
         for jump in self._resets.take():
             self._alignment = followed(self._alignment, jump)
             self._tracker.reset()
-        fixed = (self._feed, self._alignment, self._stream)
-        return reported_state(sample, *fixed, tuple(reported_state(before, *fixed) for before in missed))
+        feed, alignment, dialect = self._feed, self._alignment, self._stream
+        skipped = tuple(reported_state(before, feed, alignment, dialect) for before in missed)
+        return reported_state(sample, feed, alignment, dialect, skipped)
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s

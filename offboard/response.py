@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, exp, pi, remainder, sin
 
 import numpy as np
@@ -291,16 +291,27 @@ class ResponseEstimate:
     def _as_response(self) -> Response:
         pairs = [(DEAD_STEPS[dead] * STEP_S, LAGS_S[lag]) for dead, lag in self._chosen]
         (level_dead, level_lag), (climb_dead, climb_lag), (yaw_dead, yaw_lag) = pairs
-        times = (climb_dead, climb_lag, yaw_dead, yaw_lag)
+        follows = Response(
+            level_dead_s=level_dead,
+            level_tilt_s=0.0,
+            level_lag_s=level_lag,
+            climb_dead_s=climb_dead,
+            climb_lag_s=climb_lag,
+            yaw_dead_s=yaw_dead,
+            yaw_lag_s=yaw_lag,
+            turning=self._turning,
+            late=True,
+        )
+        other = self._slow.chosen or self._second.chosen
+        if other is None:
+            return follows
+        dead, lag = other
+        follows = replace(
+            follows, level_dead_s=DEAD_STEPS[dead] * STEP_S, level_lag_s=LAGS_S[lag], turning=False
+        )
         if self._slow.chosen is not None:
-            dead, lag = self._slow.chosen
-            level = (DEAD_STEPS[dead] * STEP_S, 0.0, LAGS_S[lag])
-            return Response(*level, *times, turning=False, late=True, share=self._slow.share)
-        if self._second.chosen is not None:
-            dead, lag = self._second.chosen
-            level = (DEAD_STEPS[dead] * STEP_S, 0.0, LAGS_S[lag])
-            return Response(*level, *times, turning=False, late=True, own_lag_s=OWN_LAG_S)
-        return Response(level_dead, 0.0, level_lag, *times, turning=self._turning, late=True)
+            return replace(follows, share=self._slow.share)
+        return replace(follows, own_lag_s=OWN_LAG_S)
 
     def _observe_disturbance(self, velocity_m_s: Vec3, steps: int) -> None:
         """Filter what the commands do not explain of the velocity now."""

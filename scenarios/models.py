@@ -256,8 +256,8 @@ class Camera(Part):
         if self.gimbal is not None and largest_rad > 0.0:
             raise refusal(largest_rad, "does not go with a gimbal; leave one of them out", "mounting_frd_rad")
         lens = None if self.effects is None else self.effects.lens
-        half = (self.width_px / 2 / self.focal_px, self.height_px / 2 / self.focal_px)
-        if lens is not None and not lens.sees_up_to(*half):
+        half_width, half_height = self.width_px / 2 / self.focal_px, self.height_px / 2 / self.focal_px
+        if lens is not None and not lens.sees_up_to(half_width, half_height):
             message = "folds the image's corners; bring k1, k2 and k3 nearer to 0 or make the view narrower"
             raise refusal(lens.k1, message, "effects", "lens", "k1")
         return self

@@ -73,5 +73,9 @@ def _from_border_m(point_m: Vec3) -> float:
     """Distance of a point to the nearest side of the arena, floor or ceiling, below zero outside."""
     arena = Arena()
     x_m, y_m, z_m = point_m
-    sides_m = (arena.length_x_m / 2 - abs(x_m), arena.width_y_m / 2 - abs(y_m))
-    return min(*sides_m, z_m, arena.height_m - z_m)
+    return min(
+        arena.length_x_m / 2 - abs(x_m),
+        arena.width_y_m / 2 - abs(y_m),
+        z_m,
+        arena.height_m - z_m,
+    )

@@ -91,10 +91,23 @@ def fit_lines(edges: BarEdges, focal_px: float, offsets: Floats | None = None) -
             continue
         planned = float(edges.used[k].sum())
         two_edges = 2.0 * boths > points
-        variances = _variances(points, end - start, slope, 0.0 if two_edges else half, square)
-        position = (edges.steep[k], float(edges.inward[k]), along, at, slope)
+        var_at, var_slope = _variances(points, end - start, slope, 0.0 if two_edges else half, square)
         lines.append(
-            BarLine(*position, *variances, start, end, half, int(points), outers / planned, boths / planned)
+            BarLine(
+                steep=edges.steep[k],
+                inward=float(edges.inward[k]),
+                along=along,
+                at=at,
+                slope=slope,
+                var_at=var_at,
+                var_slope=var_slope,
+                first=start,
+                last=end,
+                half_px=half,
+                points=int(points),
+                seen=outers / planned,
+                open=boths / planned,
+            )
         )
     _balance(lines, focal_px)
     return lines

@@ -102,5 +102,6 @@ def _find(shown: _Plane, following: _Plane, other: _Plane, focal_px: float) -> D
     if rows == 0:
         return NOT_SEEN
     height, width = shown.shape
-    box = (row + 1, row + rows, column + 1, column + columns)
-    return measure(*box, width_px=width, height_px=height, focal_px=focal_px)
+    return measure(
+        row + 1, row + rows, column + 1, column + columns, width_px=width, height_px=height, focal_px=focal_px
+    )

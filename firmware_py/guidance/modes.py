@@ -62,28 +62,28 @@ class Guidance:
 
     def __init__(self, airframe: Airframe, parameters: Parameters, period_s: float = 0.004) -> None:
         self._context = context = ModeContext(speed_limits(airframe, parameters), period_s)
-        parts = (context, airframe, parameters)
-        self._hold = hold = HoldMode(*parts)
-        land = LandMode(*parts)
-        self._follow = FollowMode(*parts)
-        self._offboard = OffboardMode(*parts)
-        stabilized, returning = StabilizedMode(*parts), ReturnMode(*parts)
+        self._hold = hold = HoldMode(context, airframe, parameters)
+        land = LandMode(context, airframe, parameters)
+        self._follow = FollowMode(context, airframe, parameters)
+        self._offboard = OffboardMode(context, airframe, parameters)
+        stabilized = StabilizedMode(context, airframe, parameters)
+        returning = ReturnMode(context, airframe, parameters)
         self._modes: dict[State, Mode] = {
             State.MANUAL: stabilized,
             State.STABILIZED: stabilized,
-            State.ACRO: AcroMode(*parts),
-            State.ALTITUDE: AltitudeMode(*parts),
-            State.POSITION: PositionMode(*parts),
+            State.ACRO: AcroMode(context, airframe, parameters),
+            State.ALTITUDE: AltitudeMode(context, airframe, parameters),
+            State.POSITION: PositionMode(context, airframe, parameters),
             State.HOLD: hold,
             State.FAILSAFE_HOLD: hold,
             State.MISSION: hold,  # until its first leg
-            State.TAKEOFF: TakeoffMode(*parts),
+            State.TAKEOFF: TakeoffMode(context, airframe, parameters),
             State.LAND: land,
             State.FAILSAFE_LAND: land,
-            State.FAILSAFE_DESCEND: DescendMode(*parts),
+            State.FAILSAFE_DESCEND: DescendMode(context, airframe, parameters),
             State.RETURN: returning,
             State.FAILSAFE_RETURN: returning,
-            State.ORBIT: OrbitMode(*parts),
+            State.ORBIT: OrbitMode(context, airframe, parameters),
             State.FOLLOW: self._follow,
             State.OFFBOARD: self._offboard,
         }

@@ -275,8 +275,9 @@ def extrinsics(
         from framerunner.camera_calibration.live_mounting import measure_live
 
         known = load_calibration(calibration, to_write=True)
-        where = (known, place_of(known, place_m, None))
-        search, stamped = asyncio.run(measure_live(drone, camera, *where, limit_s=float(seconds), say=say))
+        place = place_of(known, place_m, None)
+        watch = measure_live(drone, camera, known, place, limit_s=float(seconds), say=say)
+        search, stamped = asyncio.run(watch)
     finish(search, known, calibration, say, stamped=stamped)
     return 0
 

@@ -198,8 +198,17 @@ def fly(
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
     with _instance(instance, autopilot) as number:
-        ends = (drone, camera, api, speed, number, autopilot, delay_of(camera_delay, plan.calibration))
-        flown = None if lockstep else RealTimeSettings(*ends, procedure)
+        real_time = RealTimeSettings(
+            drone_url=drone,
+            camera_url=camera,
+            simulator=api,
+            speed=speed,
+            instance=number,
+            autopilot=autopilot,
+            camera_delay=delay_of(camera_delay, plan.calibration),
+            hardware=procedure,
+        )
+        flown = None if lockstep else real_time
         return _run(FlightSettings(plan, flown, out, record, video, *shown.checked), lifeline=lifeline)
 
 

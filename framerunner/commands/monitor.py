@@ -112,7 +112,11 @@ def monitor(
     flown = None if scenario is None else load_scenario(scenario)
     given = equipment(drone, flown, runs, camera_host, missions=missions, scenarios=scenarios, pilot=pilot)
     settings = MonitorSettings(
-        *(bind, port, database, _secret("ORGANISER_PASSWORD"), trusted_proxy),
+        bind,
+        port,
+        database,
+        organiser_password=_secret("ORGANISER_PASSWORD"),
+        trusted_proxies=trusted_proxy,
         judge_password=_secret("JUDGE_PASSWORD"),
         class_code=_secret("CLASS_CODE"),
         class_file=missions / PUPILS_FILE,

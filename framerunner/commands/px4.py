@@ -102,7 +102,8 @@ def _start(simulation: Px4Simulation, settings: ServerSettings, px4: Path | None
         return AutopilotStart(None, command)
     build = find_build(px4)
     suite = load_suite(scenario.sensors)
-    chosen = (simulation.world.airframe, suite, settings.speed)
-    values = all_parameters(*chosen, transmitter=simulation.has_transmitter)
+    values = all_parameters(
+        simulation.world.airframe, suite, settings.speed, transmitter=simulation.has_transmitter
+    )
     folder = None if settings.storage is None else settings.storage / f"px4-{settings.instance}"
     return AutopilotStart(Px4Process(build, settings.instance, folder, values), command)

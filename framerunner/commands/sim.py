@@ -227,37 +227,47 @@ def sim(
     settings = _settings(chosen, onboard, speed, instance, count)
     flown_by.check(count, settings, monitor=monitor)
     check_range("--seed", seed, 0, 2**63 - 1)
-    flown = (scenario, settings, onboard, fault)
-    asyncio.run(_run(_server(flown_by, flown, count, seed, _grants(time_grants)), watcher, lifeline=lifeline))
+    server = _server(
+        scenario,
+        settings,
+        onboard,
+        fault,
+        flown_by=flown_by,
+        count=count,
+        seed=seed,
+        grants=_grants(time_grants),
+    )
+    asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
 
 
 def _server(
+    scenario: str,
+    settings: ServerSettings,
+    onboard: Onboard,
+    fault: tuple[str, ...],
+    *,
     flown_by: FlownBy,
-    flown: tuple[str, ServerSettings, Onboard, tuple[str, ...]],
     count: int,
     seed: int,
     grants: TimeGrants | None,
 ) -> _Server:
     """The simulator with the chosen autopilot."""
     if flown_by.autopilot == "px4":
-        px4, transmitter = flown_by.px4, flown_by.transmitter
-        return px4_server(*flown, px4=px4, transmitter=transmitter, seed=seed, grants=grants)
+        return px4_server(
+            scenario,
+            settings,
+            onboard,
+            fault,
+            px4=flown_by.px4,
+            transmitter=flown_by.transmitter,
+            seed=seed,
+            grants=grants,
+        )
     if flown_by.autopilot == "ardupilot":
-        return ardupilot_server(*flown, ardupilot=flown_by.ardupilot, seed=seed, grants=grants)
-    return _own_server(*flown, count=count, seed=seed, grants=grants)
-
-
-def _own_server(
-    scenario: str,
-    settings: ServerSettings,
-    onboard: Onboard,
-    fault: tuple[str, ...],
-    *,
-    count: int,
-    seed: int,
-    grants: TimeGrants | None,
-) -> _Server:
+        return ardupilot_server(
+            scenario, settings, onboard, fault, ardupilot=flown_by.ardupilot, seed=seed, grants=grants
+        )
     from sitl.server import SimulatorServer
 
     simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)

@@ -102,8 +102,14 @@ def calibration_facts(calibration: Calibration | None, size_px: tuple[int, int])
     made_days = _days_since(calibration.made_on)
     if mounting is None:
         return CalibrationFacts(calibrated_px, size_px, made_days=made_days)
-    angles, days = (mounting.angles_frd_rad, mounting.angles_std_rad), _days_since(mounting.measured_on)
-    return CalibrationFacts(calibrated_px, size_px, *angles, made_days, days)
+    return CalibrationFacts(
+        calibrated_px,
+        size_px,
+        mounting.angles_frd_rad,
+        mounting.angles_std_rad,
+        made_days=made_days,
+        mounting_days=_days_since(mounting.measured_on),
+    )
 
 
 def _days_since(day: str | None) -> int | None:

@@ -139,8 +139,15 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
 
         plan = settings.plan
         genuine = None if settings.genuine is None else settings.genuine.autopilot
-        named = (plan.title, settings.mission, settings.pilot, settings.command)
-        page = Page(*named, summary, comparison, genuine)
+        page = Page(
+            title=plan.title,
+            mission=settings.mission,
+            pilot=settings.pilot,
+            command=settings.command,
+            summary=summary,
+            comparison=comparison,
+            genuine=genuine,
+        )
         write_report(folder, page, advance)
     print(f"left in {folder.path}/: report.html, results.csv", flush=True)
     return code

@@ -174,8 +174,9 @@ def _failures(
                 plot = _track_plot(folder, row)
                 done += 1
             file = folder.scenario_file(row.scenario)
-            flown = (page.mission, page.pilot, row.seed or 0, row.response)
-            command = replay_command(file, *flown, genuine=page.genuine)
+            command = replay_command(
+                file, page.mission, page.pilot, row.seed or 0, row.response, genuine=page.genuine
+            )
             failures.append(Failure(row, command, plot, _traceback(folder, row)))
         groups.append((cause.verdict, cause.ended_in, failures))
     return groups

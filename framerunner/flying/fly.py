@@ -80,7 +80,9 @@ async def fly(
             see(moment)
 
     flight = fly_mission(
-        *(drone, perception, plan.chart),
+        drone,
+        perception,
+        plan.chart,
         limit_s=plan.limit_s,
         observer=observe,
         box=plan.box,

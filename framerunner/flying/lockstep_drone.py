@@ -286,8 +286,14 @@ class LockstepDrone:
         """Let a control tick pass, and more until a time or until the link sends something by itself."""
         simulation, observers, state = self._simulation, self._observers, self._autopilot.state
         link = self._link
-        due_us = (self._resend_us, self._heartbeat_us, self._tick_us, self._position_us, self._gimbal_us)
-        until_us = min(until_us, *due_us)
+        until_us = min(
+            until_us,
+            self._resend_us,
+            self._heartbeat_us,
+            self._tick_us,
+            self._position_us,
+            self._gimbal_us,
+        )
         while True:
             simulation.tick()
             truth = simulation.truth

@@ -120,15 +120,29 @@ async def fly_in_real_time(
         shown = nullcontext() if settings.unattended else display
 
         def timing() -> dict[str, Timing]:
-            measured = (drone, perception, clock, records.recorder.real_time_factor, settings.speed)
-            fused = plan.chart.vision == "frames"
-            repeats = settings.repeats and not records.recorder.paused  # sticks move in wall time
-            return {"timing": flight_timing(*measured, fused=fused, repeats=repeats)}
+            measured = flight_timing(
+                drone,
+                perception,
+                clock,
+                factor=records.recorder.real_time_factor,
+                speed=settings.speed,
+                fused=plan.chart.vision == "frames",
+                repeats=settings.repeats and not records.recorder.paused,  # sticks move in wall time
+            )
+            return {"timing": measured}
 
-        run = partial(_run, shown=shown, camera=camera, vehicle=vehicle, settings=settings)
-        what = (plan, drone, perception, judge, (records.see, reporter.see))
-        seen, keep = reporter.look, None if guard is None else records.keep_unfinished
-        flown = await fly(*what, run=run, measured=timing, before_tick=seen, safety=safety, keep=keep)
+        flown = await fly(
+            plan,
+            drone,
+            perception,
+            judge,
+            observers=(records.see, reporter.see),
+            run=partial(_run, shown=shown, camera=camera, vehicle=vehicle, settings=settings),
+            measured=timing,
+            before_tick=reporter.look,
+            safety=safety,
+            keep=None if guard is None else records.keep_unfinished,
+        )
         await reporter.send_result(records.complete(flown.result))
     return flown
 
@@ -229,9 +243,16 @@ async def _vehicle(
     scenario_file, autopilot = str(records.folder.scenario), settings.autopilot
     links = () if monitor_url is None or autopilot is not None else (monitor_url,)  # others have their own
     storage = None if autopilot is None else records.folder.path
-    chosen = (scenario_file, settings.speed, settings.instance, links, plan.seed or 0)
-    on_warning = (lambda line: None) if settings.unattended else warn
-    started = SitlProcess(*chosen, autopilot=autopilot, storage=storage, on_warning=on_warning)
+    started = SitlProcess(
+        scenario_file,
+        speed=settings.speed,
+        instance=settings.instance,
+        links=links,
+        seed=plan.seed or 0,
+        autopilot=autopilot,
+        storage=storage,
+        on_warning=(lambda line: None) if settings.unattended else warn,
+    )
     sitl = await stack.enter_async_context(started)
     shared = None if autopilot is None else monitor_url
     return _Endpoints(sitl.drone_url, sitl.api.video_url, sitl.api, sitl, shared_with=shared)

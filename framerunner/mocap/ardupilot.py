@@ -53,25 +53,40 @@ class _Rule:
 _RULES = (
     _Rule("AHRS_EKF_TYPE", (3,), Level.MISSING, "its estimator is not EKF3", "set it to 3"),
     _Rule(
-        *("VISO_TYPE", (1,), Level.MISSING, "it takes no poses by MAVLink"),
+        "VISO_TYPE",
+        (1,),
+        Level.MISSING,
+        "it takes no poses by MAVLink",
         "set it to 1, then restart the vehicle",
     ),
     _Rule("VISO_SCALE", (1,), Level.MISSING, "it multiplies positions by this", "set it to 1"),
     _Rule(
-        *("EK3_SRC1_POSXY", (EXTERNAL_NAVIGATION,), Level.MISSING, "its position is not that of the poses"),
+        "EK3_SRC1_POSXY",
+        (EXTERNAL_NAVIGATION,),
+        Level.MISSING,
+        "its position is not that of the poses",
         "set it to 6",
     ),
     _Rule(
-        *("EK3_SRC1_POSZ", (EXTERNAL_NAVIGATION,), Level.NOTE, "its height is not that of the poses"),
+        "EK3_SRC1_POSZ",
+        (EXTERNAL_NAVIGATION,),
+        Level.NOTE,
+        "its height is not that of the poses",
         "set it to 6",
     ),
     _Rule(
-        *("EK3_SRC1_YAW", (EXTERNAL_NAVIGATION,), Level.NOTE, "its heading is not that of the poses"),
+        "EK3_SRC1_YAW",
+        (EXTERNAL_NAVIGATION,),
+        Level.NOTE,
+        "its heading is not that of the poses",
         "set it to 6",
     ),
     *(
         _Rule(
-            *(name, (0, EXTERNAL_NAVIGATION), Level.MISSING, "its velocity is from another sensor"),
+            name,
+            (0, EXTERNAL_NAVIGATION),
+            Level.MISSING,
+            "its velocity is from another sensor",
             "set it to 0, or to 6 if the source has velocities",
         )
         for name in _VELOCITIES

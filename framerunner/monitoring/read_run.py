@@ -158,7 +158,7 @@ def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: Clock) ->
         state, command = moment.state, moment.command
         c, s = cos(state.yaw), sin(state.yaw)
         vx, vy, vz = state.velocity_arena_m_s
-        sent = (command.forward_m_s, command.left_m_s, command.up_m_s, command.yaw_rate_rad_s)
+        sent = _rounded(command.forward_m_s, command.left_m_s, command.up_m_s, command.yaw_rate_rad_s)
         poses.append(
             {
                 "t": clock(state.time_us),
@@ -166,7 +166,7 @@ def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: Clock) ->
                 "q": _rounded(*state.attitude_arena),
                 "v": _rounded(c * vx + s * vy, c * vy - s * vx, vz),
                 "r": _rounded(turn_rad / span_s if span_s > 0 else 0.0)[0],
-                "c": _rounded(*sent) if flight.mission_is_known else None,
+                "c": sent if flight.mission_is_known else None,
                 "on": state.armed,
                 "s": numbers.get(moment.mission_state, -1),
             }

@@ -39,7 +39,9 @@ def write_pdf(card: FlightCard, path: Path) -> None:
             x = _LEFT
             for cell, width in zip(cells, _WIDTHS.get(len(cells), (100,)), strict=False):
                 figure.text(
-                    *(x, at, cell),
+                    x,
+                    at,
+                    cell,
                     fontsize=size,
                     weight=weight,
                     color=colour,

@@ -95,22 +95,23 @@ def download_fence(session: VehicleSession) -> tuple[FenceItem, ...]:
     Raises:
         DroneError: the vehicle does not answer.
     """
-    target = (session.system_id, AUTOPILOT_COMPONENT_ID)
+    system_id = session.system_id
     count = session.request(
-        mavlink.MAVLink_mission_request_list_message(*target, FENCE),
+        mavlink.MAVLink_mission_request_list_message(system_id, AUTOPILOT_COMPONENT_ID, FENCE),
         lambda each: each.count if _is(each, "MISSION_COUNT") else None,
     )
     if count is None or count > MAX_ITEMS:
         raise DroneError("the vehicle does not tell its fence; check that it takes fences")
     items = []
     for seq in range(count):
-        request = mavlink.MAVLink_mission_request_int_message(*target, seq, FENCE)
+        request = mavlink.MAVLink_mission_request_int_message(system_id, AUTOPILOT_COMPONENT_ID, seq, FENCE)
         item = session.request(request, partial(_numbered, seq))
         if item is None:
             raise DroneError(f"the vehicle does not tell item {seq + 1} of its fence; check the link")
         params = (item.param1, item.param2, item.param3, item.param4)
         items.append(FenceItem(item.command, item.frame, params, item.x, item.y, item.z))
-    session.send(mavlink.MAVLink_mission_ack_message(*target, mavlink.MAV_MISSION_ACCEPTED, FENCE))
+    done = mavlink.MAV_MISSION_ACCEPTED
+    session.send(mavlink.MAVLink_mission_ack_message(system_id, AUTOPILOT_COMPONENT_ID, done, FENCE))
     return tuple(items)
 
 
@@ -122,8 +123,24 @@ def is_same_fence(one: Sequence[FenceItem], other: Sequence[FenceItem]) -> bool:
 
 
 def _message(system_id: int, seq: int, item: FenceItem) -> Message:
-    where = (system_id, AUTOPILOT_COMPONENT_ID, seq, item.frame, item.command, 0, 1)
-    return mavlink.MAVLink_mission_item_int_message(*where, *item.params, item.x, item.y, item.z, FENCE)
+    param1, param2, param3, param4 = item.params
+    return mavlink.MAVLink_mission_item_int_message(
+        system_id,
+        AUTOPILOT_COMPONENT_ID,
+        seq,
+        item.frame,
+        item.command,
+        current=0,
+        autocontinue=1,
+        param1=param1,
+        param2=param2,
+        param3=param3,
+        param4=param4,
+        x=item.x,
+        y=item.y,
+        z=item.z,
+        mission_type=FENCE,
+    )
 
 
 def _is(message: Message, kind: str) -> bool:

@@ -162,11 +162,16 @@ class _EventBuilder:
     def take(self, topic: str, time_us: int, message: Json) -> Event | None:
         """Add a message; telemetry is the last of a tick."""
         if topic == TELEMETRY:
-            flight_time_s = float(message["flight_time_s"])
-            state = _drone_state(time_us, message)
             taken, self._transition = self._transition, None
-            what = (state, self._command, self._detections, self._state, flight_time_s, taken)
-            return Moment(*what, navigation=self._navigation)
+            return Moment(
+                _drone_state(time_us, message),
+                self._command,
+                self._detections,
+                mission_state=self._state,
+                flight_time_s=float(message["flight_time_s"]),
+                transition=taken,
+                navigation=self._navigation,
+            )
         if topic == IMAGE:
             return RecordedImage(time_us, _decoded(b64decode(message["data"])))
         if topic == CROSSING:

@@ -71,8 +71,10 @@ def command_long(
         confirmation: 0, and one more each time the same command is repeated.
         component_id: of the receiver.
     """
-    filled = (*parameters, *([0.0] * (7 - len(parameters))))
-    return mavlink.MAVLink_command_long_message(system_id, component_id, number, confirmation, *filled)
+    rest = [0.0] * (7 - len(parameters))
+    return mavlink.MAVLink_command_long_message(
+        system_id, component_id, number, confirmation, *parameters, *rest
+    )
 
 
 def request_message(system_id: int, message_id: int, component_id: int = AUTOPILOT_COMPONENT_ID) -> Message:

@@ -160,8 +160,14 @@ def decode_detections(payload: bytes) -> MissionDetections:
     """
     _check(payload, _DETECTIONS.size, _DETECTIONS.size, "detections")
     _, width, height, time_us, *numbers = _DETECTIONS.unpack(payload)
-    boxes = (_box(numbers[0:6]), _box(numbers[6:12]), _box(numbers[12:18]))
-    return MissionDetections(None if time_us < 0 else time_us, width, height, *boxes)
+    return MissionDetections(
+        None if time_us < 0 else time_us,
+        width,
+        height,
+        red=_box(numbers[0:6]),
+        green=_box(numbers[6:12]),
+        blue=_box(numbers[12:18]),
+    )
 
 
 def split_document(kind: DocumentKind, content: Mapping[str, Any]) -> tuple[int, list[bytes]]:

@@ -136,9 +136,8 @@ def _report(fields: dict[str, Any]) -> _Report:
     matrix = rotation(attitude)
     if fields["child_frame_id"] != mavlink.MAV_FRAME_LOCAL_NED:
         velocity = to_world(matrix, *velocity)
-    rates = (number("rollspeed"), number("pitchspeed"), number("yawspeed"))
     pose = Pose((number("x"), number("y"), number("z")), yaw_of(attitude))
-    yaw_rate_rad_s = to_world(matrix, *rates)[2]
+    _, _, yaw_rate_rad_s = to_world(matrix, number("rollspeed"), number("pitchspeed"), number("yawspeed"))
     return _Report(
         int(fields["time_usec"]), int(fields.get("reset_counter", 0)), pose, velocity, yaw_rate_rad_s
     )

@@ -210,8 +210,12 @@ def _corrected(
     ]
     size = hypot(*add)
     scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
-    rates = (command.yaw_rate_rad_s, model.yaw_rate_rad_s, model.measured_yaw_rate_rad_s)
-    turn = _velocity_correction(*rates, yaw_s) + HEADING_GAIN_PER_S * model.offset_rad
+    turn = HEADING_GAIN_PER_S * model.offset_rad + _velocity_correction(
+        wanted=command.yaw_rate_rad_s,
+        speed=model.yaw_rate_rad_s,
+        measured=model.measured_yaw_rate_rad_s,
+        lag_s=yaw_s,
+    )
     c, s = cos(state.yaw), sin(state.yaw)
     return VelocityCommand(
         command.forward_m_s + scale * (c * add[0] + s * add[1]),

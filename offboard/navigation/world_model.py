@@ -76,17 +76,17 @@ class WorldModel:
                 self._use(image, pose)
 
     def _use(self, image: Detections, pose: DronePose) -> None:
-        where = (pose.position_m, pose.attitude_arena)
+        position_m, attitude = pose.position_m, pose.attitude_arena
         self._frames = None
         self._map.observe(image, pose, self._poses_of_rows(image, pose))
-        self._obstacle_map.update(*where, image.obstacle_edges)
-        self.seen_space.update(*where, image.obstacle_edges)
-        self._explorer.update(*where, image.obstacle_edges)
+        self._obstacle_map.update(position_m, attitude, image.obstacle_edges)
+        self.seen_space.update(position_m, attitude, image.obstacle_edges)
+        self._explorer.update(position_m, attitude, image.obstacle_edges)
         known = [colour for colour in COLOURS if self._map.best(colour) is not None]
-        self.viewed_space.update(self._camera.pose(*where))
+        self.viewed_space.update(self._camera.pose(position_m, attitude))
         others = any(frame.colour not in COLOURS for frame in self._map.frames())
         self.viewed_space.needed = others or len(known) < len(COLOURS)
-        self._glimpses.update(*where, image, known, self._map.is_lookalike)
+        self._glimpses.update(position_m, attitude, image, known, self._map.is_lookalike)
 
     def _poses_of_rows(self, image: Detections, pose: DronePose) -> list[DronePose] | None:
         """With a rolling shutter, the drone's pose when each frame's middle row was read out."""

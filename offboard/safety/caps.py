@@ -69,9 +69,14 @@ class CapKeeper:
         self.acted: set[str] = set()
         self._caps = caps
         self._box = box
-        level_m_s, vertical_m_s = caps.level_m_s, caps.vertical_m_s
-        both = (level_m_s, level_m_s, vertical_m_s, vertical_m_s, caps.yaw_rate_rad_s)
-        self._limits = CommandLimits(*both, level_m_s=level_m_s)
+        self._limits = CommandLimits(
+            forward_m_s=caps.level_m_s,
+            left_m_s=caps.level_m_s,
+            up_m_s=caps.vertical_m_s,
+            down_m_s=caps.vertical_m_s,
+            yaw_rate_rad_s=caps.yaw_rate_rad_s,
+            level_m_s=caps.level_m_s,
+        )
 
     def limit(self, command: VelocityCommand, state: DroneState | None) -> VelocityCommand:
         """The command that may be sent; the same object if no cap acts.

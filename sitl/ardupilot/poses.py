@@ -61,7 +61,9 @@ class PoseLink:
         variances = (*pose.position_variance_m2, *pose.attitude_variance_rad2)
         self._send(
             mavlink.MAVLink_vision_position_estimate_message(
-                *(pose.time_us, *pose.position_ned_m, *attitude),
+                pose.time_us,
+                *pose.position_ned_m,
+                *attitude,
                 _covariance(variances),
                 pose.reset_counter & 0xFF,
             )

@@ -101,8 +101,14 @@ class AppRelay:
         self.from_ardupilot()  # what it has sent before
         for message in self._reader.feed(data):
             if message.get_type() == "PING" and message.target_system == 0:
-                sender = (message.get_srcSystem(), message.get_srcComponent())
-                self._tell(mavlink.MAVLink_ping_message(message.time_usec, message.seq, *sender))
+                self._tell(
+                    mavlink.MAVLink_ping_message(
+                        message.time_usec,
+                        message.seq,
+                        target_system=message.get_srcSystem(),
+                        target_component=message.get_srcComponent(),
+                    )
+                )
 
     def _tell(self, message: Message) -> None:
         """Send a message of the relay to the app."""

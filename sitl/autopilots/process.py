@@ -157,12 +157,12 @@ def may_use_real_time() -> bool:
     """Whether a program that is started here may give its threads real-time priorities; Linux only."""
     if sys.platform != "linux":
         return False
-    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(os.sched_get_priority_max(os.SCHED_FIFO)))
     except OSError:
         return False
-    os.sched_setscheduler(0, *before)
+    os.sched_setscheduler(0, policy, parameters)
     return True
 
 

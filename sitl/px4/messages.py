@@ -68,10 +68,7 @@ class Packer:
         payload = self._pack(*fields).rstrip(b"\0") or b"\0"
         self._sequence = (self._sequence + 1) & 0xFF
         low, high = self._message_id & 0xFFFF, self._message_id >> 16
-        head = _HEADER.pack(
-            *(MARKER_V2, len(payload), 0, 0, self._sequence),
-            *(*self._sender, low, high),
-        )
+        head = _HEADER.pack(MARKER_V2, len(payload), 0, 0, self._sequence, *self._sender, low, high)
         body = head + payload
         return body + _CHECKSUM.pack(checksum(body[1:], self._crc_extra))
 

@@ -110,49 +110,84 @@ class SensorMessages:
             temperature_c = barometer.temperature_k - 273.15
             flags |= _BAROMETER
         return self._sensor.pack(
-            *(readings.time_us, *acceleration, *rates, *field),
-            *(pressure_hpa, 0.0, altitude_m, temperature_c, flags, 0),
+            readings.time_us,
+            *acceleration,
+            *rates,
+            *field,
+            pressure_hpa,
+            0.0,  # differential pressure
+            altitude_m,
+            temperature_c,
+            flags,
+            0,  # sensor's id
         )
 
     def _pack_gps(self, gps: GpsSample) -> bytes:
         north, east, down = gps.velocity_ned_m_s
         course_deg = degrees(atan2(east, north)) % 360.0
         return self._gps.pack(
-            *(gps.time_us, degrees_e7(gps.latitude_deg), degrees_e7(gps.longitude_deg)),
+            gps.time_us,
+            degrees_e7(gps.latitude_deg),
+            degrees_e7(gps.longitude_deg),
             millimetres(gps.altitude_m),
-            *(_unsigned(gps.horizontal_accuracy_m * 100), _unsigned(gps.vertical_accuracy_m * 100)),
+            _unsigned(gps.horizontal_accuracy_m * 100),
+            _unsigned(gps.vertical_accuracy_m * 100),
             _unsigned(hypot(north, east) * 100),
-            *(_signed(north * 100), _signed(east * 100), _signed(down * 100)),
-            *(min(_unsigned(course_deg * 100), 35999), int(gps.fix_type), gps.satellites, 0, 0),
+            _signed(north * 100),
+            _signed(east * 100),
+            _signed(down * 100),
+            min(_unsigned(course_deg * 100), 35999),
+            int(gps.fix_type),
+            gps.satellites,
+            0,  # receiver's id
+            0,  # yaw: not measured
         )
 
     def _pack_pose(self, pose: ExternalPose) -> bytes:
         velocity = pose.velocity_ned_m_s or (nan, nan, nan)
         return self._odometry.pack(
-            *(pose.time_us, *pose.position_ned_m, *(pose.attitude or (nan, nan, nan, nan))),
-            *(*velocity, nan, nan, nan),
+            pose.time_us,
+            *pose.position_ned_m,
+            *(pose.attitude or (nan, nan, nan, nan)),
+            *velocity,
+            *[nan] * 3,  # angular rates
             *_covariance(pose.position_variance_m2, pose.attitude_variance_rad2),
             *_covariance(pose.velocity_variance_m2_s2, (nan, nan, nan)),
-            *(mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_LOCAL_NED, pose.reset_counter & 0xFF),
-            *(mavlink.MAV_ESTIMATOR_TYPE_VISION, 100),
+            mavlink.MAV_FRAME_LOCAL_NED,
+            mavlink.MAV_FRAME_LOCAL_NED,
+            pose.reset_counter & 0xFF,
+            mavlink.MAV_ESTIMATOR_TYPE_VISION,
+            100,  # quality
         )
 
     def _pack_range(self, sample: RangeSample, spec: RangeFinderSpec) -> bytes:
         measured = not isnan(sample.distance_m)
         distance_m = sample.distance_m if measured else spec.max_distance_m
         return self._distance.pack(
-            *(sample.time_us // 1000, _unsigned(spec.min_distance_m * 100)),
-            *(_unsigned(spec.max_distance_m * 100), _unsigned(distance_m * 100)),
-            *(mavlink.MAV_DISTANCE_SENSOR_LASER, 0, mavlink.MAV_SENSOR_ROTATION_PITCH_270),
+            sample.time_us // 1000,
+            _unsigned(spec.min_distance_m * 100),
+            _unsigned(spec.max_distance_m * 100),
+            _unsigned(distance_m * 100),
+            mavlink.MAV_DISTANCE_SENSOR_LASER,
+            0,  # sensor's id
+            mavlink.MAV_SENSOR_ROTATION_PITCH_270,
             min(round((spec.noise_m * 100) ** 2), 254),
-            *(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            *[0.0] * 6,  # fields of view and a quaternion: the orientation says it
             100 if measured else 1,
         )
 
     def _pack_flow(self, flow: FlowSample) -> bytes:
         return self._flow.pack(
-            *(flow.time_us, flow.integration_us, *flow.flow_rad, *flow.gyro_rad, nan),
-            *(0, -1.0, 0, 0, flow.quality),
+            flow.time_us,
+            flow.integration_us,
+            *flow.flow_rad,
+            *flow.gyro_rad,
+            nan,  # angle about the third axis
+            0,  # time since the last distance
+            -1.0,  # no distance
+            0,  # temperature
+            0,  # sensor's id
+            flow.quality,
         )
 
     def _pack_rc(self, time_us: int, channels: Channels) -> bytes:
@@ -165,9 +200,16 @@ class SensorMessages:
         velocity = [_signed(each * 100) for each in true.velocity_ned_m_s]
         speed = _unsigned(sqrt(sum(each * each for each in true.velocity_ned_m_s)) * 100)
         return self._truth.pack(
-            *(true.time_us, *true.attitude, *true.angular_rate_frd_rad_s),
-            *(degrees_e7(place.latitude_deg), degrees_e7(place.longitude_deg)),
-            *(millimetres(place.altitude_m), *velocity, speed, speed, *force),
+            true.time_us,
+            *true.attitude,
+            *true.angular_rate_frd_rad_s,
+            degrees_e7(place.latitude_deg),
+            degrees_e7(place.longitude_deg),
+            millimetres(place.altitude_m),
+            *velocity,
+            speed,
+            speed,
+            *force,
         )
 
 

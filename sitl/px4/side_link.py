@@ -102,8 +102,11 @@ class SideLink:
         origin = simulation.scenario.origin
         self._send(
             self._origin_packer.pack(
-                *(degrees_e7(origin.latitude_deg), degrees_e7(origin.longitude_deg)),
-                *(0, self._system_id, 0),  # its altitude 0: another one would not fit the barometer's offset
+                degrees_e7(origin.latitude_deg),
+                degrees_e7(origin.longitude_deg),
+                0,  # altitude: another one would not fit the barometer's offset
+                self._system_id,
+                0,  # time
             )
         )
 
@@ -115,13 +118,21 @@ class SideLink:
         cells = min(max(battery.cells, 1), _MAX_CELLS)
         cell_mv = whole(battery.voltage_v * 1e3 / cells, 16, signed=False)
         return self._packer.pack(
-            *(round(battery.used_mah), -1, _UNKNOWN_TEMPERATURE),
+            round(battery.used_mah),
+            -1,  # no energy consumed is measured
+            _UNKNOWN_TEMPERATURE,
             *[cell_mv] * cells,
             *[_UNKNOWN_CELL] * (_MAX_CELLS - cells),
             whole(battery.current_a * 100, 16),
-            *(0, mavlink.MAV_BATTERY_FUNCTION_ALL, mavlink.MAV_BATTERY_TYPE_LIPO),
+            0,  # battery's id
+            mavlink.MAV_BATTERY_FUNCTION_ALL,
+            mavlink.MAV_BATTERY_TYPE_LIPO,
             round(battery.remaining * 100),
-            *(0, battery.warning, 0, 0, 0, 0, 0, 0),
+            0,  # no time remaining is known
+            battery.warning,
+            *[0] * 4,  # voltages of cells 11 to 14
+            0,  # mode
+            0,  # faults
         )
 
     def _received(self) -> Iterator[tuple[int, tuple[int, int], bytes]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from dataclasses import replace
 from math import degrees
 
 from firmware_py.mavlink.camera.model import VideoEncoding, VideoStream
@@ -19,12 +20,18 @@ def video_streams(settings: ServerSettings, camera: Camera) -> tuple[VideoStream
         settings: of the drone.
         camera: of the scenario.
     """
-    common = (camera.width_px, camera.height_px, camera.rate_hz, degrees(camera.horizontal_fov_rad))
     place = in_url(_public_address(settings), settings.http_port)
-    page = VideoStream(f"http://{place}{VIDEO_PATH}", VideoEncoding.MJPEG_HTTP, *common)
+    page = VideoStream(
+        f"http://{place}{VIDEO_PATH}",
+        VideoEncoding.MJPEG_HTTP,
+        width_px=camera.width_px,
+        height_px=camera.height_px,
+        rate_hz=camera.rate_hz,
+        field_of_view_deg=degrees(camera.horizontal_fov_rad),
+    )
     if settings.video_rtp is None:
         return (page,)
-    return (VideoStream(str(settings.video_rtp[1]), VideoEncoding.H264_RTP, *common), page)
+    return (replace(page, uri=str(settings.video_rtp[1]), encoding=VideoEncoding.H264_RTP), page)
 
 
 def _public_address(settings: ServerSettings) -> str:

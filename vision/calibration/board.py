@@ -176,9 +176,8 @@ class Board:
         places = np.asarray(self._board.getChessboardCorners(), np.float32)
         objects = [places[view.ids].reshape(-1, 1, 3) for view in views]
         images = [view.corners_px.reshape(-1, 1, 2) for view in views]
-        guess = np.eye(3), np.zeros(5)
         rms, matrix, distortion, turns, _, deviations, _, errors = cv2.calibrateCameraExtended(
-            objects, images, size_px, *guess
+            objects, images, size_px, cameraMatrix=np.eye(3), distCoeffs=np.zeros(5)
         )
         focal_std_px = float(np.asarray(deviations).ravel()[:2].max())
         tilt_deg = _tilt_deg(turns)

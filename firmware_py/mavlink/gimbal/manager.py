@@ -98,8 +98,13 @@ class GimbalManager(Service):
         pitch_deg, yaw_deg, pitch_rate_deg_s, yaw_rate_deg_s, flags, _, device = params
         if not self._is_ours(device) or not 0 <= flags < 1 << 16:
             return CommandResult.DENIED
-        angles = (radians(pitch_deg), radians(yaw_deg), radians(pitch_rate_deg_s), radians(yaw_rate_deg_s))
-        return self._point(int(flags), *angles)
+        return self._point(
+            int(flags),
+            radians(pitch_deg),
+            radians(yaw_deg),
+            radians(pitch_rate_deg_s),
+            radians(yaw_rate_deg_s),
+        )
 
     def _configure(self, command: Command) -> CommandResult:
         return self._set_control(command.sender, command.all_params)
@@ -126,8 +131,7 @@ class GimbalManager(Service):
         pitch_rad = yaw_rad = nan
         if all(map(isfinite, q)) and hypot(*q) > 0.1:
             _, pitch_rad, yaw_rad = euler_from_quaternion(normalized(q))
-        rates = (message.angular_velocity_y, message.angular_velocity_z)
-        self._point(message.flags, pitch_rad, yaw_rad, *rates)
+        self._point(message.flags, pitch_rad, yaw_rad, message.angular_velocity_y, message.angular_velocity_z)
 
     def _set_pitch_yaw(self, _link: Link, message: Message) -> None:
         if self._is_order(message):

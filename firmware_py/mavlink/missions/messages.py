@@ -118,9 +118,18 @@ def item_message(
     if as_int:
         scale = 1.0 if item.frame == Frame.MISSION else 1e7
         x, y = _as_int(item.x, scale), _as_int(item.y, scale)
-    flags = (int(current), int(item.autocontinue))
     return build(
-        *target, item.seq, int(frame), item.command, *flags, *item.params, x, y, item.z, int(plan_type)
+        *target,
+        item.seq,
+        int(frame),
+        item.command,
+        int(current),
+        int(item.autocontinue),
+        *item.params,
+        x,
+        y,
+        item.z,
+        int(plan_type),
     )
 
 

@@ -166,12 +166,14 @@ class MissionService(Service):
     def _request_next(self, upload: _Upload) -> None:
         """Request the next item."""
         upload.requested_us = self._exchange.time_us
-        fields = (*upload.partner.address, upload.next_seq, int(upload.plan_type))
-        if upload.partner.link not in self._float_links:
-            request = mavlink.MAVLink_mission_request_int_message(*fields)
-        else:
-            request = mavlink.MAVLink_mission_request_message(*fields)
-        self._exchange.send(upload.partner.link, request)
+        link = upload.partner.link
+        as_float = link in self._float_links
+        build = (
+            mavlink.MAVLink_mission_request_message
+            if as_float
+            else mavlink.MAVLink_mission_request_int_message
+        )
+        self._exchange.send(link, build(*upload.partner.address, upload.next_seq, int(upload.plan_type)))
 
     def _item(self, partner: _Partner, message: Message) -> None:
         upload = self._upload

@@ -66,11 +66,20 @@ def _system_status(status: VehicleStatus) -> int:
 
 
 def _autopilot_version(system_id: int) -> Message:
-    # Of flight software and middleware; operating system and board have none.
-    versions = (packed_version(FOLLOWED_PX4_VERSION), packed_version(OWN_VERSION), 0, 0)
-    no_hashes = [[0] * 8] * 3
-    uid = simulator_uid(system_id)
-    return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, *versions, *no_hashes, 0, 0, uid)
+    no_hash = [0] * 8
+    return mavlink.MAVLink_autopilot_version_message(
+        capabilities=_CAPABILITIES,
+        flight_sw_version=packed_version(FOLLOWED_PX4_VERSION),
+        middleware_sw_version=packed_version(OWN_VERSION),
+        os_sw_version=0,
+        board_version=0,
+        flight_custom_version=no_hash,
+        middleware_custom_version=no_hash,
+        os_custom_version=no_hash,
+        vendor_id=0,
+        product_id=0,
+        uid=simulator_uid(system_id),
+    )
 
 
 def _protocol_version() -> Message:
@@ -131,9 +140,13 @@ class ConnectionService(Service):
         status, mode = self._autopilot.status, self._autopilot.status.mode
         # As in PX4: 29 disarmed and 157 armed in auto modes, 17 and 145 in offboard.
         base_mode = _CUSTOM | mode.value.flags | (_ARMED if status.armed else 0)
-        kind = (mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
         return mavlink.MAVLink_heartbeat_message(
-            *kind, base_mode, mode.custom_mode, _system_status(status), 3
+            type=mavlink.MAV_TYPE_QUADROTOR,
+            autopilot=mavlink.MAV_AUTOPILOT_PX4,
+            base_mode=base_mode,
+            custom_mode=mode.custom_mode,
+            system_status=_system_status(status),
+            mavlink_version=3,
         )
 
     def _receive_heartbeat(self, link: Link, message: Message) -> None:

@@ -174,8 +174,9 @@ def _organising_routes(service: CompetitionService, organisers: _Writers) -> API
     async def change_team(request: Request, team_id: str) -> Response:
         form, entry = await organisers.read(request, TeamChangeForm)
         number = _id("team", team_id)
-        values = (form.name, form.members, form.withdrawn)
-        await service.change(lambda store: store.change_team(number, *values, entry))
+        await service.change(
+            lambda store: store.change_team(number, form.name, form.members, form.withdrawn, entry)
+        )
         return json_response({"team": number})
 
     @routes.post("/next")

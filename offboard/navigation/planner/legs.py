@@ -48,23 +48,32 @@ def solve(offset_m: Array, before_m_s: Array, after_m_s: Array, limits: LegLimit
         limits: of each axis.
         least_s: motions may not be shorter than this, shape (n,).
     """
-    ends = (offset_m, before_m_s, after_m_s, _speeds(before_m_s, after_m_s, limits))
+    caps = _speeds(before_m_s, after_m_s, limits)
     limit = np.broadcast_to(limits.acceleration_m_s2, offset_m.shape)
     fastest = _fastest(offset_m, before_m_s, after_m_s, limits)
     times = np.maximum(np.maximum(fastest.max(axis=1), least_s), _SHORTEST_S)
-    a = _accelerations(*ends, times[:, None])
+    a = _accelerations(offset_m, before_m_s, after_m_s, caps, times[:, None])
     late = (np.abs(a) > limit * _TOLERANCE).any(axis=1)
     if late.any():  # rare: an axis has no motion of this duration, only shorter and longer ones
-        times[late] = _stretched(tuple(end[late] for end in ends), times[late], limit[late] * _TOLERANCE)
-        a = _accelerations(*ends, times[:, None])
+        times[late] = _stretched(
+            offset_m[late],
+            before_m_s[late],
+            after_m_s[late],
+            caps[late],
+            lower=times[late],
+            limit=limit[late] * _TOLERANCE,
+        )
+        a = _accelerations(offset_m, before_m_s, after_m_s, caps, times[:, None])
     a = np.where(np.isfinite(a), a, 0.0)
-    return Motions(times, before_m_s, after_m_s, a, ends[3], (np.abs(a) / limit).max(axis=1))
+    return Motions(times, before_m_s, after_m_s, a, caps, (np.abs(a) / limit).max(axis=1))
 
 
-def _stretched(ends: tuple[Array, ...], lower: Array, limit: Array) -> Array:
+def _stretched(
+    offset: Array, before: Array, after: Array, cap: Array, *, lower: Array, limit: Array
+) -> Array:
     """The shortest of some longer durations that is possible; the nearest to it if none is."""
     tried = lower[:, None] * _STRETCHES
-    offset, before, after, cap = (end[:, None, :] for end in ends)
+    offset, before, after, cap = (each[:, None, :] for each in (offset, before, after, cap))
     need = np.abs(_accelerations(offset, before, after, cap, tried[..., None]))
     excess = (need / limit[:, None, :]).max(axis=-1)
     possible = excess <= 1.0
@@ -211,8 +220,12 @@ class Legs:
         """Positions at shares of each leg's duration, shape (n, shares, 3)."""
         motions = self.motions
         times = motions.durations_s[:, None, None] * shares[None, :, None]
-        each = (motions.before_m_s[:, None], motions.accelerations_m_s2[:, None], self.phases_s[:, :, None])
-        moved, _ = _moved(times, *each)
+        moved, _ = _moved(
+            times,
+            speeds=motions.before_m_s[:, None],
+            a=motions.accelerations_m_s2[:, None],
+            phases=self.phases_s[:, :, None],
+        )
         return self.starts_m[:, None] + rotate(moved, self.cosines[:, None], self.sines[:, None])
 
 

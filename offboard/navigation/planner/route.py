@@ -191,9 +191,9 @@ class RouteFinder:
             sides: list[_Opening] = []
             for side, sign in ((0, 1), (1, -1)):
                 row = 2 * index + side
-                room = float(rooms[index, 1 - side]), float(rooms[index, side])
-                if gate.direction != -sign and min(room) >= LEAST_STRAIGHT_M:
-                    sides.append(_Opening(centres[row], normals[row], float(yaws[row]), *room))
+                before_m, after_m = float(rooms[index, 1 - side]), float(rooms[index, side])
+                if gate.direction != -sign and min(before_m, after_m) >= LEAST_STRAIGHT_M:
+                    sides.append(_Opening(centres[row], normals[row], float(yaws[row]), before_m, after_m))
             found.append(sides)
         return found
 

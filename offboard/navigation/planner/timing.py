@@ -224,9 +224,14 @@ def slowed(
     samples: Samples, yaw: Array, yaw_rate: Array, stretches: list[Stretch], style: FlightStyle
 ) -> Path:
     """The path, with time stretched where the speed along an axis would be too high."""
-    motion = samples.velocities_m_s, samples.accelerations_m_s2
-    near_bars = _near_bars(samples, stretches)
-    squares = speed_squares(*motion, yaw, yaw_rate, near_bars=near_bars, style=style)
+    squares = speed_squares(
+        samples.velocities_m_s,
+        samples.accelerations_m_s2,
+        yaw,
+        yaw_rate,
+        near_bars=_near_bars(samples, stretches),
+        style=style,
+    )
     share = np.sqrt(squares)
     steps = STEP_S / (0.5 * (share[:-1] + share[1:]))
     times = np.concatenate(([0.0], np.cumsum(steps)))
