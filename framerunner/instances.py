@@ -5,10 +5,11 @@ from __future__ import annotations
 import fcntl
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import gettempdir
-from typing import BinaryIO
+
+from filelock import FileLock
 
 from framerunner.errors import SettingError
 from framerunner.wire.transports.sockets import bind_udp, listen_tcp
@@ -35,36 +36,16 @@ def claimed_instance() -> Iterator[int]:
         SettingError: there is none.
     """
     for instance in range(INSTANCES):
+        path = Path(gettempdir()) / f"framerunner-instance-{instance}.lock"
         try:
-            lock = _open_lock(Path(gettempdir()) / f"framerunner-{instance}.lock")
-        except OSError:  # its name is taken by something else
+            lock = FileLock(path, timeout=0, mode=0o666).acquire()  # every user of this machine may take it
+        except OSError:  # it is claimed, or its name is taken by something else
             continue
         with lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                continue
             if _is_free(instance):
                 yield instance
                 return
     raise SettingError(f"the ports of all {INSTANCES} instances are in use; end other simulators or flights")
-
-
-def _open_lock(path: Path) -> BinaryIO:
-    """Open a file that every user can lock, in a folder where others may have put a file or a link before.
-
-    It is opened for reading, and made only where there is nothing, so no other file is changed.
-    """
-    with suppress(FileExistsError):
-        made = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_EXCL)
-        with os.fdopen(made, "rb"):
-            os.fchmod(made, 0o644)
-    return _opened(path)
-
-
-def _opened(path: Path) -> BinaryIO:
-    """A file that is there, for reading; a link is refused, and a pipe is not waited for."""
-    return os.fdopen(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb")
 
 
 def _is_free(instance: int) -> bool:
@@ -84,9 +65,10 @@ def _is_free(instance: int) -> bool:
 
 
 def _is_locked_by_px4(instance: int) -> bool:
-    """Whether a PX4 of this instance runs: it locks a file, whichever program has started it."""
-    try:
-        with _opened(Path(f"{_PX4_LOCKS}{instance}")) as file:
+    """Whether a PX4 of this instance runs: it has a record lock on a file, whoever has started it."""
+    try:  # a link is refused, and a pipe is not waited for
+        file = os.open(f"{_PX4_LOCKS}{instance}", os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        with os.fdopen(file, "rb"):
             fcntl.lockf(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except FileNotFoundError:
         return False

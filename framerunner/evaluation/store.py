@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import os
 import re
@@ -14,6 +13,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
 from pydantic import TypeAdapter
 
 from framerunner.errors import SettingError, write_advice
@@ -113,14 +113,13 @@ def open_folder(path: Path, identity: Identity, *, again: bool = False) -> Itera
     """
     with _writing(path):
         path.mkdir(parents=True, exist_ok=True)
-        lock = (path / LOCK).open("w")
-    with lock:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+            lock = FileLock(path / LOCK, timeout=0).acquire()
+        except Timeout:
             raise SettingError(
                 f"--out {path}: another evaluation is writing here; wait, or choose another"
             ) from None
+    with lock:
         is_new = _check(path, identity, again)
         with _writing(path):
             if is_new:

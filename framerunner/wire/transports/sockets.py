@@ -12,12 +12,12 @@ from __future__ import annotations
 import errno
 import os
 import socket
-import termios
-import tty
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import cast
+
+from serial import Serial
 
 from framerunner.wire.transports.urls import LinkError, LinkUrl, in_url
 
@@ -239,21 +239,17 @@ def connect_tcp(place: Address) -> Stream:
 
 def open_serial(path: str, baud: int) -> Stream:
     """A serial line: eight bits, no parity, no flow control."""
-    speed = getattr(termios, f"B{baud}", None)
-    if not speed:
+    if baud not in Serial.BAUDRATES:
         raise LinkError(f"serial {path}:{baud}: {baud} is not a usual baud rate, such as 57600 or 921600")
     with _explained(f"serial {path} cannot be opened", "is it plugged in, and may you use it?"):
-        line = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    try:
-        tty.setraw(line, termios.TCSANOW)
-        settings = termios.tcgetattr(line)
-        settings[2] = (settings[2] | termios.CLOCAL | termios.CREAD) & ~(termios.CSTOPB | termios.CRTSCTS)
-        settings[4] = settings[5] = speed
-        termios.tcsetattr(line, termios.TCSANOW, settings)
-    except (termios.error, OSError):
-        os.close(line)
-        raise LinkError(f"serial {path}: this is not a serial line") from None
-    return Stream(line)
+        try:  # a time-out between bytes sets VMIN to 1: with 0 a silent line would look like one that is gone
+            line = Serial(path, baud, inter_byte_timeout=0)
+        except Exception as error:  # pyserial passes on termios.error, too
+            if getattr(error, "errno", None):
+                raise
+            raise LinkError(f"serial {path}: this is not a serial line") from None
+        with line:
+            return Stream(os.dup(line.fileno()))
 
 
 def open_drone(url: LinkUrl) -> UdpSocket | Stream | OneClient:

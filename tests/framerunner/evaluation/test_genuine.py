@@ -203,16 +203,17 @@ def test_a_flight_that_is_interrupted_twice_still_ends_in_order():
 def test_a_lock_in_the_shared_folder_neither_changes_nor_waits_for_other_files(three_instances):
     valuable = three_instances / "valuable"
     valuable.write_text("kept")
-    (three_instances / "framerunner-0.lock").symlink_to(valuable)
-    left = three_instances / "framerunner-1.lock"  # by an earlier flight of another user
+    (three_instances / "framerunner-instance-0.lock").symlink_to(valuable)
+    left = three_instances / "framerunner-instance-1.lock"  # by an earlier flight of another user
     left.write_text("theirs")
-    left.chmod(0o444)
+    left.chmod(0o666)
     with claimed_instance() as instance:
         assert instance == 1
     assert (valuable.read_text(), left.read_text()) == ("kept", "theirs")
     with claimed_instance(), claimed_instance() as instance:
         assert instance == 2
-    assert (three_instances / "framerunner-2.lock").stat().st_mode & 0o777 == 0o644
+    made = three_instances / "framerunner-instance-2.lock"
+    assert made.stat().st_mode & 0o777 == 0o666  # other users claim it, too
 
 
 def test_a_pipe_in_the_place_of_a_lock_of_px4_is_not_waited_for(three_instances):

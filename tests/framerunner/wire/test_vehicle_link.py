@@ -3,12 +3,17 @@
 import os
 import pty
 import socket
+import termios
 import threading
+import tty
+from unittest.mock import Mock
 
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from framerunner.wire.dialect import companion_heartbeat, is_vehicle, request_message
+from framerunner.wire.transports import sockets
+from framerunner.wire.transports.sockets import open_serial
 from framerunner.wire.transports.urls import LinkError
 from framerunner.wire.transports.vehicle_link import VehicleLink
 from tests.free_ports import free_port
@@ -138,6 +143,33 @@ def test_a_serial_line():
         os.close(device)
 
 
+def test_a_serial_line_passes_all_bytes_at_its_speed_and_a_silent_one_is_not_lost():
+    vehicle, device = pty.openpty()
+    tty.setraw(vehicle)
+    everything = bytes(range(256))
+    line = open_serial(os.ttyname(device), 921600)
+    try:
+        assert termios.tcgetattr(device)[4:6] == [termios.B921600, termios.B921600]
+        assert line.read() is None
+        os.write(vehicle, everything)
+        assert line.read() == everything
+        line.write(everything)
+        assert os.read(vehicle, 300) == everything
+        os.close(vehicle)
+        with pytest.raises(ConnectionResetError, match="the serial line is gone"):
+            line.read()
+    finally:
+        line.close()
+        os.close(device)
+
+
+@pytest.mark.parametrize("error", [termios.error(5, "Input/output error"), ValueError("no")])
+def test_a_serial_line_that_is_lost_while_it_is_opened_is_one_clear_line(monkeypatch, error):
+    monkeypatch.setattr(sockets, "Serial", Mock(side_effect=error, BAUDRATES=(57600,)))
+    with pytest.raises(LinkError, match="/dev/ttyUSB0: this is not a serial line"):
+        open_serial("/dev/ttyUSB0", 57600)
+
+
 def test_noise_between_packets_is_passed_over():
     port = free_port()
     link = open_link(f"udpin://127.0.0.1:{port}")
@@ -169,6 +201,7 @@ def test_a_false_header_costs_no_packet_that_follows(noise):
         ("udp://:14540", "bad drone address"),
         ("serial:///dev/null:57600", "not a serial line"),
         ("serial:///dev/null:12345", "12345 is not a usual baud rate"),
+        ("serial:///dev/null:0", "0 is not a usual baud rate"),
         ("serial:///dev/not-there:57600", "cannot be opened .No such file or directory.; is it plugged in"),
         (
             "udpout://no.such.host.invalid:14550",
