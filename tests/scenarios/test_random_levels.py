@@ -3,10 +3,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from framerunner.files.yaml_file import MAX_BYTES
+from framerunner.files.yaml_text import to_yaml
 from scenarios.random_numbers import LevelError, Range
 from scenarios.random_scenarios import LEVEL_FILES, Level, load_level
-from scenarios.yaml_file import MAX_BYTES
-from scenarios.yaml_tree import to_yaml
 
 CALM = to_yaml(load_level("calm").model_dump(exclude_unset=True))
 
