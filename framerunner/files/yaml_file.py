@@ -20,11 +20,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from framerunner.errors import UserError
-from framerunner.files.text_file import TextError, decode_text, read_bytes
+from framerunner.files.text_file import MAX_TEXT_BYTES, TextError, decode_text, read_bytes
 from framerunner.files.yaml_text import MapNode, Scalar, YamlError, compose, follow, plain
 from framerunner.files.yaml_text import Path as FieldPath
 
-MAX_BYTES = 1_000_000
 MAX_VALUE_LENGTH = 60  # characters of a value or path shown in a message
 SUFFIXES = (".yaml", ".yml")
 
@@ -124,9 +123,11 @@ class FileKind(Generic[Model]):
                 raise error(f"{name}: is a directory; give a {kind} file")
             if not stat.S_ISREG(status.st_mode):
                 raise error(f"{name}: is not a regular file; give a {kind} file")
-            if status.st_size > MAX_BYTES:
-                raise error(f"{name}: {status.st_size} bytes is too large for a {kind}; {MAX_BYTES} at most")
-            return read_bytes(path, MAX_BYTES)
+            if status.st_size > MAX_TEXT_BYTES:
+                raise error(
+                    f"{name}: {status.st_size} bytes is too large for a {kind}; {MAX_TEXT_BYTES} at most"
+                )
+            return read_bytes(path)
         except FileNotFoundError:
             others = f" or one of: {', '.join(known)}" if known else ""
             raise error(f"{name}: no such file; give a path{others}") from None
@@ -136,8 +137,8 @@ class FileKind(Generic[Model]):
 
     def _root(self, content: bytes | str, source: str) -> MapNode:
         kind, error = self.name, self.error
-        if len(content) > MAX_BYTES:
-            raise error(f"{source}: {len(content)} bytes is too large for a {kind}; {MAX_BYTES} at most")
+        if len(content) > MAX_TEXT_BYTES:
+            raise error(f"{source}: {len(content)} bytes is too large for a {kind}; {MAX_TEXT_BYTES} at most")
         try:
             root = compose(content if isinstance(content, str) else decode_text(content), source)
         except TextError as failure:
