@@ -101,8 +101,7 @@ class FlightLoop:
         self.parameters = parameters if parameters is not None else Parameters(defaults=airframe.parameters)
         self.estimator: StateEstimator = IdealEstimator(origin) if estimator is None else estimator
         self.state = self.estimator.state
-        self._senses = not self.estimator.report().ideal
-        self.wind = WindEstimator(airframe, control_period_s) if self._senses else None
+        self.wind = None if estimator is None else WindEstimator(airframe, control_period_s)
         self.status = VehicleStatus()
         self.output = MotorOutput((0.0,) * len(airframe.rotors))
         self.flight = FlightRecord()
@@ -370,7 +369,7 @@ class FlightLoop:
             battery.can_arm,
             self.missions.valid,
             breach is not None,
-            "" if self.status.armed or not self._senses else self.estimator.report().problem,
+            "" if self.status.armed else self.estimator.report().problem,
         )
 
     def _configure(self) -> None:

@@ -13,12 +13,12 @@ import yaml
 from statemachine import StateChart
 
 from framerunner.files.text_file import TextError, TextFault, read_text
+from framerunner.files.yaml_text import Place
 from offboard.chart.check import check, is_finish
 from offboard.chart.messages import Message
 from offboard.chart.native import load_chart, native_document
 from offboard.chart.problems import (
     MissionError,
-    Place,
     Problem,
     ProblemList,
     cut,

@@ -21,7 +21,8 @@ from typing import get_type_hints
 from statemachine import StateChart
 
 from framerunner.files.text_file import TextError, read_text
-from offboard.chart.problems import MissionError, Place, mission_error
+from framerunner.files.yaml_text import Place
+from offboard.chart.problems import MissionError, mission_error
 from offboard.pilot import Pilot
 
 _INSTANCE_NAMES = (

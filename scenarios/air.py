@@ -6,7 +6,8 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from scenarios.part import Part, refusal
+from framerunner.files.yaml_file import refusal
+from scenarios.part import Part
 
 MAX_WIND_M_S = 25.0
 MAX_TURBULENCE_M_S = 10.0

@@ -7,7 +7,8 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from scenarios.part import Part, refusal
+from framerunner.files.yaml_file import refusal
+from scenarios.part import Part
 
 
 class Gimbal(Part):

@@ -11,9 +11,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from framerunner.files.yaml_file import refusal
 from framerunner.geometry.rotations import yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
-from scenarios.part import Metres, Part, refusal
+from scenarios.part import Metres, Part
 
 _DISTANCES_M = (0.0, 100.0)
 _Distance = Annotated[float, Field(ge=0, le=1000)]

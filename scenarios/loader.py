@@ -7,10 +7,10 @@ import re
 from pathlib import Path
 from typing import Any
 
+from framerunner.files.yaml_file import FileKind
+from framerunner.files.yaml_text import to_yaml
 from scenarios.models import Scenario, ScenarioError
 from scenarios.random_scenarios import LEVEL_FILES, load_level, random_scenario
-from scenarios.yaml_file import FileKind
-from scenarios.yaml_tree import to_yaml
 
 _FILES = FileKind("scenario", Scenario, ScenarioError, folder="files")
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from framerunner.errors import UserError
+from framerunner.files.yaml_file import refusal
 from framerunner.geometry.axes import flip_quaternion
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.solids import Solid
@@ -21,7 +22,7 @@ from scenarios.gimbal import Gimbal
 from scenarios.goals import Goal
 from scenarios.imaging.clutter import Hall, Patch
 from scenarios.imaging.effects import CameraEffects
-from scenarios.part import Component, Metres, OnDrone, Part, Turn, refusal
+from scenarios.part import Component, Metres, OnDrone, Part, Turn
 
 Colour = Literal["red", "green", "blue"]
 COLOURS: tuple[Colour, ...] = ("red", "green", "blue")

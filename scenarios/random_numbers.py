@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Self
 
 from pydantic import Field, model_validator
 
+from framerunner.files.yaml_file import refusal
 from scenarios.models import ScenarioError
-from scenarios.part import Part, refusal
+from scenarios.part import Part
 
 if TYPE_CHECKING:
     from numpy.random import Generator

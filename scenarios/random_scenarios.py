@@ -12,6 +12,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
+from framerunner.files.yaml_file import FileKind
 from scenarios.air import Wind
 from scenarios.faults.random import RandomFault
 from scenarios.imaging.random_imaging import RandomClutter, RandomEffects, RandomLight
@@ -21,7 +22,6 @@ from scenarios.random_air import RandomWind
 from scenarios.random_closeness import Closeness
 from scenarios.random_numbers import MAX_DRAWS, STEPS_PER_UNIT, LevelError, Range, random_stream
 from scenarios.random_obstacles import Obstacles, add_obstacles
-from scenarios.yaml_file import FileKind
 
 
 class Layout(Part):

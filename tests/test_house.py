@@ -349,6 +349,16 @@ def test_texts_are_read_by_the_one_reader():
     assert {each for each in found if "'/proc/" not in each and "os.devnull" not in each} == set()
 
 
+def test_yaml_is_read_by_the_one_reader():
+    """It has limits for strangers' files; others only write YAML."""
+    reader = ROOT / "framerunner" / "files" / "yaml_text.py"
+    calls = re.compile(
+        r"\byaml\.(?!safe_dump\b|YAMLError\b|MarkedYAMLError\b|Mark\b)\w+\(|^from yaml", re.MULTILINE
+    )
+    others = [path for path in MODULES if path != reader]
+    assert [name_of(each) for each in others if calls.search(each.read_text(encoding="utf-8"))] == []
+
+
 def test_errors_for_people_are_user_errors():
     """The command line prints a UserError; any other error ends in a traceback."""
     strays = [

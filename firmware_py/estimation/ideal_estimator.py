@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from math import isfinite, isnan
 
+from firmware_py.estimation.ideal_report import ideal_report
 from firmware_py.estimation.report import EstimatorReport
 from firmware_py.types import VehicleState
 from framerunner.geometry.rotations import euler_from_quaternion, rotation, to_world
@@ -47,13 +48,7 @@ class IdealEstimator:
 
     def report(self) -> EstimatorReport:
         """The condition now: all that is known, without error."""
-        known = self.origin_ned_m is not None
-        return EstimatorReport(
-            has_attitude=known,
-            has_velocity=known and self.has_position,
-            has_position=known and self.has_position,
-            has_height=known,
-        )
+        return ideal_report(self.state, self.origin, has_position=self.has_position)
 
     def take_external_pose(self, pose: ExternalPose) -> None:
         """Ignore a pose from outside: ideal sensors know theirs."""

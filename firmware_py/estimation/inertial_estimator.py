@@ -137,7 +137,6 @@ class InertialEstimator:
         known = self._alignment is None
         has_height = known and self._is_recent(aiding.height_us)
         return EstimatorReport(
-            ideal=False,
             present=watches.present,
             healthy=healthy,
             relied_on=relied_on | IMU if known else frozenset(),

@@ -69,7 +69,6 @@ class EstimatorReport:
     """The estimator's condition in one tick.
 
     Attributes:
-        ideal: the sensors are ideal; variances are then NaN, and `latest` is empty.
         present: sensors that the vehicle has.
         healthy: of those, the ones that deliver what can be used.
         relied_on: of those, the ones whose measurements are fused now.
@@ -91,7 +90,6 @@ class EstimatorReport:
         problem: why the vehicle should not be armed, in words; empty: nothing is wrong.
     """
 
-    ideal: bool = True
     present: frozenset[Sensor] = frozenset()
     healthy: frozenset[Sensor] = frozenset()
     relied_on: frozenset[Sensor] = frozenset()

@@ -7,11 +7,11 @@ from math import isfinite
 from struct import pack
 from typing import Any, Literal, Self
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from framerunner.errors import UserError
 from framerunner.files.text_file import decode_text
+from framerunner.files.yaml_text import read_yaml
 
 
 class ParameterError(UserError):
@@ -104,9 +104,10 @@ def _declare(name: str, group: str, fields: dict[str, Any]) -> Parameter:
     if kind == "float":
         fields.setdefault("decimals", 1)
     if "choices" in fields:
-        span = (min(fields["choices"]), max(fields["choices"]))
+        numbers = sorted(map(int, fields["choices"]))
+        span = (numbers[0], numbers[-1])
     elif "bits" in fields:
-        span = (0, sum(1 << bit for bit in fields["bits"]))
+        span = (0, sum(1 << int(bit) for bit in fields["bits"]))
     else:
         span = fields.pop("range")
     return Parameter(name=name, group=group, kind=kind, minimum=span[0], maximum=span[1], **fields)
@@ -114,7 +115,7 @@ def _declare(name: str, group: str, fields: dict[str, Any]) -> Parameter:
 
 def _load() -> tuple[Parameter, ...]:
     text = decode_text(resources.files(__package__).joinpath("declarations.yaml").read_bytes())
-    groups = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # eight times as fast
+    groups: Any = read_yaml(text)
     declared = [_declare(name, group, each) for group, rows in groups.items() for name, each in rows.items()]
     return tuple(sorted(declared, key=lambda each: each.name))
 

@@ -1,14 +1,17 @@
-"""Values of logged topics for a vehicle whose sensors have errors: samples, and the estimator's condition.
+"""A sample of the autopilot, and the values of topics about its sensors and its estimator.
 
 The order of values is that of the topics in `topics.py`; None: there is no such sensor, or no sample yet.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import atan2, hypot, nan, sqrt
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.estimation.report import EstimatorReport, Sensor
 from framerunner.vehicle.atmosphere import pressure_altitude_m
+from framerunner.vehicle.geodesy import GeodeticPoint
 
 Values = tuple[float, ...]
 
@@ -24,6 +27,25 @@ _AIDED_BY = {
     Sensor.RANGE_FINDER: 1 << 10,
     Sensor.EXTERNAL_POSE: 1 << 12 | 1 << 13 | 1 << 14,  # position, heading, height
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One sample of the autopilot, with values that several topics need.
+
+    Attributes:
+        autopilot: which is sampled.
+        time_us: vehicle time.
+        unix_us: the same since 1970; 0: not known.
+        place: position on Earth; None: not known.
+        report: of the estimator.
+    """
+
+    autopilot: Autopilot
+    time_us: int
+    unix_us: int
+    place: GeodeticPoint | None
+    report: EstimatorReport
 
 
 def control_mode_flags(report: EstimatorReport) -> int:
@@ -46,16 +68,16 @@ def accuracies_and_ratios(report: EstimatorReport) -> Values:
     )
 
 
-def gps(report: EstimatorReport, time_us: int, unix_us: int) -> Values | None:
+def gps(sample: Sample) -> Values | None:
     """Values of vehicle_gps_position."""
-    fix = report.latest.gps
+    fix = sample.report.latest.gps
     if fix is None:
         return None
     north_m_s, east_m_s, down_m_s = fix.velocity_ned_m_s
     return (
-        time_us,
+        sample.time_us,
         fix.time_us,
-        unix_us,
+        sample.unix_us,
         fix.latitude_deg,
         fix.longitude_deg,
         fix.altitude_m,
@@ -78,32 +100,32 @@ def gps(report: EstimatorReport, time_us: int, unix_us: int) -> Values | None:
     )
 
 
-def air_data(report: EstimatorReport, time_us: int) -> Values | None:
+def air_data(sample: Sample) -> Values | None:
     """Values of vehicle_air_data."""
-    sample = report.latest.barometer
-    if sample is None:
+    pressure = sample.report.latest.barometer
+    if pressure is None:
         return None
-    density_kg_m3 = sample.pressure_pa / (_AIR_GAS_CONSTANT * sample.temperature_k)
+    density_kg_m3 = pressure.pressure_pa / (_AIR_GAS_CONSTANT * pressure.temperature_k)
     return (
-        time_us,
         sample.time_us,
-        pressure_altitude_m(sample.pressure_pa),
-        sample.pressure_pa,
-        sample.temperature_k - _KELVIN,
+        sample.time_us,
+        pressure_altitude_m(pressure.pressure_pa),
+        pressure.pressure_pa,
+        pressure.temperature_k - _KELVIN,
         density_kg_m3,
     )
 
 
-def magnetometer(report: EstimatorReport, time_us: int) -> Values | None:
+def magnetometer(sample: Sample) -> Values | None:
     """Values of vehicle_magnetometer."""
-    sample = report.latest.magnetometer
-    return None if sample is None else (time_us, sample.time_us, *sample.field_frd_gauss)
+    field = sample.report.latest.magnetometer
+    return None if field is None else (sample.time_us, field.time_us, *field.field_frd_gauss)
 
 
-def sensor_combined(report: EstimatorReport, time_us: int) -> Values | None:
+def sensor_combined(sample: Sample) -> Values | None:
     """Values of sensor_combined: the IMU as measured."""
-    imu = report.latest.imu
+    imu = sample.report.latest.imu
     if imu is None:
         return None
     rate, force, period_us = imu.angular_rate_frd_rad_s, imu.specific_force_frd_m_s2, imu.period_us
-    return (time_us, *rate, period_us, 0, *force, period_us, 0, 0, 0, 0)
+    return (sample.time_us, *rate, period_us, 0, *force, period_us, 0, 0, 0, 0)

@@ -8,20 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, hypot, isfinite, nan
+from math import isfinite, nan
 
-from firmware_py.autopilot import Autopilot
 from firmware_py.estimation.report import EstimatorReport
 from firmware_py.mavlink.telemetry.health import solution_flags
-from firmware_py.mavlink.telemetry.sensing import earth_field_frd_gauss
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint
 from firmware_py.status import NAVIGATION_STATES, LandedState
 from firmware_py.ulog import measured
+from firmware_py.ulog.measured import Sample, Values
 from firmware_py.ulog.messages import Topic
-from framerunner.vehicle.atmosphere import pressure_hpa, temperature_k
-from framerunner.vehicle.geodesy import GeodeticPoint
-
-Values = tuple[float, ...]
 
 _MOTORS = 12
 _OUTPUTS = 16
@@ -31,30 +26,7 @@ _USUAL_US = 100_000
 _SLOW_US = 500_000
 _ARMED, _DISARMED = 2, 1  # vehicle_status.arming_state
 _ROTARY_WING = 1
-# estimator_status.control_mode_flags: tilt and yaw aligned, GNSS position, magnetic heading, barometer
-# height, GNSS velocity; the bit in between means in the air.
-_ESTIMATOR_MODE = 1 << 0 | 1 << 1 | 1 << 2 | 1 << 4 | 1 << 9 | 1 << 44
-_ESTIMATOR_IN_AIR = 1 << 7
-_SOLUTION_GOOD = 0x033F  # attitude, velocities and positions; no height above ground, not standing still
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """One sample of the autopilot, with values that several topics need.
-
-    Attributes:
-        autopilot: which is sampled.
-        time_us: vehicle time.
-        unix_us: the same since 1970; 0: not known.
-        place: position on Earth; None: not known.
-        report: of the estimator.
-    """
-
-    autopilot: Autopilot
-    time_us: int
-    unix_us: int
-    place: GeodeticPoint | None
-    report: EstimatorReport
+_ESTIMATOR_IN_AIR = 1 << 7  # of estimator_status.control_mode_flags
 
 
 Collector = Callable[[Sample], Values | None]
@@ -83,14 +55,6 @@ def _rates_setpoint(sample: Sample) -> Values | None:
 
 def _angular_velocity(sample: Sample) -> Values:
     return (sample.time_us, sample.time_us, *sample.autopilot.state.angular_rate_frd_rad_s)
-
-
-def _sensor_combined(sample: Sample) -> Values | None:
-    if not sample.report.ideal:
-        return measured.sensor_combined(sample.report, sample.time_us)
-    state = sample.autopilot.state
-    turning, pulling = state.angular_rate_frd_rad_s, state.specific_force_frd_m_s2
-    return (sample.time_us, *turning, 4000, 0, *pulling, 4000, 0, 0, 0, 0)
 
 
 def _thrust_setpoint(sample: Sample) -> Values:
@@ -139,8 +103,6 @@ def _local_position(sample: Sample) -> Values | None:
 
 def _local_quality(report: EstimatorReport) -> Values:
     """Height above ground, accuracies and validity."""
-    if report.ideal:
-        return (nan, 0.0, 0.0, *(True, True, True, True, True, True, True, False, False))
     horizontal_m, vertical_m = measured.accuracies_and_ratios(report)[:2]
     place, height, speed = report.has_position, report.has_height, report.has_velocity
     above_ground_m = report.height_above_ground_m
@@ -184,67 +146,6 @@ def _global_position(sample: Sample) -> Values | None:
         nan,
         *(True, True, False, False),
     )
-
-
-def _gps(sample: Sample) -> Values | None:
-    """Ideal: with the accuracies of GPS_RAW_INT, which are PX4's simulated ones."""
-    if not sample.report.ideal:
-        return measured.gps(sample.report, sample.time_us, sample.unix_us)
-    place = sample.place
-    if place is None:
-        return None
-    north_m_s, east_m_s, down_m_s = sample.autopilot.state.velocity_ned_m_s
-    return (
-        sample.time_us,
-        sample.time_us,
-        sample.unix_us,
-        place.latitude_deg,
-        place.longitude_deg,
-        place.altitude_m,
-        place.altitude_m,
-        0.4,
-        0.1,
-        0.9,
-        1.78,
-        0.7,
-        1.1,
-        0,
-        0,
-        hypot(north_m_s, east_m_s),
-        north_m_s,
-        east_m_s,
-        down_m_s,
-        atan2(east_m_s, north_m_s),
-        nan,
-        *(3, 1, 1, True, 10),
-    )
-
-
-def _air_data(sample: Sample) -> Values | None:
-    if not sample.report.ideal:
-        return measured.air_data(sample.report, sample.time_us)
-    place = sample.place
-    if place is None:
-        return None
-    altitude_m = place.altitude_m
-    temperature = temperature_k(altitude_m)
-    pressure_pa = pressure_hpa(altitude_m) * 100.0
-    density_kg_m3 = pressure_pa / (287.05 * temperature)  # ideal gas, dry air
-    return (
-        sample.time_us,
-        sample.time_us,
-        altitude_m,
-        pressure_pa,
-        temperature - 273.15,
-        density_kg_m3,
-    )
-
-
-def _magnetometer(sample: Sample) -> Values | None:
-    if not sample.report.ideal:
-        return measured.magnetometer(sample.report, sample.time_us)
-    field_gauss = earth_field_frd_gauss(sample.autopilot.state.attitude)
-    return (sample.time_us, sample.time_us, *field_gauss)
 
 
 def _land_detected(sample: Sample) -> Values:
@@ -294,22 +195,16 @@ def _vehicle_status(sample: Sample) -> Values:
 def _estimator_status(sample: Sample) -> Values:
     flying = sample.autopilot.status.landed_state is not LandedState.ON_GROUND
     report = sample.report
-    mode, solution = _ESTIMATOR_MODE, _SOLUTION_GOOD
-    quality: Values = (0.0,) * 6
-    if not report.ideal:
-        mode = measured.control_mode_flags(report)
-        solution = solution_flags(sample.autopilot, report)
-        quality = measured.accuracies_and_ratios(report)
     return (
         sample.time_us,
         sample.time_us,
-        mode | (_ESTIMATOR_IN_AIR if flying else 0),
+        measured.control_mode_flags(report) | (_ESTIMATOR_IN_AIR if flying else 0),
         0,
         *(0.0, 0.0, 0.0),
-        *quality,
+        *measured.accuracies_and_ratios(report),
         *(0.0, 0.0),
         0,
-        solution,
+        solution_flags(sample.autopilot, report),
         0,
         0,
     )
@@ -350,7 +245,7 @@ _LAYOUTS: tuple[tuple[str, int, Collector, str], ...] = (
     (
         "sensor_combined",
         _FAST_US,
-        _sensor_combined,
+        measured.sensor_combined,
         _T + "float[3] gyro_rad; uint32_t gyro_integral_dt; int32_t accelerometer_timestamp_relative; "
         "float[3] accelerometer_m_s2; uint32_t accelerometer_integral_dt; uint8_t accelerometer_clipping; "
         "uint8_t gyro_clipping; uint8_t accel_calibration_count; uint8_t gyro_calibration_count",
@@ -387,7 +282,7 @@ _LAYOUTS: tuple[tuple[str, int, Collector, str], ...] = (
     (
         "vehicle_gps_position",
         _USUAL_US,
-        _gps,
+        measured.gps,
         _TT + "uint64_t time_utc_usec; double latitude_deg; double longitude_deg; double altitude_msl_m; "
         "double altitude_ellipsoid_m; float s_variance_m_s; float c_variance_rad; float eph; float epv; "
         "float hdop; float vdop; int32_t noise_per_ms; int32_t jamming_indicator; float vel_m_s; "
@@ -397,10 +292,10 @@ _LAYOUTS: tuple[tuple[str, int, Collector, str], ...] = (
     (
         "vehicle_air_data",
         _USUAL_US,
-        _air_data,
+        measured.air_data,
         _TT + "float baro_alt_meter; float baro_pressure_pa; float ambient_temperature; float rho",
     ),
-    ("vehicle_magnetometer", _USUAL_US, _magnetometer, _TT + "float[3] magnetometer_ga"),
+    ("vehicle_magnetometer", _USUAL_US, measured.magnetometer, _TT + "float[3] magnetometer_ga"),
     (
         "vehicle_land_detected",
         _USUAL_US,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,9 @@ import yaml
 from framerunner.camera_calibration.foreign_calibration import foreign_format, read_foreign
 from framerunner.errors import SettingError, write_advice
 from framerunner.files.text_file import TextError, decode_text, replace_file
+from framerunner.files.yaml_file import FileKind
+from framerunner.files.yaml_text import MapNode, compose
 from framerunner.wire.finite_json import finite
-from scenarios.yaml_file import FileKind
 from vision.calibration.model import Calibration, CalibrationError
 
 _FILES = FileKind("calibration", Calibration, CalibrationError, folder="")
@@ -87,18 +89,17 @@ def _updated(path: Path, calibration: Calibration) -> bytes:
     old = load_calibration(path, to_write=True)
     before, data = _content(old), path.read_bytes()
     text = decode_text(data)
-    lines = text.rstrip("\n").split("\n")
     left = {key: value for key, value in _content(calibration).items() if key in calibration.model_fields_set}
-    for key, first, last, column in reversed(list(_entries(text))):
+    for key, start, end in reversed(list(_entries(text))):
         if key in left:
-            value, rest = left.pop(key), lines[last][column:]  # a comment
+            value = left.pop(key)
             if value != before.get(key):
-                lines[first : last + 1] = (_yaml({key: value}).rstrip("\n") + rest).split("\n")
+                text = text[:start] + _yaml({key: value}).rstrip("\n") + text[end:]
         elif key in _ABOUT:
-            del lines[first : last + 1]
-    lines += _yaml(left).rstrip("\n").split("\n") if left else []
-    is_marked, end = data.startswith("\ufeff".encode()), "\r\n" if b"\r\n" in data else "\n"
-    updated = ("\ufeff" * is_marked + "".join(line + end for line in lines)).encode()
+            text = text[:start] + text[end:].partition("\n")[2]
+    text = text.rstrip("\n") + "\n" + _yaml(left)
+    mark, newline = "\ufeff" * data.startswith(BOM_UTF8), "\r\n" if b"\r\n" in data else "\n"
+    updated = (mark + text.replace("\n", newline)).encode()
     wanted = old.model_copy(
         update=dict.fromkeys(_ABOUT)
         | {key: getattr(calibration, key) for key in calibration.model_fields_set}
@@ -114,12 +115,9 @@ def _updated(path: Path, calibration: Calibration) -> bytes:
     return updated
 
 
-def _entries(text: str) -> Iterator[tuple[str, int, int, int]]:
-    """The fields, each with the number of its first and last line, and the column in which it ends."""
-    root = yaml.compose(text, Loader=yaml.SafeLoader)
-    assert isinstance(root, yaml.MappingNode)
-    for key, value in root.value:
-        last = value
-        while isinstance(last, yaml.CollectionNode) and not last.flow_style and last.value:
-            last = last.value[-1][1] if isinstance(last, yaml.MappingNode) else last.value[-1]
-        yield key.value, key.start_mark.line, last.end_mark.line, last.end_mark.column
+def _entries(text: str) -> Iterator[tuple[str, int, int]]:
+    """The fields, each with the offsets at which it begins and ends."""
+    root = compose(text)
+    assert isinstance(root, MapNode)
+    for key, node in root.key_nodes.items():
+        yield key, node.start, root.items[key].end

@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import cv2
-import yaml
 from pydantic import ValidationError
 
+from framerunner.files.yaml_text import Value, YamlError, read_yaml
 from vision.calibration.model import Calibration, CalibrationError
 
 _Field: TypeAlias = "str | Sequence[float]"  # a matrix row by row; a number is a list of one
@@ -57,9 +57,11 @@ def read_foreign(text: str, source: str) -> Calibration:
         raise CalibrationError(
             f"{source}: {kind}: {where}: {fault['msg']} (got {fault['input']!r:.60})"
         ) from None
+    except YamlError as error:
+        raise CalibrationError(f"{source}:{error.place.line}: {kind}: {error}") from None
     except (cv2.error, SystemError):  # SystemError: of its constructor
         raise CalibrationError(f"{source}: {kind}: cannot be read; it is damaged") from None
-    except (ValueError, TypeError, AttributeError, OverflowError, RecursionError, yaml.YAMLError) as error:
+    except (ValueError, TypeError, AttributeError, OverflowError) as error:
         reason = str(error).strip().splitlines() or ["it is damaged"]
         raise CalibrationError(f"{source}: {kind}: {reason[0]:.200}") from None
 
@@ -84,11 +86,19 @@ def _opencv_fields(text: str) -> dict[str, _Field]:
         storage.release()
 
 
+def _number(name: str, value: Value) -> float:
+    if not isinstance(value, int | float):
+        raise ValueError(f"{name} has {value!r:.40}; must be numbers")
+    return float(value)
+
+
 def _ros_fields(text: str) -> dict[str, _Field]:
     found: dict[str, _Field] = {}
-    for name, value in yaml.safe_load(text).items():
-        if isinstance(value, Mapping) and isinstance(value.get("data"), list):
-            found[name] = [float(each) for each in value["data"]]
+    fields = read_yaml(text)
+    for name, value in fields.items() if isinstance(fields, dict) else ():
+        data = value.get("data") if isinstance(value, dict) else None
+        if isinstance(data, tuple):
+            found[name] = [_number(name, each) for each in data]
         elif isinstance(value, int | float):
             found[name] = [float(value)]
         elif isinstance(value, str):

@@ -15,11 +15,11 @@ from pydantic import Field
 
 from framerunner.errors import UserError
 from framerunner.files.text_file import decode_text, read_text
+from framerunner.files.yaml_file import FileKind
 from offboard.mission import MISSIONS
 from scenarios.loader import parse_scenario
 from scenarios.models import Scenario
 from scenarios.part import Part
-from scenarios.yaml_file import FileKind
 
 Language = Literal["en", "es"]
 LANGUAGES: tuple[Language, ...] = get_args(Language)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from framerunner.errors import SettingError
+from framerunner.files.yaml_file import SUFFIXES
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
 from framerunner.vehicle.airframe import AirframeError, load_airframe
@@ -21,7 +22,6 @@ from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario, ScenarioError
 from scenarios.random_scenarios import load_level, random_scenario
-from scenarios.yaml_file import SUFFIXES
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,21 +6,16 @@ file in `framerunner/vehicle/airframes/`.
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
-from importlib import resources
+from functools import cached_property
 from math import cos, inf, sin, sqrt
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from framerunner.errors import UserError
-from framerunner.files.text_file import TextError, decode_text, read_text
+from framerunner.files.yaml_file import FileKind, refusal
 
 GRAVITY_M_S2 = 9.80665
-
-_AIRFRAMES_KEPT = 8
 
 ParameterName = Annotated[str, StringConstraints(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")]
 """A parameter's name, by the limits of PX4 and MAVLink."""
@@ -158,7 +153,7 @@ class Airframe(_Part):
     limits: Limits = Limits()
     battery: Battery = Battery()
     stabiliser: Weights = Field(Weights(), description="of its design")
-    parameters: dict[ParameterName, int | float] = Field(
+    parameters: dict[ParameterName, float | int] = Field(
         default_factory=dict, description="defaults of the autopilot's parameters for this airframe"
     )
     envelope_m: tuple[_Size, _Size, _Size] = Field(
@@ -173,9 +168,13 @@ class Airframe(_Part):
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
         if self.hover_speed_rad_s >= self.motor.max_speed_rad_s:
-            raise ValueError("motor.max_speed_rad_s: the rotors cannot carry the mass; increase it")
+            speed = self.motor.max_speed_rad_s
+            message = "is too slow: the rotors cannot carry the mass; increase it"
+            raise refusal(speed, message, "motor", "max_speed_rad_s")
         if abs(sum(rotor.yaw_sign for rotor in self.rotors)) > 0:
-            raise ValueError("rotors: as many must spin cw as ccw, or yaw cannot be balanced")
+            cw = sum(rotor.spin == "cw" for rotor in self.rotors)
+            message = "of them spin cw; as many must spin cw as ccw, or yaw cannot be balanced"
+            raise refusal(cw, message, "rotors")
         return self
 
     @property
@@ -228,41 +227,21 @@ class Airframe(_Part):
         return float((self.weight_n / (len(self.rotors) * self.motor.thrust_n_s2)) ** 0.5)
 
 
+_FILES = FileKind("airframe", Airframe, AirframeError, folder="airframes", package="framerunner.vehicle")
+
+
 def load_airframe(name_or_path: str) -> Airframe:
-    """Load an airframe by its name in `framerunner/vehicle/airframes/` or by the path of a YAML file.
+    """Load an airframe.
+
+    Args:
+        name_or_path: of a file in `framerunner/vehicle/airframes/`, or a path: it has a directory or ends in
+            .yaml or .yml.
 
     Raises:
-        AirframeError: there is none of that name, or the file is not a valid airframe.
+        AirframeError: there is none of that name, or the file is not a valid airframe; the message names
+            line, field, value and what to do.
     """
-    folder = resources.files("framerunner.vehicle") / "airframes"
-    if name_or_path.endswith((".yaml", ".yml")):
-        path = Path(name_or_path)
-        if not path.is_file():
-            raise AirframeError(f"airframe: no file '{name_or_path}'")
-        try:
-            text = read_text(path)
-        except TextError as error:
-            raise AirframeError(f"airframe '{name_or_path}': {error}") from None
-    else:
-        known = sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
-        if name_or_path not in known:
-            raise AirframeError(
-                f"airframe: no '{name_or_path}'; there are {', '.join(known)}, or give a file"
-            )
-        text = decode_text((folder / f"{name_or_path}.yaml").read_bytes())
-    return _read(name_or_path, text)
-
-
-@lru_cache(_AIRFRAMES_KEPT)
-def _read(name: str, text: str) -> Airframe:
-    """The airframe that a file's text declares; `name` is for messages."""
-    try:
-        return Airframe.model_validate(yaml.safe_load(text))
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "airframe"
-        raise AirframeError(
-            f"airframe {name}: {where}: {first['msg']} (got {first['input']!r:.60})"
-        ) from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:  # also of what is nested deeply
-        raise AirframeError(f"airframe {name}: not YAML: {str(error).splitlines()[0]}") from error
+    airframe = _FILES.load(name_or_path)
+    if airframe is None:
+        raise _FILES.unknown(name_or_path)
+    return airframe

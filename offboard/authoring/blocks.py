@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 
+from framerunner.files.yaml_text import ListNode, MapNode, Node, Scalar
 from offboard.authoring.document import Document
 from offboard.authoring.messages import EditError
 from offboard.authoring.outline import Span
 from offboard.authoring.yaml_writer import Value, flow, style_of, written
-from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
 
 Patch = tuple[int, int, str]
 """Characters from an offset to another are replaced by a text."""

@@ -10,12 +10,11 @@ from __future__ import annotations
 from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 
+from framerunner.files.yaml_text import Place, Scalar
 from offboard.authoring.document import Document
 from offboard.authoring.outline import Event, Span, StateOutline, TransitionOutline
 from offboard.chart.check import is_finish
-from offboard.chart.problems import Place
 from offboard.chart.spec import MissionFile, State, Transition, all_states
-from offboard.chart.yaml_nodes import Scalar
 
 SETTINGS = ("name", "description", "class", "vision", "extends")
 

@@ -8,13 +8,13 @@ from functools import cached_property
 from pathlib import Path
 
 from framerunner.files.text_file import TextError, decode_text, read_bytes
+from framerunner.files.yaml_text import ListNode, MapNode, Node, Place, Scalar
 from offboard.authoring.outline import Outline
 from offboard.authoring.text import MissionText, Positions
 from offboard.chart.messages import Message
-from offboard.chart.problems import MissionError, Place, ProblemList, mission_error
+from offboard.chart.problems import MissionError, ProblemList, mission_error
 from offboard.chart.read import parse_mission_yaml, read_nodes
 from offboard.chart.spec import MissionFile, expand, merge_extended
-from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
 from offboard.mission import MAX_FILE_BYTES, BaseReader, read_base, unreadable
 
 

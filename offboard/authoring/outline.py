@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from framerunner.files.yaml_text import ListNode, MapNode, Node, Scalar
 from offboard.chart.problems import NOWHERE
-from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
 
 Event = Literal["tick", "done", "resume"]
 """When a transition is looked at: at every tick, when a final state is reached (`then`), after a pause."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from framerunner.files.yaml_text import Place, Scalar
 from offboard.authoring.document import Document
 from offboard.authoring.outline import TEMPLATE, Event, StateOutline
-from offboard.chart.problems import Place
 from offboard.chart.spec import all_states, look_up
-from offboard.chart.yaml_nodes import Scalar
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 
+from framerunner.files.yaml_text import MapNode, Scalar
 from offboard.authoring.blocks import Owner, Patch
 from offboard.authoring.edits import (
     AddState,
@@ -25,7 +26,6 @@ from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, Work, keys_befor
 from offboard.authoring.yaml_writer import Value, style_of
 from offboard.chart.problems import cut
 from offboard.chart.spec import all_states
-from offboard.chart.yaml_nodes import MapNode, Scalar
 
 
 def add_state(work: Work, edit: AddState) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from framerunner.files.yaml_text import ListNode, MapNode, Scalar
 from offboard.authoring.blocks import Owner
 from offboard.authoring.edits import (
     AddTransition,
@@ -20,7 +21,6 @@ from offboard.authoring.outline import Event, StateOutline
 from offboard.authoring.state_edits import deleted_reference
 from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, TRANSITION_ORDER, Work, keys_before
 from offboard.authoring.yaml_writer import Value
-from offboard.chart.yaml_nodes import ListNode, MapNode, Scalar
 
 _KEYS: dict[Event, str] = {"done": "then", "resume": "resume"}
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+from framerunner.files.yaml_text import MapNode, Scalar
 from offboard.authoring.blocks import Blocks, Owner, Patch
 from offboard.authoring.document import Document
 from offboard.authoring.edits import TransitionPath
@@ -14,7 +15,6 @@ from offboard.authoring.references import Reference, chart_ids, instances, refer
 from offboard.authoring.text import Change
 from offboard.authoring.yaml_writer import Value
 from offboard.chart.problems import cut
-from offboard.chart.yaml_nodes import MapNode, Scalar
 
 STATE_ORDER = (
     *("use", "initial", "resume", "enter", "during", "exit"),

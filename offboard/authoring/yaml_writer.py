@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import yaml
-
+from framerunner.files.yaml_text import ListNode, MapNode, Scalar, YamlError, compose
 from offboard.authoring.messages import EditError
-from offboard.chart.yaml_nodes import ListNode, MapNode
 
 Value = str | Sequence["Value"] | Mapping[str, "Value"]
 """What is written: a text, a list, or a mapping."""
@@ -55,17 +53,20 @@ def written(text: str, *, in_braces: bool = False) -> str:
     text = text.strip()
     if not text.isprintable():
         raise EditError("edit.control", text=repr(text[:40]))
-    around = "[{}]\n" if in_braces else "- {}\n- a: {}\n"
+    return text if _is_plain(text, in_braces) else "'" + text.replace("'", "''") + "'"
+
+
+def _is_plain(text: str, in_braces: bool) -> bool:
+    """Whether a text needs no quotation marks as an item of a list and, not in braces, as a key's value."""
     try:
-        events = list(yaml.parse(around.replace("{}", text), Loader=yaml.SafeLoader))
-    except yaml.YAMLError:
-        events = []
-    values = [(e.value, e.tag, e.anchor, e.style) for e in events if isinstance(e, yaml.ScalarEvent)]
-    plain = (text, None, None)
-    wanted = [plain] if in_braces else [plain, ("a", None, None), plain]
-    if text and [value[:3] for value in values] == wanted and values[0][3] in (None, ""):
-        return text
-    return "'" + text.replace("'", "''") + "'"
+        root = compose(f"[{text}]\n" if in_braces else f"- {text}\n- a: {text}\n")
+    except YamlError:
+        return False
+    nodes = list(root.items) if isinstance(root, ListNode) else []
+    if not in_braces and len(nodes) == 2 and isinstance(nodes[1], MapNode):
+        nodes[1:] = nodes[1].items.values()
+    texts = [node.text for node in nodes if isinstance(node, Scalar) and not (node.quoted or node.block)]
+    return bool(text) and len(nodes) == len(texts) and texts == [text] * (1 if in_braces else 2)
 
 
 def flow(value: Value) -> str:

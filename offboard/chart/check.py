@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from framerunner.files.yaml_text import Place
 from offboard.chart.expressions import (
     IN_LOCATION,
     ExpressionError,
@@ -13,7 +14,7 @@ from offboard.chart.expressions import (
 )
 from offboard.chart.guards import actions_of, check_guards
 from offboard.chart.messages import Message
-from offboard.chart.problems import Place, ProblemList, cut, did_you_mean
+from offboard.chart.problems import ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, Leaf, MissionFile, State, Transition, all_states, leaves
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary
 from offboard.pilot import NAMES_ON_MAP, Pilot

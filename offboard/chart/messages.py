@@ -70,6 +70,8 @@ ENGLISH: Mapping[str, str] = {
     "yaml.too_many": "has more than {limit} keys and values; a mission is a page or two",
     "yaml.key_no_word": "a key must be a plain word",
     "yaml.key_twice": "'{key}' is written twice (first in line {line}); rename one",
+    "yaml.character": "the character {name} is not allowed in this file; remove it",
+    "yaml.second_document": "two documents are in this file; keep one, without the line '---'",
     "yaml.syntax": "YAML syntax: {what}",
     "yaml.second_colon": "a second ':' in this line; write what follows it in the next line",
     "yaml.open_quote": "this quotation mark is never closed; write another at the end",

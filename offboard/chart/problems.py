@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from typing import Literal
 
 from framerunner.errors import UserError
+from framerunner.files.yaml_text import Place
 from offboard.chart.messages import ENGLISH, Message, as_message
 
 MAX_REPORTED = 50
@@ -17,25 +18,6 @@ MAX_COMPARED = 200
 
 Severity = Literal["error", "warning", "advice"]
 """An error: the mission is not flown. A warning: a part of it does nothing. Advice: what may go wrong."""
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """A place in a mission file."""
-
-    file: str
-    line: int = 0  # counted from 1; 0 for the whole file
-    column: int = 0  # counted from 1; 0 for the whole line
-
-    def __str__(self) -> str:
-        numbers = (number for number in (self.line, self.column) if number)
-        return ":".join((self.file, *map(str, numbers)))
-
-    def moved(self, characters: int) -> Place:
-        """The place some characters further on in the line; the same if the column is not known."""
-        if not (self.column and characters):
-            return self
-        return Place(self.file, self.line, self.column + characters)
 
 
 NOWHERE = Place("")

@@ -7,10 +7,11 @@ import re
 from pathlib import Path
 from typing import TypeVar, get_args
 
+from framerunner.files.yaml_text import ListNode, MapNode, Node, Place, Scalar
 from offboard.chart.messages import Message
-from offboard.chart.problems import Place, ProblemList, cut, did_you_mean
+from offboard.chart.problems import ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, MissionFile, State, Transition
-from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar, parse_yaml
+from offboard.chart.yaml_syntax import parse_yaml
 from scenarios.models import MissionClass
 from vision.types import Vision
 

@@ -25,6 +25,8 @@ SPANISH: Mapping[str, str] = {
     "yaml.too_many": "tiene más de {limit} claves y valores; una misión es una página o dos",
     "yaml.key_no_word": "una clave debe ser una palabra sencilla",
     "yaml.key_twice": "'{key}' está escrito dos veces (la primera en la línea {line}); cambia uno",
+    "yaml.character": "el carácter {name} no está permitido en este archivo; bórralo",
+    "yaml.second_document": "hay dos documentos en este archivo; deja uno, sin la línea '---'",
     "yaml.syntax": "sintaxis de YAML: {what}",
     "yaml.second_colon": "hay otro ':' en esta línea; escribe lo que sigue en la línea siguiente",
     "yaml.open_quote": "estas comillas no se cierran; escribe otras al final",

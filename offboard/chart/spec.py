@@ -15,8 +15,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from framerunner.files.yaml_text import Place
 from offboard.chart.messages import Message
-from offboard.chart.problems import NOWHERE, Place, ProblemList, cut, did_you_mean, mission_error
+from offboard.chart.problems import NOWHERE, ProblemList, cut, did_you_mean, mission_error
 from scenarios.models import MissionClass
 from vision.types import Vision
 

@@ -10,10 +10,10 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
-import yaml
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
 
 from framerunner.files.text_file import read_text
+from framerunner.files.yaml_text import read_yaml
 from offboard.safety.check import Check, Outcome
 from offboard.safety.fence import FlightFence
 from offboard.safety.rules import AbortAction
@@ -116,11 +116,14 @@ class FailsafeRow(BaseModel):
         return f" {self.unit}" if self.unit else ""
 
 
+_TABLES = TypeAdapter(dict[str, tuple[FailsafeRow, ...]])
+
+
 @cache
 def failsafe_rows(autopilot: str = "px4", abort: AbortAction = "land") -> tuple[FailsafeRow, ...]:
     """The table of an autopilot, for flights that end so when they are aborted; empty if there is none."""
-    rows = yaml.safe_load(TABLE.read_bytes()).get(autopilot, ())
-    return tuple(FailsafeRow.model_validate(row).strict(abort) for row in rows)
+    tables = _TABLES.validate_python(read_yaml(read_text(TABLE)))
+    return tuple(row.strict(abort) for row in tables.get(autopilot, ()))
 
 
 def rows_by_known_names(rows: Sequence[FailsafeRow], parameters: Container[str]) -> tuple[FailsafeRow, ...]:

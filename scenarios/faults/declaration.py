@@ -8,7 +8,8 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from scenarios.part import Part, refusal
+from framerunner.files.yaml_file import refusal
+from scenarios.part import Part
 
 
 class FaultPart(StrEnum):

@@ -6,7 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.part import Part, refusal
+from framerunner.files.yaml_file import refusal
+from scenarios.part import Part
 
 Sigma = Annotated[float, Field(ge=0, le=1e4)]
 """A standard deviation; 0: no such error."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from framerunner.errors import UserError
+from framerunner.files.yaml_file import FileKind
 from framerunner.vehicle.airframe import Airframe
 from framerunner.vehicle.geodesy import GeodeticPoint
 from framerunner.vehicle.measurements import ExternalPose, Readings
 from scenarios.models import Origin
-from scenarios.yaml_file import FileKind
 from sitl.sensors.battery_monitor import BatteryMonitor
 from sitl.sensors.environment import Barometer, Gps, Magnetometer
 from sitl.sensors.ground import OpticalFlow, RangeFinder

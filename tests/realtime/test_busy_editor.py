@@ -12,7 +12,7 @@ import aiohttp
 import pytest
 import pytest_asyncio
 
-from offboard.chart.yaml_nodes import MAX_NODES
+from framerunner.files.yaml_text import MAX_NODES
 from tests.framerunner.editing.editor_program import editor
 
 pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.realtime, pytest.mark.alone]

@@ -2,12 +2,12 @@
 
 import pytest
 
+from framerunner.files.yaml_text import to_yaml
 from scenarios.air import Wind
 from scenarios.loader import dump_yaml, parse_scenario
 from scenarios.models import Scenario, ScenarioError
 from scenarios.random_numbers import LevelError
 from scenarios.random_scenarios import LEVEL_FILES, load_level, random_scenario
-from scenarios.yaml_tree import to_yaml
 
 CALM = to_yaml(load_level("calm").model_dump(exclude_unset=True))
 WINDY = """\

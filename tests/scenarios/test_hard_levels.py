@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from framerunner.files.yaml_text import to_yaml
 from scenarios.loader import dump_yaml, parse_scenario
 from scenarios.models import Wall
 from scenarios.random_numbers import MAX_SEED, LevelError
 from scenarios.random_scenarios import LEVEL_FILES, load_level, random_scenario
-from scenarios.yaml_tree import to_yaml
 
 CROWDED, TIGHT = load_level("crowded"), load_level("tight")
 seeds = st.integers(0, MAX_SEED) | st.integers(0, 1000)

@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from framerunner.files.text_file import MAX_TEXT_BYTES
+from framerunner.files.yaml_text import to_yaml
 from scenarios.loader import (
     dump_yaml,
     json_schema,
@@ -14,8 +16,6 @@ from scenarios.loader import (
 )
 from scenarios.models import COLOURS, Base, Frame, Scenario, ScenarioError, Start
 from scenarios.random_scenarios import load_level, random_scenario
-from scenarios.yaml_file import MAX_BYTES
-from scenarios.yaml_tree import to_yaml
 
 NAMES = ["empty", "first-flight", "open-field", "round-1", "test-case-1", "test-case-2", "test-case-3"]
 
@@ -187,10 +187,10 @@ FRAME = "name: a\nframes:\n  - {colour: red, x_m: 1, y_m: 1, z_m: 1}\n"
             FRAME.replace("z_m: 1", "z_m: 5"),
             "f.yaml:3: frames[0].z_m 5.0 is above the arena; use 4.0 or less",
         ),
-        ("name: a\nname: b", "f.yaml:2: name is given twice, first on line 1; keep one"),
+        ("name: a\nname: b", "f.yaml:2:1: name is given twice, first on line 1; keep one"),
         ("name: a: b", "f.yaml:1:8: not valid YAML: mapping values are not allowed here"),
         (b"name: a\n# \xff", "f.yaml:2: not UTF-8 text; save the file as UTF-8"),
-        ("#" * (MAX_BYTES + 1), "f.yaml: 1000001 bytes is too large for a scenario; 1000000 at most"),
+        ("#" * (MAX_TEXT_BYTES + 1), "f.yaml: 1000001 bytes is too large for a scenario; 1000000 at most"),
     ],
 )
 def test_faults_give_one_line(text, message):
@@ -294,6 +294,6 @@ def test_directories_pipes_and_large_files_are_refused(tmp_path):
     with pytest.raises(ScenarioError, match="not a regular file"):  # and it does not wait for a writer
         load_scenario(fifo)
     large = tmp_path / "large.yaml"
-    large.write_bytes(b"#" * (MAX_BYTES + 1))
+    large.write_bytes(b"#" * (MAX_TEXT_BYTES + 1))
     with pytest.raises(ScenarioError, match="too large"):
         load_scenario(large)

@@ -1,6 +1,7 @@
 import pytest
 from pydantic import ValidationError
 
+from framerunner.files.yaml_file import field_path
 from scenarios.models import (
     Base,
     Frame,
@@ -10,7 +11,6 @@ from scenarios.models import (
     is_over_base,
     start_position,
 )
-from scenarios.part import field_path
 
 
 def test_the_opening_excludes_the_bars():

@@ -3,10 +3,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from framerunner.files.text_file import MAX_TEXT_BYTES
+from framerunner.files.yaml_text import to_yaml
 from scenarios.random_numbers import LevelError, Range
 from scenarios.random_scenarios import LEVEL_FILES, Level, load_level
-from scenarios.yaml_file import MAX_BYTES
-from scenarios.yaml_tree import to_yaml
 
 CALM = to_yaml(load_level("calm").model_dump(exclude_unset=True))
 
@@ -45,7 +45,7 @@ def test_a_level_loads_by_path(tmp_path):
         ("name: a", "f.yaml:1: layout is missing; add it"),
         ("name: a: b", "f.yaml:1:8: not valid YAML: mapping values are not allowed here"),
         (b"name: a\n# \xff", "f.yaml:2: not UTF-8 text; save the file as UTF-8"),
-        ("#" * (MAX_BYTES + 1), "f.yaml: 1000001 bytes is too large for a level; 1000000 at most"),
+        ("#" * (MAX_TEXT_BYTES + 1), "f.yaml: 1000001 bytes is too large for a level; 1000000 at most"),
         (
             CALM + "fog: 1\n",
             "f.yaml:20: fog is not a known field; known here: name, description, layout, closeness, "

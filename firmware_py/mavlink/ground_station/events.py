@@ -49,8 +49,6 @@ _SENSOR_PARTS = {
     Sensor.RANGE_FINDER: Part.DISTANCE_SENSOR,
     Sensor.OPTICAL_FLOW: Part.OPTICAL_FLOW,
 }
-_ALWAYS_THERE = Part.GYRO | Part.ACCEL | Part.MAGNETOMETER | Part.ABSOLUTE_PRESSURE | Part.ATTITUDE_ESTIMATE
-_PLACED = Part.GPS | Part.LOCAL_POSITION_ESTIMATE | Part.GLOBAL_POSITION_ESTIMATE
 _LOW_BATTERY = 2  # MAV_BATTERY_CHARGE_STATE_LOW
 
 # The part that a reason is about, by a word in it, and whether it prevents the chosen mode only.
@@ -94,17 +92,10 @@ class HealthReport:
 
 def assess(autopilot: Autopilot) -> HealthReport:
     """The present report."""
-    status, report = autopilot.status, autopilot.estimator.report()
-    if report.ideal:
-        present, failing = _ALWAYS_THERE, Part(0)
-        if status.origin is not None:
-            present |= _PLACED
-        else:
-            failing |= Part.LOCAL_POSITION_ESTIMATE
-    else:
-        present, failing = _parts(report)
-        if status.origin is not None:
-            present |= Part.GLOBAL_POSITION_ESTIMATE
+    status = autopilot.status
+    present, failing = _parts(autopilot.estimator.report())
+    if status.origin is not None:
+        present |= Part.GLOBAL_POSITION_ESTIMATE
     present |= Part.BATTERY
     warning = Part.BATTERY if autopilot.battery.warning >= _LOW_BATTERY else Part(0)
     check = None if status.ready else _check(status.not_ready, status.intended_mode)

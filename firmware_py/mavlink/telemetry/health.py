@@ -1,7 +1,6 @@
 """Telemetry of health: SYS_STATUS, ESTIMATOR_STATUS and VIBRATION, from the estimator's report.
 
-With ideal sensors nothing is estimated: all is healthy, accuracies, ratios and vibration are 0. In both cases
-the load is 0, because the autopilot reads no clock.
+The load is 0, because the autopilot reads no clock.
 """
 
 from __future__ import annotations
@@ -14,19 +13,16 @@ from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from firmware_py.status import LandedState
 from framerunner.wire.dialect import Message, mavlink, whole
 
-_POSITION = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _ATTITUDE = mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION | mavlink.MAV_SYS_STATUS_AHRS
-_PRESENT = (
+# PX4 reports a part without faults as healthy even if it is absent, except for a remote control.
+_HEALTHY = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
     | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
     | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
     | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
     | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
-    | _POSITION
-)
-# PX4 reports a part without faults as healthy even if it is absent, except for a remote control.
-_HEALTHY = (
-    _PRESENT
+    | mavlink.MAV_SYS_STATUS_SENSOR_GPS
+    | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
     | mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE
     | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
     | mavlink.MAV_SYS_STATUS_LOGGING
@@ -52,13 +48,7 @@ def sys_status(autopilot: Autopilot) -> Message:
     Of the sensors, those are enabled that the estimator relies on, and those that fail.
     """
     status, battery = autopilot.status, autopilot.battery
-    report = autopilot.estimator.report()
-    if report.ideal:
-        missing = 0 if status.origin is not None else _POSITION
-        present, healthy = _PRESENT & ~missing, _HEALTHY & ~missing
-        enabled = present
-    else:
-        present, enabled, healthy = _sensor_bits(report)
+    present, enabled, healthy = _sensor_bits(autopilot.estimator.report())
     if status.armed and autopilot.parameters.value("SDLOG_MODE") >= 0:
         present |= mavlink.MAV_SYS_STATUS_LOGGING
         enabled |= mavlink.MAV_SYS_STATUS_LOGGING
@@ -133,10 +123,8 @@ def accuracy_m(report: EstimatorReport) -> tuple[float, float]:
 
 
 def estimator_status(autopilot: Autopilot) -> Message:
-    """ESTIMATOR_STATUS; with ideal sensors PX4's flags, 895 in flight and 959 on the ground."""
+    """ESTIMATOR_STATUS."""
     report, time_us = autopilot.estimator.report(), autopilot.state.time_us
-    if report.ideal:
-        return mavlink.MAVLink_estimator_status_message(time_us, _ideal_flags(autopilot), *[0.0] * 8)
     ratios = report.ratios
     return mavlink.MAVLink_estimator_status_message(
         time_us,
@@ -149,26 +137,6 @@ def estimator_status(autopilot: Autopilot) -> Message:
         0.0,
         *accuracy_m(report),
     )
-
-
-def _ideal_flags(autopilot: Autopilot) -> int:
-    status = autopilot.status
-    flags = int(mavlink.ESTIMATOR_ATTITUDE)
-    if status.origin is not None:
-        flags |= (
-            mavlink.ESTIMATOR_VELOCITY_HORIZ
-            | mavlink.ESTIMATOR_VELOCITY_VERT
-            | mavlink.ESTIMATOR_POS_HORIZ_REL
-            | mavlink.ESTIMATOR_POS_HORIZ_ABS
-            | mavlink.ESTIMATOR_POS_VERT_ABS
-            | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
-            | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
-        )
-    if status.landed_state is LandedState.ON_GROUND:
-        flags |= mavlink.ESTIMATOR_CONST_POS_MODE
-    elif status.origin is not None:
-        flags |= mavlink.ESTIMATOR_POS_VERT_AGL
-    return flags
 
 
 def vibration(autopilot: Autopilot) -> Message:

@@ -10,7 +10,6 @@ from firmware_py.mavlink.service import Service
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode
-from firmware_py.types import VehicleState
 from framerunner.geometry.rotations import rotation
 from framerunner.geometry.vectors import NAN3, Quaternion
 from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
@@ -129,16 +128,11 @@ def odometry(autopilot: Autopilot) -> Message | None:
     if autopilot.status.origin is None:
         return None
     report = autopilot.estimator.report()
-    pose_covariance = velocity_covariance = _COVARIANCE_UNKNOWN
-    if not report.ideal:
-        m = rotation(state.attitude)
-        squared = [component * component for component in m]
-        about_body = [
-            sum(squared[3 * row + column] * report.attitude_variance_rad2[row] for row in range(3))
-            for column in range(3)
-        ]
-        pose_covariance = _covariance((*report.position_variance_m2, *about_body))
-        velocity_covariance = _covariance(report.velocity_variance_m2_s2)
+    squared = [component * component for component in rotation(state.attitude)]
+    about_body = [
+        sum(squared[3 * row + column] * report.attitude_variance_rad2[row] for row in range(3))
+        for column in range(3)
+    ]
     return mavlink.MAVLink_odometry_message(
         state.time_us,
         mavlink.MAV_FRAME_LOCAL_NED,
@@ -147,8 +141,8 @@ def odometry(autopilot: Autopilot) -> Message | None:
         state.attitude,
         *state.velocity_ned_m_s,
         *state.angular_rate_frd_rad_s,
-        pose_covariance,
-        velocity_covariance,
+        _covariance((*report.position_variance_m2, *about_body)),
+        _covariance(report.velocity_variance_m2_s2),
         report.resets & 0xFF,
         mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT,
         0,
@@ -164,16 +158,10 @@ def _covariance(variances: Sequence[float]) -> list[float]:
 
 
 def hil_state_quaternion(autopilot: Autopilot, truth: Truth | None) -> Message | None:
-    """HIL_STATE_QUATERNION: the true state. Of ideal sensors that is the estimate."""
-    state: VehicleState | Sensors
-    if autopilot.estimator.report().ideal:
-        state, place = autopilot.state, autopilot.global_position()
-    elif truth is not None:
-        state, place = truth()
-    else:
+    """HIL_STATE_QUATERNION: the true state, of a simulated vehicle."""
+    if truth is None:
         return None
-    if place is None:
-        return None
+    state, place = truth()
     return mavlink.MAVLink_hil_state_quaternion_message(
         state.time_us,
         state.attitude,

@@ -1,94 +1,90 @@
-"""Telemetry of sensors.
+"""Telemetry of sensors: their newest samples, as the estimator has taken them.
 
-Ideal sensors have no samples: what they would measure, such as pressure and magnetic field, is computed from
-the state. For others see `measured.py`.
+What the vehicle does not have is not sent, as in PX4; a field of a message that no sensor measures is 0 or
+unknown.
 """
 
 from __future__ import annotations
 
-from math import atan2, degrees, hypot, nan
+from collections.abc import Callable
+from math import atan2, degrees, hypot, isfinite, nan, sqrt
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.estimation.report import Sensor
-from firmware_py.mavlink.telemetry import measured
+from firmware_py.estimation.report import EstimatorReport, Sensor
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
-from framerunner.geometry.rotations import rotation, to_body
-from framerunner.geometry.vectors import Quaternion, Vec3
-from framerunner.vehicle.atmosphere import pressure_hpa, temperature_k
+from framerunner.geometry.vectors import ZERO3, Vec3
+from framerunner.vehicle.atmosphere import pressure_altitude_m
+from framerunner.vehicle.measurements import FixType, MagnetometerSample
 from framerunner.wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, whole
 
-# North, east, down at PX4's simulated home (Zurich), gauss; World Magnetic Model 2025, two digits.
-EARTH_FIELD_NED_GAUSS: Vec3 = (0.22, 0.013, 0.43)
 _MILLI_G = 1000.0 / 9.80665  # of 1 m/s²
+_KELVIN = 273.15
 _RANGE_M = 100.0
-_MIN_DOWN = 0.01
 _UNKNOWN_8, _UNKNOWN_16 = 0xFF, 0xFFFF
-_IMU_FIELDS = 0b1_1011_1111_1111  # all but differential pressure
+_IMU_FIELDS, _MAGNETOMETER_FIELDS, _BAROMETER_FIELDS = 0x003F, 0x01C0, 0x1A00
+_NO_DISTANCE = -1.0
 
 
-def earth_field_frd_gauss(attitude: Quaternion) -> Vec3:
-    """Earth's magnetic field in body axes, by the attitude's unit quaternion."""
-    return to_body(rotation(attitude), *EARTH_FIELD_NED_GAUSS)
-
-
-def highres_imu(autopilot: Autopilot) -> Message | None:
-    """HIGHRES_IMU."""
-    report = autopilot.estimator.report()
-    if not report.ideal:
-        return measured.highres_imu(report)
-    state, place = autopilot.state, autopilot.global_position()
-    altitude_m = place.altitude_m if place else 0.0
-    return mavlink.MAVLink_highres_imu_message(
-        state.time_us,
-        *state.specific_force_frd_m_s2,
-        *state.angular_rate_frd_rad_s,
-        *earth_field_frd_gauss(state.attitude),
-        pressure_hpa(altitude_m),
-        0.0,
-        altitude_m,
-        temperature_k(altitude_m) - 273.15,
-        _IMU_FIELDS,
-    )
-
-
-def scaled_imu(autopilot: Autopilot) -> Message | None:
-    """SCALED_IMU: thousandths of g, rad/s and gauss, hundredths of a degree (0 would be unknown)."""
-    report = autopilot.estimator.report()
-    if not report.ideal:
-        return measured.scaled_imu(report)
-    state, place = autopilot.state, autopilot.global_position()
-    field_gauss = earth_field_frd_gauss(state.attitude)
-    celsius = temperature_k(place.altitude_m if place else 0.0) - 273.15
-    return mavlink.MAVLink_scaled_imu_message(
-        boot_ms(state.time_us),
-        *[whole(force * _MILLI_G, 16) for force in state.specific_force_frd_m_s2],
-        *[whole(rate * 1e3, 16) for rate in state.angular_rate_frd_rad_s],
-        *[whole(component * 1e3, 16) for component in field_gauss],
-        whole(celsius * 100, 16) or 1,
-    )
-
-
-def distance_sensor(autopilot: Autopilot) -> Message | None:
-    """DISTANCE_SENSOR: the range along body down to flat ground at the height where the vehicle booted.
-
-    PX4's simulation computes it from the state too. Out of range, or pointing up, it is 0, as in PX4.
-    """
-    report = autopilot.estimator.report()
-    if not report.ideal:
-        return measured.distance_sensor(report)
-    state = autopilot.state
-    if autopilot.status.origin is None:
+def _highres_imu(report: EstimatorReport) -> Message | None:
+    """HIGHRES_IMU: rates and forces less their estimated biases, as in PX4."""
+    latest = report.latest
+    imu, pressure = latest.imu, latest.barometer
+    if imu is None:
         return None
-    _, qx, qy, _ = state.attitude
-    down = 1.0 - 2.0 * (qx * qx + qy * qy)  # of the body's down axis, in the world
-    range_m = -state.position_ned_m[2] / down if down > _MIN_DOWN else 0.0
-    if not 0.0 < range_m < _RANGE_M:
-        range_m = 0.0
+    fields = _IMU_FIELDS
+    fields |= _MAGNETOMETER_FIELDS if latest.magnetometer is not None else 0
+    fields |= _BAROMETER_FIELDS if pressure is not None else 0
+    return mavlink.MAVLink_highres_imu_message(
+        imu.time_us,
+        *_difference(imu.specific_force_frd_m_s2, report.accel_bias_frd_m_s2),
+        *_difference(imu.angular_rate_frd_rad_s, report.gyro_bias_frd_rad_s),
+        *_field(latest.magnetometer),
+        0.0 if pressure is None else pressure.pressure_pa / 100.0,
+        0.0,
+        0.0 if pressure is None else pressure_altitude_m(pressure.pressure_pa),
+        0.0 if pressure is None else pressure.temperature_k - _KELVIN,
+        fields,
+    )
+
+
+def _scaled_imu(report: EstimatorReport) -> Message | None:
+    """SCALED_IMU: thousandths of g, rad/s and gauss, as measured; the IMU's temperature is not known."""
+    imu = report.latest.imu
+    if imu is None:
+        return None
+    return mavlink.MAVLink_scaled_imu_message(
+        boot_ms(imu.time_us),
+        *[whole(force * _MILLI_G, 16) for force in imu.specific_force_frd_m_s2],
+        *[whole(rate * 1e3, 16) for rate in imu.angular_rate_frd_rad_s],
+        *[whole(component * 1e3, 16) for component in _field(report.latest.magnetometer)],
+        0,
+    )
+
+
+def _scaled_pressure(report: EstimatorReport) -> Message | None:
+    """SCALED_PRESSURE."""
+    pressure = report.latest.barometer
+    if pressure is None:
+        return None
+    return mavlink.MAVLink_scaled_pressure_message(
+        boot_ms(pressure.time_us),
+        pressure.pressure_pa / 100.0,
+        0.0,
+        whole((pressure.temperature_k - _KELVIN) * 100, 16),
+    )
+
+
+def _distance_sensor(report: EstimatorReport) -> Message | None:
+    """DISTANCE_SENSOR: 0 out of the range finder's range, as in PX4."""
+    sample = report.latest.range_finder
+    if sample is None:
+        return None
+    distance_m = sample.distance_m if isfinite(sample.distance_m) else 0.0
     return mavlink.MAVLink_distance_sensor_message(
-        boot_ms(state.time_us),
+        boot_ms(sample.time_us),
         0,
         round(_RANGE_M * 100),
-        round(range_m * 100),
+        whole(distance_m * 100, 16, signed=False),
         mavlink.MAV_DISTANCE_SENSOR_LASER,
         0,
         mavlink.MAV_SENSOR_ROTATION_PITCH_270,
@@ -96,65 +92,59 @@ def distance_sensor(autopilot: Autopilot) -> Message | None:
     )
 
 
-def gnss_integrity(autopilot: Autopilot) -> Message | None:
-    """GNSS_INTEGRITY: jamming and spoofing are not monitored."""
-    report = autopilot.estimator.report()
-    has_gps = report.ideal or Sensor.GPS in report.present
-    if autopilot.status.origin is None or not has_gps:
+def _optical_flow_rad(report: EstimatorReport) -> Message | None:
+    """OPTICAL_FLOW_RAD, with the range finder's distance."""
+    flow, distance = report.latest.optical_flow, report.latest.range_finder
+    if flow is None:
         return None
-    return mavlink.MAVLink_gnss_integrity_message(*[0] * 6, *[_UNKNOWN_16] * 2, *[_UNKNOWN_8] * 4)
-
-
-def scaled_pressure(autopilot: Autopilot) -> Message | None:
-    """SCALED_PRESSURE."""
-    report = autopilot.estimator.report()
-    if not report.ideal:
-        return measured.scaled_pressure(report)
-    place = autopilot.global_position()
-    if place is None:
-        return None
-    return mavlink.MAVLink_scaled_pressure_message(
-        boot_ms(autopilot.state.time_us),
-        pressure_hpa(place.altitude_m),
+    is_measured = distance is not None and isfinite(distance.distance_m)
+    return mavlink.MAVLink_optical_flow_rad_message(
+        flow.time_us,
+        0,
+        flow.integration_us,
+        *flow.flow_rad,
+        *flow.gyro_rad,
         0.0,
-        whole((temperature_k(place.altitude_m) - 273.15) * 100, 16),
+        0,
+        flow.quality,
+        0,
+        distance.distance_m if distance is not None and is_measured else _NO_DISTANCE,
     )
 
 
-def optical_flow_rad(autopilot: Autopilot) -> Message | None:
-    """OPTICAL_FLOW_RAD; ideal sensors have none."""
-    report = autopilot.estimator.report()
-    return None if report.ideal else measured.optical_flow_rad(report)
-
-
-def gps_raw_int(autopilot: Autopilot) -> Message | None:
-    """GPS_RAW_INT: a 3D fix with the values of PX4's simulation, or no fix yet."""
-    report = autopilot.estimator.report()
-    if not report.ideal:
-        return measured.gps_raw_int(report)
-    state, place = autopilot.state, autopilot.global_position()
-    if place is None:
-        return mavlink.MAVLink_gps_raw_int_message(
-            state.time_us, mavlink.GPS_FIX_TYPE_NO_FIX, 0, 0, 0, *[_UNKNOWN_16] * 4, 0
-        )
-    north_m_s, east_m_s, _ = state.velocity_ned_m_s
-    altitude_mm = millimetres(place.altitude_m)
+def _gps_raw_int(report: EstimatorReport) -> Message | None:
+    """GPS_RAW_INT: what the receiver reports; it gives accuracies, and no dilution of precision."""
+    if Sensor.GPS not in report.present:
+        return None
+    fix, now_us = report.latest.gps, report.latest.time_us
+    if fix is None or fix.fix_type < FixType.FIX_3D:
+        kind = mavlink.GPS_FIX_TYPE_NO_FIX
+        return mavlink.MAVLink_gps_raw_int_message(now_us, kind, 0, 0, 0, *[_UNKNOWN_16] * 4, 0)
+    north_m_s, east_m_s, _ = fix.velocity_ned_m_s
+    altitude_mm = millimetres(fix.altitude_m)
     return mavlink.MAVLink_gps_raw_int_message(
-        state.time_us,
-        mavlink.GPS_FIX_TYPE_3D_FIX,
-        degrees_e7(place.latitude_deg),
-        degrees_e7(place.longitude_deg),
+        fix.time_us,
+        int(fix.fix_type),
+        degrees_e7(fix.latitude_deg),
+        degrees_e7(fix.longitude_deg),
         altitude_mm,
-        70,
-        110,
+        _UNKNOWN_16,
+        _UNKNOWN_16,
         whole(hypot(north_m_s, east_m_s) * 100, 16, signed=False),
         whole(degrees(atan2(east_m_s, north_m_s)) % 360 * 100, 16, signed=False) % 36000,
-        10,
+        fix.satellites,
         altitude_mm,
-        900,
-        1780,
-        400,
+        whole(fix.horizontal_accuracy_m * 1e3, 32, signed=False),
+        whole(fix.vertical_accuracy_m * 1e3, 32, signed=False),
+        whole(fix.speed_accuracy_m_s * sqrt(3.0) * 1e3, 32, signed=False),
     )
+
+
+def gnss_integrity(autopilot: Autopilot) -> Message | None:
+    """GNSS_INTEGRITY: jamming and spoofing are not monitored."""
+    if autopilot.status.origin is None or Sensor.GPS not in autopilot.estimator.report().present:
+        return None
+    return mavlink.MAVLink_gnss_integrity_message(*[0] * 6, *[_UNKNOWN_16] * 2, *[_UNKNOWN_8] * 4)
 
 
 def wind_cov(autopilot: Autopilot) -> Message | None:
@@ -176,13 +166,26 @@ def wind_cov(autopilot: Autopilot) -> Message | None:
     )
 
 
+def _difference(a: Vec3, b: Vec3) -> Vec3:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _field(sample: MagnetometerSample | None) -> Vec3:
+    return ZERO3 if sample is None else sample.field_frd_gauss
+
+
+def _reported(measure: Callable[[EstimatorReport], Message | None]) -> AutopilotSource:
+    """The source of a message that is made from the estimator's report."""
+    return lambda autopilot: measure(autopilot.estimator.report())
+
+
 SENSORS: dict[int, AutopilotSource] = {
-    mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: distance_sensor,
+    mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: _reported(_distance_sensor),
     mavlink.MAVLINK_MSG_ID_GNSS_INTEGRITY: gnss_integrity,
-    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw_int,
-    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: highres_imu,
-    mavlink.MAVLINK_MSG_ID_OPTICAL_FLOW_RAD: optical_flow_rad,
-    mavlink.MAVLINK_MSG_ID_SCALED_IMU: scaled_imu,
-    mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: scaled_pressure,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: _reported(_gps_raw_int),
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: _reported(_highres_imu),
+    mavlink.MAVLINK_MSG_ID_OPTICAL_FLOW_RAD: _reported(_optical_flow_rad),
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU: _reported(_scaled_imu),
+    mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: _reported(_scaled_pressure),
     mavlink.MAVLINK_MSG_ID_WIND_COV: wind_cov,
 }

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from firmware_py.estimation.ideal_report import ideal_report
 from firmware_py.estimation.report import EstimatorReport
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
@@ -41,12 +42,13 @@ class FakeAutopilot:
     setpoints: list = field(default_factory=list)
     texts: list[StatusText] = field(default_factory=list)
     ground_station_heard_count: int = 0
-    report: EstimatorReport = field(default_factory=EstimatorReport)
+    report: EstimatorReport | None = None  # None: of ideal sensors
     poses: list = field(default_factory=list)
 
     @property
     def estimator(self):
-        return SimpleNamespace(report=lambda: self.report, take_external_pose=self.poses.append)
+        report = self.report or ideal_report(self.state, self.status.origin, has_position=True)
+        return SimpleNamespace(report=lambda: report, take_external_pose=self.poses.append)
 
     def _called(self, *call):
         self.calls.append(call)
@@ -122,7 +124,8 @@ class Peer:
 
     def __init__(self, autopilot, *, system=245, component=191, links=(ONBOARD, GROUND), node_options=None):
         self.autopilot = autopilot
-        self.node = MavlinkNode(autopilot, links, NodeOptions(**(node_options or {})))
+        truth = {"truth": lambda: (autopilot.state, HOME)}
+        self.node = MavlinkNode(autopilot, links, NodeOptions(**truth | (node_options or {})))
         self.packer = mavlink.MAVLink(None, system, component)
         self.time_us = 0
         self._readers = {profile.name: PacketReader() for profile in links}

@@ -86,9 +86,10 @@ def test_a_calibration_of_opencv_is_read(path, suffix, names):
         ("0.003]", "0.003, 0.1]", "distortion_coefficients: has 6; must be k1, k2, p1, p2, k3"),
         ("500.0, 0.0", "500.0, 3.0", "camera_matrix: must be fx 0 cx"),
         ("500.0, 0.0", "-5.0, 0.0", "fx_px: Input should be greater than 1"),
-        ("data: [500.0", "data: [[500.0]", "float"),
+        ("data: [500.0", "data: [[500.0]", "camera_matrix has (500.0,); must be numbers"),
         ("image_width: 640", "image_width: {data: []}", "image_width is missing; add it"),
-        ("image_width: 640", f"image_width: 1{400 * '0'}", "int too large to convert to float"),
+        ("image_width: 640", f"image_width: 1{400 * '0'}", "width_px: Input should be a finite number"),
+        ("image_width: 640", "image_width: &a 640\nb: *a", "anchor &a is not allowed"),
         ("image_width: 640", "%YAML:1.0\n---\n{{", "OpenCV's FileStorage: "),
     ],
 )
@@ -97,7 +98,7 @@ def test_a_foreign_calibration_that_cannot_be_used_names_its_format(path, old, n
     with pytest.raises(CalibrationError) as caught:
         load_calibration(path)
     assert reason in str(caught.value)
-    assert str(caught.value).startswith(f"{path}: ")
+    assert str(caught.value).startswith(f"{path}:")
     assert "\n" not in str(caught.value)
 
 

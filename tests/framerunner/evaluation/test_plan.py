@@ -62,7 +62,7 @@ def test_faults_of_a_folder_are_refused_in_one_line(tmp_path, mission):
     with pytest.raises(SettingError, match=r"calm-1: its name calm-1 is that of .*calm-1\.yaml too"):
         plan_files([str(folder), "calm-1"], mission)
     (folder / "x.yaml").write_text("name: x\nairframe: nonesuch\n", encoding="utf-8")
-    with pytest.raises(ScenarioError, match="scenario x: airframe"):
+    with pytest.raises(ScenarioError, match="scenario x: unknown airframe"):
         plan_files([str(folder)], mission)
     (folder / "bad.yaml").write_text("name: bad\nframes: 3\n", encoding="utf-8")
     with pytest.raises(ScenarioError, match=r":2: frames is 3: must be a list"):

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, replace
 
+from framerunner.files.yaml_text import ListNode
 from offboard.authoring import edits
 from offboard.authoring.blocks import Blocks
 from offboard.authoring.document import Document
 from offboard.authoring.outline import TransitionOutline
 from offboard.authoring.references import instances, prefix_change
 from offboard.chart.spec import all_states
-from offboard.chart.yaml_nodes import ListNode
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,6 @@ INDOORS = frozenset({Sensor.GYROSCOPE, Sensor.ACCELEROMETER, Sensor.BAROMETER, S
 
 def report(**changes):
     known = {
-        "ideal": False,
         "present": INDOORS,
         "healthy": INDOORS,
         "relied_on": INDOORS,

@@ -12,19 +12,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Generic, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from framerunner.errors import UserError
-from framerunner.files.text_file import TextError, decode_text, read_bytes
-from scenarios.part import field_path
-from scenarios.yaml_tree import Path as FieldPath
-from scenarios.yaml_tree import YamlError, YamlTree, parse_yaml
+from framerunner.files.text_file import MAX_TEXT_BYTES, TextError, decode_text, read_bytes
+from framerunner.files.yaml_text import MapNode, Scalar, YamlError, compose, follow, plain
+from framerunner.files.yaml_text import Path as FieldPath
 
-MAX_BYTES = 1_000_000
 MAX_VALUE_LENGTH = 60  # characters of a value or path shown in a message
 SUFFIXES = (".yaml", ".yml")
 
@@ -33,6 +32,7 @@ _COMPARISONS = {
     "greater_than_equal": "must be at least {ge}",
     "less_than": "must be below {lt}",
     "less_than_equal": "must be at most {le}",
+    "too_short": "must have at least {min_length} items",
     "string_too_long": "must have at most {max_length} characters",
     "literal_error": "must be {expected}",
 }
@@ -44,7 +44,10 @@ _TYPES = {
     "tuple_type": "must be a list",
     "model_type": "must hold fields, each written `name: value`",
     "too_long": "must be one number each for three axes",
-    "string_pattern_mismatch": "must be small letters, digits, - and _, a letter or digit first",
+}
+_SHAPES = {  # of texts, by pattern
+    r"^[a-z0-9][a-z0-9_-]*$": "must be small letters, digits, - and _, a letter or digit first",
+    r"^[A-Z][A-Z0-9_]{0,15}$": "must be at most 16 capital letters, digits and _, a letter first",
 }
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -77,7 +80,7 @@ class FileKind(Generic[Model]):
         text = str(name_or_path)
         names = self.names()
         if isinstance(name_or_path, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text:
-            return self.parse(self.read(Path(text), names), _shorten(text))
+            return self.parse(self.read(Path(text), names), _shorten_path(text))
         if text not in names:
             return None
         entry = self._folder() / f"{text}.yaml"
@@ -99,31 +102,32 @@ class FileKind(Generic[Model]):
 
     def parse(self, content: bytes | str, source: str) -> Model:
         """Check the content of a file: YAML, as UTF-8 when bytes. `source`: its name in messages."""
-        tree = self._tree(content, source)
+        root = self._root(content, source)
         try:
-            return self.model.model_validate(tree.value, strict=True)
+            return self.model.model_validate(plain(root), strict=True)
         except ValidationError as error:
-            faults = [(_path(fault), fault) for fault in error.errors(include_url=False)]
-            path, fault = min(faults, key=lambda each: tree.line(each[0]))
+            faults = [(*_place(root, fault), fault) for fault in error.errors(include_url=False)]
+            line, path, fault = min(faults, key=itemgetter(0))
             more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-            words = _describe(self, path, fault)
-            raise self.error(f"{source}:{tree.line(path)}: {words}{more}") from None
+            raise self.error(f"{source}:{line}: {_describe(self, path, fault)}{more}") from None
 
     def _folder(self) -> Traversable:
         return resources.files(self.package) / self.folder
 
     def read(self, path: Path, known: Sequence[str] = ()) -> bytes:
         """Read a file that may be anything, but never more than is allowed; the known names are told."""
-        name, kind, error = _shorten(str(path)), self.name, self.error
+        name, kind, error = _shorten_path(str(path)), self.name, self.error
         try:
             status = path.stat()
             if stat.S_ISDIR(status.st_mode):
                 raise error(f"{name}: is a directory; give a {kind} file")
             if not stat.S_ISREG(status.st_mode):
                 raise error(f"{name}: is not a regular file; give a {kind} file")
-            if status.st_size > MAX_BYTES:
-                raise error(f"{name}: {status.st_size} bytes is too large for a {kind}; {MAX_BYTES} at most")
-            return read_bytes(path, MAX_BYTES)
+            if status.st_size > MAX_TEXT_BYTES:
+                raise error(
+                    f"{name}: {status.st_size} bytes is too large for a {kind}; {MAX_TEXT_BYTES} at most"
+                )
+            return read_bytes(path)
         except FileNotFoundError:
             others = f" or one of: {', '.join(known)}" if known else ""
             raise error(f"{name}: no such file; give a path{others}") from None
@@ -131,29 +135,52 @@ class FileKind(Generic[Model]):
             reason = getattr(failure, "strerror", None) or getattr(failure, "reason", None) or str(failure)
             raise error(f"{name}: cannot be read: {reason}") from None
 
-    def _tree(self, content: bytes | str, source: str) -> YamlTree:
+    def _root(self, content: bytes | str, source: str) -> MapNode:
         kind, error = self.name, self.error
-        if len(content) > MAX_BYTES:
-            raise error(f"{source}: {len(content)} bytes is too large for a {kind}; {MAX_BYTES} at most")
+        if len(content) > MAX_TEXT_BYTES:
+            raise error(f"{source}: {len(content)} bytes is too large for a {kind}; {MAX_TEXT_BYTES} at most")
         try:
-            tree = parse_yaml(content if isinstance(content, str) else decode_text(content))
+            root = compose(content if isinstance(content, str) else decode_text(content), source)
         except TextError as failure:
             words = "not UTF-8 text; save the file as UTF-8" if failure.fault == "not_utf8" else str(failure)
             raise error(f"{source}:{failure.line or 1}: {words}") from None
         except YamlError as failure:
-            where = f"{failure.line}" if failure.column is None else f"{failure.line}:{failure.column}"
-            raise error(f"{source}:{where}: {' '.join(str(failure).split())}") from None
-        if tree.value is None:
+            raise error(f"{failure.place}: {failure}") from None
+        if root is None or plain(root) is None:
             raise error(f"{source}:1: empty; a {kind} needs at least `name: my-{kind}`")
-        if not isinstance(tree.value, dict):
-            what = _show(tree.value)
-            raise error(f"{source}:{tree.line(())}: must hold fields like `name: my-{kind}`, not {what}")
-        return tree
+        if not isinstance(root, MapNode):
+            what = _show(plain(root))
+            raise error(f"{source}:{root.place.line}: must hold fields like `name: my-{kind}`, not {what}")
+        return root
 
 
-def _path(fault: ErrorDetails) -> FieldPath:
-    """Keys and indices to the bad value; a `refusal` has the rest of its path in its context."""
-    return (*fault["loc"], *fault.get("ctx", {}).get("at", ()))
+def refusal(value: float | str, message: str, *at: str | int) -> PydanticCustomError:
+    """Make a validation error that has the path of the bad value, so that a file's line can be named.
+
+    Args:
+        value: the bad value, which may be a default.
+        message: what is wrong and how to correct it; one line that continues after the value.
+        *at: keys and indices from the validated part to the value.
+    """
+    context = {"field": field_path(at), "value": value, "message": message, "at": at}
+    return PydanticCustomError("refused", "{field} {value} {message}", context)
+
+
+def field_path(at: tuple[str | int, ...]) -> str:
+    """Write keys and indices as one text: ("frames", 1, "x_m") is "frames[1].x_m"."""
+    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in at)
+    return text.removeprefix(".")
+
+
+def _place(root: MapNode, fault: ErrorDetails) -> tuple[int, FieldPath]:
+    """Line, keys and indices of the bad value; a `refusal` has the rest of its path in its context.
+
+    The line of a missing value is that of the part in which it should be.
+    """
+    path: FieldPath = (*fault["loc"], *fault.get("ctx", {}).get("at", ()))
+    nodes = follow(root, path)
+    place, last = nodes[-1]
+    return place.line, path[: len(nodes) - 1] if isinstance(last, Scalar) else path
 
 
 def _describe(kind: FileKind[Any], path: FieldPath, fault: ErrorDetails) -> str:
@@ -169,7 +196,8 @@ def _describe(kind: FileKind[Any], path: FieldPath, fault: ErrorDetails) -> str:
     shown = "empty" if value is None else _show(value)
     if code in _COMPARISONS:
         return f"{name} is {shown}: {_COMPARISONS[code].format_map(context)}"
-    return f"{name} is {shown}: {_TYPES.get(code, fault['msg'])}"
+    words = _SHAPES.get(context.get("pattern", ""), _TYPES.get(code, fault["msg"]))
+    return f"{name} is {shown}: {words}"
 
 
 def _nearest_field(model: type[BaseModel], path: FieldPath) -> str:
@@ -186,9 +214,14 @@ def _nearest_field(model: type[BaseModel], path: FieldPath) -> str:
 
 
 def _shorten(text: str) -> str:
-    """Make a value or path fit for a message: one line of printable characters, not too long."""
+    """Make a value fit for a message: one line of printable characters, not too long."""
     line = "".join(char if char.isprintable() else "?" for char in " ".join(text.split()))
     return line if len(line) <= MAX_VALUE_LENGTH else line[: MAX_VALUE_LENGTH - 1] + "…"
+
+
+def _shorten_path(path: str) -> str:
+    """Make a path fit for a message: its end, which names the file."""
+    return _shorten(path[::-1])[::-1]
 
 
 def _show(value: object) -> str:

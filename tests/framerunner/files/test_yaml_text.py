@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.yaml_tree import MAX_DEPTH, YamlError, parse_yaml, to_yaml
+from framerunner.files.yaml_text import MAX_DEPTH, YamlError, compose, follow, read_yaml, to_yaml
 
 scalars = (
     st.none()
@@ -24,9 +24,9 @@ trees = st.recursive(
 @given(trees.filter(lambda value: value is not None))
 def test_what_is_written_is_read_back(value):
     if isinstance(value, dict | tuple):
-        back = parse_yaml(to_yaml(_listed(value))).value
+        back = read_yaml(to_yaml(_listed(value)))
     else:
-        back = parse_yaml(to_yaml(value)).value
+        back = read_yaml(to_yaml(value))
     assert back == value
     assert type(back) is type(value)
 
@@ -56,20 +56,24 @@ def _listed(value):
     ],
 )
 def test_scalars_follow_yaml_1_2(text, value):
-    assert parse_yaml(text).value == value
+    assert read_yaml(text) == value
 
 
 def test_lines_are_those_of_keys_and_items():
-    tree = parse_yaml("name: a\n\nframes:\n  - x: 1\n    y: 2\n  - {x: 3,\n     y: 4}\n")
-    assert tree.line(("name",)) == 1
-    assert tree.line(("frames",)) == 3
-    assert tree.line(("frames", 0, "y")) == 5
-    assert tree.line(("frames", 1, "y")) == 7
-    assert tree.line(("frames", 1, "missing", "deeper")) == 6
+    tree = compose("name: a\n\nframes:\n  - x: 1\n    y: 2\n  - {x: 3,\n     y: 4}\n")
+
+    def line(path):
+        return follow(tree, path)[-1][0].line
+
+    assert line(("name",)) == 1
+    assert line(("frames",)) == 3
+    assert line(("frames", 0, "y")) == 5
+    assert line(("frames", 1, "y")) == 7
+    assert line(("frames", 1, "missing", "deeper")) == 6
 
 
 def test_an_empty_text_has_no_value():
-    assert parse_yaml("# only a comment\n").value is None
+    assert read_yaml("# only a comment\n") is None
 
 
 @pytest.mark.parametrize(
@@ -90,13 +94,13 @@ def test_an_empty_text_has_no_value():
 )
 def test_refused_yaml_names_its_line(text, line, words):
     with pytest.raises(YamlError) as caught:
-        parse_yaml(text)
-    assert caught.value.line == line
+        read_yaml(text)
+    assert caught.value.place.line == line
     assert words in str(caught.value)
 
 
 def test_an_alias_bomb_is_refused_at_its_first_anchor():
     bomb = "a: &a [x, x]\n" + "".join(f"b{i}: &b{i} [*a, *a]\n" for i in range(9))
     with pytest.raises(YamlError, match="anchor &a") as caught:
-        parse_yaml(bomb)
-    assert caught.value.line == 1
+        read_yaml(bomb)
+    assert caught.value.place.line == 1
