@@ -11,10 +11,10 @@ from cyclopts import Parameter
 
 from framerunner.commands import (
     DEFAULT_MISSION,
+    NamedPilot,
     Sensors,
     WholeNumber,
     check_range,
-    load_mission_with,
     say,
     with_sensors,
 )
@@ -77,7 +77,7 @@ def evaluate(
     count: _CountOption = None,
     seed: _SeedOption = None,
     mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
-    pilot: Annotated[Path | None, Parameter(help="Python file with a subclass of Pilot")] = None,
+    pilot: NamedPilot = None,
     sensors: Sensors = None,
     response: _Response = None,
     px4: _Px4 = None,
@@ -115,8 +115,9 @@ def evaluate(
     use = _genuine_use(_autopilot(px4, ardupilot), speed, jobs, response=response, backend=backend)
 
     from framerunner.evaluation import evaluate as evaluation
+    from offboard.mission import load_mission
 
-    plan = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
+    plan = _plan(scenarios, level, seed, count, load_mission(mission, pilot))
     plan = _flown_by(_sensing_by(plan, sensors), response, use)
     settings = evaluation.EvaluationSettings(
         plan=plan,
@@ -125,7 +126,7 @@ def evaluate(
         again=again,
         against=compare,
         mission=mission,
-        pilot=None if pilot is None else str(pilot),
+        pilot=pilot,
         command=_command(scenarios, given),
         genuine=use,
     )
@@ -142,7 +143,7 @@ def _sensing_by(plan: Plan, sensors: str | None) -> Plan:
 def _flown_by(plan: Plan, response: str | None, use: GenuineUse | None) -> Plan:
     """The plan with a vehicle that answers late, or that a genuine autopilot flies."""
     if response is not None:
-        from framerunner.commands.named_numbers import response_of
+        from framerunner.commands.options.named_numbers import response_of
 
         return plan.answering_late(response_of(response))
     return plan if use is None else _plan_for_genuine(plan, use.autopilot)

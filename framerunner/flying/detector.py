@@ -6,16 +6,22 @@ from framerunner.flying.plan import FlightPlan
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Camera
 from vision.calibration.model import Calibration
-from vision.detectors import Detector, new_detector
+from vision.detectors import Detector, new_detector, others_detector
 
 
 def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
     """Make the detector of a plan; without a mission, the paper's.
 
     Args:
-        plan: its scenario has the camera, and it may have a calibration.
+        plan: its scenario has the camera, and it may have a calibration and a detector of its own.
         rendered: the images are the simulator's, not a real camera's.
+
+    Raises:
+        DetectorError, ExtensionError: a detector of others cannot be made.
     """
+    own = plan.detector or (None if plan.mission is None else plan.mission.detector)
+    if own:
+        return others_detector(own, plan.calibration or true_calibration(plan.scenario.camera))
     if plan.mission is None or plan.mission.vision == "boxes":
         return new_detector("boxes")  # with the paper's focal length
     return new_detector(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from functools import cached_property, lru_cache
 from importlib import resources
+from importlib.resources.abc import Traversable
 from math import cos, inf, sin, sqrt
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -16,6 +17,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 from framerunner.errors import UserError
+from framerunner.files.extensions import extension_names, find_extension
 from framerunner.files.text_file import TextError, decode_text, read_text
 
 GRAVITY_M_S2 = 9.80665
@@ -229,28 +231,37 @@ class Airframe(_Part):
 
 
 def load_airframe(name_or_path: str) -> Airframe:
-    """Load an airframe by its name in `framerunner/vehicle/airframes/` or by the path of a YAML file.
+    """Load an airframe by its name, ours or one that another package adds, or by the path of a YAML file.
 
     Raises:
         AirframeError: there is none of that name, or the file is not a valid airframe.
+        ExtensionError: another package adds it, but it cannot be used.
     """
-    folder = resources.files("framerunner.vehicle") / "airframes"
     if name_or_path.endswith((".yaml", ".yml")):
         path = Path(name_or_path)
         if not path.is_file():
             raise AirframeError(f"airframe: no file '{name_or_path}'")
-        try:
-            text = read_text(path)
-        except TextError as error:
-            raise AirframeError(f"airframe '{name_or_path}': {error}") from None
+    elif name_or_path in own_airframes():
+        return _read(name_or_path, decode_text((_folder() / f"{name_or_path}.yaml").read_bytes()))
     else:
-        known = sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
-        if name_or_path not in known:
-            raise AirframeError(
-                f"airframe: no '{name_or_path}'; there are {', '.join(known)}, or give a file"
-            )
-        text = decode_text((folder / f"{name_or_path}.yaml").read_bytes())
-    return _read(name_or_path, text)
+        added = find_extension("airframe", name_or_path)
+        if added is None:
+            known = ", ".join(sorted({*own_airframes(), *extension_names("airframe")}))
+            raise AirframeError(f"airframe: no '{name_or_path}'; there are {known}, or give a file")
+        path = added.path()
+    try:
+        return _read(name_or_path, read_text(path))
+    except TextError as error:
+        raise AirframeError(f"airframe '{name_or_path}': {error}") from None
+
+
+def own_airframes() -> list[str]:
+    """Names of the airframes of this package, sorted."""
+    return sorted(entry.name[:-5] for entry in _folder().iterdir() if entry.name.endswith(".yaml"))
+
+
+def _folder() -> Traversable:
+    return resources.files("framerunner.vehicle") / "airframes"
 
 
 @lru_cache(_AIRFRAMES_KEPT)

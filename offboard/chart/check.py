@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from framerunner.files.extensions import extension_names
 from offboard.chart.expressions import (
     IN_LOCATION,
     ExpressionError,
@@ -25,6 +26,7 @@ def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList)
     if not mission.states:
         problems.add(mission.place, Message("mission.no_states"))
         return
+    _check_detector(mission, problems)
     whole = not problems.found
     for state in all_states(mission.states):
         _check_names(state, vocabulary, problems)
@@ -113,6 +115,18 @@ def _check_action(action: Action, vocabulary: Vocabulary, problems: ProblemList)
         in_location = error.offset == IN_LOCATION
         place = action.place if in_location else action.expression_place.moved(error.offset)
         problems.add(place, Message("action", action=cut(str(action)), reason=error.message))
+
+
+def _check_detector(mission: MissionFile, problems: ProblemList) -> None:
+    """A file that anybody may write names an installed detector only; nothing of it runs here."""
+    name = mission.detector
+    if not name:
+        return
+    known = extension_names("detector")
+    if name not in known:
+        installed = Message("detector.known", names=", ".join(known)) if known else Message("detector.none")
+        advice = did_you_mean(name, known, installed)
+        problems.add(mission.detector_place, Message("detector.unknown", name=cut(name, 40), advice=advice))
 
 
 def _check_vision(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:

@@ -23,7 +23,9 @@ class SuiteError(UserError):
     """A sensor suite that cannot be used; the message is one line for people."""
 
 
-_FILES = FileKind("suite", SuiteSpec, SuiteError, folder="suites", package="sitl.sensors")
+_FILES = FileKind(
+    "suite", SuiteSpec, SuiteError, folder="suites", package="sitl.sensors", extension="sensors"
+)
 
 
 def list_suites() -> list[str]:
