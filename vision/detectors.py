@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, get_args
 
 from framerunner.errors import UserError
 from framerunner.files.extensions import extension_names, find_extension
@@ -16,6 +16,8 @@ from vision.detector import detect
 from vision.frame_finder import PAINTED_SPREAD_PX, SMOOTH_SPREAD_PX, FrameFinder
 from vision.types import Detections, Image, Vision
 
+OWN_DETECTORS: tuple[Vision, ...] = get_args(Vision)
+"""Names that no other package can use."""
 Detector = Callable[[Image, int | None], Detections]
 """From an image (BGR, shape (height, width, 3), uint8) and its vehicle time (microseconds) to detections."""
 DetectorMaker = Callable[[Calibration], Detector]
@@ -110,7 +112,7 @@ def detector_name(made_by: str | DetectorMaker) -> str:
 
 def _added(name: str) -> Any:  # noqa: ANN401 - whoever calls it finds out
     """What a package adds as a detector."""
-    added = find_extension("detector", name)
+    added = None if name in OWN_DETECTORS else find_extension("detector", name)
     if added is None:
         known = ", ".join(extension_names("detector")) or "none"
         raise DetectorError(f"unknown detector {name!r}; installed packages add: {known}")

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from framerunner.errors import SettingError
+from framerunner.evaluation import COUNT, SEED
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
 from framerunner.vehicle.airframe import AirframeError, load_airframe
@@ -158,7 +159,7 @@ class Plan:
                 yield FlightPlan(scenario, self.mission, seed, response=self.response)
 
 
-def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Plan:
+def plan_level(level: str | Path, first_seed: int, count: int, mission: Mission) -> Plan:
     """Plan `count` random scenarios of a level, name or file, with consecutive seeds.
 
     Raises:
@@ -176,8 +177,39 @@ def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Pla
     return Plan(title, f"{loaded.name}-{first_seed}-{count}", _checked(scenarios), mission, seeds)
 
 
-def plan_files(sources: Sequence[str], mission: Mission) -> Plan:
-    """Plan given scenarios: names, files, or folders of scenario files.
+def plan_flights(
+    scenarios: Sequence[str | Path | Scenario],
+    level: str | Path | None,
+    first_seed: int | None,
+    count: int | None,
+    mission: Mission,
+) -> Plan:
+    """Plan given scenarios, or those of a level; seed and count are of the level.
+
+    Raises:
+        SettingError, ScenarioError, LevelError: see `plan_level` and `plan_files`; or neither is given, or
+            both.
+    """
+    if level is None and not scenarios:
+        raise SettingError(
+            "--level: say what to fly: a level such as calm, or names, files or folders of scenarios"
+        )
+    if level is not None and scenarios:
+        raise SettingError(
+            f"--level {level}: does not go with {_shown(scenarios[0])}; give a level or scenarios, not both"
+        )
+    for option, value in (("--count", count), ("--seed", first_seed)):
+        if level is None and value is not None:
+            raise SettingError(f"{option} {value}: is for scenarios of a level; add --level, or leave it out")
+    if level is None:
+        return plan_files(scenarios, mission)
+    return plan_level(
+        level, SEED if first_seed is None else first_seed, COUNT if count is None else count, mission
+    )
+
+
+def plan_files(sources: Sequence[str | Path | Scenario], mission: Mission) -> Plan:
+    """Plan given scenarios: names, files, folders of scenario files, or scenarios.
 
     Raises:
         ScenarioError: one of them is invalid.
@@ -185,24 +217,28 @@ def plan_files(sources: Sequence[str], mission: Mission) -> Plan:
     """
     named: dict[str, str] = {}
     scenarios = []
-    for file in [file for source in sources for file in _files(source)]:
-        scenario = load_scenario(file)
+    for given in [given for source in sources for given in _files(source)]:
+        scenario = given if isinstance(given, Scenario) else load_scenario(given)
         if scenario.name in named:
             raise SettingError(
-                f"{file}: its name {scenario.name} is that of {named[scenario.name]} too; give each its own"
+                f"{_shown(given)}: its name {scenario.name} is that of {named[scenario.name]} too; give each "
+                "its own"
             )
-        named[scenario.name] = file
+        named[scenario.name] = _shown(given)
         scenarios.append(scenario)
-    title = ", ".join(sources) if len(sources) <= 4 else f"{len(sources)} scenarios"
-    label = (
-        re.sub(r"[^a-z0-9_-]+", "-", Path(sources[0]).stem.lower()).strip("-") if len(sources) == 1 else ""
-    )
+    title = ", ".join(map(_shown, sources)) if len(sources) <= 4 else f"{len(sources)} scenarios"
+    stem = Path(_shown(sources[0])).stem.lower() if len(sources) == 1 else ""
+    label = re.sub(r"[^a-z0-9_-]+", "-", stem).strip("-")
     return Plan(title, label[:40] or "scenarios", _checked(scenarios), mission, [0] * len(scenarios))
 
 
-def _files(source: str) -> list[str]:
-    path = Path(source)
-    if not path.is_dir():
+def _shown(source: str | Path | Scenario) -> str:
+    """A scenario as it was given, for people."""
+    return f"scenario {source.name}" if isinstance(source, Scenario) else str(source)
+
+
+def _files(source: str | Path | Scenario) -> Sequence[str | Path | Scenario]:
+    if isinstance(source, Scenario) or not (path := Path(source)).is_dir():
         return [source]
     files = sorted(str(each) for each in path.iterdir() if each.suffix in SUFFIXES)
     if not files:

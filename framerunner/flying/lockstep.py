@@ -10,6 +10,8 @@ import asyncio
 import hashlib
 from collections import deque
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from struct import Struct
 
@@ -44,9 +46,18 @@ def fly_lockstep(
     """Fly a plan as fast as the machine can; see `lockstep_flight`, which does it within an event loop."""
     flight = lockstep_flight(plan, observers=observers, on_image=on_image)
     try:
-        return asyncio.run(flight)
+        if not _in_event_loop():
+            return asyncio.run(flight)
+        with ThreadPoolExecutor(1) as apart:  # of a notebook
+            return apart.submit(asyncio.run, flight).result()
     finally:
         flight.close()  # if a signal came before the event loop had started it; otherwise nothing is left
+
+
+def _in_event_loop() -> bool:
+    with suppress(RuntimeError):
+        return asyncio.get_running_loop() is not None
+    return False
 
 
 async def lockstep_flight(

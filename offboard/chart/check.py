@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import get_args
 
 from framerunner.files.extensions import extension_names
 from offboard.chart.expressions import (
@@ -18,6 +19,7 @@ from offboard.chart.problems import Place, ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, Leaf, MissionFile, State, Transition, all_states, leaves
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary
 from offboard.pilot import NAMES_ON_MAP, Pilot
+from vision.types import Vision
 
 
 def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:
@@ -122,7 +124,7 @@ def _check_detector(mission: MissionFile, problems: ProblemList) -> None:
     name = mission.detector
     if not name:
         return
-    known = extension_names("detector")
+    known = [each for each in extension_names("detector") if each not in get_args(Vision)]
     if name not in known:
         installed = Message("detector.known", names=", ".join(known)) if known else Message("detector.none")
         advice = did_you_mean(name, known, installed)
