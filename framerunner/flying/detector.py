@@ -6,7 +6,7 @@ from framerunner.flying.plan import FlightPlan
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Camera
 from vision.calibration.model import Calibration
-from vision.detectors import Detector, new_detector, others_detector
+from vision.detectors import Detector, DetectorMaker, new_detector, others_detector
 
 
 def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
@@ -19,9 +19,9 @@ def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
     Raises:
         DetectorError, ExtensionError: a detector of others cannot be made.
     """
-    own = plan.detector or (None if plan.mission is None else plan.mission.detector)
-    if own:
-        return others_detector(own, plan.calibration or true_calibration(plan.scenario.camera))
+    others = others_of(plan)
+    if others is not None:
+        return others_detector(others, plan.calibration or true_calibration(plan.scenario.camera))
     if plan.mission is None or plan.mission.vision == "boxes":
         return new_detector("boxes")  # with the paper's focal length
     return new_detector(
@@ -30,6 +30,11 @@ def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
         rendered=rendered,
         smooth=plan.scenario.camera.effects is not None,
     )
+
+
+def others_of(plan: FlightPlan) -> str | DetectorMaker | None:
+    """The detector of others with which a plan's mission sees; None: it is one of ours."""
+    return plan.detector or (None if plan.mission is None else plan.mission.detector or None)
 
 
 def true_calibration(camera: Camera) -> Calibration:
