@@ -111,7 +111,6 @@ def evaluate(
     """
     given = dict(locals())
     use = _genuine_use(_autopilot(px4, ardupilot), speed, jobs, response=response, backend=backend)
-
     from framerunner.evaluation import evaluate as evaluation
     from framerunner.evaluation.plan import plan_flights
     from offboard.mission import load_mission

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import re
+import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -18,6 +20,7 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
 from framerunner.vehicle.airframe import AirframeError, load_airframe
 from offboard.mission import Mission
+from offboard.pilot import Pilot
 from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario, ScenarioError
@@ -34,7 +37,7 @@ class Identity:
         mission: its name.
         mission_sha256: of the expanded chart with its variables, class and vision.
         pilot: name of the contestant's file or class.
-        pilot_sha256: of the contestant's file; empty for a class of the package.
+        pilot_sha256: of the contestant's file, or of the module of another package's class; empty for ours.
         seeds: of everything random in each flight, in the scenarios' order.
         version: of framerunner.
         response: how late the vehicle answers; empty: as its autopilot does.
@@ -119,7 +122,7 @@ class Plan:
             mission=mission.name,
             mission_sha256=_sha256(f"{mission.native}\n{variables}\n{mission.rules}"),
             pilot=pilot.name if isinstance(pilot, PilotFile) else pilot.__qualname__,
-            pilot_sha256=_sha256(pilot.text) if isinstance(pilot, PilotFile) else "",
+            pilot_sha256=_pilot_sha256(pilot),
             seeds=tuple(self.seeds),
             version=metadata.version("framerunner"),
             response="" if self.response is None else str(self.response),
@@ -257,6 +260,17 @@ def _checked(scenarios: list[Scenario]) -> list[Scenario]:
         except AirframeError as error:
             raise ScenarioError(f"scenario {scenario.name}: {error}") from None
     return scenarios
+
+
+def _pilot_sha256(pilot: PilotFile | type[Pilot]) -> str:
+    if isinstance(pilot, PilotFile):
+        return _sha256(pilot.text)
+    if pilot is Pilot:
+        return ""
+    try:
+        return _sha256(inspect.getsource(sys.modules[pilot.__module__]))
+    except (OSError, TypeError):  # it was typed into an interpreter
+        return ""
 
 
 def _sha256(text: str) -> str:
