@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Self, TypeVar
 
 from framerunner.errors import SettingError
-from framerunner.monitor.run import FIRST_VIEWER
+from framerunner.monitor import FIRST_VIEWER
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 

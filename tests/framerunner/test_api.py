@@ -2,8 +2,10 @@
 
 import asyncio
 import inspect
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -50,6 +52,20 @@ def test_the_import_loads_nothing_heavy():
     assert done.stdout == "[]\n"
     line = next(each for each in done.stderr.splitlines() if each.endswith("| framerunner"))
     assert int(line.split("|")[1]) < 100_000  # microseconds
+
+
+def test_flights_and_simulators_need_no_extras():
+    """As after an installation of `locks/small.txt`."""
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
+    extras = project["project"]["optional-dependencies"]
+    needed = [each for name in ("monitor", "plots", "video") for each in extras[name]]
+    packages = [re.match(r"[A-Za-z0-9-]+", each).group() for each in needed]
+    modules = [*packages, "multipart", "sqlalchemy", "PIL"]
+    program = (
+        f"import sys; sys.modules.update(dict.fromkeys({modules}))\n"
+        "import framerunner; print([getattr(framerunner, name) for name in framerunner.__all__])"
+    )
+    subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
 
 
 def test_unknown_names_are_attribute_errors():
