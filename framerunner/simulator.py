@@ -46,8 +46,9 @@ class Simulator:
         video_url: the camera's images as MJPEG over HTTP.
         system_id: of the drone in MAVLink.
 
-    Raises (when it is entered):
-        UserError: it cannot be started; the message is the reason in one line.
+    Raises:
+        UserError: there is no such scenario or, when it is entered, the simulator cannot be started; one line
+            with the reason.
     """
 
     drone_url: str
@@ -70,7 +71,7 @@ class Simulator:
         self._options += [] if sensors is None else ["--sensors", sensors]
         self._options += [word for fault in faults for word in ("--fault", fault)]
         self._lines: list[str] = []
-        self._ready = threading.Event()
+        self._ready = asyncio.Event()
         self._stack = ExitStack()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._process: ChildProcess | None = None
@@ -81,7 +82,7 @@ class Simulator:
         """Start it, and wait until all its ports are open."""
         if self._loop is not None:
             raise SettingError("Simulator: is running already; make another for a second drone")
-        self._lines, self._ready = [], threading.Event()
+        self._lines, self._ready = [], asyncio.Event()
         with ExitStack() as stack:
             instance = stack.enter_context(claimed_instance())
             folder = stack.enter_context(TemporaryDirectory(prefix="framerunner-simulator-"))
@@ -127,14 +128,9 @@ class Simulator:
             timeout_s: wall time.
 
         Raises:
-            UserError: it could not be armed by then.
+            UserError: it could not be armed by then, or the simulator has ended.
         """
-        if not self._ready.wait(timeout_s):
-            last = self._lines[-1] if self._lines else "it printed nothing"
-            raise SettingError(
-                f"the drone was not ready within {timeout_s:g} s; wait longer, or mend what prevents arming: "
-                f"{last}"
-            )
+        self._wait_for(lambda: self._readiness(timeout_s))
 
     def _start_thread(self, loop: asyncio.AbstractEventLoop) -> threading.Thread:
         thread = threading.Thread(target=loop.run_forever, name="simulator", daemon=True)
@@ -167,6 +163,17 @@ class Simulator:
         if self._process is not None:
             await self._process.__aexit__()
         self._reader = self._writer = self._process = None
+
+    async def _readiness(self, limit_s: float) -> None:
+        assert self._process is not None
+        try:
+            async with asyncio.timeout(limit_s):
+                await self._process.guard(asyncio.create_task(self._ready.wait()))
+        except TimeoutError:
+            raise SettingError(
+                f"the drone was not ready within {limit_s:g} s; wait longer, or mend what prevents arming: "
+                f"{self._lines[-1] if self._lines else 'the simulator printed nothing'}"
+            ) from None
 
     async def _ask(self) -> TrueState:
         assert self._reader is not None

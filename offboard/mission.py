@@ -29,7 +29,7 @@ from offboard.chart.problems import (
 from offboard.chart.read import read_mission_file
 from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
 from offboard.pilot import Pilot
-from offboard.pilot_file import PilotFile, find_pilot
+from offboard.pilot_file import PilotFile, PilotSource, class_of, find_pilot
 from scenarios.models import MissionClass
 from vision.types import Vision
 
@@ -74,7 +74,7 @@ class Mission:
     description: str
     path: Path
     spec: MissionFile = field(repr=False)
-    pilot: PilotFile | type[Pilot] = field(repr=False)
+    pilot: PilotSource = field(repr=False)
     mission_class: MissionClass = "contest"
     vision: Vision = "boxes"
     detector: str = ""
@@ -146,9 +146,7 @@ def installed_mission(name: str) -> Path | None:
     return None if added is None else added.path()
 
 
-def load_mission(
-    name_or_path: str | Path, pilot: str | Path | PilotFile | type[Pilot] | None = None
-) -> Mission:
+def load_mission(name_or_path: str | Path, pilot: str | Path | PilotSource | None = None) -> Mission:
     """Read, expand, check and load a mission.
 
     Args:
@@ -167,9 +165,7 @@ def load_mission(
     return _checked(read_mission_file(_read_text(path, label), path, label), path, pilot, read_base)
 
 
-def mission_from_text(
-    text: str, pilot: PilotFile | type[Pilot] | None = None, *, file: str = "mission.yaml"
-) -> Mission:
+def mission_from_text(text: str, pilot: PilotSource | None = None, *, file: str = "mission.yaml") -> Mission:
     """Load a mission that is not in a file, as `load_mission`; it may extend missions of the package only.
 
     Args:
@@ -187,13 +183,10 @@ def mission_from_text(
     return _checked(written, path, pilot, read_package_base)
 
 
-def _checked(
-    written: MissionFile, path: Path, pilot: PilotFile | type[Pilot] | None, open_base: BaseReader
-) -> Mission:
+def _checked(written: MissionFile, path: Path, pilot: PilotSource | None, open_base: BaseReader) -> Mission:
     pilot = Pilot if pilot is None else pilot
     problems = ProblemList()
-    pilot_class = pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot
-    spec = expand_and_check(written, pilot_class, problems, open_base)
+    spec = expand_and_check(written, class_of(pilot), problems, open_base)
     problems.raise_if_any()
     mission = Mission(
         spec.name,

@@ -109,7 +109,16 @@ class PilotFile:
         return mission_error(Place(self.name, line), text)
 
 
-def find_pilot(name_or_path: str | Path) -> PilotFile | type[Pilot]:
+PilotSource = PilotFile | type[Pilot]
+"""What a mission's pilots are made of."""
+
+
+def class_of(pilot: PilotSource | None) -> type[Pilot]:
+    """The class of a mission's pilots; None: `Pilot` itself. Raises `MissionError`."""
+    return pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot or Pilot
+
+
+def find_pilot(name_or_path: str | Path) -> PilotSource:
     """A pilot by the name under which another package adds it, or a contestant's Python file.
 
     Args:

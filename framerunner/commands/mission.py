@@ -119,7 +119,7 @@ def export(
 def import_(
     file: Annotated[Path, Parameter(help="SCXML file")],
     *,
-    pilot: PilotOption = None,
+    pilot: NamedPilot = None,
     out: Annotated[Path | None, Parameter(help="mission file to write; it must not exist")] = None,
 ) -> int:
     """Print or write the mission that an SCXML file describes, and say what the checker finds in it.
@@ -133,10 +133,9 @@ def import_(
         framerunner mission import chart.scxml --out my_mission.yaml
     """
     from offboard.authoring import Document, check_document, import_scxml
-    from offboard.pilot import Pilot
-    from offboard.pilot_file import read_pilot
+    from offboard.pilot_file import class_of, find_pilot
 
-    pilot_class = Pilot if pilot is None else read_pilot(pilot).pilot_class()
+    pilot_class = class_of(None if pilot is None else find_pilot(pilot))
     text = import_scxml(_read(file), file.stem)
     findings = check_document(Document.from_text(text, out or file.with_suffix(".yaml")), pilot_class)
     errors = [found.message for found in findings if found.severity == "error"]

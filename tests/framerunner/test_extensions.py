@@ -2,6 +2,7 @@
 
 import sys
 from importlib import resources
+from pathlib import Path
 
 import pytest
 
@@ -137,6 +138,8 @@ def test_the_command_line_takes_their_names(second_package, capsys):
     command = ["gentle-3", "--mission", "gentle_hover", "--pilot", "gentle", "--lockstep", "--out", "runs"]
     assert run(["fly", *command, "--sensors", "noisy"]) == 1
     assert run(["mission", "show", "gentle_hover", "--pilot", "gentle"]) == 0
+    (flight,) = Path("runs").iterdir()
+    assert run(["replay", str(flight), "--pilot", "gentle", "--fast"]) == 0  # it is the same to the last bit
     options = ["--level", "gentle", "--images", "80", "--detector", "redness", "--out", "rated"]
     assert run(["vision", "evaluate", *options]) == 0
     printed = capsys.readouterr().out

@@ -94,8 +94,9 @@ def test_a_drone_that_cannot_be_armed_is_not_waited_for_long():
 def test_a_simulator_that_was_killed_is_told_in_one_line():
     with framerunner.Simulator() as simulator:
         simulator._process._process.kill()
-        with pytest.raises(framerunner.UserError, match="the simulator was ended by signal 9"):
-            simulator.truth()
+        for ask in (simulator.truth, simulator.wait_until_ready):
+            with pytest.raises(framerunner.UserError, match="the simulator was ended by signal 9"):
+                ask()
 
 
 def test_all_ports_are_free_again_afterwards():
