@@ -9,6 +9,7 @@ import pytest
 import framerunner
 from framerunner.cli import run
 from framerunner.errors import UserError
+from framerunner.evaluation.plan import plan_flights
 from framerunner.files.extensions import KINDS, ExtensionError
 from framerunner.vehicle.airframe import load_airframe
 from offboard.mission import MISSIONS
@@ -199,6 +200,24 @@ def test_a_name_that_two_packages_add_is_refused(second_package):
     install(second_package, "third-package", "[framerunner.levels]\ngentle = second_package:GENTLE\n")
     with pytest.raises(ExtensionError, match="level gentle: second-package and third-package both add it"):
         framerunner.load_level("gentle")
+
+
+def test_an_evaluation_knows_the_versions_that_it_was_flown_with(second_package):
+    def identity():
+        mission = framerunner.load_mission("gentle_hover", "gentle")
+        assert mission.rules == f"class contest, vision boxes, detector redness of second-package {version}"
+        return plan_flights(["calm-17"], None, None, None, mission).identity
+
+    version = "1.0"
+    before = identity()
+    assert before == identity()
+    assert before.pilot_sha256
+    version = "1.1"
+    for file in second_package.glob("*/METADATA"):
+        file.write_text(
+            file.read_text(encoding="utf-8").replace("Version: 1.0", "Version: 1.1"), encoding="utf-8"
+        )
+    assert before.difference(identity()) == "another content of mission gentle_hover"
 
 
 def test_the_list_shows_what_is_installed_and_from_where(second_package, capsys):
