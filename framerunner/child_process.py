@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Self, TypeVar
 
 from framerunner.errors import SettingError
-from framerunner.monitor.run import FIRST_VIEWER
+from framerunner.monitor import FIRST_VIEWER
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 
@@ -158,7 +158,7 @@ class MonitorProcess(ChildProcess):
         *,
         judges: bool = False,
     ) -> None:
-        port = _free_port()
+        port = free_port()
         self.link = f"udpout://127.0.0.1:{port}"  # to which the drones' packets are to be sent
         arguments = ["monitor", "--lifeline", "--drone", f"udpin://127.0.0.1:{port}"]
         self._folder = TemporaryDirectory(prefix="framerunner-monitor-")  # only this user may read it
@@ -233,7 +233,8 @@ class MonitorProcess(ChildProcess):
             self._viewed.set()
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A UDP port of this machine that is free now."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -36,6 +36,7 @@ _COMMANDS = {
     "course": "app",
     "scenario": "app",
     "vision": "app",
+    "list": "list_",
 }
 _DISK_REFUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 

@@ -23,7 +23,7 @@ from sitl.server_settings import VIDEO_PORT
 
 INSTANCES = 10
 _TCP_PORTS = (px4.FIRST_PORT, VIDEO_PORT)
-_UDP_PORTS = (14540, 14580, 18570, CAMERA_PORT)  # of the app, and PX4's own
+_UDP_PORTS = (14280, 14540, 14580, 18570, CAMERA_PORT)  # of the app, and PX4's own
 _ARDUPILOT_UDP_PORTS = (ardupilot.FIRST_PORT, POSE_PORT, RELAY_PORT)
 _PX4_LOCKS = "/tmp/px4_lock-"  # PX4's own; an instance is one PX4's on this machine
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import yaml
 from statemachine import StateChart
 
+from framerunner.files.extensions import extension_names, find_extension
 from framerunner.files.text_file import TextError, TextFault, read_text
 from framerunner.files.yaml_text import Place
 from offboard.chart.check import check, is_finish
@@ -28,7 +29,7 @@ from offboard.chart.problems import (
 from offboard.chart.read import read_mission_file
 from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
 from offboard.pilot import Pilot
-from offboard.pilot_file import PilotFile
+from offboard.pilot_file import PilotFile, PilotSource, class_of, find_pilot
 from scenarios.models import MissionClass
 from vision.types import Vision
 
@@ -65,6 +66,7 @@ class Mission:
         pilot: what the mission was checked against: a contestant's file or a class.
         mission_class: by which limits it flies.
         vision: how it sees frames.
+        detector: name of another package's detector that finds them; empty: the vision's own.
         remarks: the checker's warnings and advice.
     """
 
@@ -72,9 +74,10 @@ class Mission:
     description: str
     path: Path
     spec: MissionFile = field(repr=False)
-    pilot: PilotFile | type[Pilot] = field(repr=False)
+    pilot: PilotSource = field(repr=False)
     mission_class: MissionClass = "contest"
     vision: Vision = "boxes"
+    detector: str = ""
     remarks: tuple[Problem, ...] = field(default=(), repr=False)
 
     def __getstate__(self) -> dict[str, object]:
@@ -94,7 +97,9 @@ class Mission:
     @property
     def rules(self) -> str:
         """By which limits it flies and how it sees, in words."""
-        return f"class {self.mission_class}, vision {self.vision}"
+        rules = f"class {self.mission_class}, vision {self.vision}"
+        added = find_extension("detector", self.detector) if self.detector else None
+        return rules if added is None else f"{rules}, detector {added}"
 
     @cached_property
     def states(self) -> dict[str, State]:
@@ -120,29 +125,47 @@ class Mission:
 
 
 def list_missions() -> list[str]:
-    """Names of the missions in the package."""
+    """Names of the installed missions: of this package, and those that others add."""
+    return sorted({*own_missions(), *extension_names("mission")})
+
+
+def own_missions() -> list[str]:
+    """Names of the missions of this package, sorted."""
     return sorted(path.stem for path in MISSIONS.glob("*.yaml"))
 
 
-def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None = None) -> Mission:
+def installed_mission(name: str) -> Path | None:
+    """The file of an installed mission; None if there is none of this name.
+
+    Raises:
+        ExtensionError: another package adds it, but it cannot be used.
+    """
+    if name in own_missions():
+        return MISSIONS / f"{name}.yaml"
+    added = find_extension("mission", name)
+    return None if added is None else added.path()
+
+
+def load_mission(name_or_path: str | Path, pilot: str | Path | PilotSource | None = None) -> Mission:
     """Read, expand, check and load a mission.
 
     Args:
         name_or_path: a name of `list_missions()` or a YAML file.
-        pilot: a contestant's file from `read_pilot`, or a subclass of `Pilot`; None for `Pilot` itself.
+        pilot: a subclass of `Pilot`, the name of one that another package adds, a contestant's Python file,
+            which is executed, or such a file from `read_pilot`; None for `Pilot` itself.
 
     Raises:
         MissionError: every problem, one a line, as `file:line: text`, with the file as it was named.
+        ExtensionError: what another package adds cannot be used.
     """
+    pilot = find_pilot(pilot) if isinstance(pilot, str | Path) else pilot
     name = str(name_or_path)
     path = _find(name, Path.cwd(), Place(name))
-    label = path.name if path.parent == MISSIONS else name
+    label = name if _is_file_name(name) else path.name
     return _checked(read_mission_file(_read_text(path, label), path, label), path, pilot, read_base)
 
 
-def mission_from_text(
-    text: str, pilot: PilotFile | type[Pilot] | None = None, *, file: str = "mission.yaml"
-) -> Mission:
+def mission_from_text(text: str, pilot: PilotSource | None = None, *, file: str = "mission.yaml") -> Mission:
     """Load a mission that is not in a file, as `load_mission`; it may extend missions of the package only.
 
     Args:
@@ -160,13 +183,10 @@ def mission_from_text(
     return _checked(written, path, pilot, read_package_base)
 
 
-def _checked(
-    written: MissionFile, path: Path, pilot: PilotFile | type[Pilot] | None, open_base: BaseReader
-) -> Mission:
+def _checked(written: MissionFile, path: Path, pilot: PilotSource | None, open_base: BaseReader) -> Mission:
     pilot = Pilot if pilot is None else pilot
     problems = ProblemList()
-    pilot_class = pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot
-    spec = expand_and_check(written, pilot_class, problems, open_base)
+    spec = expand_and_check(written, class_of(pilot), problems, open_base)
     problems.raise_if_any()
     mission = Mission(
         spec.name,
@@ -176,6 +196,7 @@ def _checked(
         pilot,
         mission_class=spec.mission_class or "contest",
         vision=spec.vision or "boxes",
+        detector=spec.detector,
         remarks=problems.all,
     )
     mission.new_pilot()  # now, so that an error in the pilot or the chart is raised now
@@ -203,24 +224,25 @@ def expand_and_check(
 
 
 def read_base(mission: MissionFile) -> MissionFile:
-    """Read the mission that one extends: of the package, or a file in its own folder or below.
+    """Read the mission that one extends: an installed one, or a file in its own folder or below.
 
     Raises:
         MissionError: there is none, or it is elsewhere: a mission shall not read any file that it names.
     """
     folder = mission.path.parent
     path = _find(mission.extends, folder, mission.place)
-    if path.parent != MISSIONS and not path.is_relative_to(folder.resolve()):
+    is_installed = not _is_file_name(mission.extends) or path.parent == MISSIONS
+    if not is_installed and not path.is_relative_to(folder.resolve()):
         raise mission_error(mission.place, Message("extends.elsewhere", name=mission.extends))
     label = path.name if path.name != mission.path.name else str(path)
     return read_mission_file(_read_text(path, label), path, label)
 
 
 def read_package_base(mission: MissionFile) -> MissionFile:
-    """Read the mission that one extends, of the package only: files beside it may be others'.
+    """Read the mission that one extends, an installed one only: files beside it may be others'.
 
     Raises:
-        MissionError: the package has none of that name.
+        MissionError: none of that name is installed.
     """
     known = list_missions()
     if mission.extends not in known:
@@ -230,8 +252,8 @@ def read_package_base(mission: MissionFile) -> MissionFile:
 
 
 def _find(name: str, folder: Path, place: Place) -> Path:
-    """A file if it looks like one, otherwise a mission of the package."""
-    if name.endswith((".yaml", ".yml")) or "/" in name:
+    """A file if it looks like one, otherwise an installed mission."""
+    if _is_file_name(name):
         path = folder / name
         with contextlib.suppress(RuntimeError):  # links in a loop, before Python 3.13
             path = path.resolve()
@@ -239,11 +261,16 @@ def _find(name: str, folder: Path, place: Place) -> Path:
             return path
         code = "file.irregular" if path.exists() else "file.missing"
         raise mission_error(place, Message(code, name=name))
+    installed = installed_mission(name)
+    if installed is not None:
+        return installed
     known = list_missions()
-    if name in known:
-        return MISSIONS / f"{name}.yaml"
     advice = did_you_mean(name, known, Message("file.known", names=", ".join(known)))
     raise mission_error(place, Message("file.unknown", name=name, advice=advice))
+
+
+def _is_file_name(name: str) -> bool:
+    return name.endswith((".yaml", ".yml")) or "/" in name
 
 
 def _read_text(path: Path, label: str) -> str:

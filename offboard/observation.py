@@ -110,6 +110,7 @@ def check_change(old: Mission, new: Mission, state: str) -> None:
     for what, before, after in (
         ("class", old.mission_class, new.mission_class),
         ("vision", old.vision, new.vision),
+        ("detector", old.detector, new.detector),
     ):
         if before != after:
             raise ChangeRefusedError(

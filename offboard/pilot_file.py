@@ -20,6 +20,7 @@ from typing import get_type_hints
 
 from statemachine import StateChart
 
+from framerunner.files.extensions import extension_names, find_extension
 from framerunner.files.text_file import TextError, read_text
 from framerunner.files.yaml_text import Place
 from offboard.chart.problems import MissionError, mission_error
@@ -92,12 +93,8 @@ class PilotFile:
         """Refuse members that would fail only in flight."""
         with self._errors_refused(kind.__module__, f"a type in class {kind.__name__} is unknown"):
             get_type_hints(kind)  # an annotation may be any expression
-        for name, member in inspect.getmembers(kind):
-            if name.startswith("_") or getattr(Pilot, name, None) is member:
-                continue
-            reason = _why_unusable(name, member)
-            if reason:
-                raise self._refused(reason, _line_of(member))
+        for member, reason in _unusable_members(kind):
+            raise self._refused(reason, _line_of(member))
 
     def new_pilot(self, variables: dict[str, object]) -> Pilot:
         """A pilot of a new class, with the mission's variables. Raises `MissionError`."""
@@ -111,6 +108,40 @@ class PilotFile:
 
     def _refused(self, text: str, line: int = 0) -> MissionError:
         return mission_error(Place(self.name, line), text)
+
+
+PilotSource = PilotFile | type[Pilot]
+"""What a mission's pilots are made of."""
+
+
+def class_of(pilot: PilotSource | None) -> type[Pilot]:
+    """The class of a mission's pilots; None: `Pilot` itself. Raises `MissionError`."""
+    return pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot or Pilot
+
+
+def find_pilot(name_or_path: str | Path) -> PilotSource:
+    """A pilot by the name under which another package adds it, or a contestant's Python file.
+
+    Args:
+        name_or_path: a text is a file if it ends in .py or has a directory.
+
+    Raises:
+        MissionError: see `read_pilot`, or no package adds a pilot of this name.
+        ExtensionError: a package does, but it cannot be used.
+    """
+    name = str(name_or_path)
+    if isinstance(name_or_path, Path) or name.endswith(".py") or "/" in name:
+        return read_pilot(name_or_path)
+    added = find_extension("pilot", name)
+    if added is None:
+        known = ", ".join(extension_names("pilot")) or "none"
+        raise mission_error(Place(name), f"unknown pilot; installed: {known}; a Python file ends in .py")
+    kind = added.load()
+    if not (isinstance(kind, type) and issubclass(kind, Pilot)):
+        raise added.refused("is no subclass of framerunner.Pilot")
+    for _, reason in _unusable_members(kind):
+        raise added.refused(reason)
+    return kind
 
 
 def read_pilot(path: str | Path) -> PilotFile:
@@ -180,6 +211,15 @@ def _last_line_in(traceback: TracebackType | None, module_name: str) -> int:
             line = traceback.tb_lineno
         traceback = traceback.tb_next
     return line
+
+
+def _unusable_members(kind: type[Pilot]) -> Iterator[tuple[object, str]]:
+    """The members of a pilot's class that a mission cannot use, each with the reason."""
+    for name, member in inspect.getmembers(kind):
+        if not name.startswith("_") and getattr(Pilot, name, None) is not member:
+            reason = _why_unusable(name, member)
+            if reason:
+                yield member, reason
 
 
 def _why_unusable(name: str, member: object) -> str:

@@ -59,7 +59,8 @@ def json_schema() -> dict[str, Any]:
 def _random(name: str) -> Scenario:
     """The scenario that `random_scenario` gives this name."""
     level, _, seed = name.rpartition("-")
-    levels = LEVEL_FILES.names()
+    levels = LEVEL_FILES.own_names()
+    levels = levels if level in levels else LEVEL_FILES.names()
     if level in levels and re.fullmatch(r"0|[1-9][0-9]{0,30}", seed):
         return random_scenario(load_level(level), int(seed))
     nearest = []

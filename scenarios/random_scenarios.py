@@ -82,7 +82,7 @@ class Level(Part):
     sensors: str | None = Field(None, description="name of the drone's sensor suite, or a file of one")
 
 
-LEVEL_FILES = FileKind("level", Level, LevelError, folder="levels")
+LEVEL_FILES = FileKind("level", Level, LevelError, folder="levels", extension="level")
 
 
 def load_level(name_or_path: str | Path) -> Level:

@@ -13,6 +13,7 @@ from sitl.pacing.pacer import BURST_TICKS, LagNotices, Pacer
 from sitl.pacing.time_grants import TimeGrants
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
+from sitl.truth_channel import TruthChannel
 from sitl.world import CONTROL_PERIOD_US
 
 
@@ -25,6 +26,7 @@ class SimulatorServer:
         notice: called with lines for people: the addresses once all is open, that every drone can be armed
             (once), when it cannot keep up.
         grants: how far the time of a single simulation may advance; None: without a limit.
+        truth: tells the first drone's true state to the program that started this one; None: nobody asks.
     """
 
     def __init__(
@@ -33,11 +35,13 @@ class SimulatorServer:
         settings: ServerSettings,
         notice: Callable[[str], None] = lambda line: None,
         grants: TimeGrants | None = None,
+        truth: TruthChannel | None = None,
     ) -> None:
         simulations = list(simulation) if isinstance(simulation, Sequence) else [simulation]
         self._settings = settings
         self._notice = notice
         self._grants = grants
+        self._truth = truth
         boot_unix_us = int(time.time() * 1e6)
         self._drones = [
             ServedDrone(flown, settings.shifted(number), boot_unix_us, notice, grants)
@@ -68,8 +72,9 @@ class SimulatorServer:
             if video_task is not None:
                 video_task.cancel()
                 await asyncio.gather(video_task, return_exceptions=True)
-            if self._grants is not None:
-                await self._grants.close()
+            for channel in (self._grants, self._truth):
+                if channel is not None:
+                    await channel.close()
             for drone in self._drones:
                 await drone.close()
 
@@ -82,6 +87,9 @@ class SimulatorServer:
             self._notice(f"{drone.greeting()} (Ctrl-C stops)")
         if self._grants is not None:
             await self._grants.open()
+        if self._truth is not None:
+            simulation = self._drones[0].simulation
+            await self._truth.open(lambda: simulation.truth)
 
     async def _run_paced(self, video_task: asyncio.Task[None]) -> None:
         drones, fleet = self._drones, self._fleet

@@ -1,10 +1,14 @@
-"""The detectors by name."""
+"""The detectors: ours by name, and those of others."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
+from typing import Any, get_args
 
+from framerunner.errors import UserError
+from framerunner.files.extensions import extension_names, find_extension
 from vision.calibration.colours import correct_colours
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
@@ -12,7 +16,16 @@ from vision.detector import detect
 from vision.frame_finder import PAINTED_SPREAD_PX, SMOOTH_SPREAD_PX, FrameFinder
 from vision.types import Detections, Image, Vision
 
+OWN_DETECTORS: tuple[Vision, ...] = get_args(Vision)
+"""Names that no other package can use."""
 Detector = Callable[[Image, int | None], Detections]
+"""From an image (BGR, shape (height, width, 3), uint8) and its vehicle time (microseconds) to detections."""
+DetectorMaker = Callable[[Calibration], Detector]
+"""Makes a detector for the camera of one flight; what it keeps from image to image is in the detector."""
+
+
+class DetectorError(UserError):
+    """A detector of others cannot be used; the message is one line for people."""
 
 
 def new_detector(
@@ -54,3 +67,53 @@ def new_detector(
         spread_px = SMOOTH_SPREAD_PX if smooth else PAINTED_SPREAD_PX
     lens = None if calibration is None or calibration.is_ideal else Lens(calibration)
     return FrameFinder(focal_px, spread_px, lens).find
+
+
+def others_detector(made_by: str | DetectorMaker, calibration: Calibration) -> Detector:
+    """Make a detector of others for a camera.
+
+    Args:
+        made_by: name under which a package adds it, or a function that makes it.
+        calibration: of the camera.
+
+    Returns:
+        A function of an image and its vehicle time, which the detections then have. It raises `DetectorError`
+        if the detector fails, or gives no `Detections`.
+
+    Raises:
+        DetectorError: no package adds a detector of this name, or it cannot be made.
+        ExtensionError: a package does, but it cannot be loaded.
+    """
+    name = detector_name(made_by)
+    make: DetectorMaker = _added(made_by) if isinstance(made_by, str) else made_by
+    try:
+        find = make(calibration)
+    except Exception as error:  # of others' code
+        raise DetectorError(f"detector {name} cannot be made: {type(error).__name__}: {error}") from error
+
+    def detect_checked(image: Image, time_us: int | None) -> Detections:
+        if calibration.colour_matrix is not None:
+            image = correct_colours(image, calibration.colour_matrix)
+        try:
+            found = find(image, time_us)
+        except Exception as error:  # of others' code
+            raise DetectorError(f"detector {name} failed: {type(error).__name__}: {error}") from error
+        if not isinstance(found, Detections):
+            raise DetectorError(f"detector {name} gave {type(found).__name__}; it must give Detections")
+        return found if found.time_us == time_us else replace(found, time_us=time_us)
+
+    return detect_checked
+
+
+def detector_name(made_by: str | DetectorMaker) -> str:
+    """The name of a detector of others, for people."""
+    return made_by if isinstance(made_by, str) else getattr(made_by, "__name__", type(made_by).__name__)
+
+
+def _added(name: str) -> Any:  # noqa: ANN401 - whoever calls it finds out
+    """What a package adds as a detector."""
+    added = None if name in OWN_DETECTORS else find_extension("detector", name)
+    if added is None:
+        known = ", ".join(extension_names("detector")) or "none"
+        raise DetectorError(f"unknown detector {name!r}; installed packages add: {known}")
+    return added.load()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
@@ -12,7 +11,6 @@ from cyclopts import Parameter, Token
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
-    from offboard.mission import Mission
     from scenarios.models import Scenario
 
 
@@ -70,6 +68,14 @@ def check_range(option: str, value: float | None, low: float, high: float) -> No
         raise SettingError(f"{option} {given}: must be from {lowest} to {highest}")
 
 
+NamedPilot = Annotated[
+    str | None,
+    Parameter(
+        help="primitives of your own: a Python file with a subclass of Pilot, which is executed, or the name "
+        "of a pilot that a package adds"
+    ),
+]
+
 Faults = Annotated[
     tuple[str, ...],
     Parameter(
@@ -92,14 +98,6 @@ def with_faults(scenario: Scenario, fault: tuple[str, ...]) -> Scenario:
     if len(faults) > MAX_FAULTS:
         raise FaultError(f"--fault: a scenario has at most {MAX_FAULTS} faults, not {len(faults)}")
     return scenario.model_copy(update={"faults": faults}) if fault else scenario
-
-
-def load_mission_with(mission: str | Path, pilot: Path | None) -> Mission:
-    """Load a mission, with the user's Python file if there is one, which is executed."""
-    from offboard.mission import load_mission
-    from offboard.pilot_file import read_pilot
-
-    return load_mission(mission, None if pilot is None else read_pilot(pilot))
 
 
 def say(line: str) -> None:

@@ -260,7 +260,7 @@ def extrinsics(
 
     from framerunner.camera_calibration.mounting_report import finish
     from framerunner.camera_calibration.recorded_mounting import measure_recorded, place_of
-    from framerunner.commands.named_numbers import place_of_lens
+    from framerunner.commands.options.named_numbers import place_of_lens
 
     place_m = None if position is None else place_of_lens(position)
     if flight is not None:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from framerunner.commands import load_mission_with, say
+from framerunner.commands import NamedPilot, say
 from framerunner.errors import SettingError
 from framerunner.files.text_file import make_file
 
@@ -81,10 +81,7 @@ def check(
     lesson: LessonName,
     mission: Annotated[str, Parameter(help="name or file")],
     *,
-    pilot: Annotated[
-        Path | None,
-        Parameter(help="Python file with a subclass of Pilot that the mission uses; it is executed"),
-    ] = None,
+    pilot: NamedPilot = None,
 ) -> int:
     """Fly a mission in a lesson's scenario, as fast as the machine can, and say whether it passes.
 
@@ -99,9 +96,10 @@ def check(
     from framerunner.course.lessons import find_lesson
     from framerunner.flying.lockstep import fly_lockstep
     from framerunner.flying.plan import FlightPlan
+    from offboard.mission import load_mission
 
     found = find_lesson(lesson)
     say(f"flying lesson {found.number} …")
-    result = fly_lockstep(FlightPlan(found.scenario, load_mission_with(mission, pilot))).result
+    result = fly_lockstep(FlightPlan(found.scenario, load_mission(mission, pilot))).result
     print(f"{'passed' if result.completed else 'not yet'}: {result.reason}")
     return 0 if result.completed else _FAILED

@@ -11,31 +11,30 @@ from cyclopts import Parameter
 
 from framerunner.commands import (
     DEFAULT_MISSION,
+    NamedPilot,
     Sensors,
     WholeNumber,
     check_range,
-    load_mission_with,
     say,
     with_sensors,
 )
 from framerunner.errors import SettingError
+from framerunner.evaluation import COUNT, SEED
 
 if TYPE_CHECKING:
     from framerunner.evaluation.backends import Backend, Pool
     from framerunner.evaluation.genuine_flight import GenuineUse
     from framerunner.evaluation.plan import Plan
     from framerunner.flying.simulator_process import GenuineAutopilot
-    from offboard.mission import Mission
 
-_COUNT, _SEED = 100, 1
 _GENUINE_SPEED, _MAX_GENUINE_SPEED = 4.0, 100.0
 _Level = Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")]
 _CountOption = Annotated[
-    WholeNumber | None, Parameter(help=f"how many scenarios of the level; {_COUNT} if not given")
+    WholeNumber | None, Parameter(help=f"how many scenarios of the level; {COUNT} if not given")
 ]
 _SeedOption = Annotated[
     WholeNumber | None,
-    Parameter(help=f"of the first scenario; each next one has one more; {_SEED} if not given"),
+    Parameter(help=f"of the first scenario; each next one has one more; {SEED} if not given"),
 ]
 _Jobs = Annotated[
     WholeNumber | None,
@@ -77,7 +76,7 @@ def evaluate(
     count: _CountOption = None,
     seed: _SeedOption = None,
     mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
-    pilot: Annotated[Path | None, Parameter(help="Python file with a subclass of Pilot")] = None,
+    pilot: NamedPilot = None,
     sensors: Sensors = None,
     response: _Response = None,
     px4: _Px4 = None,
@@ -111,12 +110,12 @@ def evaluate(
         framerunner evaluate --level calm --backend dask --address tcp://10.0.0.1:8786
     """
     given = dict(locals())
-    _check(scenarios, level, count, seed)
     use = _genuine_use(_autopilot(px4, ardupilot), speed, jobs, response=response, backend=backend)
-
     from framerunner.evaluation import evaluate as evaluation
+    from framerunner.evaluation.plan import plan_flights
+    from offboard.mission import load_mission
 
-    plan = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
+    plan = plan_flights(scenarios, level, seed, count, load_mission(mission, pilot))
     plan = _flown_by(_sensing_by(plan, sensors), response, use)
     settings = evaluation.EvaluationSettings(
         plan=plan,
@@ -125,7 +124,7 @@ def evaluate(
         again=again,
         against=compare,
         mission=mission,
-        pilot=None if pilot is None else str(pilot),
+        pilot=pilot,
         command=_command(scenarios, given),
         genuine=use,
     )
@@ -142,7 +141,7 @@ def _sensing_by(plan: Plan, sensors: str | None) -> Plan:
 def _flown_by(plan: Plan, response: str | None, use: GenuineUse | None) -> Plan:
     """The plan with a vehicle that answers late, or that a genuine autopilot flies."""
     if response is not None:
-        from framerunner.commands.named_numbers import response_of
+        from framerunner.commands.options.named_numbers import response_of
 
         return plan.answering_late(response_of(response))
     return plan if use is None else _plan_for_genuine(plan, use.autopilot)
@@ -235,30 +234,6 @@ def _genuine_use(
     check_range("--jobs", jobs, 1, INSTANCES)
     _program(autopilot)
     return GenuineUse(autopilot, _GENUINE_SPEED if speed is None else speed)
-
-
-def _plan(
-    scenarios: tuple[str, ...], level: str | None, seed: int | None, count: int | None, mission: Mission
-) -> Plan:
-    from framerunner.evaluation.plan import plan_files, plan_level
-
-    if level is None:
-        return plan_files(scenarios, mission)
-    return plan_level(level, _SEED if seed is None else seed, _COUNT if count is None else count, mission)
-
-
-def _check(scenarios: tuple[str, ...], level: str | None, count: int | None, seed: int | None) -> None:
-    if level is None and not scenarios:
-        raise SettingError(
-            "--level: say what to fly: a level such as calm, or names, files or folders of scenarios"
-        )
-    if level is not None and scenarios:
-        raise SettingError(
-            f"--level {level}: does not go with {scenarios[0]}; give a level or scenarios, not both"
-        )
-    for option, value in (("--count", count), ("--seed", seed)):
-        if level is None and value is not None:
-            raise SettingError(f"{option} {value}: is for scenarios of a level; add --level, or leave it out")
 
 
 def _command(scenarios: tuple[str, ...], given: Mapping[str, object]) -> str:

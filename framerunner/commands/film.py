@@ -33,7 +33,8 @@ def film(
     fps: _Fps = None,
     force: Annotated[bool, Parameter(help="replace a film that is there")] = False,
     pilot: Annotated[
-        Path | None, Parameter(help="Python file of a mission that has to be flown again and needs one")
+        str | None,
+        Parameter(help="of a mission that has to be flown again and needs one: a Python file, or a name"),
     ] = None,
 ) -> int:
     """Make a short film of a flight: the arena, the camera's image, the mission's state, times and verdict.
@@ -65,11 +66,11 @@ def film(
     size_px = _size(size or ("640x360" if suffix == ".gif" else "960x540"))
 
     from framerunner.film.make_film import FilmSettings, make_film
-    from offboard.pilot_file import read_pilot
+    from offboard.pilot_file import find_pilot
 
-    pilot_file = None if pilot is None else read_pilot(pilot)
+    source = None if pilot is None else find_pilot(pilot)
     rate = fps or (10.0 if suffix == ".gif" else 25.0)
-    made = make_film(flight, FilmSettings(target, size_px, rate, speed or 8.0, seconds), pilot_file)
+    made = make_film(flight, FilmSettings(target, size_px, rate, speed or 8.0, seconds), source)
     megabytes = target.stat().st_size / 1e6
     print(f"{target}: {made.seconds:.1f} s, {made.images} images, {megabytes:.1f} MB")
     if made.codec == "mpeg4":

@@ -14,16 +14,16 @@ from framerunner.camera_calibration.camera_delay import delay_of
 from framerunner.commands import (
     DEFAULT_MISSION,
     Faults,
+    NamedPilot,
     Sensors,
     WholeNumber,
     check_range,
     for_genuine,
-    load_mission_with,
     say,
     with_faults,
     with_sensors,
 )
-from framerunner.commands.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
+from framerunner.commands.options.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
@@ -101,7 +101,6 @@ _MonitorLink = Annotated[
     Parameter(help="MAVLink URL of a monitor that runs already, such as udpout://127.0.0.1:14550"),
 ]
 _Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input ends")]
-_Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
 
 
 @Parameter(name="*")
@@ -162,7 +161,7 @@ def fly(
     record: _Record = False,
     video: _Video = False,
     shown: MonitorOptions = _NO_MONITOR,
-    pilot: _Pilot = None,
+    pilot: NamedPilot = None,
     drone_limits: _DroneLimits = None,
     response: _Response = None,
     hardware: HardwareOptions = NONE,
@@ -192,8 +191,9 @@ def fly(
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
+    from offboard.mission import load_mission
 
-    loaded = load_mission_with(mission, pilot)
+    loaded = load_mission(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, hardware, autopilot, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
@@ -287,7 +287,7 @@ def _plan(
     drone_limits: str | None,
 ) -> FlightPlan:
     """The flight that the options describe; a seed is given in lockstep."""
-    from framerunner.commands.named_numbers import limits_of, response_of
+    from framerunner.commands.options.named_numbers import limits_of, response_of
     from framerunner.flying.plan import FlightPlan
 
     if response is not None and seed is None:

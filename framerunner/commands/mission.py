@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from framerunner.commands import load_mission_with, say
+from framerunner.commands import NamedPilot, say
 from framerunner.errors import SettingError
 from framerunner.files.text_file import make_file
 
@@ -26,7 +26,7 @@ PilotOption = Annotated[
 
 @app.command(name="list")
 def list_() -> int:
-    """List the missions that come with the package.
+    """List the installed missions.
 
     **Example**
 
@@ -43,7 +43,7 @@ def list_() -> int:
 
 
 @app.command
-def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: PilotOption = None) -> int:
+def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: NamedPilot = None) -> int:
     """Print a mission's diagram in Mermaid's language (paste it into any Markdown page or mermaid.live).
 
     **Examples**
@@ -54,14 +54,14 @@ def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: Pilo
 
         framerunner mission show my_mission.yaml --pilot my_mission.py
     """
-    from offboard.mission import mermaid
+    from offboard.mission import load_mission, mermaid
 
-    print(mermaid(load_mission_with(mission, pilot)))
+    print(mermaid(load_mission(mission, pilot)))
     return 0
 
 
 @app.command
-def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOption = None) -> int:
+def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: NamedPilot = None) -> int:
     """Say whether a mission file is good, or every fault with its line; then what may go wrong with it.
 
     A warning names a part that does nothing, such as a transition that is never taken; advice, a state that
@@ -74,8 +74,9 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOpt
         framerunner mission check my_mission.yaml --pilot my_mission.py
     """
     from offboard.chart.native import load_chart
+    from offboard.mission import load_mission
 
-    loaded = load_mission_with(file, pilot)
+    loaded = load_mission(file, pilot)
     load_chart(loaded.spec, validate=True)
     with_pilot = f" and {pilot}" if pilot is not None else ""
     print(
@@ -94,7 +95,7 @@ def export(
     format: Annotated[  # noqa: A002 - the option's name
         Literal["scxml", "mermaid"], Parameter(help="W3C State Chart XML, or Mermaid's language")
     ] = "scxml",
-    pilot: PilotOption = None,
+    pilot: NamedPilot = None,
     out: Annotated[Path | None, Parameter(help="file to write; it must not exist")] = None,
 ) -> int:
     """Print or write a mission for other programs: as SCXML for statechart editors, or as a Mermaid diagram.
@@ -106,9 +107,9 @@ def export(
         framerunner mission export my_mission.yaml --format mermaid
     """
     from offboard.authoring import export_scxml
-    from offboard.mission import mermaid
+    from offboard.mission import load_mission, mermaid
 
-    loaded = load_mission_with(mission, pilot)
+    loaded = load_mission(mission, pilot)
     text = export_scxml(loaded.spec) if format == "scxml" else mermaid(loaded)
     _print_or_write(text, out)
     return 0
@@ -118,7 +119,7 @@ def export(
 def import_(
     file: Annotated[Path, Parameter(help="SCXML file")],
     *,
-    pilot: PilotOption = None,
+    pilot: NamedPilot = None,
     out: Annotated[Path | None, Parameter(help="mission file to write; it must not exist")] = None,
 ) -> int:
     """Print or write the mission that an SCXML file describes, and say what the checker finds in it.
@@ -132,10 +133,9 @@ def import_(
         framerunner mission import chart.scxml --out my_mission.yaml
     """
     from offboard.authoring import Document, check_document, import_scxml
-    from offboard.pilot import Pilot
-    from offboard.pilot_file import read_pilot
+    from offboard.pilot_file import class_of, find_pilot
 
-    pilot_class = Pilot if pilot is None else read_pilot(pilot).pilot_class()
+    pilot_class = class_of(None if pilot is None else find_pilot(pilot))
     text = import_scxml(_read(file), file.stem)
     findings = check_document(Document.from_text(text, out or file.with_suffix(".yaml")), pilot_class)
     errors = [found.message for found in findings if found.severity == "error"]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from framerunner.camera_calibration.camera_delay import delay_of
-from framerunner.commands import DEFAULT_MISSION, check_range, load_mission_with
+from framerunner.commands import DEFAULT_MISSION, check_range
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
@@ -86,15 +86,16 @@ def preflight(
         raise SettingError("--any-vehicle: is for --restore-parameters; leave it out")
 
     from framerunner.camera_calibration.calibration_file import load_calibration
-    from framerunner.commands.hardware import HardwareOptions, caps_of
+    from framerunner.commands.options.hardware import HardwareOptions, caps_of
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.check_names import CHECK_NAMES
     from framerunner.preflight.run import PreflightSettings
+    from offboard.mission import load_mission
     from offboard.safety.check import check_names
     from scenarios.loader import load_scenario
 
     check_names(accept, CHECK_NAMES)
-    caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission_with(mission, None)
+    caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission(mission)
     known = None if calibration is None else load_calibration(calibration)
     plan = FlightPlan(load_scenario(scenario), loaded, None, calibration=known, caps=caps)
     delay = delay_of(camera_delay, known)

@@ -25,7 +25,8 @@ def replay(
     ] = None,
     port: Annotated[WholeNumber, Parameter(help="TCP port of the video; 0 lets the system choose")] = 8090,
     pilot: Annotated[
-        Path | None, Parameter(help="Python file of a mission that has to be flown again and needs one")
+        str | None,
+        Parameter(help="of a mission that has to be flown again and needs one: a Python file, or a name"),
     ] = None,
 ) -> int:
     """Show a flight again: its states in the terminal, its images at http://127.0.0.1:8090/.
@@ -50,12 +51,12 @@ def replay(
     from framerunner.flying.display import result_lines
     from framerunner.recording.open_recording import recorded_flight
     from framerunner.recording.replay import replay as show
-    from offboard.pilot_file import read_pilot
+    from offboard.pilot_file import find_pilot
     from sitl.video import VideoServer
 
-    pilot_file = None if pilot is None else read_pilot(pilot)
+    source = None if pilot is None else find_pilot(pilot)
     server = VideoServer(port=port) if with_video else None
-    with recorded_flight(flight, pilot_file) as recorded:
+    with recorded_flight(flight, source) as recorded:
         asyncio.run(show(recorded, speed, server))
         result = recorded.result
         print("no result: the flight was not judged" if result is None else result_lines(result))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from sitl.pacing.time_grants import TimeGrants
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
+    from sitl.truth_channel import TruthChannel
 
 _MAX_INSTANCES = 10  # as PX4: the apps' port of an eleventh is the ground stations' port of the first
 
@@ -171,6 +173,32 @@ class FlownBy:
                 raise SettingError(f"{option}: {why}; leave it out with --autopilot {self.autopilot}")
 
 
+@Parameter(name="*", show=False)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartedBy:
+    """What the program that has started this one wants of it, over descriptors of sockets."""
+
+    lifeline: Annotated[bool, Parameter(help="stop when standard input ends")] = False
+    time_grants: Annotated[int | None, Parameter(help="by which it grants time")] = None
+    truth: Annotated[int | None, Parameter(help="by which it gets true states")] = None
+
+    def grants(self) -> TimeGrants | None:
+        """Its end of the channel of time; None: it grants none, and time runs."""
+        if self.time_grants is None:
+            return None
+        from sitl.pacing.time_grants import TimeGrants
+
+        return TimeGrants(socket.socket(fileno=self.time_grants))
+
+    def truth_channel(self) -> TruthChannel | None:
+        """Its end of the channel of true states; None: it asks for none."""
+        if self.truth is None:
+            return None
+        from sitl.truth_channel import TruthChannel
+
+        return TruthChannel(socket.socket(fileno=self.truth))
+
+
 def sim(
     *,
     scenario: Annotated[
@@ -189,10 +217,7 @@ def sim(
     monitor: Annotated[
         bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")
     ] = False,
-    lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
-    time_grants: Annotated[
-        int | None, Parameter(show=False, help="descriptor of a socket by which the caller grants time")
-    ] = None,
+    started_by: StartedBy | None = None,
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8100/.
 
@@ -227,17 +252,11 @@ def sim(
     settings = _settings(chosen, onboard, speed, instance, count)
     flown_by.check(count, settings, monitor=monitor)
     check_range("--seed", seed, 0, 2**63 - 1)
+    caller = started_by or StartedBy()
     server = _server(
-        scenario,
-        settings,
-        onboard,
-        fault,
-        flown_by=flown_by,
-        count=count,
-        seed=seed,
-        grants=_grants(time_grants),
+        scenario, settings, onboard, fault, flown_by=flown_by, count=count, seed=seed, caller=caller
     )
-    asyncio.run(_run(server, watcher, lifeline=lifeline))
+    asyncio.run(_run(server, watcher, lifeline=caller.lifeline))
     return 0
 
 
@@ -250,9 +269,10 @@ def _server(
     flown_by: FlownBy,
     count: int,
     seed: int,
-    grants: TimeGrants | None,
+    caller: StartedBy,
 ) -> _Server:
-    """The simulator with the chosen autopilot."""
+    """The simulator with the chosen autopilot; only with ours it tells the truth."""
+    grants = caller.grants()
     if flown_by.autopilot == "px4":
         return px4_server(
             scenario,
@@ -271,17 +291,7 @@ def _server(
     from sitl.server import SimulatorServer
 
     simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
-    return SimulatorServer(simulations, settings, notice=say, grants=grants)
-
-
-def _grants(descriptor: int | None) -> TimeGrants | None:
-    if descriptor is None:
-        return None
-    import socket
-
-    from sitl.pacing.time_grants import TimeGrants
-
-    return TimeGrants(socket.socket(fileno=descriptor))
+    return SimulatorServer(simulations, settings, notice=say, grants=grants, truth=caller.truth_channel())
 
 
 def _monitor(scenario: str, video_port: int | None, count: int) -> MonitorProcess:

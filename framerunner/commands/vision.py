@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,11 +36,15 @@ def evaluate(
     blur: _Blur = 0.0,
     light: _Light = 1.0,
     jpeg: _Jpeg = None,
+    detector: Annotated[
+        str | None, Parameter(help="one that a package adds, to be rated beside ours")
+    ] = None,
     out: Annotated[Path | None, Parameter(help="folder for the report and the picture")] = None,
 ) -> int:
     """Tell how often and how exactly frames are found: by shape, and by the paper's boxes.
 
     The images are painted from random poses in random scenarios; the same options give the same images.
+    A detector that a package adds is rated by what it gives: boxes, frames, or both.
     Printed and written are rates of detection, false alarms, errors of distance, bearing and tilt by distance
     and by angle, and the time an image takes.
 
@@ -52,7 +57,8 @@ def evaluate(
     from framerunner.vision_evaluation.evaluate import evaluate_vision
 
     default = Path("runs") / f"vision-{Path(level).stem}-{images}-{seed}"
-    evaluate_vision(_settings(level, images, seed, (noise, blur, light, jpeg), out or default))
+    settings = _settings(level, images, seed, (noise, blur, light, jpeg), out or default)
+    evaluate_vision(replace(settings, detector=detector))
     return 0
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import re
+import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -13,11 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from framerunner.errors import SettingError
+from framerunner.evaluation import COUNT, SEED
 from framerunner.files.yaml_file import SUFFIXES
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
 from framerunner.vehicle.airframe import AirframeError, load_airframe
 from offboard.mission import Mission
+from offboard.pilot import Pilot
 from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario, ScenarioError
@@ -33,7 +37,7 @@ class Identity:
         mission: its name.
         mission_sha256: of the expanded chart with its variables, class and vision.
         pilot: name of the contestant's file or class.
-        pilot_sha256: of the contestant's file; empty for a class of the package.
+        pilot_sha256: of the contestant's file, or of the module of another package's class; empty for ours.
         seeds: of everything random in each flight, in the scenarios' order.
         version: of framerunner.
         response: how late the vehicle answers; empty: as its autopilot does.
@@ -118,7 +122,7 @@ class Plan:
             mission=mission.name,
             mission_sha256=_sha256(f"{mission.native}\n{variables}\n{mission.rules}"),
             pilot=pilot.name if isinstance(pilot, PilotFile) else pilot.__qualname__,
-            pilot_sha256=_sha256(pilot.text) if isinstance(pilot, PilotFile) else "",
+            pilot_sha256=_pilot_sha256(pilot),
             seeds=tuple(self.seeds),
             version=metadata.version("framerunner"),
             response="" if self.response is None else str(self.response),
@@ -158,7 +162,7 @@ class Plan:
                 yield FlightPlan(scenario, self.mission, seed, response=self.response)
 
 
-def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Plan:
+def plan_level(level: str | Path, first_seed: int, count: int, mission: Mission) -> Plan:
     """Plan `count` random scenarios of a level, name or file, with consecutive seeds.
 
     Raises:
@@ -176,8 +180,39 @@ def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Pla
     return Plan(title, f"{loaded.name}-{first_seed}-{count}", _checked(scenarios), mission, seeds)
 
 
-def plan_files(sources: Sequence[str], mission: Mission) -> Plan:
-    """Plan given scenarios: names, files, or folders of scenario files.
+def plan_flights(
+    scenarios: Sequence[str | Path | Scenario],
+    level: str | Path | None,
+    first_seed: int | None,
+    count: int | None,
+    mission: Mission,
+) -> Plan:
+    """Plan given scenarios, or those of a level; seed and count are of the level.
+
+    Raises:
+        SettingError, ScenarioError, LevelError: see `plan_level` and `plan_files`; or neither is given, or
+            both.
+    """
+    if level is None and not scenarios:
+        raise SettingError(
+            "--level: say what to fly: a level such as calm, or names, files or folders of scenarios"
+        )
+    if level is not None and scenarios:
+        raise SettingError(
+            f"--level {level}: does not go with {_shown(scenarios[0])}; give a level or scenarios, not both"
+        )
+    for option, value in (("--count", count), ("--seed", first_seed)):
+        if level is None and value is not None:
+            raise SettingError(f"{option} {value}: is for scenarios of a level; add --level, or leave it out")
+    if level is None:
+        return plan_files(scenarios, mission)
+    return plan_level(
+        level, SEED if first_seed is None else first_seed, COUNT if count is None else count, mission
+    )
+
+
+def plan_files(sources: Sequence[str | Path | Scenario], mission: Mission) -> Plan:
+    """Plan given scenarios: names, files, folders of scenario files, or scenarios.
 
     Raises:
         ScenarioError: one of them is invalid.
@@ -185,24 +220,28 @@ def plan_files(sources: Sequence[str], mission: Mission) -> Plan:
     """
     named: dict[str, str] = {}
     scenarios = []
-    for file in [file for source in sources for file in _files(source)]:
-        scenario = load_scenario(file)
+    for given in [given for source in sources for given in _files(source)]:
+        scenario = given if isinstance(given, Scenario) else load_scenario(given)
         if scenario.name in named:
             raise SettingError(
-                f"{file}: its name {scenario.name} is that of {named[scenario.name]} too; give each its own"
+                f"{_shown(given)}: its name {scenario.name} is that of {named[scenario.name]} too; give each "
+                "its own"
             )
-        named[scenario.name] = file
+        named[scenario.name] = _shown(given)
         scenarios.append(scenario)
-    title = ", ".join(sources) if len(sources) <= 4 else f"{len(sources)} scenarios"
-    label = (
-        re.sub(r"[^a-z0-9_-]+", "-", Path(sources[0]).stem.lower()).strip("-") if len(sources) == 1 else ""
-    )
+    title = ", ".join(map(_shown, sources)) if len(sources) <= 4 else f"{len(sources)} scenarios"
+    stem = Path(_shown(sources[0])).stem.lower() if len(sources) == 1 else ""
+    label = re.sub(r"[^a-z0-9_-]+", "-", stem).strip("-")
     return Plan(title, label[:40] or "scenarios", _checked(scenarios), mission, [0] * len(scenarios))
 
 
-def _files(source: str) -> list[str]:
-    path = Path(source)
-    if not path.is_dir():
+def _shown(source: str | Path | Scenario) -> str:
+    """A scenario as it was given, for people."""
+    return f"scenario {source.name}" if isinstance(source, Scenario) else str(source)
+
+
+def _files(source: str | Path | Scenario) -> Sequence[str | Path | Scenario]:
+    if isinstance(source, Scenario) or not (path := Path(source)).is_dir():
         return [source]
     files = sorted(str(each) for each in path.iterdir() if each.suffix in SUFFIXES)
     if not files:
@@ -221,6 +260,17 @@ def _checked(scenarios: list[Scenario]) -> list[Scenario]:
         except AirframeError as error:
             raise ScenarioError(f"scenario {scenario.name}: {error}") from None
     return scenarios
+
+
+def _pilot_sha256(pilot: PilotFile | type[Pilot]) -> str:
+    if isinstance(pilot, PilotFile):
+        return _sha256(pilot.text)
+    if pilot is Pilot:
+        return ""
+    try:
+        return _sha256(inspect.getsource(sys.modules[pilot.__module__]))
+    except (OSError, TypeError):  # it was typed into an interpreter
+        return ""
 
 
 def _sha256(text: str) -> str:

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from framerunner.errors import UserError
+from framerunner.files.extensions import Kind, extension_names, find_extension
 from framerunner.files.text_file import MAX_TEXT_BYTES, TextError, decode_text, read_bytes
 from framerunner.files.yaml_text import MapNode, Scalar, YamlError, compose, follow, plain
 from framerunner.files.yaml_text import Path as FieldPath
@@ -62,11 +63,17 @@ class FileKind(Generic[Model]):
     error: type[UserError]
     folder: str  # of the package, with the files that are installed with it
     package: str = "scenarios"
+    extension: Kind | None = None  # what other packages may add
 
-    def names(self) -> list[str]:
-        """Names of the installed files, sorted."""
+    def own_names(self) -> list[str]:
+        """Names of the files of this package, sorted."""
         files = (each.name for each in self._folder().iterdir())
         return sorted(name.removesuffix(".yaml") for name in files if name.endswith(".yaml"))
+
+    def names(self) -> list[str]:
+        """Names of all installed files, other packages' too, sorted."""
+        added = [] if self.extension is None else extension_names(self.extension)
+        return sorted({*self.own_names(), *added})
 
     def load(self, name_or_path: str | Path) -> Model | None:
         """Load a file.
@@ -78,13 +85,13 @@ class FileKind(Generic[Model]):
             The content; None if no file of this name is installed.
         """
         text = str(name_or_path)
-        names = self.names()
         if isinstance(name_or_path, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text:
-            return self.parse(self.read(Path(text), names), _shorten_path(text))
-        if text not in names:
-            return None
-        entry = self._folder() / f"{text}.yaml"
-        return self.parse(entry.read_bytes(), entry.name)
+            return self.parse(self.read(Path(text), self.names()), _shorten_path(text))
+        if text in self.own_names():
+            entry = self._folder() / f"{text}.yaml"
+            return self.parse(entry.read_bytes(), entry.name)
+        added = None if self.extension is None else find_extension(self.extension, text)
+        return None if added is None else self.parse(self.read(added.path()), str(added.path()))
 
     def unknown(self, name: str, nearest: Sequence[str] = (), others: str = "") -> UserError:
         """Make the error for a name that `load` does not find.

@@ -17,7 +17,7 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.recording.collected import CollectedFlight, collect
 from framerunner.recording.events import RecordingError
 from framerunner.recording.open_recording import recorded_flight
-from offboard.pilot_file import PilotFile
+from offboard.pilot_file import PilotSource
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 
@@ -56,7 +56,7 @@ class FilmSummary:
     codec: str
 
 
-def make_film(folder: Path, settings: FilmSettings, pilot: PilotFile | None = None) -> FilmSummary:
+def make_film(folder: Path, settings: FilmSettings, pilot: PilotSource | None = None) -> FilmSummary:
     """Make a film of a run folder's flight.
 
     Args:

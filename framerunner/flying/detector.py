@@ -6,16 +6,22 @@ from framerunner.flying.plan import FlightPlan
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Camera
 from vision.calibration.model import Calibration
-from vision.detectors import Detector, new_detector
+from vision.detectors import Detector, DetectorMaker, new_detector, others_detector
 
 
 def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
     """Make the detector of a plan; without a mission, the paper's.
 
     Args:
-        plan: its scenario has the camera, and it may have a calibration.
+        plan: its scenario has the camera, and it may have a calibration and a detector of its own.
         rendered: the images are the simulator's, not a real camera's.
+
+    Raises:
+        DetectorError, ExtensionError: a detector of others cannot be made.
     """
+    others = others_of(plan)
+    if others is not None:
+        return others_detector(others, plan.calibration or true_calibration(plan.scenario.camera))
     if plan.mission is None or plan.mission.vision == "boxes":
         return new_detector("boxes")  # with the paper's focal length
     return new_detector(
@@ -24,6 +30,11 @@ def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
         rendered=rendered,
         smooth=plan.scenario.camera.effects is not None,
     )
+
+
+def others_of(plan: FlightPlan) -> str | DetectorMaker | None:
+    """The detector of others with which a plan's mission sees; None: it is one of ours."""
+    return plan.detector or (None if plan.mission is None else plan.mission.detector or None)
 
 
 def true_calibration(camera: Camera) -> Calibration:

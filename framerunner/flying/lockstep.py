@@ -10,12 +10,14 @@ import asyncio
 import hashlib
 from collections import deque
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from struct import Struct
 
 import numpy as np
 
-from framerunner.flying.detector import plan_detector
+from framerunner.flying.detector import others_of, plan_detector
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
@@ -44,9 +46,18 @@ def fly_lockstep(
     """Fly a plan as fast as the machine can; see `lockstep_flight`, which does it within an event loop."""
     flight = lockstep_flight(plan, observers=observers, on_image=on_image)
     try:
-        return asyncio.run(flight)
+        if not _in_event_loop():
+            return asyncio.run(flight)
+        with ThreadPoolExecutor(1) as apart:  # of a notebook
+            return apart.submit(asyncio.run, flight).result()
     finally:
         flight.close()  # if a signal came before the event loop had started it; otherwise nothing is left
+
+
+def _in_event_loop() -> bool:
+    with suppress(RuntimeError):
+        return asyncio.get_running_loop() is not None
+    return False
 
 
 async def lockstep_flight(
@@ -102,7 +113,9 @@ class LockstepVehicle:
         self.simulation = Simulation(plan.scenario, plan.airframe, plan.seed or 0)
         detector = plan_detector(plan, rendered=True)
         feed = new_feed(plan.scenario, self.simulation.faults, plan.seed or 0)
-        self.perception = LockstepPerception(plan.scenario, on_image, detector, feed)
+        self.perception = LockstepPerception(
+            plan.scenario, on_image, detector, feed, remembers=others_of(plan) is not None
+        )
         self.drone = LockstepDrone(
             self.simulation,
             plan.start_pose,
@@ -139,7 +152,10 @@ class _SimulationJudge:
 
 
 class LockstepPerception:
-    """The camera's images, each when its latency is over; `follow` is called at every control tick."""
+    """The camera's images, each when its latency is over; `follow` is called at every control tick.
+
+    With `remembers` the detector may keep something from image to image, so it gets equal ones too.
+    """
 
     def __init__(
         self,
@@ -147,7 +163,10 @@ class LockstepPerception:
         on_image: ImageObserver | None = None,
         detector: Detector | None = None,
         feed: CameraFeed | FaultyFeed | None = None,
+        *,
+        remembers: bool = False,
     ) -> None:
+        self._remembers = remembers
         self._feed = feed or CameraFeed(scenario)
         self._on_image = on_image
         self._detector = detector or new_detector("boxes")
@@ -207,7 +226,7 @@ class LockstepPerception:
     def _detect(self, exposure: Exposure) -> Detections:
         """What an exposure shows; a drone that stands takes the same image again and again."""
         image, last = exposure.image, self._last
-        if last is not None and _are_same(image, last[0]):
+        if last is not None and not self._remembers and _are_same(image, last[0]):
             return replace(last[1], time_us=exposure.time_us)
         found = self._detector(image, exposure.time_us)
         self._last = (image, found)

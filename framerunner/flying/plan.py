@@ -20,6 +20,7 @@ from vision.calibration.model import Calibration
 
 if TYPE_CHECKING:  # it imports the statechart library, which the virtual camera does not need
     from offboard.mission import Mission
+    from vision.detectors import DetectorMaker
 
 P = TypeVar("P", bound=Part)
 StartPose = tuple[float, float, float, float]
@@ -40,6 +41,7 @@ class FlightPlan:
         drone_limits: of a real drone, for a mission of the class `open`; None: those of the airframe.
         response: how late the simulated vehicle of a lockstep flight answers; None: as its autopilot does.
         calibration: of the camera; None: it is the scenario's.
+        detector: with which its mission sees, a package's name for it or what makes it; None: the mission's.
         caps: on the speed and the height of the drone, whatever the mission asks; None: there are none.
     """
 
@@ -51,6 +53,7 @@ class FlightPlan:
     response: Response | None = None
     calibration: Calibration | None = None
     caps: Caps | None = None
+    detector: str | DetectorMaker | None = None
 
     @property
     def chart(self) -> Mission:

@@ -9,6 +9,7 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from framerunner.monitor import FIRST_VIEWER
 from framerunner.monitor.settings import BACKLOG, MonitorError, MonitorSettings
 from framerunner.monitor.urls import is_for_others, terminal_code, url_of, urls_for_people
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from framerunner.monitor.server import Job
 
 
-FIRST_VIEWER = "a browser shows the monitor"  # is said once
 _MAX_UNSENT_BYTES = 1 << 16  # that the kernel buffers for a slow viewer
 
 

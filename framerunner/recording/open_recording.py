@@ -14,7 +14,7 @@ from framerunner.recording.events import Recorded, RecordingError
 from framerunner.recording.mcap_file import first_and_last_bytes
 from offboard.app import INTERRUPTED
 from offboard.mission import MissionError, load_mission
-from offboard.pilot_file import PilotFile
+from offboard.pilot_file import PilotSource
 from scenarios.loader import load_scenario
 from scenarios.result import MAX_RESULT_BYTES, FlightResult, ResultError
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def recorded_flight(path: Path, pilot: PilotFile | None = None) -> Iterator[Recorded]:
+def recorded_flight(path: Path, pilot: PilotSource | None = None) -> Iterator[Recorded]:
     """Open a recorded flight.
 
     A run folder is read from its `flight.mcap`; without one, a lockstep flight is flown again, which gives
@@ -97,7 +97,7 @@ def _tlog(path: Path, result: FlightResult | None) -> Recorded:
         return TlogRecording(path, scenario, result)
 
 
-def _fly_again(folder: Path, result: FlightResult, path: Path, pilot: PilotFile | None) -> None:
+def _fly_again(folder: Path, result: FlightResult, path: Path, pilot: PilotSource | None) -> None:
     """Fly the lockstep flight of a run folder again and record it; it must be the same to the last bit."""
     from framerunner.camera_calibration.calibration_file import load_calibration
     from framerunner.flying.display import LockstepProgress

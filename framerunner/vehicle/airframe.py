@@ -227,21 +227,29 @@ class Airframe(_Part):
         return float((self.weight_n / (len(self.rotors) * self.motor.thrust_n_s2)) ** 0.5)
 
 
-_FILES = FileKind("airframe", Airframe, AirframeError, folder="airframes", package="framerunner.vehicle")
+AIRFRAME_FILES = FileKind(
+    "airframe",
+    Airframe,
+    AirframeError,
+    folder="airframes",
+    package="framerunner.vehicle",
+    extension="airframe",
+)
 
 
 def load_airframe(name_or_path: str) -> Airframe:
     """Load an airframe.
 
     Args:
-        name_or_path: of a file in `framerunner/vehicle/airframes/`, or a path: it has a directory or ends in
-            .yaml or .yml.
+        name_or_path: of a file in `framerunner/vehicle/airframes/` or of another package, or a path: it has a
+            directory or ends in .yaml or .yml.
 
     Raises:
         AirframeError: there is none of that name, or the file is not a valid airframe; the message names
             line, field, value and what to do.
+        ExtensionError: another package adds it, but it cannot be used.
     """
-    airframe = _FILES.load(name_or_path)
+    airframe = AIRFRAME_FILES.load(name_or_path)
     if airframe is None:
-        raise _FILES.unknown(name_or_path)
+        raise AIRFRAME_FILES.unknown(name_or_path)
     return airframe

@@ -17,7 +17,6 @@ from framerunner.vision_evaluation.labelled_images import Disturbance, LabelledI
 from framerunner.vision_evaluation.scores import (
     ANGLES_DEG,
     DISTANCES_M,
-    KINDS,
     RATED_ANGLE_DEG,
     Scores,
     detect_all,
@@ -28,6 +27,7 @@ from framerunner.vision_evaluation.scores import (
 from framerunner.vision_evaluation.terminal import print_scores
 from framerunner.wire.finite_json import finite
 from scenarios.random_scenarios import Level
+from vision.detectors import DetectorMaker
 
 REPORT, PICTURE, LABELS = "vision.json", "vision.png", "labels.json"
 
@@ -41,6 +41,7 @@ class VisionSettings:
     seed: int
     disturbance: Disturbance
     out: Path
+    detector: str | DetectorMaker | None = None  # of others, to be rated beside ours
 
     @property
     def title(self) -> str:
@@ -55,14 +56,15 @@ _CLEAN = asdict(Disturbance())
 
 
 def evaluate_vision(settings: VisionSettings) -> None:
-    """Paint the images, run both detectors over them, print and write the report.
+    """Paint the images, run the detectors over them, print and write the report.
 
     Raises:
         SettingError: the folder cannot be written to.
+        DetectorError, ExtensionError: the detector of others cannot be used.
     """
     _make_folder(settings.out)
     # Blurred images are not painted on the nearest pixels any more, but their bars are as wide.
-    scores, examples = detect_all(_shown(settings), rendered=True)
+    scores, examples = detect_all(_shown(settings), rendered=True, others=settings.detector)
     print_scores(scores, settings.title)
     report = settings.out / REPORT
     report.write_text(json.dumps(finite(_as_json(settings, scores), 5), indent=1), encoding="utf-8")
@@ -133,9 +135,9 @@ def _make_folder(path: Path) -> None:
 def _as_json(settings: VisionSettings, scores: Scores) -> dict[str, object]:
     samples = rated(scores.samples)
     near = [s for s in scores.samples if s.angle_deg < RATED_ANGLE_DEG]
-    by_distance = rows_by(near, lambda sample: sample.distance_m, DISTANCES_M)
-    by_angle = rows_by(samples, lambda sample: sample.angle_deg, ANGLES_DEG)
-    total = [row_of(kind, 0.0, 0.0, [s for s in samples if s.kind == kind]) for kind in KINDS]
+    by_distance = rows_by(scores.kinds, near, lambda sample: sample.distance_m, DISTANCES_M)
+    by_angle = rows_by(scores.kinds, samples, lambda sample: sample.angle_deg, ANGLES_DEG)
+    total = [row_of(kind, 0.0, 0.0, [s for s in samples if s.kind == kind]) for kind in scores.kinds]
     return {
         "level": settings.level.name,
         "images": scores.images,

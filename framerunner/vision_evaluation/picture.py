@@ -18,7 +18,6 @@ from framerunner.vision_evaluation.labelled_images import LabelledImage
 from framerunner.vision_evaluation.scores import (
     ANGLES_DEG,
     DISTANCES_M,
-    KINDS,
     RATED_ANGLE_DEG,
     ErrorRow,
     Scores,
@@ -48,8 +47,8 @@ def save_picture(
     figure.suptitle(f"{title}: {scores.images} images", fontsize=13)
     axes = figure.subplots(3, 3)
     near = [s for s in scores.samples if s.angle_deg < RATED_ANGLE_DEG]
-    by_distance = rows_by(near, lambda sample: sample.distance_m, DISTANCES_M)
-    by_angle = rows_by(rated(scores.samples), lambda sample: sample.angle_deg, ANGLES_DEG)
+    by_distance = rows_by(scores.kinds, near, lambda sample: sample.distance_m, DISTANCES_M)
+    by_angle = rows_by(scores.kinds, rated(scores.samples), lambda sample: sample.angle_deg, ANGLES_DEG)
     ranges = ((by_distance, "distance (m)"), (by_angle, "angle off the normal (°)"))
     for row, (rows, label) in zip(axes, ranges, strict=False):
         for axis, (what, value) in zip(row, _CURVES, strict=True):
@@ -64,8 +63,8 @@ def save_picture(
 
 
 def _draw(axes: Axes, rows: Sequence[ErrorRow], what: str, value: Callable[[ErrorRow], float | None]) -> None:
-    for kind in KINDS:
-        colour, dash, name = _STYLES[kind]
+    for kind in dict.fromkeys(row.kind for row in rows):
+        colour, dash, name = _STYLES.get(kind, ("#009988", ":" if kind.endswith("boxes") else "-.", kind))
         points = [
             ((row.low + row.high) / 2.0, number)
             for row in rows

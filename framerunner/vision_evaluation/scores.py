@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import acos, asin, degrees, hypot, inf, isfinite, sqrt
 
@@ -13,7 +13,7 @@ import numpy as np
 from framerunner.geometry.vectors import Vec3
 from framerunner.vision_evaluation.labelled_images import FrameLabel, LabelledImage
 from vision.calibration.model import Calibration
-from vision.detectors import Detector, new_detector
+from vision.detectors import Detector, DetectorMaker, detector_name, new_detector, others_detector
 from vision.types import Detection, Detections, FrameSighting, Image, Vision
 
 KINDS: tuple[Vision, ...] = ("boxes", "frames")
@@ -31,7 +31,7 @@ _KEPT = 60  # images that are given back
 class Sample:
     """One frame wholly in view, and what one detector said of it; errors are None if it said nothing."""
 
-    kind: Vision
+    kind: str  # see `Scores`
     distance_m: float
     angle_deg: float
     found: bool
@@ -44,29 +44,48 @@ class Sample:
 
 @dataclass(slots=True)
 class Scores:
-    """Everything that was counted."""
+    """Everything that was counted, by kind: ours are `KINDS`; what others' gave is rated as both of them."""
 
     images: int = 0
     samples: list[Sample] = field(default_factory=list)
     false_alarms: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
     times_ms: dict[str, list[float]] = field(default_factory=lambda: {kind: [] for kind in KINDS})
 
-    def add(self, labelled: LabelledImage, found: dict[Vision, tuple[Detections, float]]) -> None:
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """In the order in which they are shown."""
+        return tuple(self.times_ms)
+
+    def add(self, labelled: LabelledImage, found: dict[str, tuple[Detections, float]]) -> None:
         """Count one image: what each detector found in it, and how long it took, milliseconds."""
         self.images += 1
-        for kind, (detections, time_ms) in found.items():
-            self.times_ms[kind].append(time_ms)
-            judge = _boxes if kind == "boxes" else _frames
-            samples, false_alarms = judge(labelled, detections)
-            self.samples += samples
-            self.false_alarms[kind] += false_alarms
+        for name, (detections, time_ms) in found.items():
+            for vision in (name,) if name in KINDS else KINDS:
+                samples, false_alarms = (_boxes if vision == "boxes" else _frames)(labelled, detections)
+                kind = name if name == vision else f"{name} {vision}"
+                self.samples += [
+                    sample if sample.kind == kind else replace(sample, kind=kind) for sample in samples
+                ]
+                self.false_alarms[kind] = self.false_alarms.get(kind, 0) + false_alarms
+                self.times_ms.setdefault(kind, []).append(time_ms)
+
+    def leave_out_unused(self) -> None:
+        """Forget of a detector of others what it never gives, boxes or frames, unless it gives neither."""
+        used = {*KINDS, *(s.kind for s in self.samples if s.found)}
+        used |= {kind for kind, count in self.false_alarms.items() if count}
+        others = [kind for kind in self.kinds if kind not in KINDS]
+        if any(kind in used for kind in others):
+            for kind in others:
+                if kind not in used:
+                    del self.times_ms[kind], self.false_alarms[kind]
+            self.samples = [sample for sample in self.samples if sample.kind in used]
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorRow:
     """The errors over a part of the samples; None where there is no number."""
 
-    kind: Vision
+    kind: str
     low: float
     high: float
     frames: int
@@ -81,21 +100,30 @@ class ErrorRow:
     outliers: float | None  # share of corners farther off than four standard deviations
 
 
-def detect_all(labelled: Iterable[LabelledImage], *, rendered: bool) -> tuple[Scores, list[LabelledImage]]:
-    """Run both detectors over images; also give back the first few of them."""
+def detect_all(
+    labelled: Iterable[LabelledImage], *, rendered: bool, others: str | DetectorMaker | None = None
+) -> tuple[Scores, list[LabelledImage]]:
+    """Run our detectors over images, and one of others if it is given; also give back the first images.
+
+    Raises:
+        DetectorError, ExtensionError: the others' detector cannot be made, or fails.
+    """
     scores = Scores()
     first: list[LabelledImage] = []
-    detectors: dict[Vision, Detector] = {}
+    detectors: dict[str, Detector] = {}
     calibration: Calibration | None = None
     for one in labelled:
         if calibration != one.calibration:
             calibration = one.calibration
             detectors = {k: detector_of(one, k, rendered=rendered) for k in KINDS}
+            if others is not None:
+                detectors[detector_name(others)] = others_detector(others, calibration)
             for detector in detectors.values():
                 detector(one.image, None)  # the first call loads code
         scores.add(one, {kind: _timed(detector, one.image) for kind, detector in detectors.items()})
         if len(first) < _KEPT:
             first.append(one)
+    scores.leave_out_unused()
     return scores, first
 
 
@@ -105,17 +133,17 @@ def detector_of(labelled: LabelledImage, kind: Vision, *, rendered: bool) -> Det
 
 
 def rows_by(
-    samples: Sequence[Sample], key: Callable[[Sample], float], edges: Sequence[float]
+    kinds: Sequence[str], samples: Sequence[Sample], key: Callable[[Sample], float], edges: Sequence[float]
 ) -> list[ErrorRow]:
-    """The samples of both detectors by ranges of a number."""
+    """The samples of each kind by ranges of a number."""
     return [
         row_of(kind, low, high, [s for s in samples if s.kind == kind and low <= key(s) < high])
-        for kind in KINDS
+        for kind in kinds
         for low, high in pairwise(edges)
     ]
 
 
-def row_of(kind: Vision, low: float, high: float, samples: Sequence[Sample]) -> ErrorRow:
+def row_of(kind: str, low: float, high: float, samples: Sequence[Sample]) -> ErrorRow:
     """Sum up samples."""
     distances = [abs(s.distance_error) for s in samples if s.distance_error is not None]
     bearings = [s.bearing_error_deg for s in samples if s.bearing_error_deg is not None]

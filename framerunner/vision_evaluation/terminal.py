@@ -12,7 +12,6 @@ from rich.table import Table
 from framerunner.vision_evaluation.scores import (
     ANGLES_DEG,
     DISTANCES_M,
-    KINDS,
     RATED_ANGLE_DEG,
     RATED_DISTANCE_M,
     ErrorRow,
@@ -26,7 +25,7 @@ _ERRORS = ("distance", "95 %", "bearing", "tilt", "95 %", "first right", "corner
 
 
 def print_scores(scores: Scores, title: str) -> None:
-    """Print rates and errors of both detectors to standard output."""
+    """Print rates and errors of the detectors to standard output."""
     console = Console(highlight=False)
     if not console.is_terminal:
         console.width = max(console.width, 130)  # a pipe has no width; do not cut what is written to a file
@@ -35,16 +34,16 @@ def print_scores(scores: Scores, title: str) -> None:
         f"wholly in view, up to {RATED_DISTANCE_M:g} m and {RATED_ANGLE_DEG:g}° off the normal", markup=False
     )
     samples = rated(scores.samples)
-    total = [row_of(kind, 0.0, 0.0, [s for s in samples if s.kind == kind]) for kind in KINDS]
+    total = [row_of(kind, 0.0, 0.0, [s for s in samples if s.kind == kind]) for kind in scores.kinds]
     console.print(_table("detector", [(row.kind, row) for row in total]))
     near = [s for s in scores.samples if s.angle_deg < RATED_ANGLE_DEG]
-    rows = rows_by(near, lambda sample: sample.distance_m, DISTANCES_M)
+    rows = rows_by(scores.kinds, near, lambda sample: sample.distance_m, DISTANCES_M)
     console.print(
         _table("by distance", [(f"{row.kind}  {row.low:g} to {row.high:g} m", row) for row in rows])
     )
-    rows = rows_by(samples, lambda sample: sample.angle_deg, ANGLES_DEG)
+    rows = rows_by(scores.kinds, samples, lambda sample: sample.angle_deg, ANGLES_DEG)
     console.print(_table("by angle", [(f"{row.kind}  {row.low:g} to {row.high:g}°", row) for row in rows]))
-    for kind in KINDS:
+    for kind in scores.kinds:
         times_ms = np.percentile(scores.times_ms[kind], (50, 95))
         console.print(
             f"{kind}: {scores.false_alarms[kind]} false alarms, "

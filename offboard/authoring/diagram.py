@@ -16,7 +16,7 @@ from offboard.authoring.outline import Event, Span, StateOutline, TransitionOutl
 from offboard.chart.check import is_finish
 from offboard.chart.spec import MissionFile, State, Transition, all_states
 
-SETTINGS = ("name", "description", "class", "vision", "extends")
+SETTINGS = ("name", "description", "class", "vision", "detector", "extends")
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class Diagram:
 
     Attributes:
         initial: id of the state in which the mission starts; empty if it has none.
-        settings: the mission's own keys as written here: name, description, class, vision, extends.
+        settings: the mission's own keys as written here: name, description, class, vision, detector, extends.
         variables: names and first values as written here.
         templates: written here, with the paths of their states; one that nothing uses has no nodes.
         readable: the text can be understood; if not there are no nodes, and a page keeps its last diagram.

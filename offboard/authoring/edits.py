@@ -214,7 +214,7 @@ class SetMission(StrictModel):
     """A key of the mission itself; an empty value removes it."""
 
     kind: Literal["set_mission"] = "set_mission"
-    key: Literal["name", "description", "class", "vision", "extends"]
+    key: Literal["name", "description", "class", "vision", "detector", "extends"]
     value: Line
 
 

@@ -8,7 +8,7 @@ not share is written so:
 - a superstate's transitions and `during` are written at each of its states, because in SCXML a state that
   takes an event keeps it from the states around it;
 - an action is a `<script>` that calls the primitive, or an `<assign>`; expressions are Python's;
-- description, class and vision are attributes of the namespace `NAMESPACE`.
+- description, class, vision and detector are attributes of the namespace `NAMESPACE`.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ def export_scxml(mission: MissionFile) -> str:
         "description": mission.description,
         "class": mission.mission_class,
         "vision": mission.vision,
+        "detector": mission.detector,
     }
     for key, value in own.items():
         if value:

@@ -92,7 +92,7 @@ class _Importer:
         if not states:
             self._refuse(root, "there is no <state>; a mission has at least one")
         value: dict[str, Value] = {"name": _mission_name(root.attributes.get("name", "") or name)}
-        for key in ("description", "class", "vision"):
+        for key in ("description", "class", "vision", "detector"):
             text = " ".join(root.attributes.get(f"{NAMESPACE} {key}", "").split())
             if text:
                 value[key] = text

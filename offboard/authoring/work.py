@@ -21,7 +21,7 @@ STATE_ORDER = (
     *("transitions", "final", "states", "then"),
 )
 MISSION_ORDER = (
-    *("name", "description", "class", "vision", "extends"),
+    *("name", "description", "class", "vision", "detector", "extends"),
     *("initial", "variables", "templates", "states"),
 )
 TRANSITION_ORDER = ("when", "to", "do")

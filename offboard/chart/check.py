@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import get_args
 
+from framerunner.files.extensions import extension_names
 from framerunner.files.yaml_text import Place
 from offboard.chart.expressions import (
     IN_LOCATION,
@@ -18,6 +20,7 @@ from offboard.chart.problems import ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, Leaf, MissionFile, State, Transition, all_states, leaves
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary
 from offboard.pilot import NAMES_ON_MAP, Pilot
+from vision.types import Vision
 
 
 def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:
@@ -26,6 +29,7 @@ def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList)
     if not mission.states:
         problems.add(mission.place, Message("mission.no_states"))
         return
+    _check_detector(mission, problems)
     whole = not problems.found
     for state in all_states(mission.states):
         _check_names(state, vocabulary, problems)
@@ -114,6 +118,18 @@ def _check_action(action: Action, vocabulary: Vocabulary, problems: ProblemList)
         in_location = error.offset == IN_LOCATION
         place = action.place if in_location else action.expression_place.moved(error.offset)
         problems.add(place, Message("action", action=cut(str(action)), reason=error.message))
+
+
+def _check_detector(mission: MissionFile, problems: ProblemList) -> None:
+    """A file that anybody may write names an installed detector only; nothing of it runs here."""
+    name = mission.detector
+    if not name:
+        return
+    known = [each for each in extension_names("detector") if each not in get_args(Vision)]
+    if name not in known:
+        installed = Message("detector.known", names=", ".join(known)) if known else Message("detector.none")
+        advice = did_you_mean(name, known, installed)
+        problems.add(mission.detector_place, Message("detector.unknown", name=cut(name, 40), advice=advice))
 
 
 def _check_vision(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:

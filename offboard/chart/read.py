@@ -18,7 +18,7 @@ from vision.types import Vision
 Choice = TypeVar("Choice", bound=str)
 
 _MISSION_KEYS = (
-    *("name", "description", "class", "vision", "extends"),
+    *("name", "description", "class", "vision", "detector", "extends"),
     *("initial", "variables", "templates", "states"),
 )
 _CLASSES: tuple[MissionClass, ...] = get_args(MissionClass)
@@ -89,6 +89,8 @@ class _Reader:
             description=self._text(root, "description"),
             mission_class=self._choice(root, "class", _CLASSES),
             vision=self._choice(root, "vision", _VISIONS),
+            detector=self._text(root, "detector"),
+            detector_place=_value_place(root, "detector"),
             extends=self._text(root, "extends"),
             initial=self._text(root, "initial"),
             initial_place=_value_place(root, "initial"),

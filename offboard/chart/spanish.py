@@ -139,6 +139,9 @@ SPANISH: Mapping[str, str] = {
     "guard.from_to": "de {low:g} a {high:g}",
     "guard.always": "when '{when}' se cumple siempre: {reason}; quita 'when', o corrígelo",
     "guard.always_true": "es verdadero para cualquier valor",
+    "detector.unknown": "detector desconocido '{name}'; {advice}",
+    "detector.known": "los paquetes instalados añaden: {names}",
+    "detector.none": "ningún paquete instalado añade uno; quita 'detector' y decide 'vision'",
     "vision.needed": (
         "'{name}' necesita el mapa de marcos; añade la línea 'vision: frames' al principio de {file}"
     ),

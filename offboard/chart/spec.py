@@ -90,6 +90,8 @@ class MissionFile:
     description: str = ""
     mission_class: MissionClass | None = None  # None: not given
     vision: Vision | None = None  # None: not given
+    detector: str = ""  # of another package, instead of the vision's own
+    detector_place: Place = NOWHERE
     extends: str = ""
     initial: str = ""
     initial_place: Place = NOWHERE
@@ -201,6 +203,8 @@ def _merge(base: MissionFile, top: MissionFile) -> MissionFile:
         description=top.description or base.description,
         mission_class=top.mission_class or base.mission_class,
         vision=top.vision or base.vision,
+        detector=top.detector or base.detector,
+        detector_place=top.detector_place if top.detector else base.detector_place,
         variables={**base.variables, **top.variables},
         templates={**base.templates, **top.templates},
         states=kept + tuple(replaced.values()),

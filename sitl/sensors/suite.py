@@ -23,27 +23,24 @@ class SuiteError(UserError):
     """A sensor suite that cannot be used; the message is one line for people."""
 
 
-_FILES = FileKind("suite", SuiteSpec, SuiteError, folder="suites", package="sitl.sensors")
-
-
-def list_suites() -> list[str]:
-    """Names of the suites that are installed with the package, sorted."""
-    return _FILES.names()
+SUITE_FILES = FileKind(
+    "suite", SuiteSpec, SuiteError, folder="suites", package="sitl.sensors", extension="sensors"
+)
 
 
 def load_suite(name_or_path: str | Path) -> SuiteSpec:
     """Load an installed suite or any YAML file.
 
     Args:
-        name_or_path: a name of `list_suites`, or a path: it has a directory or ends in .yaml or .yml.
+        name_or_path: a name of `SUITE_FILES`, or a path: it has a directory or ends in .yaml or .yml.
 
     Raises:
         SuiteError: there is no such suite, or the file is not a valid one; the message names line, field,
             value and what to do.
     """
-    suite = _FILES.load(name_or_path)
+    suite = SUITE_FILES.load(name_or_path)
     if suite is None:
-        raise _FILES.unknown(str(name_or_path))
+        raise SUITE_FILES.unknown(str(name_or_path))
     return suite
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from framerunner.child_process import MonitorProcess
 from framerunner.errors import SettingError
-from framerunner.monitor.run import FIRST_VIEWER
+from framerunner.monitor import FIRST_VIEWER
 from scenarios.loader import load_scenario
 from tests.waiting import until
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from framerunner.cli import build_app
-from framerunner.commands.hardware import SERVICE_VARIABLE, HardwareOptions, hardware_of
+from framerunner.commands.options.hardware import SERVICE_VARIABLE, HardwareOptions, hardware_of
 from framerunner.errors import SettingError
 
 FOLDER = Path(__file__).parents[2] / "systemd"

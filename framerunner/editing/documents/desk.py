@@ -17,7 +17,7 @@ from weakref import WeakValueDictionary
 from framerunner.editing.documents.open_document import OpenDocument, write_problem
 from framerunner.editing.words import Language, Said, SaidError
 from framerunner.files.text_file import make_file, read_text, resolved_in_folder
-from offboard.mission import MISSIONS, list_missions, new_mission
+from offboard.mission import installed_mission, new_mission
 from offboard.pilot import Pilot
 
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,80}\.ya?ml")
@@ -192,8 +192,8 @@ class EditorDesk:
             text = EMPTY_CHART.format(name=name)
         elif source == "example":
             (text,) = new_mission(name, self.folder, python=False).texts.values()
-        elif source in list_missions():
-            text = read_text(MISSIONS / f"{source}.yaml")
+        elif (installed := installed_mission(source)) is not None:
+            text = read_text(installed)
             text = re.sub(rf"(?m)^name: {source}$", f"name: {name}", text, count=1)
         else:
             raise DeskError("desk.source", name=source[:80])

@@ -171,7 +171,7 @@ def _state(opened: OpenDocument) -> dict[str, object]:
         for edge in drawn.edges
     ]
     outline = document.outline
-    keys = ("name", "description", "class", "vision", "extends", "initial")
+    keys = ("name", "description", "class", "vision", "detector", "extends", "initial")
     return {
         **status_message(opened),
         "name": opened.path.name,

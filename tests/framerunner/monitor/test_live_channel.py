@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from framerunner.monitor import FIRST_VIEWER
 from framerunner.monitor.live_channel import MAX_PENDING, LiveChannel, Viewer, encode
-from framerunner.monitor.run import FIRST_VIEWER
 from tests.framerunner.monitor.serving import StubFleet, browser, serving
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from framerunner.vehicle.measurements import Readings
 from scenarios.models import Origin
-from sitl.sensors.suite import SensorSuite, SuiteError, list_suites, load_suite
+from sitl.sensors.suite import SUITE_FILES, SensorSuite, SuiteError, load_suite
 from tests.sitl.sensors.statistics import AIRFRAME, ORIGIN, TICK_US, motion
 
 ALL = load_suite("outdoor").model_copy(
@@ -40,7 +40,7 @@ def values_of(name):
 def test_the_installed_suites_have_their_sensors():
     sensors = {
         name: {each for each in ("imu", *SENSORS) if getattr(load_suite(name), each) is not None}
-        for name in list_suites()
+        for name in SUITE_FILES.names()
     }
     common = {"imu", "barometer", "range_finder", "battery"}
     assert sensors == {
