@@ -52,7 +52,7 @@ def edit(
     """
     check_range("--port", port, 0, 65535)
     from framerunner.commands.monitor import equipment, prepare_server
-    from framerunner.editing.documents.desk import EditorDesk
+    from framerunner.editing.documents.session import EditorSession
     from framerunner.monitor.run import serve
     from framerunner.monitor.settings import MonitorSettings
 
@@ -63,7 +63,7 @@ def edit(
         if mission.suffix not in _SUFFIXES:
             raise SettingError(f"MISSION '{mission}': give a file that ends in .yaml, such as {mission}.yaml")
         if not mission.exists():
-            say(f"made: {folder / EditorDesk(folder).create(mission.stem, source)}")
+            say(f"made: {folder / EditorSession(folder).create(mission.stem, source)}")
         path = f"edit?file={quote(mission.name)}"
     given = equipment(url, None, Path("runs"), missions=folder, pilot=pilot)
     settings = MonitorSettings("127.0.0.1", port, _database())

@@ -150,12 +150,12 @@ def equipment(
     """
     from tempfile import mkdtemp
 
-    from framerunner.course.door import CourseDoor
-    from framerunner.editing.documents.desk import EditorDesk
-    from framerunner.editing.documents.door import DocumentsDoor
+    from framerunner.course.router import CourseRouter
+    from framerunner.editing.documents.router import DocumentsRouter
+    from framerunner.editing.documents.session import EditorSession
     from framerunner.editing.live import LiveSettings
     from framerunner.editing.service import EditingSettings
-    from framerunner.editing.web import EditingDoor
+    from framerunner.editing.web import EditingRouter
     from framerunner.flying.plan import FlightPlan
     from framerunner.monitor.ports import Equipment
     from framerunner.monitor.visitors.pupils import PupilBook
@@ -183,9 +183,9 @@ def equipment(
         start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,
         extensions=(
-            EditingDoor(editing),
-            DocumentsDoor(EditorDesk(missions, pilot_class)),
-            CourseDoor(missions, pilot, PupilBook(missions / PUPILS_FILE, None)),
+            EditingRouter(editing),
+            DocumentsRouter(EditorSession(missions, pilot_class)),
+            CourseRouter(missions, pilot, PupilBook(missions / PUPILS_FILE, None)),
         ),
     )
 

@@ -1,4 +1,4 @@
-"""The editor's door to flights: `GET /api/editing/choices` and the WebSocket `/ws/editing`.
+"""The editor's addresses for flights: `GET /api/editing/choices` and the WebSocket `/ws/editing`.
 
 `/api/editing/choices` is `{"scenarios": [names], "lessons": [names], "levels": [names], "max_text":
 characters, "max_count": flights of a batch}`. A `scenario` below is the name of one or of a lesson, whose
@@ -72,7 +72,7 @@ _MAX_QUEUE = 1000
 _MAX_MESSAGE = 4 * messages.MAX_TEXT
 
 
-class EditingDoor:
+class EditingRouter:
     """The editor's addresses; implements `framerunner.monitor.ports.Extension`.
 
     Args:

@@ -64,7 +64,7 @@ class _Page:
             self.is_slow.set()
 
 
-class OperatorDesk:
+class OperatorSession:
     """The flight that is connected, and the pages that show it.
 
     Args:
@@ -198,9 +198,9 @@ def _opened_socket(path: Path) -> socket.socket:
 def register(monitor: Monitor) -> None:
     """Add the WebSocket, and listen for flights."""
     path = monitor.settings.operator_socket
-    desk = None if path is None else OperatorDesk(path)
-    if desk is not None:
-        monitor.jobs.append(desk.run)
+    session = None if path is None else OperatorSession(path)
+    if session is not None:
+        monitor.jobs.append(session.run)
 
     @monitor.web.websocket("/ws/operator")
     async def operator(websocket: WebSocket) -> None:
@@ -208,18 +208,18 @@ def register(monitor: Monitor) -> None:
         if not visitor.may_fly:
             await refuse(websocket, "only judges and organisers may operate a flight; log in at /login")
             return
-        if desk is None:
+        if session is None:
             await refuse(websocket, "this monitor was started without --operator-socket")
             return
         await websocket.accept()
-        page = desk.enter(visitor.name)
+        page = session.enter(visitor.name)
         if page is None:
             await websocket.close(TOO_MANY_CODE, "too many operators' pages")
             return
         tasks = [
             asyncio.create_task(each)
             for each in (
-                _receive(monitor, desk, page, websocket),
+                _receive(monitor, session, page, websocket),
                 _send(page, websocket),
                 page.is_slow.wait(),
             )
@@ -227,7 +227,7 @@ def register(monitor: Monitor) -> None:
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            desk.leave(page)
+            session.leave(page)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -236,7 +236,7 @@ def register(monitor: Monitor) -> None:
                     await websocket.close(TOO_MANY_CODE if page.is_slow.is_set() else 1000)
 
 
-async def _receive(monitor: Monitor, desk: OperatorDesk, page: _Page, websocket: WebSocket) -> None:
+async def _receive(monitor: Monitor, session: OperatorSession, page: _Page, websocket: WebSocket) -> None:
     """Take a page's demands until it leaves, sends something else, or its person has logged out."""
     allowance = Allowance(time.monotonic)
     while True:
@@ -258,7 +258,7 @@ async def _receive(monitor: Monitor, desk: OperatorDesk, page: _Page, websocket:
             if not allowance.spend():
                 await websocket.close(TOO_MANY_CODE, "too many messages a second")
                 return
-        desk.demand(page, demand)
+        session.demand(page, demand)
 
 
 async def _send(page: _Page, websocket: WebSocket) -> None:

@@ -1,4 +1,4 @@
-"""`/ws/pilot`: checks browsers' sticks and orders, passes them to the drones' seats, and sends answers."""
+"""`/ws/pilot`: checks browsers' sticks and orders, gives them to the drones' manual controls, sends answers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from framerunner.errors import UserError
 from framerunner.monitor.access import refuse
-from framerunner.monitor.pilot_seat import ORDERS, Browser, Clock, JsonMessage, Order, PilotSeat
+from framerunner.monitor.manual_control import ORDERS, Browser, Clock, JsonMessage, ManualControl, Order
 from framerunner.monitor.vehicle.commands import Answer, Sticks
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class PilotMessageError(UserError):
 
 def register(monitor: Monitor) -> None:
     """Add the WebSocket."""
-    desk = PilotDesk(monitor.fleet)
+    controls = ManualControls(monitor.fleet)
 
     @monitor.web.websocket("/ws/pilot")
     async def pilot(websocket: WebSocket) -> None:
@@ -58,18 +58,23 @@ def register(monitor: Monitor) -> None:
         def may_fly() -> bool:
             return monitor.access.visitor(websocket).may_fly
 
-        await _Connection(websocket, desk, visitor.name or UNNAMED, may_fly, visitor.may_judge).serve()
+        await _Connection(websocket, controls, visitor.name or UNNAMED, may_fly, visitor.may_judge).serve()
 
 
 class _Connection:
     """One browser's WebSocket."""
 
     def __init__(
-        self, websocket: WebSocket, desk: PilotDesk, name: str, may_fly: Callable[[], bool], may_judge: bool
+        self,
+        websocket: WebSocket,
+        controls: ManualControls,
+        name: str,
+        may_fly: Callable[[], bool],
+        may_judge: bool,
     ) -> None:
         self._may_fly = may_fly
         self._websocket = websocket
-        self._desk = desk
+        self._controls = controls
         self._outbox: asyncio.Queue[JsonMessage] = asyncio.Queue(_MAX_QUEUE)
         self._browser = Browser(name, may_judge, self._queue)
         self._allowance = Allowance(time.monotonic)
@@ -78,12 +83,12 @@ class _Connection:
 
     async def serve(self) -> None:
         """Receive and send until the browser disconnects or is disconnected."""
-        self._desk.add(self._browser)
+        self._controls.add(self._browser)
         tasks = [asyncio.create_task(each) for each in (self._receive(), self._send(), self._overrun.wait())]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            self._desk.remove(self._browser)
+            self._controls.remove(self._browser)
             for task in tasks:
                 task.cancel()
             for failure in await asyncio.gather(*tasks, return_exceptions=True):
@@ -109,7 +114,7 @@ class _Connection:
     def _take(self, message: Sticks | Order) -> None:
         if isinstance(message, Sticks):
             if self._may_fly():  # else it falls silent, and the drone holds
-                self._desk.sticks(self._browser, message)
+                self._controls.sticks(self._browser, message)
         elif message.what not in _ALWAYS and not self._may_fly():
             self._reply(message.what, False, "you are logged out; log in again at /login")
         elif len(self._orders) >= _MAX_ORDERS and message.what not in _ALWAYS:
@@ -121,7 +126,7 @@ class _Connection:
 
     async def _carry_out(self, order: Order) -> None:
         try:
-            answer = await self._desk.do(self._browser, order)
+            answer = await self._controls.do(self._browser, order)
         except Exception:
             logger.exception("order %s to drone %d", order.what, order.drone_id)
             self._reply(order.what, False, "the monitor failed at this; its log says more")
@@ -153,8 +158,8 @@ class _Connection:
                     await self._websocket.close(code, short)
 
 
-class PilotDesk:
-    """The seats of all drones and the browsers that are informed of them.
+class ManualControls:
+    """The controls of all drones and the browsers that are informed of them.
 
     Args:
         fleet: the drones.
@@ -164,77 +169,77 @@ class PilotDesk:
     def __init__(self, fleet: Fleet, clock: Clock | None = None) -> None:
         self._fleet = fleet
         self._clock = clock or Clock(time.monotonic)
-        self._seats: dict[int, PilotSeat] = {}
+        self._controls: dict[int, ManualControl] = {}
         self._browsers: list[Browser] = []
         self._announced: dict[int, tuple[str, Browser | None, bool]] = {}
         self._watch: asyncio.Task[None] | None = None
 
     def add(self, browser: Browser) -> None:
-        """Add a browser and send it the state of all seats."""
+        """Add a browser and send it the state of all controls."""
         self._browsers.append(browser)
-        for drone_id in self._seats:
-            browser.send(self._seat_message(drone_id, browser))
+        for drone_id in self._controls:
+            browser.send(self._control_message(drone_id, browser))
         if self._watch is None or self._watch.done():
             self._watch = asyncio.get_running_loop().create_task(self._keep_watch(), name="pilot's dead man")
 
     def remove(self, browser: Browser) -> None:
         """Remove a browser; a drone that it flew holds."""
         self._browsers.remove(browser)
-        for seat in self._seats.values():
-            seat.leave(browser)
+        for control in self._controls.values():
+            control.leave(browser)
 
     def sticks(self, browser: Browser, sticks: Sticks) -> None:
-        """Take a browser's sticks, for the drone whose seat it has."""
-        for seat in self._seats.values():
-            seat.sticks(browser, sticks)
+        """Take a browser's sticks, for the drone that it controls."""
+        for control in self._controls.values():
+            control.sticks(browser, sticks)
 
     async def do(self, browser: Browser, order: Order) -> Answer:
         """Carry out or refuse an order."""
         drone_id = order.drone_id
         if drone_id not in self._fleet.drone_ids():
             return Answer(False, f"no drone {drone_id} is heard")
-        for other_id, other in self._seats.items():
+        for other_id, other in self._controls.items():
             if order.what == "take" and other_id != drone_id and other.holder is browser:
                 return Answer(False, f"you have the sticks of drone {other_id}; give them back first")
-        if drone_id not in self._seats:
-            self._seats[drone_id] = PilotSeat(drone_id, self._fleet, self._announce, self._clock)
-        return await self._seats[drone_id].do(browser, order)
+        if drone_id not in self._controls:
+            self._controls[drone_id] = ManualControl(drone_id, self._fleet, self._announce, self._clock)
+        return await self._controls[drone_id].do(browser, order)
 
     def tick(self) -> None:
-        """Update all seats; a seat that fails does not stop the others."""
-        for drone_id, seat in self._seats.items():
+        """Update all drones' controls; one that fails does not stop the others."""
+        for drone_id, control in self._controls.items():
             try:
-                seat.tick()
+                control.tick()
             except Exception:
-                logger.exception("drone %d: the update of its seat failed", drone_id)
+                logger.exception("drone %d: the update of its manual control failed", drone_id)
 
     async def _keep_watch(self) -> None:
-        while self._browsers or not all(seat.idle for seat in self._seats.values()):
+        while self._browsers or not all(control.idle for control in self._controls.values()):
             self.tick()
             await asyncio.sleep(WATCH_PERIOD_S)
 
     def _announce(self, drone_id: int) -> None:
-        """Tell all browsers and the fleet who has a seat, if that changed."""
-        seat = self._seats.get(drone_id)
-        if seat is None:
+        """Tell all browsers and the fleet who has manual control, if that changed."""
+        control = self._controls.get(drone_id)
+        if control is None:
             return
-        name = "" if seat.holder is None else seat.holder.name
-        now = (name, seat.holder, seat.flying)
+        name = "" if control.holder is None else control.holder.name
+        now = (name, control.holder, control.flying)
         if self._announced.get(drone_id, _NOBODY) == now:
             return
         self._announced[drone_id] = now
         self._fleet.set_pilot(drone_id, name)
         for browser in self._browsers:
-            browser.send(self._seat_message(drone_id, browser))
+            browser.send(self._control_message(drone_id, browser))
 
-    def _seat_message(self, drone_id: int, browser: Browser) -> JsonMessage:
-        seat = self._seats[drone_id]
+    def _control_message(self, drone_id: int, browser: Browser) -> JsonMessage:
+        control = self._controls[drone_id]
         return {
             "kind": "seat",
             "id": drone_id,
-            "pilot": "" if seat.holder is None else seat.holder.name,
-            "yours": seat.holder is browser,
-            "flying": seat.flying,
+            "pilot": "" if control.holder is None else control.holder.name,
+            "yours": control.holder is browser,
+            "flying": control.flying,
         }
 
 

@@ -27,7 +27,7 @@ from framerunner.monitor.pages.static_files import StaticBundles
 from framerunner.monitor.ports import Equipment
 from framerunner.monitor.security import Guard
 from framerunner.monitor.settings import BACKLOG, MonitorSettings
-from framerunner.monitor.tls import OnlyTls, TlsDoor
+from framerunner.monitor.tls import OnlyTls, TlsProtocol
 from framerunner.monitor.visitors.peers import is_own_connection
 from framerunner.monitor.visitors.pupils import PupilBook
 
@@ -153,7 +153,7 @@ def make_server(
     gate: Callable[..., asyncio.Protocol] = partial(Gate, connections)
     if tls is not None:
         knocking = Places(settings.limits.total, settings.limits.per_address)
-        gate = partial(TlsDoor, tls, connections, knocking)
+        gate = partial(TlsProtocol, tls, connections, knocking)
     config = uvicorn.Config(
         cast(Any, connections.watch(web)),
         http=cast(Any, gate),

@@ -170,7 +170,7 @@ def _try(server_context: ssl.SSLContext, path: Path) -> dict[str, Any]:
             server.do_handshake()
 
 
-class TlsDoor(asyncio.Protocol):
+class TlsProtocol(asyncio.Protocol):
     """Takes a connection until its first byte tells TLS from plain HTTP, then gives it to a `Gate`.
 
     Connections whose handshake is not complete have a limit and a deadline of their own, as the gate does not

@@ -91,7 +91,7 @@ class OpenDocument:
         try:
             document = Document.from_bytes(read_in_folder(path, MAX_FILE_BYTES), path)
         except OSError as error:
-            raise SaidError("desk.not_read", name=path.name, reason=_words(error)) from None
+            raise SaidError("session.not_read", name=path.name, reason=_words(error)) from None
         try:
             layout, problem = read_layout(path), ""
         except LayoutError as error:
@@ -246,10 +246,10 @@ class OpenDocument:
         try:
             file = resolved_in_folder(self.path)  # a link stays one
             if not force and file.exists() and read_in_folder(file, MAX_FILE_BYTES) != self._saved:
-                raise SaveRefusedError("desk.changed", name=name)
+                raise SaveRefusedError("session.changed", name=name)
             replace_file(file, self.document.data)
         except OSError as error:
-            raise SaveRefusedError("desk.not_written", name=name, **write_problem(error)) from None
+            raise SaveRefusedError("session.not_written", name=name, **write_problem(error)) from None
         self._saved = self.document.data
         self._is_kept = True
         with contextlib.suppress(OSError):
@@ -263,7 +263,7 @@ class OpenDocument:
 
 
 def write_problem(error: OSError) -> dict[str, object]:
-    """Reason and advice of a file that cannot be written, for `desk.not_written`."""
+    """Reason and advice of a file that cannot be written, for `session.not_written`."""
     advice = "advice.space" if is_disk_full(error) else "advice.again"
     return {"reason": _words(error), "advice": Said(advice)}
 

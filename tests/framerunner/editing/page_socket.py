@@ -1,4 +1,4 @@
-"""A page's end of a document's WebSocket, and a server with the documents' door, without a browser."""
+"""A page's end of a document's WebSocket, and a server with the documents' router, without a browser."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from types import SimpleNamespace
 from fastapi import FastAPI
 from starlette.testclient import TestClient
 
-from framerunner.editing.documents.desk import EditorDesk
-from framerunner.editing.documents.door import DocumentsDoor
+from framerunner.editing.documents.router import DocumentsRouter
+from framerunner.editing.documents.session import EditorSession
 from framerunner.monitor.access import Role, Visitor
 
 ORGANISER = Visitor(role=Role.ORGANISER)
@@ -48,10 +48,10 @@ class Socket:
 
 @contextmanager
 def served(folder, *, visitor=ORGANISER):
-    """A client of a server with the documents' door."""
+    """A client of a server with the documents' router."""
     web = FastAPI()
     web.include_router(
-        DocumentsDoor(EditorDesk(folder)).router(lambda _: visitor() if callable(visitor) else visitor)
+        DocumentsRouter(EditorSession(folder)).router(lambda _: visitor() if callable(visitor) else visitor)
     )
     with TestClient(web) as client:
 

@@ -1,4 +1,4 @@
-"""Open documents: the journal, saving, the folder's files, and the door to them, without a browser."""
+"""Open documents: the journal, saving, the folder's files, and the router to them, without a browser."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from fastapi import FastAPI
 from starlette.websockets import WebSocketDisconnect
 
 from framerunner.editing import words
-from framerunner.editing.documents.desk import DeskError, EditorDesk
-from framerunner.editing.documents.door import DocumentsDoor
 from framerunner.editing.documents.messages import catalogue_message, document_message
 from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
+from framerunner.editing.documents.router import DocumentsRouter
+from framerunner.editing.documents.session import EditorSession, SessionError
 from framerunner.editing.words import SaidError
 from framerunner.monitor.access import Role, Visitor
 from offboard.authoring import read_layout
@@ -110,31 +110,31 @@ def test_pages_name_files_of_the_folder_and_no_others(tmp_path, name):
     folder = tmp_path / "missions"
     folder.mkdir()
     (tmp_path / "x.yaml").write_text(HOVER)
-    with pytest.raises(DeskError, match="is no mission file of this folder"):
-        asyncio.run(EditorDesk(folder).open(name))
+    with pytest.raises(SessionError, match="is no mission file of this folder"):
+        asyncio.run(EditorSession(folder).open(name))
 
 
 @pytest.mark.parametrize("name", ["../x", "X", "", "a b", "a" * 61, "x.yaml", "ü"])
 def test_a_new_missions_name_is_one_word(tmp_path, name):
-    with pytest.raises(DeskError, match="use small letters"):
-        EditorDesk(tmp_path).create(name, "empty")
+    with pytest.raises(SessionError, match="use small letters"):
+        EditorSession(tmp_path).create(name, "empty")
     assert not list(tmp_path.iterdir())
 
 
 def test_new_missions_are_made_from_an_empty_chart_an_example_or_a_copy(tmp_path):
-    desk = EditorDesk(tmp_path / "new")
-    assert desk.files() == []
-    assert [desk.create(name, name) for name in ("empty", "example")] == ["empty.yaml", "example.yaml"]
-    desk.create("mine", "frame_challenge")
+    session = EditorSession(tmp_path / "new")
+    assert session.files() == []
+    assert [session.create(name, name) for name in ("empty", "example")] == ["empty.yaml", "example.yaml"]
+    session.create("mine", "frame_challenge")
     shipped = (MISSIONS / "frame_challenge.yaml").read_text()
-    copied = (desk.folder / "mine.yaml").read_text()
+    copied = (session.folder / "mine.yaml").read_text()
     assert copied == shipped.replace("name: frame_challenge\n", "name: mine\n")
-    for file in desk.files():
-        assert OpenDocument.open(desk.folder / file).document.text
-    with pytest.raises(DeskError, match="is there already"):
-        desk.create("mine", "empty")
-    with pytest.raises(DeskError, match="unknown source"):
-        desk.create("other", "../x")
+    for file in session.files():
+        assert OpenDocument.open(session.folder / file).document.text
+    with pytest.raises(SessionError, match="is there already"):
+        session.create("mine", "empty")
+    with pytest.raises(SessionError, match="unknown source"):
+        session.create("other", "../x")
 
 
 def test_a_link_to_a_mission_stays_a_link(path):
@@ -201,7 +201,7 @@ def test_a_message_that_no_page_sends_closes_with_one_line(path, message):
 
 async def test_a_page_that_was_closed_leaves_no_traceback(path, caplog):
     web = FastAPI()
-    web.include_router(DocumentsDoor(EditorDesk(path.parent)).router(lambda _: ORGANISER))
+    web.include_router(DocumentsRouter(EditorSession(path.parent)).router(lambda _: ORGANISER))
     came = iter([{"type": "websocket.connect"}])
 
     async def receive():
@@ -420,8 +420,8 @@ def test_on_a_full_disk_nothing_is_lost_and_it_is_told_in_one_line(path):
 
 
 def test_a_mission_that_cannot_be_written_is_not_half_made(tmp_path):
-    with no_space(), pytest.raises(DeskError, match="cannot be written"):
-        EditorDesk(tmp_path).create("mine", "frame_challenge")
+    with no_space(), pytest.raises(SessionError, match="cannot be written"):
+        EditorSession(tmp_path).create("mine", "frame_challenge")
     assert not list(tmp_path.iterdir())
 
 
@@ -431,7 +431,7 @@ def test_a_full_disk_is_told_to_the_page_in_its_language(path):
         with no_space():
             refused = window.ask("save")
         assert refused["refused"].startswith("hover.yaml: no se puede escribir")
-        assert refused["code"] == "desk.not_written"
+        assert refused["code"] == "session.not_written"
         refused = window.edit("delete_state", state="nowhere")["refused"]
         assert refused == "no hay ningún estado 'nowhere' en este documento"
 
@@ -593,8 +593,8 @@ async def test_names_that_are_asked_for_take_no_memory(tmp_path):
         gc.collect()
         return sum(isinstance(each, asyncio.Lock) for each in gc.get_objects())
 
-    desk, before = EditorDesk(tmp_path), locks()
+    session, before = EditorSession(tmp_path), locks()
     for number in range(20):
         with pytest.raises(SaidError):
-            await desk.open(f"none-{number}.yaml")
+            await session.open(f"none-{number}.yaml")
     assert locks() < before + 20

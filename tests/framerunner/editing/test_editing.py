@@ -1,4 +1,4 @@
-"""The editor's door to flights, as a page uses it: over its WebSocket, with the real worker processes."""
+"""The editor's addresses for flights, as a page uses them: over WebSocket, with real worker processes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from starlette.websockets import WebSocketDisconnect
 from framerunner.course.lessons import find_lesson
 from framerunner.editing.service import EditingSettings
 from framerunner.editing.waiting_queue import WaitingQueue
-from framerunner.editing.web import EditingDoor
+from framerunner.editing.web import EditingRouter
 from framerunner.editing.worker_pool import WorkerPool
 from framerunner.evaluation.runner import fly_task
 from framerunner.flying.plan import FlightPlan
@@ -113,17 +113,17 @@ def no_spare_workers(monkeypatch):
 @contextlib.contextmanager
 def page(*, role=Role.ORGANISER, **settings):
     """A page that is connected to a server."""
-    door = EditingDoor(EditingSettings(**{"jobs": 2, **settings}))
+    router = EditingRouter(EditingSettings(**{"jobs": 2, **settings}))
 
     @contextlib.asynccontextmanager
     async def lifespan(_):
-        running = asyncio.create_task(door.run())
+        running = asyncio.create_task(router.run())
         yield
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
 
     web = FastAPI(lifespan=lifespan)
-    web.include_router(door.router(lambda _: Visitor("Ada", role, "ada")))
+    web.include_router(router.router(lambda _: Visitor("Ada", role, "ada")))
     with TestClient(web) as client, client.websocket_connect("/ws/editing") as socket:
         yield Page(socket)
 
@@ -397,7 +397,7 @@ def test_those_who_may_not_act_are_refused():
 
 def test_the_choices_are_listed():
     web = FastAPI()
-    web.include_router(EditingDoor().router(lambda _: True))
+    web.include_router(EditingRouter().router(lambda _: True))
     choices = TestClient(web).get("/api/editing/choices").json()
     assert "test-case-1" in choices["scenarios"]
     assert "calm" in choices["levels"]

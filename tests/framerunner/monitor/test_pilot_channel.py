@@ -14,8 +14,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from framerunner.monitor import pilot_channel
 from framerunner.monitor.access import Role, Visitor
+from framerunner.monitor.manual_control import NEUTRAL, Order
 from framerunner.monitor.pilot_channel import Allowance, PilotMessageError, read_message
-from framerunner.monitor.pilot_seat import NEUTRAL, Order
 from framerunner.monitor.vehicle.commands import Sticks
 from tests.framerunner.monitor.pilot_fakes import FakeFleet
 

@@ -6,9 +6,9 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
-from framerunner.monitor import pilot_seat
+from framerunner.monitor import manual_control
 from framerunner.monitor.access import Access, Visitor
-from framerunner.monitor.pilot_seat import NEUTRAL
+from framerunner.monitor.manual_control import NEUTRAL
 from framerunner.monitor.ports import Equipment
 from framerunner.monitor.vehicle.commands import Sticks
 from tests.chromium import Complaints, until
@@ -104,8 +104,8 @@ async def monitor(monkeypatch, tmp_path, chromium):
         return fleets[-1]
 
     monkeypatch.setattr("framerunner.monitor.server.Fleet", make_fleet)
-    monkeypatch.setattr(pilot_seat, "SILENT_S", 20.0)  # a busy machine is not a page that fell silent
-    monkeypatch.setattr(pilot_seat, "ABANDONED_S", 60.0)
+    monkeypatch.setattr(manual_control, "SILENT_S", 20.0)  # a busy machine is not a page that fell silent
+    monkeypatch.setattr(manual_control, "ABANDONED_S", 60.0)
     async with served(EQUIPMENT, tmp_path) as url:
 
         async def open_window(viewport=None, touch=False):

@@ -39,7 +39,7 @@ states:
 T = TypeVar("T")
 
 
-class DeskError(SaidError):
+class SessionError(SaidError):
     """A file that cannot be opened or made."""
 
 
@@ -92,7 +92,7 @@ class SharedDocument:
                 self.answered.popitem(last=False)
 
 
-class EditorDesk:
+class EditorSession:
     """Opens and makes missions in a folder. Pages name files, never paths.
 
     Reading and checking a mission may take a second, so `work` does it in threads, which share the
@@ -130,10 +130,10 @@ class EditorDesk:
             package_only: who opens it may not read what other files of the folder say.
 
         Raises:
-            DeskError, MissionError: it cannot be opened.
+            SessionError, MissionError: it cannot be opened.
         """
         if not _FILE.fullmatch(name):
-            raise DeskError("desk.not_here", name=name[:80])
+            raise SessionError("session.not_here", name=name[:80])
         # Of this file only: others are not held up.
         async with self._opening.setdefault(name, asyncio.Lock()):
             shared = self._open.get(name)
@@ -143,7 +143,7 @@ class EditorDesk:
             if shared is None:
                 await self._forget()
                 if len(self._open) >= _MAX_OPEN:
-                    raise DeskError("desk.too_many_open", limit=_MAX_OPEN)
+                    raise SessionError("session.too_many_open", limit=_MAX_OPEN)
                 path = self.folder / name
                 opened = await self.work(lambda: OpenDocument.open(path, self._pilot_class))
                 shared = SharedDocument(opened)
@@ -185,7 +185,7 @@ class EditorDesk:
             owner: key of the pupil whose it is; "": nobody's.
 
         Returns:
-            The file's name. Raises `DeskError`.
+            The file's name. Raises `SessionError`.
         """
         _check_name(name)
         if source == "empty":
@@ -196,20 +196,20 @@ class EditorDesk:
             text = read_text(installed)
             text = re.sub(rf"(?m)^name: {source}$", f"name: {name}", text, count=1)
         else:
-            raise DeskError("desk.source", name=source[:80])
+            raise SessionError("session.source", name=source[:80])
         return self.write(name, text, owner)
 
     def write(self, name: str, text: str, owner: str = "") -> str:
-        """Make a mission file with a text, see `create`; return its name. Raises `DeskError`."""
+        """Make a mission file with a text, see `create`; return its name. Raises `SessionError`."""
         _check_name(name)
         path = self.folder / (f"{name}-{owner}.yaml" if owner else f"{name}.yaml")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             make_file(path, text)
         except FileExistsError:
-            raise DeskError("desk.taken", name=path.name) from None
+            raise SessionError("session.taken", name=path.name) from None
         except OSError as error:
-            raise DeskError("desk.not_written", name=path.name, **write_problem(error)) from None
+            raise SessionError("session.not_written", name=path.name, **write_problem(error)) from None
         return path.name
 
 
@@ -221,4 +221,4 @@ def _can_be_opened(path: Path) -> bool:
 
 def _check_name(name: str) -> None:
     if not _NAME.fullmatch(name):
-        raise DeskError("desk.name", name=name[:80])
+        raise SessionError("session.name", name=name[:80])

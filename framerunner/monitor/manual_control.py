@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from framerunner.monitor.fleet import Fleet
 
 SILENT_S = 0.5  # without sticks from the browser; then the drone holds
-ABANDONED_S = 5.0  # of silence, after which another browser may take the seat
+ABANDONED_S = 5.0  # of silence, after which another browser may take manual control
 STREAM_FIRST_S = 0.4  # sticks are sent before position mode is requested, which requires them
 HOLD_AGAIN_S = 1.0
 NEUTRAL = Sticks(0.0, 0.0, 0.0, 0.0)
@@ -64,7 +64,7 @@ class Browser:
 
 
 class Control(Enum):
-    """Whether the sticks of this seat control the drone."""
+    """Whether the sticks of this browser control the drone."""
 
     NONE = "none"
     ACTIVE = "active"
@@ -81,7 +81,7 @@ class Clock:
 
 @dataclass(frozen=True, slots=True)
 class _DroneView:
-    """What a seat needs of a drone's status."""
+    """What manual control needs of a drone's status."""
 
     mode: str = ""  # in capitals
     armed: bool = False
@@ -142,8 +142,8 @@ class _CurrentOrder:
             logger.error("%s failed", task.get_name(), exc_info=task.exception())
 
 
-class PilotSeat:
-    """A drone's seat; `tick` is to be called some twenty times a second.
+class ManualControl:
+    """Manual control of a drone by one browser at a time; `tick` is to be called some twenty times a second.
 
     While a browser has the sticks and afterwards, until the drone is disarmed, neutral sticks are sent when
     no others are: an autopilot that has received sticks takes their end for a failure.
@@ -155,7 +155,7 @@ class PilotSeat:
         clock: time.
 
     Attributes:
-        holder: the browser that has the seat.
+        holder: the browser that has it.
         control: whether its sticks control the drone.
     """
 
@@ -170,7 +170,7 @@ class PilotSeat:
         self._heard_s = clock.now_s()
         self._streaming = False
         self._climbing = False  # after this take-off the sticks control the drone
-        self._order = _CurrentOrder(self._name, lambda: self._seat(self.holder))
+        self._order = _CurrentOrder(self._name, lambda: self._set_holder(self.holder))
 
     @property
     def flying(self) -> bool:
@@ -183,7 +183,7 @@ class PilotSeat:
         return self.holder is None and not self._streaming and not self._order.what
 
     def sticks(self, browser: Browser, sticks: Sticks) -> None:
-        """Take a browser's sticks; ignored if it does not have the seat."""
+        """Take a browser's sticks; ignored if it does not have manual control."""
         if browser is not self.holder:
             return
         self._heard_s = self._clock.now_s()
@@ -207,9 +207,9 @@ class PilotSeat:
         return await present.run(what, browser, work)
 
     def leave(self, browser: Browser) -> None:
-        """Take the seat from a browser that has disconnected."""
+        """Take manual control from a browser that has disconnected."""
         if browser is self.holder:
-            self._seat(None)
+            self._set_holder(None)
             self._fall_silent("is gone")
 
     def tick(self) -> None:
@@ -262,14 +262,14 @@ class PilotSeat:
             self._fleet.notice(self._id, "warning", text)
         self.control = Control.ACTIVE
         self._stream(NEUTRAL)
-        self._seat(browser)
+        self._set_holder(browser)
         await self._clock.wait(STREAM_FIRST_S)
         ok, text = await self._fleet.do(self._id, "position")
         if ok:
             return Answer(True, f"you have the sticks of {self._name}")
         # In a manual mode the holder before was flying it, and has lost it now.
         self.control = Control.LOST if self._view().is_manual else Control.NONE
-        self._seat(None)
+        self._set_holder(None)
         return Answer(False, text)
 
     async def _give(self, _browser: Browser) -> Answer:
@@ -315,11 +315,11 @@ class PilotSeat:
         return Answer(ok, text)
 
     def _let_go(self, holder: Browser | None) -> None:
-        """The drone flies by itself; `holder` has the seat."""
+        """The drone flies by itself; `holder` has manual control."""
         self.control = Control.NONE
         if self._streaming:
             self._stream(NEUTRAL)
-        self._seat(holder)
+        self._set_holder(holder)
 
     def _climb(self, view: _DroneView, silent_s: float) -> None:
         """Follow a take-off; at its end the sticks control the drone, if the holder is still there."""
@@ -355,7 +355,7 @@ class PilotSeat:
             self._fleet.notice(self._id, "warning", text)
         if self.control is Control.LOST and self._order.what not in _ENDING:
             self._order.start("hold", None, self._hold_after_silence())
-        self._seat(self.holder)
+        self._set_holder(self.holder)
 
     async def _hold_after_silence(self) -> Answer:
         while True:
@@ -373,7 +373,7 @@ class PilotSeat:
         self._streaming = True
         self._fleet.sticks(self._id, sticks)
 
-    def _seat(self, browser: Browser | None) -> None:
+    def _set_holder(self, browser: Browser | None) -> None:
         if browser is not None and browser is not self.holder:
             self._heard_s = self._clock.now_s()
         self.holder = browser

@@ -8,8 +8,8 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from framerunner.course.door import CourseDoor
 from framerunner.course.lessons import load_lessons
+from framerunner.course.router import CourseRouter
 from framerunner.monitor.access import Role, Visitor
 
 LESSON = load_lessons()[0]
@@ -26,10 +26,10 @@ async def check(client, learner, text, lesson=LESSON.name):
 
 @asynccontextmanager
 async def course(folder, who=lambda _connection: TEACHER):
-    door = CourseDoor(folder)
+    router = CourseRouter(folder)
     web = FastAPI()
-    web.include_router(door.router(who))
-    running = asyncio.create_task(door.run())
+    web.include_router(router.router(who))
+    running = asyncio.create_task(router.run())
     try:
         async with httpx.AsyncClient(transport=httpx.ASGITransport(web), base_url="http://course") as client:
             yield client
@@ -66,7 +66,7 @@ async def test_a_pupil_opens_a_lesson_fails_passes_and_is_in_the_table(tmp_path)
 
 
 async def test_checks_queue_and_a_learner_has_one(tmp_path, monkeypatch):
-    monkeypatch.setattr("framerunner.course.door._CHECKS_AT_ONCE", 1)
+    monkeypatch.setattr("framerunner.course.router._CHECKS_AT_ONCE", 1)
     async with course(tmp_path) as client:
         told = await asyncio.gather(*(check(client, name, LESSON.solution) for name in ("Ada", "Bo", "Cy")))
         assert all(lines[-1]["passed"] for lines in told)

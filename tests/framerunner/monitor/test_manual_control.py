@@ -1,12 +1,12 @@
-"""The seat: who has the sticks, and what is done when the pilot falls silent."""
+"""The control: who has the sticks, and what is done when the pilot falls silent."""
 
 import asyncio
 from contextlib import suppress
 
 import pytest
 
-from framerunner.monitor.pilot_channel import PilotDesk
-from framerunner.monitor.pilot_seat import NEUTRAL, Browser, Clock, Control, Order
+from framerunner.monitor.manual_control import NEUTRAL, Browser, Clock, Control, Order
+from framerunner.monitor.pilot_channel import ManualControls
 from framerunner.monitor.vehicle.commands import Sticks
 from tests.framerunner.monitor.pilot_fakes import MISSION, FakeFleet
 
@@ -30,23 +30,23 @@ class FakeTime:
 
 
 class Game:
-    """A desk with its drones, people and time."""
+    """A controls with its drones, people and time."""
 
     def __init__(self):
         self.time = FakeTime()
         self.fleet = FakeFleet()
-        self.desk = PilotDesk(self.fleet, self.time.clock())
+        self.controls = ManualControls(self.fleet, self.time.clock())
         self.told = {}
 
     def browser(self, name, may_judge=False):
         told = []
         browser = Browser(name, may_judge, told.append)
         self.told[name] = told
-        self.desk._browsers.append(browser)  # without the watch: the test ticks
+        self.controls._browsers.append(browser)  # without the watch: the test ticks
         return browser
 
-    def seat(self, number=1):
-        return self.desk._seats[number]
+    def control(self, number=1):
+        return self.controls._controls[number]
 
     async def settle(self):
         for _ in range(10):
@@ -57,16 +57,16 @@ class Game:
         for _ in range(round(seconds / 0.05)):
             self.time.now_s += 0.05
             if streaming is not None:
-                self.desk.sticks(streaming, sticks)
+                self.controls.sticks(streaming, sticks)
             for due in [each for each in self.time.sleepers if each[0] <= self.time.now_s + 1e-9]:
                 self.time.sleepers.remove(due)
                 due[1].set()
             await self.settle()
-            self.desk.tick()
+            self.controls.tick()
             await self.settle()
 
     async def order(self, browser, what, number=1, confirmed=False, streaming=True):
-        task = asyncio.create_task(self.desk.do(browser, Order(number, what, confirmed)))
+        task = asyncio.create_task(self.controls.do(browser, Order(number, what, confirmed)))
         for _ in range(40):
             await self.settle()
             if task.done():
@@ -94,7 +94,7 @@ async def game():
 
 async def test_taking_sends_neutral_sticks_before_it_requests_position_mode(game):
     ana = game.browser("Ana")
-    task = asyncio.create_task(game.desk.do(ana, Order(1, "take")))
+    task = asyncio.create_task(game.controls.do(ana, Order(1, "take")))
     await game.pass_time(0.3, ana, FORWARD)
     assert game.fleet.orders == []
     assert game.fleet.sent and all(sticks == NEUTRAL for _, sticks in game.fleet.sent)
@@ -102,16 +102,16 @@ async def test_taking_sends_neutral_sticks_before_it_requests_position_mode(game
     answer = await task
     assert answer.ok and "drone 1" in answer.text
     assert game.fleet.orders == ["position"]
-    assert game.seat().control is Control.ACTIVE
+    assert game.control().control is Control.ACTIVE
     assert game.fleet.pilots[1] == "Ana"
 
 
 async def test_only_the_holder_s_sticks_reach_the_drone(game):
     ana, ben = game.browser("Ana"), game.browser("Ben")
     await game.take(ana)
-    game.desk.sticks(ana, FORWARD)
+    game.controls.sticks(ana, FORWARD)
     assert game.last_sticks() == FORWARD
-    game.desk.sticks(ben, Sticks(-1.0, 0.0, 0.0, 0.0))
+    game.controls.sticks(ben, Sticks(-1.0, 0.0, 0.0, 0.0))
     assert game.last_sticks() == FORWARD
 
 
@@ -128,7 +128,7 @@ async def test_a_refusal_has_the_vehicle_s_reason_and_frees_the_seat(game):
     game.fleet.refuse["position"] = "Switching to Position is currently not available: no position"
     answer = await game.order(ana, "take")
     assert not answer.ok and answer.text == game.fleet.refuse["position"]
-    assert game.seat().holder is None and game.seat().control is Control.NONE
+    assert game.control().holder is None and game.control().control is Control.NONE
 
 
 async def test_silence_for_half_a_second_centres_the_sticks_and_requests_hold(game):
@@ -156,15 +156,15 @@ async def test_sticks_after_silence_are_not_sent(game):
     assert game.last_sticks() == NEUTRAL
     assert game.told["Ana"][-1]["yours"] and not game.told["Ana"][-1]["flying"]
     await game.take(ana)
-    game.desk.sticks(ana, FORWARD)
+    game.controls.sticks(ana, FORWARD)
     assert game.last_sticks() == FORWARD
 
 
 async def test_the_drone_holds_at_once_when_the_page_is_closed(game):
     ana = game.browser("Ana")
     await game.take(ana)
-    game.desk.sticks(ana, FORWARD)
-    game.desk.remove(ana)
+    game.controls.sticks(ana, FORWARD)
+    game.controls.remove(ana)
     assert game.last_sticks() == NEUTRAL
     await game.settle()
     assert game.fleet.orders[-1] == "hold"
@@ -180,7 +180,7 @@ async def test_hold_is_requested_until_the_drone_holds(game):
     assert (1, "error", "drone 1 does not hold: drone 1 does not answer") in game.fleet.notices
     del game.fleet.refuse["hold"]
     await game.pass_time(1.1)
-    assert game.seat().control is Control.NONE and game.fleet.orders.count("hold") == 4
+    assert game.control().control is Control.NONE and game.fleet.orders.count("hold") == 4
 
 
 async def test_silence_does_not_interrupt_a_failsafe(game):
@@ -195,12 +195,12 @@ async def test_silence_does_not_interrupt_a_failsafe(game):
 async def test_the_drone_holds_when_the_page_is_closed_while_it_takes_the_sticks(game):
     ana = game.browser("Ana")
     game.fleet.gates["position"] = asyncio.Event()
-    task = asyncio.create_task(game.desk.do(ana, Order(1, "take")))
+    task = asyncio.create_task(game.controls.do(ana, Order(1, "take")))
     await game.pass_time(0.5, ana)
     assert game.fleet.orders == ["position"]
-    game.desk.remove(ana)
+    game.controls.remove(ana)
     await game.settle()
-    assert game.fleet.orders == ["position", "hold"] and game.seat().holder is None
+    assert game.fleet.orders == ["position", "hold"] and game.control().holder is None
     assert not (await task).ok
 
 
@@ -210,7 +210,7 @@ async def test_giving_back_resumes_the_waiting_mission(game):
     game.fleet.status[1]["mission"] = MISSION
     answer = await game.order(ana, "give")
     assert answer.ok and answer.text == "the mission frame_challenge goes on"
-    assert game.fleet.orders == ["position", "offboard"] and game.seat().holder is None
+    assert game.fleet.orders == ["position", "offboard"] and game.control().holder is None
 
 
 @pytest.mark.parametrize("mission", [None, MISSION | {"paused": False}, MISSION | {"alive": False}])
@@ -238,7 +238,7 @@ async def test_the_pilot_keeps_a_drone_that_does_not_hold(game):
     game.fleet.refuse["hold"] = "no answer"
     answer = await game.order(ana, "give")
     assert not answer.ok and "you still have the sticks" in answer.text
-    game.desk.sticks(ana, FORWARD)
+    game.controls.sticks(ana, FORWARD)
     assert game.last_sticks() == FORWARD
 
 
@@ -247,13 +247,13 @@ async def test_closing_the_page_does_not_interrupt_giving_back(game):
     await game.take(ana)
     game.fleet.status[1]["mission"] = MISSION
     game.fleet.gates["offboard"] = asyncio.Event()
-    task = asyncio.create_task(game.desk.do(ana, Order(1, "give")))
+    task = asyncio.create_task(game.controls.do(ana, Order(1, "give")))
     await game.settle()
-    game.desk.remove(ana)
+    game.controls.remove(ana)
     game.fleet.gates["offboard"].set()
     assert (await task).ok
     await game.pass_time(1.0)
-    assert game.fleet.orders == ["position", "offboard"] and game.seat().control is Control.NONE
+    assert game.fleet.orders == ["position", "offboard"] and game.control().control is Control.NONE
 
 
 async def test_neutral_sticks_go_on_until_the_drone_is_disarmed(game):
@@ -268,7 +268,7 @@ async def test_neutral_sticks_go_on_until_the_drone_is_disarmed(game):
     assert game.last_sticks() == NEUTRAL
     game.fleet.status[1]["link"]["state"] = "live"
     await game.pass_time(0.1)
-    assert game.last_sticks() is None and game.seat().idle
+    assert game.last_sticks() is None and game.control().idle
 
 
 async def test_a_taken_seat_is_refused_until_its_holder_was_silent_for_five_seconds(game):
@@ -280,8 +280,8 @@ async def test_a_taken_seat_is_refused_until_its_holder_was_silent_for_five_seco
     assert not (await game.order(ben, "take")).ok
     await game.pass_time(0.3)
     await game.take(ben)
-    assert game.seat().holder is ben
-    game.desk.sticks(ana, FORWARD)
+    assert game.control().holder is ben
+    game.controls.sticks(ana, FORWARD)
     assert game.last_sticks() == NEUTRAL
 
 
@@ -290,7 +290,7 @@ async def test_a_judge_takes_the_sticks_at_any_time_and_the_pilot_is_told(game):
     await game.take(ana)
     await game.pass_time(0.1, ana, FORWARD)
     await game.take(judge)
-    assert game.seat().holder is judge and game.last_sticks() == NEUTRAL
+    assert game.control().holder is judge and game.last_sticks() == NEUTRAL
     assert not game.told["Ana"][-1]["yours"]
     assert (1, "warning", "Judge took the sticks of drone 1 from Ana") in game.fleet.notices
 
@@ -301,7 +301,7 @@ async def test_orders_of_others_are_refused_while_somebody_flies(game):
     for what in ("arm", "disarm", "take_off", "land", "hold", "give"):
         answer = await game.order(ben, what, streaming=False)
         assert not answer.ok and answer.text == "Ana has the sticks of drone 1"
-        game.desk.sticks(ana, NEUTRAL)
+        game.controls.sticks(ana, NEUTRAL)
     assert not (await game.order(ben, "stop_motors", confirmed=True)).ok
     assert game.fleet.orders == ["position"]
 
@@ -311,7 +311,7 @@ async def test_stopping_the_motors_needs_confirmation_and_does_not_wait(game):
     answer = await game.order(ana, "stop_motors")
     assert not answer.ok and "confirmed" in answer.text and game.fleet.orders == []
     game.fleet.gates["arm"] = asyncio.Event()
-    waiting = asyncio.create_task(game.desk.do(ana, Order(1, "arm")))
+    waiting = asyncio.create_task(game.controls.do(ana, Order(1, "arm")))
     await game.settle()
     assert (await game.order(ana, "stop_motors", confirmed=True)).ok
     assert game.fleet.orders == ["arm", "stop_motors"]
@@ -321,13 +321,13 @@ async def test_stopping_the_motors_needs_confirmation_and_does_not_wait(game):
 async def test_hold_replaces_the_present_order_and_others_wait(game):
     ana = game.browser("Ana")
     game.fleet.gates["position"] = asyncio.Event()
-    taking = asyncio.create_task(game.desk.do(ana, Order(1, "take")))
+    taking = asyncio.create_task(game.controls.do(ana, Order(1, "take")))
     await game.pass_time(0.5, ana)
     answer = await game.order(ana, "arm")
     assert not answer.ok and answer.text == "drone 1 has not answered to take yet"
     assert (await game.order(ana, "hold")).ok
     assert not (await taking).ok
-    assert game.seat().control is Control.NONE and game.seat().holder is ana
+    assert game.control().control is Control.NONE and game.control().holder is ana
 
 
 async def test_after_hold_the_sticks_must_be_taken_again(game):
@@ -335,7 +335,7 @@ async def test_after_hold_the_sticks_must_be_taken_again(game):
     await game.take(ana)
     assert (await game.order(ana, "hold")).ok
     await game.pass_time(0.1, ana, FORWARD)
-    assert game.last_sticks() == NEUTRAL and game.seat().holder is ana
+    assert game.last_sticks() == NEUTRAL and game.control().holder is ana
 
 
 async def test_after_a_take_off_the_sticks_control_the_drone_again(game):
@@ -347,7 +347,7 @@ async def test_after_a_take_off_the_sticks_control_the_drone_again(game):
     game.fleet.status[1]["mode"] = "Hold"
     await game.pass_time(0.6, ana, NEUTRAL)
     assert game.fleet.orders == ["position", "take_off", "position"]
-    game.desk.sticks(ana, FORWARD)
+    game.controls.sticks(ana, FORWARD)
     assert game.last_sticks() == FORWARD
 
 
@@ -374,7 +374,7 @@ async def test_the_seats_of_two_drones_are_independent(game):
     await game.take(ana)
     await game.take(ben, number=2, streaming=True)
     assert game.last_sticks(2) == NEUTRAL
-    game.desk.sticks(ben, FORWARD)
+    game.controls.sticks(ben, FORWARD)
     assert game.last_sticks(2) == FORWARD and game.last_sticks(1) == NEUTRAL
 
 
@@ -382,27 +382,27 @@ async def test_a_fault_in_one_seat_does_not_affect_another(game, caplog):
     ana, ben = game.browser("Ana"), game.browser("Ben")
     await game.take(ana)
     await game.take(ben, number=2)
-    game.seat(1).tick = lambda: 1 / 0
+    game.control(1).tick = lambda: 1 / 0
     await game.pass_time(0.6)
-    assert game.seat(2).control is Control.NONE and game.fleet.orders[-1] == "hold"
-    assert "the update of its seat failed" in caplog.text
+    assert game.control(2).control is Control.NONE and game.fleet.orders[-1] == "hold"
+    assert "the update of its control failed" in caplog.text
 
 
 async def test_the_watch_runs_by_itself_while_a_browser_is_there():
     fleet, told = FakeFleet(), []
-    desk = PilotDesk(fleet)
+    controls = ManualControls(fleet)
     ana = Browser("Ana", False, told.append)
-    desk.add(ana)
+    controls.add(ana)
     loop = asyncio.get_running_loop()
-    task = asyncio.create_task(desk.do(ana, Order(1, "take")))
+    task = asyncio.create_task(controls.do(ana, Order(1, "take")))
     while not task.done():
-        desk.sticks(ana, NEUTRAL)
+        controls.sticks(ana, NEUTRAL)
         await asyncio.sleep(0.02)
     silent_since_s = loop.time()
     async with asyncio.timeout(5.0):
         await fleet.held.wait()
     assert loop.time() - silent_since_s > 0.4
-    desk.remove(ana)
+    controls.remove(ana)
 
 
 def test_two_browsers_with_one_name_are_different():

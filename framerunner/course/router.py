@@ -51,7 +51,7 @@ _Short = Annotated[str, Body(max_length=200)]
 _Text = Annotated[str, Body(max_length=MAX_TEXT)]
 
 
-class CourseDoor:
+class CourseRouter:
     """Addresses of the course; implements `framerunner.monitor.ports.Extension`.
 
     Args:

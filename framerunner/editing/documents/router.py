@@ -16,7 +16,6 @@ from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, Response
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from framerunner.editing.documents.desk import EditorDesk, SharedDocument
 from framerunner.editing.documents.messages import (
     EditMessage,
     LayoutMessage,
@@ -33,6 +32,7 @@ from framerunner.editing.documents.messages import (
     status_message,
 )
 from framerunner.editing.documents.open_document import OpenDocument
+from framerunner.editing.documents.session import EditorSession, SharedDocument
 from framerunner.editing.words import Language, Said, SaidError, language_of, reason, say
 from framerunner.errors import UserError
 from framerunner.monitor.access import REFUSED_CODE, Visitor, refuse
@@ -51,19 +51,19 @@ _GONE = (WebSocketDisconnect, RuntimeError, OSError)  # sending to a page that w
 logger = logging.getLogger(__name__)
 
 
-class DocumentsDoor:
+class DocumentsRouter:
     """The editor's addresses for documents; implements `framerunner.monitor.ports.Extension`.
 
     Args:
-        desk: of the folder whose missions are edited.
+        session: of the folder whose missions are edited.
     """
 
-    def __init__(self, desk: EditorDesk) -> None:
-        self._desk = desk
+    def __init__(self, session: EditorSession) -> None:
+        self._session = session
 
     def router(self, who: Callable[[HTTPConnection], Visitor]) -> APIRouter:
         """The addresses; `who` tells who asks, and which files they may edit."""
-        router, desk = APIRouter(), self._desk
+        router, session = APIRouter(), self._session
 
         def demand(request: Request, file: str | None = None) -> Visitor:
             visitor = who(request)
@@ -71,12 +71,12 @@ class DocumentsDoor:
                 raise HTTPException(403, say(_refusal(visitor), language_of(request)))
             return visitor
 
-        _add_files(router, desk, demand)
+        _add_files(router, session, demand)
 
         @router.get("/api/edit/export")
         async def export(request: Request, file: str, kind: Literal["scxml", "mermaid"]) -> Response:
             package_only = not demand(request, file).may_teach
-            return await _export(desk, file, kind, language_of(request), package_only=package_only)
+            return await _export(session, file, kind, language_of(request), package_only=package_only)
 
         @router.websocket("/ws/edit")
         async def edit(websocket: WebSocket, file: str, client: str = "") -> None:
@@ -86,14 +86,14 @@ class DocumentsDoor:
                 await refuse(websocket, say(_refusal(visitor), language))
                 return
             try:
-                shared = await desk.open(file, package_only=not visitor.may_teach)
+                shared = await session.open(file, package_only=not visitor.may_teach)
             except UserError as error:
                 await refuse(websocket, reason(error, language))
                 return
             try:
                 shared.opened.speaks_spanish |= language == "es"
                 await websocket.accept()
-                window = _Window(websocket, desk, shared, client[:_MAX_CLIENT])
+                window = _Window(websocket, session, shared, client[:_MAX_CLIENT])
                 await window.serve(lambda: who(websocket).may_edit(file))
             finally:
                 shared.leave()
@@ -105,43 +105,43 @@ class DocumentsDoor:
         try:
             while True:
                 await asyncio.sleep(_JOURNAL_PERIOD_S)
-                await self._desk.keep()
+                await self._session.keep()
         finally:
-            await self._desk.keep()
+            await self._session.keep()
 
 
 def _refusal(visitor: Visitor) -> Said:
     return Said("access.own" if visitor.may_learn else "access.edit")
 
 
-def _add_files(router: APIRouter, desk: EditorDesk, demand: Callable[[Request], Visitor]) -> None:
+def _add_files(router: APIRouter, session: EditorSession, demand: Callable[[Request], Visitor]) -> None:
     """Add the addresses of the folder's files; `demand` refuses those who may not edit."""
 
     @router.get("/api/edit/files")
     async def files(request: Request) -> dict[str, object]:
         visitor = demand(request)
-        files = [each for each in await desk.work(desk.files) if visitor.may_edit(each)]
+        files = [each for each in await session.work(session.files) if visitor.may_edit(each)]
         return {"files": files, "missions": list_missions()}
 
     @router.post("/api/edit/files")
     async def create(request: Request, name: _Text, source: _Text) -> dict[str, str]:
         owner = demand(request).key
-        return await made(request, lambda: desk.create(name, source, owner))
+        return await made(request, lambda: session.create(name, source, owner))
 
     @router.post("/api/edit/import")
     async def import_(request: Request, name: _Text, scxml: _Scxml) -> dict[str, str]:
         owner = demand(request).key
-        return await made(request, lambda: desk.write(name, import_scxml(scxml.encode(), name), owner))
+        return await made(request, lambda: session.write(name, import_scxml(scxml.encode(), name), owner))
 
     async def made(request: Request, make: Callable[[], str]) -> dict[str, str]:
         try:
-            return {"file": await desk.work(make)}
+            return {"file": await session.work(make)}
         except UserError as error:
             raise HTTPException(400, reason(error, language_of(request))) from None
 
 
 async def _export(
-    desk: EditorDesk,
+    session: EditorSession,
     file: str,
     kind: Literal["scxml", "mermaid"],
     language: Language,
@@ -155,10 +155,10 @@ async def _export(
         return export_scxml(chart) if kind == "scxml" else mermaid_of(chart)
 
     try:
-        shared = await desk.open(file, package_only=package_only)
+        shared = await session.open(file, package_only=package_only)
         try:
             async with shared.lock:
-                text = await desk.work(lambda: export(shared.opened))
+                text = await session.work(lambda: export(shared.opened))
         finally:
             shared.leave()
     except UserError as error:
@@ -179,10 +179,12 @@ class _Told:
 class _Window:
     """A page's WebSocket; a viewer of its document."""
 
-    def __init__(self, websocket: WebSocket, desk: EditorDesk, shared: SharedDocument, client: str) -> None:
+    def __init__(
+        self, websocket: WebSocket, session: EditorSession, shared: SharedDocument, client: str
+    ) -> None:
         self.language = language_of(websocket)
         self._websocket = websocket
-        self._desk = desk
+        self._session = session
         self._shared = shared
         self._client = client
         self._outbox: asyncio.Queue[str] = asyncio.Queue(_MAX_QUEUE)
@@ -192,7 +194,7 @@ class _Window:
         """Receive and send until the page leaves, or its person may not edit any more."""
         shared = self._shared
         async with shared.lock:
-            self.put(await self._desk.work(self._first))
+            self.put(await self._session.work(self._first))
             shared.viewers.append(self)
         self._tell_others()
         tasks = [
@@ -257,7 +259,7 @@ class _Window:
         shared = self._shared
         async with shared.lock:
             others = [each for each in shared.viewers if each is not self]
-            told = await self._desk.work(lambda: self._do(message, tells_others=bool(others)))
+            told = await self._session.work(lambda: self._do(message, tells_others=bool(others)))
             self.put(told.own)
             if told.others is not None:
                 for viewer in others:
