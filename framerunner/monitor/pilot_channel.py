@@ -1,4 +1,4 @@
-"""`/ws/pilot`: checks browsers' sticks and orders, gives them to the drones' manual controls, sends answers."""
+"""`/ws/pilot`: checks browsers' sticks and orders, gives them to the drones' manual controls, answers."""
 
 from __future__ import annotations
 
