@@ -167,7 +167,7 @@ class Pilot:
     def fly_to_goal(self) -> None:
         """Fly straight to the goal at half the distance per second, 1 m/s at most; the yaw rate stays.
 
-        The paper's Fly2: v = e/2 in axes turned with the yaw, scaled down to |v| <= 1.
+        The paper's Fly2: v = e/2 in axes turned with the yaw, scaled down to 1 m/s at most.
         """
         imu, cmd = self.imu, self.cmd
         x, y, z = self.goal_m

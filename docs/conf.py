@@ -1,0 +1,89 @@
+"""Configuration of Sphinx: `make docs` builds these pages and the API reference into build/docs.
+
+Nothing is fetched, neither when the pages are built nor when they are read.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib import metadata
+from pathlib import Path
+
+from pydantic import BaseModel
+from pygments.lexers.special import TextLexer
+from sphinx.application import Sphinx
+
+_ROOT = Path(__file__).parents[1]
+_ROOT_PAGES = {"contributing": "CONTRIBUTING.md", "changelog": "CHANGELOG.md"}
+_WORDS_A_MINUTE = 200
+_TITLE = re.compile(r"\A# .+\n")
+_OWN_TIME = re.compile(r"^\*\*Time:", re.MULTILINE)
+_DIAGRAM = re.compile(r"^```mermaid\n.*?^```\n", re.MULTILINE | re.DOTALL)
+_DIAGRAM_NOTE = "\n*A diagram in the language of Mermaid, which GitHub and <https://mermaid.live> draw.*\n"
+
+project = "framerunner"
+release = version = metadata.version("framerunner")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+
+html_theme = "furo"
+html_title = f"framerunner {release}"
+html_copy_source = False
+html_show_copyright = False
+
+myst_heading_anchors = 4
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_member_order = "bysource"
+autodoc_inherit_docstrings = False
+autodoc_default_options = {"exclude-members": "model_config"}
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+
+# For `make docs-links`: addresses of this machine and of examples are not looked up.
+linkcheck_ignore = [r"https?://(127\.0\.0\.1|localhost|0\.0\.0\.0|192\.168\.|[\w.]*example\.)"]
+
+
+def _read_page(app: Sphinx, page: str, source: list[str]) -> None:
+    """Adapt a page to the site: pages of the folder above, the time that it takes, its diagrams.
+
+    Whoever reads the files in the repository needs none of this.
+    """
+    text = source[0]
+    if page in _ROOT_PAGES:
+        file = _ROOT / _ROOT_PAGES[page]
+        app.env.note_dependency(str(file))
+        text = file.read_text(encoding="utf-8").replace("](docs/", "](")
+    for name, above in _ROOT_PAGES.items():
+        text = re.sub(rf"\]\((?:\.\./)*{re.escape(above)}", f"](/{name}.md", text)
+    text = _DIAGRAM.sub(lambda found: found.group() + _DIAGRAM_NOTE, text)
+    title = _TITLE.match(text)
+    if title is not None and _OWN_TIME.search(text) is None:
+        minutes = max(1, round(len(text.split()) / _WORDS_A_MINUTE))
+        time = f"*Reading time: {minutes} {'minute' if minutes == 1 else 'minutes'}*"
+        text = f"{title.group()}\n{time}\n{text[title.end() :]}"
+    source[0] = text
+
+
+def _document_fields(
+    _app: Sphinx, _kind: str, _name: str, value: object, _options: object, lines: list[str]
+) -> None:
+    """List the fields of a model with their descriptions, which files of that kind have too."""
+    if isinstance(value, type) and issubclass(value, BaseModel):
+        fields = ((name, field.description or "") for name, field in value.model_fields.items())
+        lines += ["", *(f":ivar {name}: {text.replace('`', '``')}" for name, text in fields)]
+
+
+def _leave_out_signature(
+    _app: Sphinx, _kind: str, _name: str, value: object, *_others: object
+) -> tuple[str, None] | None:
+    """A model is made of a file: the arguments of its constructor are its fields once more."""
+    is_model = isinstance(value, type) and issubclass(value, BaseModel)
+    return ("", None) if is_model else None
+
+
+def setup(app: Sphinx) -> None:
+    """Connect what is above with Sphinx."""
+    app.add_lexer("mermaid", TextLexer)
+    app.connect("source-read", _read_page)
+    app.connect("autodoc-process-docstring", _document_fields)
+    app.connect("autodoc-process-signature", _leave_out_signature)
