@@ -9,6 +9,7 @@ import re
 from importlib import metadata
 from pathlib import Path
 
+from docutils import nodes
 from pydantic import BaseModel
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
@@ -16,8 +17,7 @@ from sphinx.application import Sphinx
 _ROOT = Path(__file__).parents[1]
 _ROOT_PAGES = {"contributing": "CONTRIBUTING.md", "changelog": "CHANGELOG.md"}
 _WORDS_A_MINUTE = 200
-_TITLE = re.compile(r"\A# .+\n")
-_OWN_TIME = re.compile(r"^\*\*Time:", re.MULTILINE)
+_OWN_TIME = re.compile(r"^Time: ", re.MULTILINE)
 _DIAGRAM = re.compile(r"^```mermaid\n.*?^```\n", re.MULTILINE | re.DOTALL)
 _DIAGRAM_NOTE = "\n*A diagram in the language of Mermaid, which GitHub and <https://mermaid.live> draw.*\n"
 
@@ -32,7 +32,7 @@ html_show_copyright = False
 
 myst_heading_anchors = 4
 autodoc_typehints = "description"
-autodoc_typehints_description_target = "documented"
+autodoc_typehints_description_target = "documented_params"
 autodoc_member_order = "bysource"
 autodoc_inherit_docstrings = False
 autodoc_default_options = {"exclude-members": "model_config"}
@@ -44,7 +44,7 @@ linkcheck_ignore = [r"https?://(127\.0\.0\.1|localhost|0\.0\.0\.0|192\.168\.|[\w
 
 
 def _read_page(app: Sphinx, page: str, source: list[str]) -> None:
-    """Adapt a page to the site: pages of the folder above, the time that it takes, its diagrams.
+    """Adapt a page to the site, where pages of the folder above have other places, and no diagram is drawn.
 
     Whoever reads the files in the repository needs none of this.
     """
@@ -55,13 +55,19 @@ def _read_page(app: Sphinx, page: str, source: list[str]) -> None:
         text = file.read_text(encoding="utf-8").replace("](docs/", "](")
     for name, above in _ROOT_PAGES.items():
         text = re.sub(rf"\]\((?:\.\./)*{re.escape(above)}", f"](/{name}.md", text)
-    text = _DIAGRAM.sub(lambda found: found.group() + _DIAGRAM_NOTE, text)
-    title = _TITLE.match(text)
-    if title is not None and _OWN_TIME.search(text) is None:
-        minutes = max(1, round(len(text.split()) / _WORDS_A_MINUTE))
-        time = f"*Reading time: {minutes} {'minute' if minutes == 1 else 'minutes'}*"
-        text = f"{title.group()}\n{time}\n{text[title.end() :]}"
-    source[0] = text
+    source[0] = _DIAGRAM.sub(lambda found: found.group() + _DIAGRAM_NOTE, text)
+
+
+def _add_reading_time(_app: Sphinx, page: nodes.document) -> None:
+    """Say below the title how long a page takes to read, unless it says a time itself, as tutorials do."""
+    text = page.astext()
+    title = next(page.findall(nodes.title), None)
+    if title is None or _OWN_TIME.search(text):
+        return
+    minutes = max(1, round(len(text.split()) / _WORDS_A_MINUTE))
+    words = f"Reading time: {minutes} {'minute' if minutes == 1 else 'minutes'}"
+    place = title.parent.index(title) + 1
+    title.parent.insert(place, nodes.paragraph("", "", nodes.emphasis(words, words)))
 
 
 def _document_fields(
@@ -85,5 +91,6 @@ def setup(app: Sphinx) -> None:
     """Connect what is above with Sphinx."""
     app.add_lexer("mermaid", TextLexer)
     app.connect("source-read", _read_page)
+    app.connect("doctree-read", _add_reading_time)
     app.connect("autodoc-process-docstring", _document_fields)
     app.connect("autodoc-process-signature", _leave_out_signature)
