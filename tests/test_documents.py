@@ -281,6 +281,7 @@ def broken_links(site, page, texts):
 def check_pages(site, texts):
     """Every page is there and says a time; so are search, the public names, and what links lead to."""
     assert [page for page in PAGES if (site / page).with_suffix(".html") not in texts] == []
+    assert "searchindex.js" in texts[site / "search.html"]
     assert "framerunner" in (site / "searchindex.js").read_text(encoding="utf-8")
     pages = {page: texts[(site / page).with_suffix(".html")] for page in PAGES}
     times = re.compile(r"Reading time: \d+ min|<strong>Time: \d+ min")

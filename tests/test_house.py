@@ -439,7 +439,7 @@ def needed(*extras):
         ("small", []),
         ("framerunner", ["monitor", "plots", "video"]),
         ("extras", ["monitor", "plots", "video", "dask", "gym", "postgresql"]),
-        ("dev", ["monitor", "plots", "video", "dask", "gym", "dev"]),
+        ("dev", ["monitor", "plots", "video", "dask", "docs", "gym", "dev"]),
     ],
 )
 def test_everything_that_is_needed_is_locked_and_no_lock_contradicts_another(name, extras):
