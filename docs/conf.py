@@ -5,6 +5,7 @@ Nothing is fetched, neither when the pages are built nor when they are read.
 
 from __future__ import annotations
 
+import inspect
 import re
 from importlib import metadata
 from pathlib import Path
@@ -19,6 +20,8 @@ _ROOT_PAGES = {"contributing": "CONTRIBUTING.md", "changelog": "CHANGELOG.md"}
 _WORDS_A_MINUTE = 200
 _OWN_TIME = re.compile(r"^Time: ", re.MULTILINE)
 _DIAGRAM = re.compile(r"^```mermaid\n.*?^```\n", re.MULTILINE | re.DOTALL)
+_OPTION = re.compile(r"(?<!`)--[a-z][a-z-]*")
+_FIELD_COMMENT = re.compile(r"^    (\w+): [^#\n]*# (.+)$", re.MULTILINE)
 _DIAGRAM_NOTE = "\n*A diagram in the language of Mermaid, which GitHub and <https://mermaid.live> draw.*\n"
 
 project = "framerunner"
@@ -70,13 +73,30 @@ def _add_reading_time(_app: Sphinx, page: nodes.document) -> None:
     title.parent.insert(place, nodes.paragraph("", "", nodes.emphasis(words, words)))
 
 
+def _descriptions(value: type) -> dict[str, str]:
+    """What is said of each field of a class: by pydantic's `Field`, or by a comment behind it."""
+    if issubclass(value, BaseModel):
+        return {name: field.description or "" for name, field in value.model_fields.items()}
+    comments = dict(_FIELD_COMMENT.findall(inspect.getsource(value)))
+    hints = inspect.get_annotations(value, eval_str=True)
+    said = {name: getattr(hint, "__metadata__", ()) for name, hint in hints.items()}
+    fields = {
+        name: [each.description for each in found if hasattr(each, "description")]
+        for name, found in said.items()
+    }
+    return {
+        name: "".join(fields[name]) or comments.get(name, "") for name in hints if not name.startswith("_")
+    }
+
+
 def _document_fields(
     _app: Sphinx, _kind: str, _name: str, value: object, _options: object, lines: list[str]
 ) -> None:
-    """List the fields of a model with their descriptions, which files of that kind have too."""
-    if isinstance(value, type) and issubclass(value, BaseModel):
-        fields = ((name, field.description or "") for name, field in value.model_fields.items())
-        lines += ["", *(f":ivar {name}: {text.replace('`', '``')}" for name, text in fields)]
+    """List the fields of a class whose docstring has no section for them."""
+    if isinstance(value, type) and not any(line.startswith(":ivar ") for line in lines):
+        marked = {name: text.replace("`", "``") for name, text in _descriptions(value).items()}
+        texts = {name: _OPTION.sub(r"``\g<0>``", text) for name, text in marked.items()}
+        lines += ["", *(f":ivar {name}: {text}" for name, text in texts.items())]
 
 
 def _leave_out_signature(

@@ -123,7 +123,7 @@ class Pilot:
 
     @property
     def frame_seen(self) -> bool:
-        """The frame of this `colour` is wholly in view: its distance is known."""
+        """The frame of this `colour` is wholly in view, so its distance is known."""
         return isfinite(self.frame.d)
 
     @property
@@ -150,7 +150,7 @@ class Pilot:
 
     @property
     def crossing_refused(self) -> bool:
-        """`cross_frame` cannot fly through the frame from here: it was lost, uncertain or missed."""
+        """`cross_frame` cannot fly through the frame from here; it was lost, uncertain or missed."""
         return self._map_user.refused
 
     @property
