@@ -126,6 +126,15 @@ test-px4: $(VENV)/installed-dev ## fly a genuine PX4 in the simulated world: mak
 bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt; options in BENCH="--peers none"
 	$(BIN)/python -m benchmarks $(BENCH)
 
+.PHONY: docs docs-links
+SPHINX = $(BIN)/sphinx-build --quiet --fresh-env --fail-on-warning --keep-going
+docs: $(VENV)/installed-dev ## build the documentation with search and API reference: build/docs/index.html
+	$(SPHINX) --builder html docs build/docs
+	@echo "open build/docs/index.html in a browser"
+
+docs-links: $(VENV)/installed-dev ## ask the web whether every address in the documentation exists
+	$(SPHINX) --builder linkcheck docs build/docs-links
+
 .PHONY: parameters
 parameters: $(VENV)/installed-dev ## write docs/parameters.md from the declarations
 	$(BIN)/python -m firmware_py.parameters.reference > docs/parameters.md

@@ -123,7 +123,7 @@ class Pilot:
 
     @property
     def frame_seen(self) -> bool:
-        """The frame of this `colour` is wholly in view: its distance is known."""
+        """The frame of this `colour` is wholly in view, so its distance is known."""
         return isfinite(self.frame.d)
 
     @property
@@ -150,7 +150,7 @@ class Pilot:
 
     @property
     def crossing_refused(self) -> bool:
-        """`cross_frame` cannot fly through the frame from here: it was lost, uncertain or missed."""
+        """`cross_frame` cannot fly through the frame from here; it was lost, uncertain or missed."""
         return self._map_user.refused
 
     @property
@@ -167,7 +167,7 @@ class Pilot:
     def fly_to_goal(self) -> None:
         """Fly straight to the goal at half the distance per second, 1 m/s at most; the yaw rate stays.
 
-        The paper's Fly2: v = e/2 in axes turned with the yaw, scaled down to |v| <= 1.
+        The paper's Fly2: v = e/2 in axes turned with the yaw, scaled down to 1 m/s at most.
         """
         imu, cmd = self.imu, self.cmd
         x, y, z = self.goal_m

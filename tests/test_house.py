@@ -78,7 +78,7 @@ def test_the_readme_shows_the_four_uses_in_order():
         for words in commands_in((ROOT / "README.md").read_text(encoding="utf-8"), "framerunner")
     ]
     wanted = ["sim", "sim --scenario test-case-1", "fly test-case-1", "mission show explorer"]
-    places = [shown.index(command, 1) for command in wanted]  # the very first is the set-up's
+    places = [shown.index(command) for command in wanted]
     assert places == sorted(places)
     assert any(command.startswith("fly test-case-1 --drone serial://") for command in shown[places[-1] :])
 
@@ -439,7 +439,7 @@ def needed(*extras):
         ("small", []),
         ("framerunner", ["monitor", "plots", "video"]),
         ("extras", ["monitor", "plots", "video", "dask", "gym", "postgresql"]),
-        ("dev", ["monitor", "plots", "video", "dask", "gym", "dev"]),
+        ("dev", ["monitor", "plots", "video", "dask", "docs", "gym", "dev"]),
     ],
 )
 def test_everything_that_is_needed_is_locked_and_no_lock_contradicts_another(name, extras):

@@ -18,7 +18,7 @@ EXAMPLE = re.compile(r"^ +framerunner fly ([\w-]+) --lockstep(?: --record)?$", r
 
 def examples() -> list[str]:
     """Names of the scenarios, each once."""
-    pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
     return sorted({name for page in pages for name in EXAMPLE.findall(page.read_text(encoding="utf-8"))})
 
 

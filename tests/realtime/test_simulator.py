@@ -1,5 +1,6 @@
 """`framerunner.Simulator` and the fixtures of pytest: a drone of one's own, its truth, its log."""
 
+import ast
 import os
 import socket
 import subprocess
@@ -13,9 +14,25 @@ import pytest
 from pymavlink import mavutil
 
 import framerunner
+from tests.documents import blocks
 
 pytestmark = pytest.mark.realtime
 ROOT = Path(__file__).parents[2]
+MY_PROGRAM = """
+from pymavlink import mavutil
+
+
+def take_off(url):
+    drone = mavutil.mavlink_connection(url.replace("://", ":"))
+    drone.wait_heartbeat()
+    for command, values in (("COMPONENT_ARM_DISARM", [1, 0]), ("NAV_TAKEOFF", [0, 0])):
+        number = getattr(mavutil.mavlink, f"MAV_CMD_{command}")
+        rest = [0, 0, float("nan"), float("nan"), float("nan")]
+        drone.mav.command_long_send(drone.target_system, 1, number, 0, *values, *rest)
+        drone.recv_match(type="COMMAND_ACK", blocking=True, timeout=5)
+    while drone.recv_match(type="LOCAL_POSITION_NED", blocking=True, timeout=20).z > -1.2:
+        pass
+"""
 
 
 def pytest_here(folder, *arguments):
@@ -120,6 +137,31 @@ def test_the_example_with_pymavlink_takes_off():
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.splitlines()[:2] == ["arm: 0", "take off: 0"]
     assert "land: 0" in done.stdout
+
+
+def test_the_simulator_of_the_document_is_there(capsys):
+    exec(blocks("api.md", "python")[1], {"framerunner": framerunner})
+    x_m, y_m, _ = ast.literal_eval(capsys.readouterr().out)
+    scenario = framerunner.load_scenario("calm-17")
+    assert (x_m, y_m) == pytest.approx((scenario.start.x_m, scenario.start.y_m), abs=0.05)
+
+
+def test_the_test_of_the_document_passes(tmp_path):
+    (tmp_path / "my_program.py").write_text(MY_PROGRAM, encoding="utf-8")
+    shown = blocks("api.md", "python")[2]
+    (tmp_path / "test_shown.py").write_text(f"import my_program\nimport pytest\n\n{shown}", encoding="utf-8")
+    output, code = pytest_here(tmp_path, "test_shown.py", "-p", "no:cacheprovider", "-o", "pythonpath=.")
+    assert code == 0, output
+
+
+def test_the_script_with_mavsdk_of_the_document_flies():
+    (script,) = blocks("simulator.md", "python")
+    with framerunner.Simulator() as simulator:
+        assert "udpin://0.0.0.0:14540" in script
+        script = script.replace("udpin://0.0.0.0:14540", simulator.drone_url)
+        command = [sys.executable, "-c", script]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert float(done.stdout.partition("height:")[2]) == pytest.approx(2.5, abs=0.5), done.stderr
 
 
 def test_a_failure_has_the_log_and_the_result(tmp_path):
