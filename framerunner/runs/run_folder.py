@@ -11,7 +11,6 @@ from datetime import datetime
 from pathlib import Path
 
 from framerunner.errors import SettingError, write_advice
-from framerunner.extras import install_advice
 from framerunner.files.text_file import replace_file
 from framerunner.runs import PlotError
 from framerunner.runs.track import Track
@@ -186,10 +185,5 @@ def _try(path: Path, write: Callable[[], None]) -> None:
     except PlotError as error:
         path.unlink(missing_ok=True)  # an incomplete plot
         warn(str(error))
-    except ModuleNotFoundError as error:
-        missing = install_advice(error.name or "")
-        if missing is None:
-            raise
-        warn(f"{path.name} was not drawn: {missing}")
     except OSError as error:
         warn(f"cannot write '{path}': {error.strerror or error}")
