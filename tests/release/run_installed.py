@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import time
 from collections.abc import Callable
@@ -46,7 +47,8 @@ WITHOUT_EXTRAS = {  # what each says instead of working
     "monitor": "framerunner[monitor]",
     "edit mission.yaml --from example": "framerunner[monitor]",
     "fly test-case-1 --lockstep --record": "framerunner[recording]",
-    "film flights": "framerunner[video]",
+    "replay lockstep": "framerunner[recording]",
+    "film lockstep": "framerunner[video]",
     "evaluate --level calm --count 1 --backend ray": "framerunner[ray]",
 }
 EXAMPLES_NEED = ("framerunner[gym]", "pytest")
@@ -122,8 +124,10 @@ class Installed:
             ("lockstep", lambda: self._fly("lockstep", "--lockstep")),
             ("real time", lambda: self._fly("real-time", "--speed", "2")),
             ("evaluate", self._evaluate),
-            ("sim", self._simulate),
+            ("replay", self._replay),
+            ("sim", lambda: self._start_and_stop(_READY, "sim")),
             ("no extras", self._without_extras),
+            ("extras", self._extras),
             ("examples", self._examples),
         ]
 
@@ -156,39 +160,61 @@ class Installed:
         _expect("left in evaluation/: report.html, results.csv", self.run("framerunner", *command))
         return "a report of 2 flights"
 
-    def _simulate(self) -> str:
-        """Start the simulator and stop it as Ctrl-C does."""
-        command = [str(self.folder / "venv" / "bin" / "framerunner"), "sim"]
-        log = self.folder / "sim.log"
+    def _replay(self) -> str:
+        """The flight in real time, from its log."""
+        (run,) = (self.folder / "real-time").iterdir()
+        _expect("clean after", self.run("framerunner", "replay", str(run), "--fast", "--no-video"))
+        return "shown"
+
+    def _start_and_stop(self, ready: str, *words: str) -> str:
+        """Start a command, wait until it says that it is ready, and stop it as Ctrl-C does."""
+        command = [str(self.folder / "venv" / "bin" / "framerunner"), *words]
+        log = self.folder / f"{words[0]}.log"
         with log.open("w", encoding="utf-8") as output:
-            simulator = subprocess.Popen(
+            started = subprocess.Popen(
                 command, cwd=self.folder, env=_environment(), stdout=output, stderr=subprocess.STDOUT
             )
             deadline = time.monotonic() + 60.0
-            while _READY not in log.read_text(encoding="utf-8") and simulator.poll() is None:
+            while ready not in log.read_text(encoding="utf-8") and started.poll() is None:
                 if time.monotonic() > deadline:
                     break
                 time.sleep(0.2)
-            simulator.send_signal(signal.SIGINT)
+            started.send_signal(signal.SIGINT)
             try:
-                code = simulator.wait(30.0)
+                code = started.wait(30.0)
             except subprocess.TimeoutExpired:
-                simulator.kill()
-                raise StepError("the simulator did not end") from None
+                started.kill()
+                raise StepError(f"{words[0]} did not end") from None
         shown = log.read_text(encoding="utf-8")
-        _expect(_READY, shown)
+        _expect(ready, shown)
         if code != 130 or "Traceback" in shown:
             raise StepError(f"exit code {code}:\n{shown}")
         return "started and stopped"
 
     def _without_extras(self) -> str:
         for words, wanted in WITHOUT_EXTRAS.items():
-            (self.folder / "flights").mkdir(exist_ok=True)
-            shown = self.run("framerunner", *words.split(), code=2)
+            (run,) = (self.folder / "lockstep").iterdir()
+            arguments = [str(run) if word == "lockstep" else word for word in words.split()]
+            shown = self.run("framerunner", *arguments, code=2)
             _expect(wanted, shown)
             if len(shown.splitlines()) != 1:
                 raise StepError(f"not one line: {words}\n{shown}")
         return f"{len(WITHOUT_EXTRAS)} commands name the extra that they need"
+
+    def _extras(self) -> str:
+        """Record, fly again and film a flight, and start the monitor."""
+        self.install("framerunner[all]")
+        self.run("framerunner", "fly", "test-case-1", "--lockstep", "--record", "--out", "recorded")
+        (recorded,) = (self.folder / "recorded").iterdir()
+        (flown,) = (self.folder / "lockstep").iterdir()
+        for run in (recorded, flown):
+            _expect("clean after", self.run("framerunner", "replay", str(run), "--fast", "--no-video"))
+        self.run("framerunner", "film", str(recorded), "--out", "film.mp4")
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = str(free.getsockname()[1])
+        self._start_and_stop(f"monitor: http://127.0.0.1:{port}/", "monitor", "--port", port)
+        return "recorded, flown again, filmed; the monitor starts"
 
     def _examples(self) -> str:
         """Run copies of the examples, with what they need."""
