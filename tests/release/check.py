@@ -92,10 +92,10 @@ def _registry_defects(artefacts: Artefacts, folder: Path) -> list[str]:
 
 def _print_summary(rows: dict[str, dict[str, str]], defects: list[str]) -> None:
     names = list(dict.fromkeys(name for steps in rows.values() for name in steps))
-    say("\n" + "".join(f"{each:>11}" for each in ["", *names]))
+    say("\n" + "".join(f"{each:>13}" for each in ["", *names]))
     for version, steps in rows.items():
         shown = [steps.get(name, "-") for name in names] if steps else ["not at hand"]
-        say("".join(f"{each:>11}" for each in [f"Python {version}", *shown]))
+        say("".join(f"{each:>13}" for each in [f"Python {version}", *shown]))
     say(f"contents, metadata and size: {'as they should be' if not defects else f'{len(defects)} defects'}")
 
 
