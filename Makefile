@@ -176,6 +176,13 @@ lock: ## choose newer versions of everything installed (needs uv)
 check-pi: $(VENV)/installed-dev ## ask the registry whether a Raspberry Pi can install it without a compiler
 	$(BIN)/python -m tests.locks.check_wheels locks/framerunner.txt
 
+.PHONY: release-check release-sizes
+release-check: $(VENV)/installed-dev ## build the wheel, install it on each Python at hand, fly, run the examples
+	$(BIN)/python -m tests.release.check $(RELEASE)
+
+release-sizes: $(VENV)/installed-dev ## measure dependencies and extras for docs/installation.md
+	$(BIN)/python -m tests.release.check --sizes
+
 .PHONY: clean
 clean: ## remove what was installed and built; runs/ is kept
 	rm -rf $(VENV) $(MAVPROXY_VENV) $(BENCH_VENV) web/node_modules build dist *.egg-info

@@ -8,7 +8,7 @@ _EXTRAS = {
     "av": "video",
     "fastapi": "monitor",
     "ifaddr": "monitor",
-    "matplotlib": "plots",
+    "mcap": "recording",
     "motioncapture": "mocap",
     "multipart": "monitor",
     "PIL": "video",
@@ -16,6 +16,7 @@ _EXTRAS = {
     "sqlalchemy": "monitor",
     "starlette": "monitor",
     "uvicorn": "monitor",
+    "zstandard": "recording",
 }
 
 

@@ -437,9 +437,9 @@ def needed(*extras):
     ("name", "extras"),
     [
         ("small", []),
-        ("framerunner", ["monitor", "plots", "video"]),
-        ("extras", ["monitor", "plots", "video", "dask", "gym", "postgresql"]),
-        ("dev", ["monitor", "plots", "video", "dask", "docs", "gym", "dev"]),
+        ("framerunner", ["monitor", "recording", "video"]),
+        ("extras", ["monitor", "recording", "video", "dask", "gym", "postgresql"]),
+        ("dev", ["monitor", "recording", "video", "dask", "docs", "gym", "dev"]),
     ],
 )
 def test_everything_that_is_needed_is_locked_and_no_lock_contradicts_another(name, extras):

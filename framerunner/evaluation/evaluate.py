@@ -19,7 +19,6 @@ from framerunner.evaluation.runner import Terms, fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
 from framerunner.evaluation.terminal import EvaluationProgress, print_comparison, print_summary
-from framerunner.extras import install_advice, is_installed
 from scenarios.verdict import Verdict
 
 EXIT_INTERRUPTED = 130
@@ -126,10 +125,6 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
     folder.write(RESULTS, csv_text(rows))
     code = 1 if Verdict.ERROR in summary.verdicts else 0
 
-    if not is_installed("matplotlib"):
-        _note(f"warning: report.html was not made: {install_advice('matplotlib')}")
-        print(f"left in {folder.path}/: results.csv", flush=True)
-        return code
     console = Console(stderr=True)
     with console.status("drawing the report") as status:
         from framerunner.evaluation.report import Page, write_report

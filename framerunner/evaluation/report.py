@@ -1,6 +1,6 @@
 """`report.html`: one self-contained page for a browser, a phone or a printer.
 
-Importing this imports matplotlib, which is an extra.
+Import this late: matplotlib takes a second.
 """
 
 from __future__ import annotations

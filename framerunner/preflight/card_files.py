@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from framerunner.extras import install_advice
 from framerunner.preflight.card import FlightCard
 from framerunner.runs.run_folder import warn
 
@@ -21,11 +20,6 @@ def write_card(card: FlightCard, folder: Path) -> None:
         from framerunner.preflight.card_pdf import write_pdf
 
         write_pdf(card, folder / PDF_NAME)
-    except ModuleNotFoundError as error:
-        missing = install_advice(error.name or "")
-        if missing is None:
-            raise
-        warn(f"{PDF_NAME} was not written: {missing}")
     except OSError as error:
         warn(f"cannot write '{folder / PDF_NAME}': {error.strerror or error}")
 

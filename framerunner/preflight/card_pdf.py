@@ -1,4 +1,4 @@
-"""The flight card as a PDF of A4 pages. Importing this imports matplotlib, which is an extra."""
+"""The flight card as a PDF of A4 pages. Import this late: matplotlib takes a second."""
 
 from __future__ import annotations
 

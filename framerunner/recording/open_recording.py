@@ -8,10 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from mcap.writer import MCAP0_MAGIC
-
 from framerunner.recording.events import Recorded, RecordingError
-from framerunner.recording.mcap_file import first_and_last_bytes
 from offboard.app import INTERRUPTED
 from offboard.mission import MissionError, load_mission
 from offboard.pilot_file import PilotSource
@@ -47,8 +44,8 @@ def recorded_flight(path: Path, pilot: PilotSource | None = None) -> Iterator[Re
     result = _read_result(path)
     recording, log = path / "flight.mcap", path / "flight.tlog"
     # A real-time flight whose program was killed has no result, and its recording is incomplete.
-    was_killed = result is None and log.is_file() and first_and_last_bytes(recording)[1] != MCAP0_MAGIC
-    if recording.is_file() and not was_killed:
+    was_killed = result is None and log.is_file()
+    if recording.is_file() and not (was_killed and _is_incomplete(recording)):
         with _mcap(recording) as recorded:
             yield recorded
     elif result is not None and result.state_sha256 and (path / "mission.yaml").is_file():
@@ -78,6 +75,17 @@ def _read_result(folder: Path) -> FlightResult | None:
     except (OSError, ResultError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"replay '{path}': damaged: {reason:.120}") from None
+
+
+# Reading and writing MCAP needs an extra, which flights and their logs do not.
+
+
+def _is_incomplete(recording: Path) -> bool:
+    from mcap.writer import MCAP0_MAGIC
+
+    from framerunner.recording.mcap_file import first_and_last_bytes
+
+    return first_and_last_bytes(recording)[1] != MCAP0_MAGIC
 
 
 def _mcap(path: Path) -> closing[McapRecording]:

@@ -1,6 +1,6 @@
 """Plots for people: a scenario, or the track of a flight, from above and from the side.
 
-Import this late: matplotlib takes a second and is an extra. Figures are made without pyplot, so they share no
+Import this late: matplotlib takes a second. Figures are made without pyplot, so they share no
 state and need no display.
 """
 

@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 
 from framerunner.errors import SettingError, write_advice
-from framerunner.extras import install_advice
+from framerunner.extras import install_advice, is_installed
 from framerunner.files.text_file import replace_file
 from framerunner.runs import PlotError
 from framerunner.runs.track import Track
@@ -170,13 +170,18 @@ def warn(problem: str) -> None:
 
 
 def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:
-    """Say where a flight's files are, if it left any, and how to replay it, if that is possible."""
+    """Say where a flight's files are, if it left any, and how to replay it, if that is possible.
+
+    To fly it again needs an extra, to show its log does not.
+    """
     lines = [f"left in {folder.path}/"] if folder.path.is_dir() else []
     # A lockstep flight is flown again from its plan.
     shown_from = (folder.recording, folder.tlog) if result.seed is None else (folder.result,)
     if any(path.is_file() and path.stat().st_size for path in shown_from):
         command = shlex.join(["framerunner", "replay", str(folder.path)])
-        lines.append(f"see it again: {command}")
+        lacks_extra = shown_from == (folder.result,) and not is_installed("mcap")
+        advice = f" ({install_advice('mcap')})" if lacks_extra else ""
+        lines.append(f"see it again: {command}{advice}")
     return lines
 
 
@@ -186,10 +191,5 @@ def _try(path: Path, write: Callable[[], None]) -> None:
     except PlotError as error:
         path.unlink(missing_ok=True)  # an incomplete plot
         warn(str(error))
-    except ModuleNotFoundError as error:
-        missing = install_advice(error.name or "")
-        if missing is None:
-            raise
-        warn(f"{path.name} was not drawn: {missing}")
     except OSError as error:
         warn(f"cannot write '{path}': {error.strerror or error}")

@@ -12,7 +12,6 @@ from rich.console import Console
 from rich.progress import track
 
 from framerunner.errors import SettingError
-from framerunner.extras import install_advice, is_installed
 from framerunner.vision_evaluation.labelled_images import Disturbance, LabelledImage, labelled_images
 from framerunner.vision_evaluation.scores import (
     ANGLES_DEG,
@@ -68,15 +67,10 @@ def evaluate_vision(settings: VisionSettings) -> None:
     print_scores(scores, settings.title)
     report = settings.out / REPORT
     report.write_text(json.dumps(finite(_as_json(settings, scores), 5), indent=1), encoding="utf-8")
-    written = str(report)
-    if is_installed("matplotlib"):
-        from framerunner.vision_evaluation.picture import save_picture
+    from framerunner.vision_evaluation.picture import save_picture
 
-        save_picture(scores, examples, settings.title, settings.out / PICTURE, rendered=True)
-        written += f" and {PICTURE}"
-    else:
-        written += f"; no picture: {install_advice('matplotlib')}"
-    print(f"written to {written}")
+    save_picture(scores, examples, settings.title, settings.out / PICTURE, rendered=True)
+    print(f"written to {report} and {PICTURE}")
 
 
 def write_dataset(settings: VisionSettings) -> None:

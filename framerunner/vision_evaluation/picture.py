@@ -1,6 +1,6 @@
 """The picture of an evaluation of the detectors: rates and errors, and images with what was found in them.
 
-Import this late: matplotlib is an extra and takes a second.
+Import this late: matplotlib takes a second.
 """
 
 from __future__ import annotations
