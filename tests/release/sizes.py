@@ -52,7 +52,7 @@ EXTRAS = {  # what each adds
     "postgresql": "contests stored in PostgreSQL",
     "ray": "`evaluate --backend ray`",
 }
-NOT_FOR_USERS = frozenset({"dev"})
+NOT_FOR_USERS = frozenset({"dev", "docs"})
 
 
 class Environment:
