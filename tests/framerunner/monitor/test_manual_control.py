@@ -385,7 +385,7 @@ async def test_a_fault_in_one_seat_does_not_affect_another(game, caplog):
     game.control(1).tick = lambda: 1 / 0
     await game.pass_time(0.6)
     assert game.control(2).control is Control.NONE and game.fleet.orders[-1] == "hold"
-    assert "the update of its control failed" in caplog.text
+    assert "the update of its manual control failed" in caplog.text
 
 
 async def test_the_watch_runs_by_itself_while_a_browser_is_there():
