@@ -140,7 +140,7 @@ async def test_one_address_cannot_take_all_connections(monkeypatch):
 
 async def test_one_address_cannot_take_all_places_of_viewers(monkeypatch):
     for limit in ("live_channel.MAX_VIEWERS_PER_ADDRESS", "competition.api.MAX_WATCHERS_PER_ADDRESS"):
-        monkeypatch.setattr(f"monitor.{limit}", 2)
+        monkeypatch.setattr(f"framerunner.monitor.{limit}", 2)
     async with serving(monkeypatch, "framerunner.monitor.competition.api") as served, browser() as client:
         elsewhere = aiohttp.TCPConnector(local_addr=(OTHER, 0))
         async with aiohttp.ClientSession(connector=elsewhere) as other:
