@@ -5,6 +5,7 @@ from importlib import resources
 from pathlib import Path
 
 import pytest
+from joblib.externals.loky import get_reusable_executor
 
 import framerunner
 from framerunner.cli import run
@@ -116,7 +117,9 @@ def second_package(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.setenv("PYTHONPATH", str(folder))
     monkeypatch.chdir(tmp_path)
+    get_reusable_executor().shutdown(wait=True)  # processes that were started before do not find it
     yield folder
+    get_reusable_executor().shutdown(wait=True)
     sys.modules.pop("second_package", None)
 
 
