@@ -63,8 +63,9 @@ def fly(
         The verdict with its reason, times, crossings and contacts, as in `result.json`.
 
     Raises:
-        UserError: scenario, mission, pilot or detector cannot be used; one line that says what to do.
+        UserError: scenario, mission, pilot, detector or seed cannot be used; one line that says what to do.
     """
+    _check_whole("seed", seed)
     chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     flown = fly_lockstep(FlightPlan(chosen, _mission(mission, pilot), seed, detector=detector))
     if flown.outcome.interrupted:
@@ -97,6 +98,8 @@ def evaluate(
     Raises:
         UserError: see `fly`; or neither scenarios nor a level are given, or both.
     """
+    for name, value in (("count", count), ("seed", seed), ("jobs", jobs)):
+        _check_whole(name, value)
     plan = plan_flights(scenarios, level, seed, count, _mission(mission, pilot))
     pool = Pool(jobs=cpu_count() if jobs is None else jobs)
     check_pool(pool)
@@ -104,6 +107,12 @@ def evaluate(
     rows = {row.scenario: row for row in fly_all(tasks, pool)}
     ordered = tuple(rows[each.name] for each in plan.scenarios)
     return Evaluation(ordered, summarise(ordered))
+
+
+def _check_whole(name: str, value: int | None) -> None:
+    """Refuse what is no whole number from 0 to the largest seed; None is not given."""
+    if value is not None and not (type(value) is int and 0 <= value < 2**63):
+        raise SettingError(f"{name} {value!r:.40}: must be a whole number from 0 to {2**63 - 1}")
 
 
 def _mission(mission: str | Path | Mission, pilot: PilotLike | None) -> Mission:
