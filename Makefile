@@ -128,9 +128,21 @@ bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt;
 
 .PHONY: docs docs-links
 SPHINX = $(BIN)/sphinx-build --quiet --fresh-env --fail-on-warning --keep-going
+MERMAID_VERSION = 11.17.2
+MERMAID_SHA256 = 6ad2f42c3fc26bbf9e45cbb6d11898972573ea52b33a5f4ff51952899f950ffd
+MERMAID = build/mermaid-$(MERMAID_VERSION)
 docs: $(VENV)/installed-dev ## build the documentation with search and API reference: build/docs/index.html
-	$(SPHINX) --builder html docs build/docs
+	@$(IF_NODE_DRAWS) $(MAKE) --silent $(MERMAID)/mermaid.min.js
+	FRAMERUNNER_MERMAID=$(abspath $(MERMAID)) $(SPHINX) --builder html docs build/docs
 	@echo "open build/docs/index.html in a browser"
+
+IF_NODE_DRAWS = command -v npm >/dev/null || { echo "Node.js is not installed; diagrams are shown as text"; exit 0; };
+# The package's bundle needs no other file, so that the pages draw diagrams without a network, also from a disk.
+$(MERMAID)/mermaid.min.js:
+	mkdir -p $(MERMAID)
+	npm pack --silent --pack-destination build mermaid@$(MERMAID_VERSION) > build/mermaid.txt
+	cd build && echo "$(MERMAID_SHA256)  $$(cat mermaid.txt)" | sha256sum --check --quiet
+	tar --extract --gzip --touch --file build/$$(cat build/mermaid.txt) --directory $(MERMAID) --strip-components 2 package/dist/mermaid.min.js
 
 docs-links: $(VENV)/installed-dev ## ask the web whether every address in the documentation exists
 	$(SPHINX) --builder linkcheck docs build/docs-links
@@ -145,7 +157,7 @@ failsafes: $(VENV)/installed-dev ## write the tables of failsafes in the documen
 
 .PHONY: messages
 messages: $(VENV)/installed-dev ## generate framerunner/wire/extra_messages.py again from framerunner/wire/extra_messages.xml
-	$(BIN)/python -m tests.wire.generate_messages
+	$(BIN)/python -m tests.framerunner.wire.generate_messages
 
 .PHONY: result-schema
 result-schema: $(VENV)/installed-dev ## write docs/result.schema.json again from the type FlightResult

@@ -6,6 +6,7 @@ Nothing is fetched, neither when the pages are built nor when they are read.
 from __future__ import annotations
 
 import inspect
+import os
 import re
 from importlib import metadata
 from pathlib import Path
@@ -22,6 +23,9 @@ _OWN_TIME = re.compile(r"^Time: ", re.MULTILINE)
 _DIAGRAM = re.compile(r"^```mermaid\n.*?^```\n", re.MULTILINE | re.DOTALL)
 _OPTION = re.compile(r"(?<!`)--[a-z][a-z-]*")
 _FIELD_COMMENT = re.compile(r"^    (\w+): [^#\n]*# (.+)$", re.MULTILINE)
+# `make docs` names the folder with Mermaid's script if it could be had; without it, diagrams are shown as text.
+_MERMAID = os.environ.get("FRAMERUNNER_MERMAID", "")
+_DRAWS = (Path(_MERMAID) / "mermaid.min.js").is_file()
 _DIAGRAM_NOTE = "\n*A diagram in the language of Mermaid, which GitHub and <https://mermaid.live> draw.*\n"
 
 project = "framerunner"
@@ -29,6 +33,8 @@ release = version = metadata.version("framerunner")
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 
 html_theme = "furo"
+html_static_path = [_MERMAID, "scripts"] if _DRAWS else []
+html_js_files = ["mermaid.min.js", "diagrams.js"] if _DRAWS else []
 html_title = f"framerunner {release}"
 html_copy_source = False
 html_show_copyright = False
@@ -46,7 +52,7 @@ linkcheck_ignore = [r"https?://(127\.0\.0\.1|localhost|0\.0\.0\.0|192\.168\.|[\w
 
 
 def _read_page(app: Sphinx, page: str, source: list[str]) -> None:
-    """Adapt a page to the site, where pages of the folder above have other places, and no diagram is drawn.
+    """Adapt a page to the site, where pages of the folder above have other places.
 
     Whoever reads the files in the repository needs none of this.
     """
@@ -57,7 +63,7 @@ def _read_page(app: Sphinx, page: str, source: list[str]) -> None:
         text = file.read_text(encoding="utf-8").replace("](docs/", "](")
     for name, above in _ROOT_PAGES.items():
         text = re.sub(rf"\]\((?:\.\./)*{re.escape(above)}", f"](/{name}.md", text)
-    source[0] = _DIAGRAM.sub(lambda found: found.group() + _DIAGRAM_NOTE, text)
+    source[0] = text if _DRAWS else _DIAGRAM.sub(lambda found: found.group() + _DIAGRAM_NOTE, text)
 
 
 def _add_reading_time(_app: Sphinx, page: nodes.document) -> None:
