@@ -14,17 +14,10 @@ from typing import TYPE_CHECKING
 from framerunner.camera_calibration.mounting_report import MountingSearch, search_mounting
 from framerunner.geometry.axes import flip_quaternion, flip_vector
 from framerunner.geometry.vectors import Vec3
-from framerunner.preflight.session import open_link
-from framerunner.wire.dialect import (
-    AUTOPILOT_COMPONENT_ID,
-    Message,
-    companion_heartbeat,
-    is_vehicle,
-    mavlink,
-    request_rate,
-)
+from framerunner.preflight.link import open_link
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.session.session import Session, pose_rates
 from framerunner.wire.simulator_api import SimulatorApi
-from framerunner.wire.vehicle_telemetry import VehicleTelemetry
 from offboard.drone import DroneError
 from offboard.link.telemetry import least_lag
 from vision.calibration.motion import MotionReport
@@ -38,13 +31,13 @@ if TYPE_CHECKING:
     from vision.calibration.model import Calibration
 
 _RECEIVE_S = 0.05
-_BEAT_S = 1.0
 _FIND_S = 10.0
 _REPORT_S = 5.0
 _MIN_S = 20.0
 """Time that is watched at least, so that errors that go on for seconds are averaged."""
 _WANTED_HZ = 50.0
-_ENOUGH_REPORTS = 80  # a second: attitudes and positions, 40 each
+_ENOUGH = 0.8  # share of these, of attitudes and positions
+_MEASURED_S = 1.0
 _MAX_REQUESTS = 5
 _ATTITUDES = (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mavlink.MAVLINK_MSG_ID_ATTITUDE)
 
@@ -60,33 +53,25 @@ class Watched:
         reports: the drone's states, axes north, west, up.
         images: what was seen.
         stamped: whether the images have times of their own.
-        vehicle: MAVLink id; None until it is heard.
+        session: with the drone.
     """
 
     def __init__(self, calibration: Calibration, task: Task | None) -> None:
         self.reports: list[MotionReport] = []
         self.images: list[Detections] = []
         self.stamped = False
-        self.vehicle: int | None = None
+        self.session = Session(heartbeat="companion")
         smooth = task is not None and task.camera.effects is not None
         self._detect = new_detector(
             "frames", calibration=calibration, rendered=task is not None, smooth=smooth
         )
-        self._telemetry = VehicleTelemetry()
         self._lag_s: float | None = None
 
     def take_messages(self, messages: list[Message], now_s: float) -> None:
         """Take what was received at a monotonic wall time."""
-        telemetry = self._telemetry
+        telemetry = self.session.telemetry
         for message in messages:
-            if self.vehicle is None and is_vehicle(message):
-                self.vehicle = message.get_srcSystem()
-            if (message.get_srcSystem(), message.get_srcComponent()) != (
-                self.vehicle,
-                AUTOPILOT_COMPONENT_ID,
-            ):
-                continue
-            if not telemetry.take(message, now_s):
+            if not self.session.take(message, now_s):
                 continue
             attitude, position = telemetry.attitude, telemetry.position
             if message.get_msgId() in _ATTITUDES and attitude is not None:
@@ -179,7 +164,7 @@ async def measure_live(
 
 
 def _silent(watched: Watched, drone_url: str) -> str:
-    if watched.vehicle is None:
+    if watched.session.system_id is None:
         return (
             f"no vehicle was heard on {drone_url} within {_FIND_S:g} s; "
             "is it running and sending to this address?"
@@ -244,32 +229,20 @@ class _Reading:
     def __init__(self, link: VehicleLink, watched: Watched) -> None:
         self.stopped = False
         self._link, self._watched = link, watched
-        self._requests = 0
-        self._reports = 0
 
     async def run(self) -> None:
         """Read until stopped; raises `LinkError` if the link fails."""
-        beat_s = -_BEAT_S
+        session, now_s = self._watched.session, time.monotonic()
+        rates = pose_rates(_WANTED_HZ, _ENOUGH, _MEASURED_S, now_s, _MAX_REQUESTS)
         while not self.stopped:
-            now_s = time.monotonic()
-            if now_s - beat_s >= _BEAT_S:
-                beat_s = now_s
-                # Over udpout the vehicle cannot send before it has received something.
-                self._link.send(companion_heartbeat())
-                self._ask_for_rates()
+            if session.system_id is not None:
+                for request in rates.requests(session.vehicle, session.pose_counts, now_s):
+                    session.send(request)
+            for message in session.due(now_s):
+                self._link.send(message)
             messages, now_s = await asyncio.to_thread(self._receive)
             self._watched.take_messages(messages, now_s)
 
     def _receive(self) -> tuple[list[Message], float]:
         messages = self._link.receive(_RECEIVE_S)
         return messages, time.monotonic()
-
-    def _ask_for_rates(self) -> None:
-        """Once a second: request poses more often if fewer came than are needed."""
-        vehicle, reports = self._watched.vehicle, len(self._watched.reports)
-        few, self._reports = reports - self._reports < _ENOUGH_REPORTS, reports
-        if vehicle is None or not few or self._requests >= _MAX_REQUESTS:
-            return
-        self._requests += 1
-        for number in (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED):
-            self._link.send(request_rate(vehicle, number, _WANTED_HZ))

@@ -7,7 +7,6 @@ measurements agree; its sources are parameters, EK3_SRC1_*.
 from __future__ import annotations
 
 from framerunner.doctor.findings import Findings, Level
-from framerunner.doctor.listen import Record
 from framerunner.doctor.subjects import Subject, finding, good, missing, note
 from framerunner.wire import ardupilot_modes
 from framerunner.wire.ardupilot_messages import (
@@ -17,6 +16,7 @@ from framerunner.wire.ardupilot_messages import (
     has_position,
 )
 from framerunner.wire.dialect import mavlink
+from framerunner.wire.session.record import Record
 
 _GUIDE = "docs/ardupilot.md, section 5"
 _GPS = 3

@@ -11,7 +11,6 @@ from math import isfinite
 
 from framerunner.doctor import ardupilot
 from framerunner.doctor.findings import Finding, Findings, Level
-from framerunner.doctor.listen import Record
 from framerunner.doctor.subjects import Subject
 from framerunner.doctor.subjects import finding as _finding
 from framerunner.doctor.subjects import good as _good
@@ -19,6 +18,7 @@ from framerunner.doctor.subjects import missing as _missing
 from framerunner.doctor.subjects import note as _note
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.px4_modes import OFFBOARD
+from framerunner.wire.session.record import Record
 
 WANTED_HZ = 50.0  # as `fly` and `camera` request
 LOW_HZ = 20.0  # the mission's own rate

@@ -12,9 +12,9 @@ from rich.text import Text
 
 from framerunner.doctor.checks import can_fly
 from framerunner.doctor.findings import Finding, Level
-from framerunner.doctor.listen import Record
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.px4_modes import mode_words
+from framerunner.wire.session.record import Record
 
 _MARKS = {Level.GOOD: "[green]ok[/]", Level.NOTE: "[yellow]note[/]", Level.MISSING: "[red]MISSING[/]"}
 _STREAMS = (

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from framerunner.doctor.findings import Findings
-from framerunner.doctor.listen import Record
 from framerunner.mocap.ardupilot import ArduPilotPoses
 from framerunner.mocap.facts import Facts, SendSettings
 from framerunner.mocap.poses import Pose
 from framerunner.mocap.px4 import Px4Poses
 from framerunner.wire.dialect import Message
+from framerunner.wire.session.record import Record
 
 
 class PoseDialect(Protocol):

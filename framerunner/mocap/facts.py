@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import partial
 
 from framerunner.doctor.findings import Finding, Level
-from framerunner.doctor.listen import Record
 from framerunner.mocap.motion import PoseComparison
 from framerunner.wire.dialect import mavlink
+from framerunner.wire.session.record import Record
 
 NEAR_M, FAR_M = 0.10, 0.5
 DELAY_S = 0.02  # difference that matters

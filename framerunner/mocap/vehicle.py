@@ -6,22 +6,20 @@ from collections import deque
 from collections.abc import Iterator
 from statistics import median
 
-from framerunner.doctor.listen import Record
 from framerunner.mocap.dialects import PoseDialect, dialect_of
 from framerunner.mocap.facts import Origin
 from framerunner.wire.ardupilot_messages import add_ardupilot_messages
 from framerunner.wire.dialect import (
-    AUTOPILOT_COMPONENT_ID,
     Message,
-    companion_heartbeat,
     degrees_e7,
     mavlink,
     millimetres,
     request_message,
-    request_rate,
+    request_parameter,
 )
+from framerunner.wire.session.record import Record
+from framerunner.wire.session.session import RateWatch
 
-_HEARTBEAT_S = 1.0
 _REQUEST_S = 1.0
 _PARAMETER_S = 0.05
 _ORIGIN_S = 1.0
@@ -52,17 +50,16 @@ class Vehicle:
     def __init__(
         self, needs_truth_hz: float = 0.0, origin: Origin | None = None, zero_s: float = 0.0
     ) -> None:
-        self.record = Record()
+        self.record = Record(heartbeat="companion")
         self.answers = 0
         self.rates_rad_s: deque[tuple[int, float, float, float]] = deque(maxlen=2000)
         self.worst_ratio = 0.0
         self._truth_hz, self._origin, self._zero_s = needs_truth_hz, origin, zero_s
+        self._rates: RateWatch | None = None  # once the autopilot is known
         self._restarts = 0
         self._asked_origin = False  # a second ago, without an answer
         self._offsets: deque[tuple[float, float]] = deque(maxlen=_KEPT)  # round trip, offset
-        self._due_s = {"heartbeat": 0.0, "rates": 0.5, "timesync": 0.0, "parameter": 0.0, "origin": 0.0}
-        self._counted: dict[str, int] = {}
-        self._counted_s = 0.0
+        self._due_s = {"timesync": 0.0, "parameter": 0.0, "origin": 0.0}
 
     @property
     def found(self) -> bool:
@@ -105,9 +102,7 @@ class Vehicle:
     def take(self, message: Message, now_s: float) -> Message | None:
         """Take a message; the answer to send, if there is one."""
         self.record.take(message, now_s)
-        if message.get_srcSystem() != self.record.system_id:
-            return None
-        if message.get_srcComponent() != AUTOPILOT_COMPONENT_ID:
+        if not self.record.is_from_autopilot(message):
             return None
         self._follow_restarts()
         kind = message.get_type()
@@ -151,8 +146,7 @@ class Vehicle:
 
     def requests(self, now_s: float) -> Iterator[Message]:
         """What is due to be sent, except poses. Only rates of this link and a missing origin are set."""
-        if self._is_due("heartbeat", now_s, _HEARTBEAT_S):
-            yield companion_heartbeat()  # over udpout the vehicle cannot send before it has this address
+        yield from self.record.due(now_s)
         system_id = self.record.system_id
         if system_id is None:
             return
@@ -160,8 +154,7 @@ class Vehicle:
             yield mavlink.MAVLink_timesync_message(0, self.stamp_us(now_s) * 1000)
         if self._is_due("parameter", now_s, _PARAMETER_S):
             yield from self._parameter_request(system_id, now_s)
-        if self._is_due("rates", now_s, _REQUEST_S):
-            yield from self._rate_requests(system_id, now_s)
+        yield from self._rate_requests(system_id, now_s)
         wants_origin = self.dialect.needs_origin or self._origin is not None
         if wants_origin and self._is_due("origin", now_s, _ORIGIN_S):
             yield from self._origin_requests(system_id)
@@ -179,20 +172,18 @@ class Vehicle:
             self._due_s["parameter"] = now_s + 5.0  # they may be changed meanwhile
             missing = [*names]
         name = missing[int(now_s / _PARAMETER_S) % len(missing)]
-        yield mavlink.MAVLink_param_request_read_message(system_id, AUTOPILOT_COMPONENT_ID, name.encode(), -1)
+        yield request_parameter(system_id, name)
 
-    def _rate_requests(self, system_id: int, now_s: float) -> Iterator[Message]:
+    def _rate_requests(self, system_id: int, now_s: float) -> list[Message]:
         """Request what comes too slowly; never less than the link has already."""
-        counts, span_s = self.record.counts, now_s - self._counted_s
         wanted = dict(self.dialect.streams_hz)
         if self._truth_hz:
             name, number = self.dialect.truth
             wanted[name] = (number, self._truth_hz)
-        for name, (number, wanted_hz) in wanted.items():
-            received_hz = (counts.get(name, 0) - self._counted.get(name, 0)) / span_s
-            if received_hz < _LOW * wanted_hz:
-                yield request_rate(system_id, number, wanted_hz)
-        self._counted, self._counted_s = dict(counts), now_s
+        if self._rates is None:
+            self._rates = RateWatch(dict(wanted.values()), _LOW, _REQUEST_S, now_s)
+        counts = {number: self.record.counts.get(name, 0) for name, (number, _) in wanted.items()}
+        return self._rates.requests(system_id, counts, now_s)
 
     def _origin_requests(self, system_id: int) -> Iterator[Message]:
         """Ask for the origin until it is known; set it if there is none and one was given."""

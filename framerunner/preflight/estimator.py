@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from math import isnan
 
-from framerunner.doctor.listen import Record
 from framerunner.wire.ardupilot_messages import (
     EKF_ATTITUDE,
     EKF_POS_HORIZ_ABS,
@@ -12,6 +11,7 @@ from framerunner.wire.ardupilot_messages import (
     has_position,
 )
 from framerunner.wire.dialect import mavlink
+from framerunner.wire.session.record import Record
 from offboard.safety.vehicle_checks import EstimatorFacts
 
 

@@ -14,11 +14,10 @@ from pathlib import Path
 
 from framerunner.errors import SettingError
 from framerunner.files.text_file import TextError, read_text
-from framerunner.preflight.fence_upload import MAX_ITEMS, FenceItem, upload_fence
-from framerunner.preflight.parameters import ParameterValue, set_parameter
-from framerunner.preflight.session import VehicleSession
+from framerunner.preflight.link import PreflightClient
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
-from offboard.drone import DroneError
+from framerunner.wire.session.fence import MAX_ITEMS, FenceItem, upload_fence
+from framerunner.wire.session.session import ParameterValue, VehicleError
 
 OPTION = "--restore-parameters"
 OVERRIDE = "--any-vehicle"
@@ -49,7 +48,7 @@ class KeptState:
     """What a vehicle had before.
 
     Attributes:
-        uid: of the vehicle, as `VehicleSession.uid`; empty: the file does not say.
+        uid: of the vehicle, as `identity`; empty: the file does not say.
         parameters: old values.
         fence: the old fence, empty if there was none; None: it was not replaced.
     """
@@ -146,24 +145,24 @@ def check_vehicle(kept: KeptState, path: Path, uid: str) -> None:
     )
 
 
-def restore(session: VehicleSession, kept: KeptState, tell: Callable[[str], None]) -> None:
+def restore(client: PreflightClient, kept: KeptState, tell: Callable[[str], None]) -> None:
     """Return parameters and fence to a disarmed vehicle.
 
     Args:
-        session: with the vehicle.
+        client: of the vehicle.
         kept: what it had.
         tell: called with a line for each thing that was returned.
 
     Raises:
-        DroneError: the vehicle is armed, or one thing could not be set; those before it are.
+        VehicleError: the vehicle is armed, or one thing could not be set; those before it are.
     """
-    if session.record.armed:
-        raise DroneError("the vehicle is armed; land and disarm it before its parameters are changed")
+    if client.session.armed:
+        raise VehicleError("the vehicle is armed; land and disarm it before its parameters are changed")
     for parameter in kept.parameters:
-        set_parameter(session, parameter)
+        client.set_parameter(parameter)
         tell(f"{parameter.name} is {parameter.value:g} now")
     if kept.fence is not None:
-        upload_fence(session, kept.fence)
+        upload_fence(client, kept.fence)
         count = len(kept.fence)
         tell(f"the fence has {count} items, as before" if count else "there is no fence, as before")
 

@@ -19,6 +19,7 @@ Message = Any  # a pymavlink message; its classes are made at run time and have 
 
 AUTOPILOT_COMPONENT_ID = 1
 BROADCAST = 0
+MAVSDK_SYSTEM_ID = 245  # of a ground station, as the app is one
 _MAVLINK_VERSION = 3
 
 _own = vars(mavlink)
@@ -80,6 +81,19 @@ def command_long(
 def request_message(system_id: int, message_id: int, component_id: int = AUTOPILOT_COMPONENT_ID) -> Message:
     """Request a message once (REQUEST_MESSAGE)."""
     return command_long(system_id, mavlink.MAV_CMD_REQUEST_MESSAGE, message_id, component_id=component_id)
+
+
+def request_parameter(system_id: int, name: str) -> Message:
+    """Request a parameter by its name (PARAM_REQUEST_READ)."""
+    return mavlink.MAVLink_param_request_read_message(system_id, AUTOPILOT_COMPONENT_ID, name.encode(), -1)
+
+
+def event_id(name: str) -> int:
+    """Id of an autopilot's EVENT: its component, then 24 bits of its name's FNV-1a hash, as in PX4."""
+    number = 0x811C9DC5
+    for byte in name.encode():
+        number = (number ^ byte) * 0x01000193 & 0xFFFFFFFF
+    return AUTOPILOT_COMPONENT_ID << 24 | number & 0xFFFFFF
 
 
 def request_rate(system_id: int, message_id: int, rate_hz: float) -> Message:

@@ -1,14 +1,19 @@
-"""Messages to one vehicle through MAVSDK's plugin `mavlink_direct`, which sends each once, at once."""
+"""Messages from and to one vehicle through MAVSDK's plugin `mavlink_direct`, which sends each once, at once.
+
+They are pymavlink's here, as for all clients of vehicles; the plugin's are JSON.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from math import nan
 from typing import Any
 
 from mavsdk.asyncio import MavsdkError
 from mavsdk.plugins.mavlink_direct import MavlinkMessage
 
-from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, command_long, mavlink
 from offboard.drone import VelocityCommand
 from offboard.link.commands import synchronous
 
@@ -33,6 +38,29 @@ class CommandRefusedError(MavsdkError):  # type: ignore[misc]  # MAVSDK is untyp
         return cls(f"result {result}" if known is None else known.name.removeprefix("MAV_RESULT_"))
 
 
+def subscribe(direct: Any, name: str, take: Callable[[Message], None]) -> None:  # noqa: ANN401
+    """Let MAVSDK's thread call a function with each message of a name, of any component of the vehicle.
+
+    Numbers that JSON cannot express, which are not finite, are NaN.
+    """
+    kind = getattr(mavlink, f"MAVLink_{name.lower()}_message")
+
+    def receive(message: Any, _user: object) -> None:  # noqa: ANN401
+        fields = json.loads(message.fields_json)
+        found = kind(*(_finite(fields.get(each, 0)) for each in kind.fieldnames))
+        header = found.get_header()
+        header.srcSystem, header.srcComponent = message.system_id, message.component_id
+        take(found)
+
+    direct.subscribe_message(name, receive)
+
+
+def _finite(value: Any) -> Any:  # noqa: ANN401
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    return nan if value is None else value
+
+
 class DirectMessages:
     """Sends messages to an autopilot; from any thread.
 
@@ -43,55 +71,43 @@ class DirectMessages:
 
     def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
         self._direct = synchronous(direct)
-        self._system_id = system_id
+        self.system_id = system_id
 
-    def send(self, name: str, fields: dict[str, float]) -> None:
-        """Send a message to the autopilot."""
-        self._direct.send_message(self._message(name, fields))
+    def send(self, message: Message) -> None:
+        """Send a message."""
+        self._direct.send_message(_encoded(message))
 
     def send_velocity(self, command: VelocityCommand) -> None:
         """Send a velocity and a yaw rate in body axes."""
-        self.send("SET_POSITION_TARGET_LOCAL_NED", _velocity_target(command))
-
-    def send_ping(self, sequence: int) -> None:
-        """Send a PING, which the vehicle returns."""
-        fields = {"time_usec": 0, "seq": sequence, "target_system": 0, "target_component": 0}
-        self._direct.send_message(MavlinkMessage("PING", 0, 0, 0, 0, json.dumps(fields)))
+        self.send(
+            mavlink.MAVLink_set_position_target_local_ned_message(
+                0,
+                self.system_id,
+                AUTOPILOT_COMPONENT_ID,
+                mavlink.MAV_FRAME_BODY_NED,
+                _VELOCITY_AND_YAW_RATE,
+                *(0.0, 0.0, 0.0),
+                *(command.forward_m_s, -command.left_m_s, -command.up_m_s),
+                *(0.0, 0.0, 0.0),
+                0.0,
+                -command.yaw_rate_rad_s,
+            )
+        )
 
     def send_command(self, number: int, *parameters: float) -> None:
         """Send a MAV_CMD without waiting for its answer."""
-        self.send("COMMAND_LONG", _command_fields(number, *parameters))
+        self.send(command_long(self.system_id, number, *parameters))
 
     def command(self, number: int, *parameters: float) -> None:
         """Send a MAV_CMD and wait for its answer, which blocks. Raises `CommandRefusedError`."""
-        message = self._message("COMMAND_LONG", _command_fields(number, *parameters))
+        message = _encoded(command_long(self.system_id, number, *parameters))
         result = json.loads(self._direct.send_command(message).fields_json).get("result")
         if result != mavlink.MAV_RESULT_ACCEPTED:
             raise CommandRefusedError.of(result)
 
-    def _message(self, name: str, fields: dict[str, float]) -> MavlinkMessage:
-        target = {"target_system": self._system_id, "target_component": AUTOPILOT_COMPONENT_ID}
-        return MavlinkMessage(
-            name, 0, 0, self._system_id, AUTOPILOT_COMPONENT_ID, json.dumps({**target, **fields})
-        )
 
-
-def _command_fields(number: int, *parameters: float) -> dict[str, float]:
-    filled = (*parameters, *([0.0] * (7 - len(parameters))))
-    values = {f"param{index}": value for index, value in enumerate(filled, start=1)}
-    return {"command": number, "confirmation": 0, **values}
-
-
-def _velocity_target(command: VelocityCommand) -> dict[str, float]:
-    """The fields of SET_POSITION_TARGET_LOCAL_NED for a velocity and a yaw rate in body axes."""
-    zeros = dict.fromkeys(("x", "y", "z", "afx", "afy", "afz", "yaw"), 0.0)
-    return {
-        **zeros,
-        "time_boot_ms": 0,
-        "coordinate_frame": mavlink.MAV_FRAME_BODY_NED,
-        "type_mask": _VELOCITY_AND_YAW_RATE,
-        "vx": command.forward_m_s,
-        "vy": -command.left_m_s,
-        "vz": -command.up_m_s,
-        "yaw_rate": -command.yaw_rate_rad_s,
-    }
+def _encoded(message: Message) -> MavlinkMessage:
+    fields = message.to_dict()
+    name = fields.pop("mavpackettype")
+    target = (fields.get("target_system", 0), fields.get("target_component", 0))
+    return MavlinkMessage(name, 0, 0, *target, json.dumps(fields))

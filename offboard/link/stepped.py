@@ -8,17 +8,18 @@ the autopilot has it. So a flight in the same simulation is the same again.
 from __future__ import annotations
 
 import asyncio
-import json
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable
+from math import inf
 from typing import Any, ClassVar
 
-from framerunner.wire.dialect import mavlink
+from framerunner.wire.dialect import MAVSDK_SYSTEM_ID, Message, mavlink
+from framerunner.wire.session.session import Request, Session
 from offboard.drone import DroneError, VelocityCommand
 from offboard.link.commands import synchronous
 from offboard.link.dialect import TickExchange
-from offboard.link.direct import CommandRefusedError, DirectMessages
+from offboard.link.direct import CommandRefusedError, DirectMessages, subscribe
 
 ECHO_LIMIT_S = 20.0  # wall time for the answer to a PING, on the busiest machine
 _ECHO_AGAIN_S = 0.5  # wall time after which another one is sent
@@ -35,7 +36,7 @@ class _Echo:
         self._loop = asyncio.get_running_loop()
         self._sequence = 0
         self._echo: asyncio.Future[None] | None = None
-        synchronous(direct).subscribe_message("PING", self._on_ping)
+        subscribe(synchronous(direct), "PING", self._on_ping)
 
     async def wait(self) -> None:
         """Send a PING, and wait until it comes back."""
@@ -45,44 +46,17 @@ class _Echo:
         while not echo.done():
             if time.monotonic() > end_s:
                 raise DroneError(f"link lost: {self._name} has not returned a PING for {ECHO_LIMIT_S:g} s")
-            self._messages.send_ping(self._sequence)
+            self._messages.send(mavlink.MAVLink_ping_message(0, self._sequence, 0, 0))
             await asyncio.wait((echo,), timeout=_ECHO_AGAIN_S)
 
-    def _on_ping(self, message: Any, _user: object) -> None:  # noqa: ANN401
+    def _on_ping(self, message: Message) -> None:
         """On MAVSDK's thread. PX4 sends PINGs of its own, too, to nobody."""
-        fields = json.loads(message.fields_json)
-        if fields["target_system"]:
-            self._loop.call_soon_threadsafe(self._returned, fields["seq"])
+        if message.target_system:
+            self._loop.call_soon_threadsafe(self._returned, message.seq)
 
     def _returned(self, sequence: int) -> None:
         if self._echo is not None and sequence == self._sequence and not self._echo.done():
             self._echo.set_result(None)
-
-
-class _Requests:
-    """MAV_CMDs, whose answers are awaited while time goes on."""
-
-    def __init__(self, messages: DirectMessages, direct: Any) -> None:  # noqa: ANN401
-        self._messages = messages
-        self._loop = asyncio.get_running_loop()
-        self._answers: dict[int, asyncio.Future[int]] = {}  # by the number of the command
-        synchronous(direct).subscribe_message("COMMAND_ACK", self._on_answer)
-
-    def send(self, number: int, *parameters: float) -> Awaitable[None]:
-        """Send a command at once; what is returned waits for the answer, and raises `CommandRefusedError`."""
-        answer: asyncio.Future[int] = self._loop.create_future()
-        self._answers[number] = answer
-        self._messages.send_command(number, *parameters)
-        return _accepted(answer)
-
-    def _on_answer(self, message: Any, _user: object) -> None:  # noqa: ANN401
-        fields = json.loads(message.fields_json)
-        self._loop.call_soon_threadsafe(self._answered, fields["command"], fields["result"])
-
-    def _answered(self, number: int, result: int) -> None:
-        answer = self._answers.get(number)
-        if answer is not None and not answer.done() and result != mavlink.MAV_RESULT_IN_PROGRESS:
-            answer.set_result(result)
 
 
 class SteppedDialect(ABC):
@@ -106,7 +80,9 @@ class SteppedDialect(ABC):
         self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
         self._sent_since_tick = False
         self._echo = _Echo(self._messages, direct, self.NAME)
-        self._requests = _Requests(self._messages, direct)
+        self._session = Session(MAVSDK_SYSTEM_ID, system_id)
+        self._loop = asyncio.get_running_loop()
+        subscribe(synchronous(direct), "COMMAND_ACK", self._on_answer)
 
     @property
     def exchange(self) -> TickExchange:
@@ -187,16 +163,28 @@ class SteppedDialect(ABC):
     def _set_mode(self, parameters: tuple[float, ...]) -> Awaitable[None]:
         return self._request(mavlink.MAV_CMD_DO_SET_MODE, *parameters)
 
+    def _on_answer(self, message: Message) -> None:
+        """On MAVSDK's thread."""
+        self._loop.call_soon_threadsafe(self._session.take, message, time.monotonic())
+
     def _request(self, number: int, *parameters: float) -> Awaitable[None]:
-        return self._requests.send(number, *parameters)
+        """Send a command at once; what is returned waits for the answer, and raises `CommandRefusedError`."""
+        over = asyncio.Event()
+        request = self._session.command(number, *parameters, urgent=True, tries=1, every_s=inf)
+        request.on_over = over.set
+        for message in self._session.due(time.monotonic()):
+            self._messages.send(message)
+        return _accepted(request, over)
 
 
-async def _accepted(answer: asyncio.Future[int]) -> None:
+async def _accepted(request: Request[int], over: asyncio.Event) -> None:
     """Wait for an answer. Raises `CommandRefusedError` if it is another one than "accepted"."""
     try:
         async with asyncio.timeout(_ANSWER_LIMIT_S):
-            result = await answer
+            await over.wait()
     except TimeoutError:
-        raise CommandRefusedError("TIMEOUT") from None
-    if result != mavlink.MAV_RESULT_ACCEPTED:
-        raise CommandRefusedError.of(result)
+        request.end()
+    if request.answer is None:
+        raise CommandRefusedError("TIMEOUT")
+    if request.answer != mavlink.MAV_RESULT_ACCEPTED:
+        raise CommandRefusedError.of(request.answer)

@@ -12,23 +12,23 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import nan, radians
+from math import radians
 from typing import Any
 
 from framerunner.geometry.axes import Pose
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.vectors import Quaternion, Vec3
-from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message
 from framerunner.wire.mission_tunnel import TEXT_PREFIX
 from framerunner.wire.status_text import plain
 from framerunner.wire.vehicle_telemetry import MessageOrder
 from offboard.arming import Arming
+from offboard.link.direct import subscribe
 from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
 
 TICK_US = 50_000
@@ -118,11 +118,11 @@ class TelemetryFeed:
         """
         self._loop = asyncio.get_running_loop()
         plugin.subscribe_attitude_euler(self._on_attitude)
-        direct.subscribe_message("LOCAL_POSITION_NED", self._on_position)
+        subscribe(direct, "LOCAL_POSITION_NED", self._on_position)
         self._gimbal.subscribe(direct)
         plugin.subscribe_armed(self._on_armed)
         if numbered_modes:
-            direct.subscribe_message("HEARTBEAT", partial(_take_mode, self, numbered_modes))
+            subscribe(direct, "HEARTBEAT", partial(_take_mode, self, numbered_modes))
         else:
             plugin.subscribe_flight_mode(self._on_mode)
         plugin.subscribe_landed_state(self._on_landed)
@@ -242,13 +242,12 @@ class TelemetryFeed:
             self.tick_number = tick  # after its sample, for tasks that look at the number
             self._wake()
 
-    def _on_position(self, message: Any, _user: object) -> None:  # noqa: ANN401
-        fields = json.loads(message.fields_json)
-        position_us = fields["time_boot_ms"] * 1000
+    def _on_position(self, message: Message) -> None:
+        position_us = message.time_boot_ms * 1000
         if not self._position_order.is_next(position_us):
             return
-        self.position_ned_m = (_number(fields["x"]), _number(fields["y"]), _number(fields["z"]))
-        self.velocity_ned_m_s = (_number(fields["vx"]), _number(fields["vy"]), _number(fields["vz"]))
+        self.position_ned_m = (message.x, message.y, message.z)
+        self.velocity_ned_m_s = (message.vx, message.vy, message.vz)
         self.position_us = position_us
         self._position_received_s = self._clock()
         self.positions += 1
@@ -287,10 +286,10 @@ def pose_of(feed: TelemetryFeed) -> Pose:
     return Pose(feed.position_ned_m, feed.yaw_ned_rad)
 
 
-def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Any, _user: object) -> None:  # noqa: ANN401
-    """Take the mode in an autopilot's HEARTBEAT, of `mavlink_direct`."""
-    if heartbeat.component_id == AUTOPILOT_COMPONENT_ID:
-        number = json.loads(heartbeat.fields_json)["custom_mode"]
+def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Message) -> None:
+    """Take the mode in an autopilot's HEARTBEAT."""
+    if heartbeat.get_srcComponent() == AUTOPILOT_COMPONENT_ID:
+        number = heartbeat.custom_mode
         feed.mode = names.get(number, f"mode {number}")
 
 
@@ -303,8 +302,3 @@ def least_lag(before_s: float | None, lag_s: float) -> float:
     if before_s is None:
         return lag_s
     return max(min(before_s + LAG_GROWTH_S, lag_s), lag_s - MAX_JITTER_S)
-
-
-def _number(value: float | None) -> float:
-    """JSON cannot express values that are not finite; MAVSDK writes null."""
-    return nan if value is None else value

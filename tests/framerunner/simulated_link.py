@@ -171,7 +171,7 @@ class LinkedVehicle:
         fields = {"time_boot_ms": state.time_us // 1000}
         fields |= zip("xyz", state.position_ned_m, strict=True)
         fields |= zip(("vx", "vy", "vz"), state.velocity_ned_m_s, strict=True)
-        position = SimpleNamespace(fields_json=json.dumps(fields))
+        position = SimpleNamespace(system_id=1, component_id=1, fields_json=json.dumps(fields))
 
         def arrive():
             self.direct.call("LOCAL_POSITION_NED", position)

@@ -20,7 +20,8 @@ class Direct:
         self.callback = callback
 
     def tell(self, q, flags):
-        self.callback(SimpleNamespace(fields_json=json.dumps({"q": q, "flags": flags})), None)
+        fields = json.dumps({"q": q, "flags": flags})
+        self.callback(SimpleNamespace(system_id=1, component_id=154, fields_json=fields), None)
 
 
 @pytest.fixture

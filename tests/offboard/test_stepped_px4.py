@@ -38,7 +38,9 @@ class FakePlugin:
             self.receive("COMMAND_ACK", {"command": fields["command"], "result": self.result})
 
     def receive(self, name, fields):
-        self.callbacks[name](SimpleNamespace(fields_json=json.dumps(fields)), None)
+        self.callbacks[name](
+            SimpleNamespace(system_id=1, component_id=1, fields_json=json.dumps(fields)), None
+        )
 
     def names(self):
         names = [name for name, _ in self.sent]

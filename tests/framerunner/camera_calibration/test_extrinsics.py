@@ -180,7 +180,7 @@ def test_a_live_drone_is_only_watched() -> None:
     attitude = mavlink.MAVLink_attitude_quaternion_message(1000, 0.955336, 0.0, 0.0, 0.295520, 0.0, 0.0, 0.0)
     position = mavlink.MAVLink_local_position_ned_message(1010, 1.0, 2.0, -3.0, 0.1, 0.2, -0.3)
     watched.take_messages([received(each) for each in (heartbeat, attitude, position)], 5.0)
-    assert watched.vehicle == 7
+    assert watched.session.system_id == 7
     last = watched.reports[-1]
     assert (last.time_us, last.position_time_us) == (1_000_000, 1_010_000)
     assert last.position_m == pytest.approx((1.0, -2.0, 3.0))

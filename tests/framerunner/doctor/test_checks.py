@@ -6,8 +6,8 @@ import pytest
 
 from framerunner.doctor.checks import can_fly, examine
 from framerunner.doctor.findings import Level
-from framerunner.doctor.listen import SUMMARY, Record, event_id
-from framerunner.wire.dialect import mavlink
+from framerunner.wire.dialect import event_id, mavlink
+from framerunner.wire.session.record import SUMMARY, Record
 
 GOOD_PARAMETERS = {
     "BAT_CRIT_THR": 0.07,
@@ -61,6 +61,8 @@ def put(record, message):
     """Put a message into a record, without its counts."""
     record.latest[message.get_type()] = message
     record.telemetry.take(message)
+    if message.get_type() == "HEARTBEAT":
+        record.autopilot = message.autopilot
 
 
 def healthy(**parameters):

@@ -11,7 +11,6 @@ from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
 from framerunner.doctor.findings import Level
-from framerunner.doctor.listen import Record
 from framerunner.mocap.facts import Facts, Origin, SendSettings, Unused
 from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison
@@ -21,6 +20,7 @@ from framerunner.mocap.sources import SitlSource, TimedPose
 from framerunner.mocap.vehicle import Vehicle
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.framing import PacketReader
+from framerunner.wire.session.record import Record
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 
