@@ -6,8 +6,7 @@ measurements agree; its sources are parameters, EK3_SRC1_*.
 
 from __future__ import annotations
 
-from framerunner.doctor.findings import Findings, Level
-from framerunner.doctor.subjects import Subject, finding, good, missing, note
+from framerunner.doctor.subjects import Subject, good, missing, note
 from framerunner.wire import ardupilot_modes
 from framerunner.wire.ardupilot_messages import (
     EKF_ATTITUDE,
@@ -17,6 +16,7 @@ from framerunner.wire.ardupilot_messages import (
 )
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.session.record import Record
+from offboard.safety.check import Checks
 
 _GUIDE = "docs/ardupilot.md, section 5"
 _GPS = 3
@@ -30,7 +30,7 @@ _HIGH_VARIANCE = 0.5
 _CHALLENGE_HEIGHT_M, _CHALLENGE_REACH_M = 3.0, 8.0
 
 
-def autopilot(record: Record) -> Findings:
+def autopilot(record: Record) -> Checks:
     """Whether it is ArduCopter, whose GUIDED mode takes velocities."""
     heartbeat = record.latest["HEARTBEAT"]
     if not ardupilot_modes.is_arducopter(heartbeat):
@@ -46,7 +46,7 @@ def autopilot(record: Record) -> Findings:
         yield good("guided", "takes velocities in body axes")
 
 
-def health(record: Record) -> Findings:
+def health(record: Record) -> Checks:
     """The pre-arm checks; ArduPilot reports its reasons as texts."""
     status = record.latest.get("SYS_STATUS")
     if status is None:
@@ -61,7 +61,7 @@ def health(record: Record) -> Findings:
     yield missing("pre-arm checks", f"not passed: {reasons}" if reasons else "not passed", advice)
 
 
-def estimator(record: Record) -> Findings:
+def estimator(record: Record) -> Checks:
     """Which states the estimator has, and whether measurements agree with them."""
     report = record.latest.get("EKF_STATUS_REPORT")
     if report is None:
@@ -86,7 +86,7 @@ def estimator(record: Record) -> Findings:
         yield good("estimator", f"measurements agree, largest variance {max(variances.values()):.2f}")
 
 
-def position(record: Record) -> Findings:
+def position(record: Record) -> Checks:
     """Where its position and height are from."""
     report, parameters = record.latest.get("EKF_STATUS_REPORT"), record.parameters
     source = int(parameters.get("EK3_SRC1_POSXY", _GPS))
@@ -110,7 +110,7 @@ def position(record: Record) -> Findings:
     yield from _height(record, advice)
 
 
-def _height(record: Record, advice: str) -> Findings:
+def _height(record: Record, advice: str) -> Checks:
     report = record.latest.get("EKF_STATUS_REPORT")
     source = int(record.parameters.get("EK3_SRC1_POSZ", 1))
     words = _HEIGHT_SOURCES.get(source, f"source {source}")
@@ -123,7 +123,7 @@ def _height(record: Record, advice: str) -> Findings:
         yield note("height", text, f"take it from external navigation (EK3_SRC1_POSZ 6): {_GUIDE}")
 
 
-def limits(record: Record) -> Findings:
+def limits(record: Record) -> Checks:
     """Parameters that slow the drone down or end the flight."""
     parameters = record.parameters
     if not parameters:
@@ -155,14 +155,15 @@ def limits(record: Record) -> Findings:
                 yield missing(name, f"fence at {value:g} m", f"the challenge needs {minimum:g} m")
 
 
-def failsafes(record: Record) -> Findings:
+def failsafes(record: Record) -> Checks:
     """What the drone does without commands, for a person to confirm."""
     parameters = record.parameters
     timeout_s = parameters.get("GUID_TIMEOUT")
     if timeout_s is not None:
         advice = "" if 0.5 <= timeout_s <= 1.0 else "set GUID_TIMEOUT to 1: until then it flies on"
-        level = Level.NOTE if advice else Level.GOOD
-        yield finding(level, "setpoints lost", f"it stops and hovers after {timeout_s:g} s", advice)
+        yield (note if advice else good)(
+            "setpoints lost", f"it stops and hovers after {timeout_s:g} s", advice
+        )
     station = parameters.get("FS_GCS_ENABLE")
     if station is not None:
         climb_m = parameters.get("RTL_ALT", 1500.0) / 100
@@ -173,7 +174,7 @@ def failsafes(record: Record) -> Findings:
             advice = "under a roof set FS_GCS_ENABLE to 5 (land)"
         elif station == 5.0:
             words = "land"
-        yield finding(Level.NOTE if advice else Level.GOOD, "ground station lost", words, advice)
+        yield (note if advice else good)("ground station lost", words, advice)
     if parameters.get("FS_THR_ENABLE") == 1.0:
         advice = "under a roof set FS_THR_ENABLE to 3 (land)"
         yield note("radio control lost", "return, which climbs to RTL_ALT first", advice)

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from framerunner.camera_calibration.camera_delay import delay_of
 from framerunner.doctor.camera_times import CameraTimes, calibration_facts
-from framerunner.doctor.findings import Finding, Level
-from offboard.safety.check import Check, Outcome
+from offboard.safety.check import Check
 from offboard.safety.vehicle_checks import calibration_checks, camera_checks
 from vision.calibration.model import Calibration
 
 LOOK_S = 3.0
 """For how long images are received."""
-_LEVELS = {Outcome.PASS: Level.GOOD, Outcome.NOTE: Level.NOTE, Outcome.FAIL: Level.MISSING}
 
 
 def examine_camera(
     times: CameraTimes | None, calibration: Calibration | None, clock_ms: tuple[int, float] | None
-) -> list[Finding]:
+) -> list[Check]:
     """What was measured of the camera, and whether its lens, mounting and delay are known.
 
     Args:
@@ -28,4 +26,4 @@ def examine_camera(
     if times is not None:
         checks += camera_checks(times.facts(clock_ms, delay_of(None, calibration)))
     checks += calibration_checks(calibration_facts(calibration, (0, 0) if times is None else times.size_px))
-    return [Finding(_LEVELS[each.outcome], each.name, each.value, each.advice) for each in checks]
+    return checks

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from framerunner.doctor.findings import Findings
 from framerunner.mocap.ardupilot import ArduPilotPoses
 from framerunner.mocap.facts import Facts, SendSettings
 from framerunner.mocap.poses import Pose
 from framerunner.mocap.px4 import Px4Poses
 from framerunner.wire.dialect import Message
 from framerunner.wire.session.record import Record
+from offboard.safety.check import Checks
 
 
 class PoseDialect(Protocol):
@@ -55,7 +55,7 @@ class PoseDialect(Protocol):
     def used_in_part(self, facts: Facts) -> tuple[str, str] | None:
         """Which setting keeps it from using all of a pose, and what to do; None: it uses all."""
 
-    def settings(self, facts: Facts) -> Findings:
+    def settings(self, facts: Facts) -> Checks:
         """Its other parameters."""
         ...
 
@@ -63,7 +63,7 @@ class PoseDialect(Protocol):
         """Why its heading differs from that of the poses, and what to do."""
         ...
 
-    def delay(self, facts: Facts) -> Findings:
+    def delay(self, facts: Facts) -> Checks:
         """Whether it knows how old poses are. Called only when that has been measured."""
         ...
 

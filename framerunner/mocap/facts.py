@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
-from framerunner.doctor.findings import Finding, Level
 from framerunner.mocap.motion import PoseComparison
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.session.record import Record
@@ -13,10 +11,6 @@ from framerunner.wire.session.record import Record
 NEAR_M, FAR_M = 0.10, 0.5
 DELAY_S = 0.02  # difference that matters
 VISION = int(mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION)
-
-good = partial(Finding, Level.GOOD)
-note = partial(Finding, Level.NOTE)
-missing = partial(Finding, Level.MISSING)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from framerunner.doctor.findings import Findings
-from framerunner.mocap.facts import DELAY_S, FAR_M, NEAR_M, VISION, Facts, SendSettings, good, note
+from framerunner.mocap.facts import DELAY_S, FAR_M, NEAR_M, VISION, Facts, SendSettings
 from framerunner.mocap.messages import odometry
 from framerunner.mocap.poses import Pose
 from framerunner.wire.dialect import Message, mavlink
+from offboard.safety.check import Checks, good, note
 
 _POSITION, _HEIGHT, _VELOCITY, _YAW = 1, 2, 4, 8  # bits of EKF2_EV_CTRL
 _WANTED = _POSITION | _HEIGHT | _VELOCITY | _YAW
@@ -80,7 +80,7 @@ class Px4Poses:
             return None
         return f"EKF2_EV_CTRL is {control}", "set it to 15"
 
-    def settings(self, facts: Facts) -> Findings:
+    def settings(self, facts: Facts) -> Checks:
         """The reference of height."""
         reference = facts.record.parameters.get("EKF2_HGT_REF")
         if reference is not None and int(reference) != _HEIGHT_BY_VISION:
@@ -93,7 +93,7 @@ class Px4Poses:
             return "it is not that of the poses", "set EKF2_EV_CTRL to 15 and EKF2_MAG_TYPE to 5"
         return "", "choose --frame or --forward; without a compass restart the vehicle"
 
-    def delay(self, facts: Facts) -> Findings:
+    def delay(self, facts: Facts) -> Checks:
         """EKF2_EV_DELAY, after TIMESYNC has converged."""
         delay_s = facts.comparison.delay_s
         given_ms = facts.record.parameters.get("EKF2_EV_DELAY", 0.0)

@@ -9,13 +9,13 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.page import findings_table
 from framerunner.mocap.facts import Facts, SendSettings
 from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.session import MocapSession
 from framerunner.mocap.sources import PoseSource
 from framerunner.wire.transports.vehicle_link import VehicleLink
+from offboard.safety.check import Check, Outcome
 
 _WAIT_S = 0.002
 _LINE_S = 1.0
@@ -60,7 +60,7 @@ def run_session(
             live.stop()
         if facts is not None:
             _report(console, session, link.url, facts)
-    return session.vehicle.found and all(finding.level is not Level.MISSING for finding in judge(facts))
+    return session.vehicle.found and all(finding.outcome is not Outcome.FAIL for finding in judge(facts))
 
 
 def _run(
@@ -104,7 +104,7 @@ def _report(console: Console, session: MocapSession, url: str, facts: Facts) -> 
             soft_wrap=True,
         )
         return
-    findings: list[Finding] = judge(facts)
+    findings: list[Check] = judge(facts)
     vehicle = session.vehicle.record
     words = (
         f"Vehicle {vehicle.system_id} ({vehicle.autopilot_name}) on {url}, poses from {session.source.label}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
@@ -13,7 +13,6 @@ from pathlib import Path
 from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
 from framerunner.doctor.camera_times import CameraTimes, calibration_facts, measure_camera
 from framerunner.doctor.checks import examine
-from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.listen import listen
 from framerunner.errors import UserError
 from framerunner.flying.plan import FlightPlan
@@ -54,7 +53,6 @@ FENCED = ("px4", "ardupilot")
 """Autopilots that take a fence as mission items."""
 CAMERA_S = 3.0
 KEPT_PARAMETERS = "parameters-before{}.params"
-_OUTCOMES = {Level.GOOD: Outcome.PASS, Level.NOTE: Outcome.NOTE, Level.MISSING: Outcome.FAIL}
 
 
 class NotArmedError(UserError):
@@ -168,7 +166,11 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
             await asyncio.gather(watching, return_exceptions=True)
     record = measured.record
     checks = [
-        *_doctors(examine(record)),
+        *(
+            replace(each, name=RENAMED.get(each.name, each.name))
+            for each in examine(record)
+            if each.name not in REPLACED  # by checks with a limit
+        ),
         estimator_check(estimator_facts(record, autopilot_of(record))),
         battery_check(_battery(record)),
         *link_checks(measured.link),
@@ -346,21 +348,6 @@ def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
     if limits.forward_m_s > caps.level_m_s or max(limits.up_m_s, limits.down_m_s) > caps.vertical_m_s:
         return Check("caps", Outcome.NOTE, value, limit, "they are below what the mission may ask for")
     return Check("caps", Outcome.PASS, value, limit)
-
-
-def _doctors(findings: Sequence[Finding]) -> list[Check]:
-    """The doctor's findings, but for those that other checks replace."""
-    return [
-        Check(
-            RENAMED.get(each.subject, each.subject),
-            _OUTCOMES[each.level],
-            each.text,
-            "",
-            each.advice,
-        )
-        for each in findings
-        if each.subject not in REPLACED
-    ]
 
 
 def _battery(record: Record) -> BatteryFacts:

@@ -15,7 +15,6 @@ from mavsdk.plugins.mavlink_direct import MavlinkMessage
 
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, command_long, mavlink
 from offboard.drone import VelocityCommand
-from offboard.link.commands import synchronous
 
 _VELOCITY_AND_YAW_RATE = (
     mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
@@ -36,6 +35,12 @@ class CommandRefusedError(MavsdkError):  # type: ignore[misc]  # MAVSDK is untyp
         """By the number in COMMAND_ACK."""
         known = mavlink.enums["MAV_RESULT"].get(result)
         return cls(f"result {result}" if known is None else known.name.removeprefix("MAV_RESULT_"))
+
+
+def synchronous(wrapper: Any) -> Any:  # noqa: ANN401 - MAVSDK is untyped
+    """The synchronous object inside one of MAVSDK's asyncio wrappers; they have no public access to it."""
+    inner = getattr(wrapper, "_plugin", None)
+    return wrapper._system if inner is None else inner
 
 
 def subscribe(direct: Any, name: str, take: Callable[[Message], None]) -> None:  # noqa: ANN401

@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import asyncio
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Awaitable
 from math import inf
-from typing import Any, ClassVar
+from typing import Any
 
 from framerunner.wire.dialect import MAVSDK_SYSTEM_ID, Message, mavlink
 from framerunner.wire.session.session import Request, Session
 from offboard.drone import DroneError, VelocityCommand
-from offboard.link.commands import synchronous
-from offboard.link.dialect import TickExchange
-from offboard.link.direct import CommandRefusedError, DirectMessages, subscribe
+from offboard.link.dialect import Dialect, TickExchange
+from offboard.link.direct import CommandRefusedError, DirectMessages, subscribe, synchronous
 
 ECHO_LIMIT_S = 20.0  # wall time for the answer to a PING, on the busiest machine
 _ECHO_AGAIN_S = 0.5  # wall time after which another one is sent
@@ -59,7 +57,7 @@ class _Echo:
             self._echo.set_result(None)
 
 
-class SteppedDialect(ABC):
+class SteppedDialect(Dialect):
     """A vehicle, by MAVSDK's plugin `mavlink_direct`; see the module and `Dialect`.
 
     Requests are sent when a method is called; what it returns waits for the answer.
@@ -69,17 +67,11 @@ class SteppedDialect(ABC):
         system_id: the vehicle's.
     """
 
-    NAME: ClassVar[str]  # of the autopilot, for people
-    OFFBOARD: ClassVar[tuple[float, ...]]  # parameters of MAV_CMD_DO_SET_MODE
-    HOLD: ClassVar[tuple[float, ...]]
-    LAND: ClassVar[tuple[float, ...]]
-
     def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
-        self.ended = False
         self._messages = DirectMessages(direct, system_id)
         self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
         self._sent_since_tick = False
-        self._echo = _Echo(self._messages, direct, self.NAME)
+        self._echo = _Echo(self._messages, direct, self.kind.name)
         self._session = Session(MAVSDK_SYSTEM_ID, system_id)
         self._loop = asyncio.get_running_loop()
         subscribe(synchronous(direct), "COMMAND_ACK", self._on_answer)
@@ -102,37 +94,30 @@ class SteppedDialect(ABC):
         for _ in range(_TURNS):
             await asyncio.sleep(0)
 
-    @abstractmethod
-    def request_streams(self) -> Awaitable[None]:
-        """Request what the vehicle does not send by itself, or too rarely."""
-
     def send(self, command: VelocityCommand) -> None:
         """Send a velocity; ignored after `end`."""
         if not self.ended:
             self._command, self._sent_since_tick = command, True
             self._transmit(command)
 
-    def repeat(self) -> None:  # noqa: B027 - it is complete
-        """Nothing: `before_tick` does."""
-
     def request_offboard(self) -> Awaitable[None]:
         """Request the mode that follows setpoints."""
-        return self._set_mode(self.OFFBOARD)
+        return self._set_mode(self.kind.offboard)
 
     def request_hold(self) -> Awaitable[None]:
         """End the setpoints until the next one, and request hold."""
         self._command = None
-        return self._set_mode(self.HOLD)
+        return self._set_mode(self.kind.hold)
 
     def request_hold_blocking(self) -> None:
         """The same from a thread, which waits for the answer."""
         self._command = None
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.HOLD)
+        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.kind.hold)
 
     def request_land_blocking(self) -> None:
         """End the setpoints permanently and request landing, from a thread, which waits for the answer."""
         self.end()
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.LAND)
+        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.kind.land)
 
     def arm(self) -> Awaitable[None]:
         """Arm."""
@@ -146,7 +131,7 @@ class SteppedDialect(ABC):
     def land(self) -> Awaitable[None]:
         """Request landing where the vehicle is."""
         self._command = None
-        return self._set_mode(self.LAND)
+        return self._set_mode(self.kind.land)
 
     def end(self) -> None:
         """End the setpoints permanently; from any thread."""

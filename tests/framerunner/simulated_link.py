@@ -25,7 +25,7 @@ from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flying.plan import FlightPlan
 from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box
-from offboard.link.dialect import Px4Dialect
+from offboard.link.px4 import Px4Dialect
 from offboard.link.telemetry import TelemetryFeed
 from offboard.link.ticks import Requester, TickSource
 from offboard.link.watchdog import LIMITS
