@@ -5,30 +5,20 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 from framerunner.mocap.facts import Facts, SendSettings, Unused
 from framerunner.mocap.motion import MotionCheck, PoseComparison, SentPose
 from framerunner.mocap.poses import with_forward
 from framerunner.mocap.sources import PoseSource, TimedPose
 from framerunner.mocap.vehicle import Vehicle
-from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.transports.vehicle_link import VehicleLink
 
 SYSTEM_ID = 248  # the doctor has 247
 COMPONENT_ID = mavlink.MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY
 SILENT_S = 0.2  # without a new pose for so long, the source has stopped
 _EARLY = 0.2  # share of a period by which a pose may come early
 _RATE_SPAN_S = 2.0
-
-
-class Link(Protocol):
-    """What is needed of a link, as `VehicleLink` has it."""
-
-    def receive(self, timeout_s: float) -> list[Message]:
-        """Wait for messages."""
-
-    def send(self, message: Message) -> None:
-        """Send a message."""
 
 
 class MocapSession:
@@ -53,7 +43,7 @@ class MocapSession:
 
     def __init__(
         self,
-        link: Link,
+        link: VehicleLink,
         source: PoseSource,
         settings: SendSettings,
         say: Callable[[str], None],

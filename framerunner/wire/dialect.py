@@ -22,9 +22,7 @@ BROADCAST = 0
 MAVSDK_SYSTEM_ID = 245  # of a ground station, as the app is one
 _MAVLINK_VERSION = 3
 
-_own = vars(mavlink)
-mavlink.mavlink_map.update(extra_messages.mavlink_map | mavlink.mavlink_map)
-_own.update({name: value for name, value in vars(extra_messages).items() if name not in _own})
+extra_messages.add_to(mavlink)
 
 
 def is_vehicle(message: Message) -> bool:

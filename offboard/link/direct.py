@@ -84,20 +84,25 @@ class DirectMessages:
 
     def send_velocity(self, command: VelocityCommand) -> None:
         """Send a velocity and a yaw rate in body axes."""
-        self.send(
-            mavlink.MAVLink_set_position_target_local_ned_message(
-                0,
-                self.system_id,
-                AUTOPILOT_COMPONENT_ID,
-                mavlink.MAV_FRAME_BODY_NED,
-                _VELOCITY_AND_YAW_RATE,
-                *(0.0, 0.0, 0.0),
-                *(command.forward_m_s, -command.left_m_s, -command.up_m_s),
-                *(0.0, 0.0, 0.0),
-                0.0,
-                -command.yaw_rate_rad_s,
-            )
+        message = mavlink.MAVLink_set_position_target_local_ned_message(
+            time_boot_ms=0,
+            target_system=self.system_id,
+            target_component=AUTOPILOT_COMPONENT_ID,
+            coordinate_frame=mavlink.MAV_FRAME_BODY_NED,
+            type_mask=_VELOCITY_AND_YAW_RATE,
+            x=0.0,
+            y=0.0,
+            z=0.0,
+            vx=command.forward_m_s,
+            vy=-command.left_m_s,
+            vz=-command.up_m_s,
+            afx=0.0,
+            afy=0.0,
+            afz=0.0,
+            yaw=0.0,
+            yaw_rate=-command.yaw_rate_rad_s,
         )
+        self.send(message)
 
     def send_command(self, number: int, *parameters: float) -> None:
         """Send a MAV_CMD without waiting for its answer."""

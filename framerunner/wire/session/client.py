@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from framerunner.wire.session.record import Record
@@ -15,6 +15,7 @@ from framerunner.wire.session.session import (
     VehicleError,
     identity,
 )
+from framerunner.wire.transports.vehicle_link import VehicleLink
 
 FIND_S = 10.0
 TIME_REQUESTS = 20
@@ -29,24 +30,6 @@ Progress = Callable[[str, float], None]
 """Called with what is being done and how far it is, 0 to 1. What it raises ends all waiting."""
 
 
-class Link(Protocol):
-    """What is needed of a link, as `VehicleLink` has it."""
-
-    url: str
-
-    def receive(self, timeout_s: float) -> list[Message]:
-        """Wait for messages."""
-
-    def send(self, message: Message) -> None:
-        """Send a message."""
-
-    def send_to_all(self, message: Message) -> None:
-        """Send a message to all addresses that were heard."""
-
-    def addresses(self, system_id: int, component_id: int) -> tuple[str, ...]:
-        """HOST:PORT of all senders of a component's packets."""
-
-
 class VehicleClient(Generic[S]):
     """A session and the link to its vehicle.
 
@@ -59,7 +42,7 @@ class VehicleClient(Generic[S]):
 
     def __init__(
         self,
-        link: Link,
+        link: VehicleLink,
         session: S,
         clock: Callable[[], float],
         progress: Progress = lambda _what, _share: None,
