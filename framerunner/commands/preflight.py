@@ -102,8 +102,7 @@ def preflight(
 
 
 def _check(plan: FlightPlan, settings: PreflightSettings) -> int:
-    from framerunner.preflight.card import make_card
-    from framerunner.preflight.card_files import HTML_NAME, write_card
+    from framerunner.preflight.card import HTML_NAME, make_card, write_card
     from framerunner.preflight.run import run_preflight, tell
     from offboard.safety.rules import SafetyRules
 

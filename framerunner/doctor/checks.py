@@ -10,6 +10,14 @@ from collections.abc import Callable
 from math import isfinite
 
 from framerunner.doctor import ardupilot
+from framerunner.doctor.common import (
+    CHALLENGE_HEIGHT_M,
+    CHALLENGE_REACH_M,
+    agreement,
+    early_disarming,
+    slow_limits,
+    takes_velocities,
+)
 from framerunner.doctor.subjects import Subject, good, missing, note
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.px4_modes import OFFBOARD
@@ -20,11 +28,15 @@ WANTED_HZ = 50.0  # as `fly` and `camera` request
 LOW_HZ = 20.0  # the mission's own rate
 LOST_SHARE = 0.05
 BATTERY_PERCENT = 40
-CHALLENGE_HEIGHT_M = 3.0  # frames are at up to 2 m, the mission climbs from them
-CHALLENGE_REACH_M = 8.0
 ACCURATE_M = 0.1  # standard deviation; PX4 reports 0.3 with GPS, 0.01 with motion capture
 WANDER_M = 0.1
 _GUIDE = "docs/real-drone.md, step 6"
+_SLOWEST: tuple[tuple[Subject, float, str], ...] = (
+    ("MPC_XY_VEL_MAX", 1.0, "m/s"),
+    ("MPC_Z_VEL_MAX_UP", 1.0, "m/s"),
+    ("MPC_Z_VEL_MAX_DN", 1.0, "m/s"),
+    ("MC_YAWRATE_MAX", 60.0, "deg/s"),
+)
 _EV_POSITION, _EV_HEIGHT = 1, 2  # bits of EKF2_EV_CTRL
 _SLOW_ESTIMATOR = (
     # name, upper limit, unit
@@ -44,7 +56,6 @@ _MEASURING = (
     | mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION
     | mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION
 )
-HIGH_RATIO = 0.5  # of an innovation to what its gate lets pass; PX4 does not arm above it
 _ATTITUDES = ("ATTITUDE", "ATTITUDE_QUATERNION")
 _MULTICOPTERS = (
     mavlink.MAV_TYPE_QUADROTOR,
@@ -176,45 +187,23 @@ def _sensors(record: Record) -> Checks:
 
 def _innovations(record: Record) -> Checks:
     """Whether the measurements agree with the estimate."""
-    status = record.latest.get("ESTIMATOR_STATUS")
-    if status is None:
+    report = record.estimator
+    if report is None:
         return
-    if not status.flags & mavlink.ESTIMATOR_ATTITUDE:
+    if not report.has_attitude:
         yield missing("estimator", "it does not know its attitude", "keep the drone still for some seconds")
         return
-    if status.flags & mavlink.ESTIMATOR_ACCEL_ERROR:
+    if record.latest["ESTIMATOR_STATUS"].flags & mavlink.ESTIMATOR_ACCEL_ERROR:
         yield missing("estimator", "its accelerometer measures wrongly", "calibrate it, damp vibration")
-    ratios = {
-        "velocity": status.vel_ratio,
-        "position": status.pos_horiz_ratio,
-        "height": status.pos_vert_ratio,
-        "heading": status.mag_ratio,
-        "height above ground": status.hagl_ratio,
-    }
-    high = {name: ratio for name, ratio in ratios.items() if ratio > HIGH_RATIO}
-    words = ", ".join(f"{name} {ratio:.2f}" for name, ratio in high.items())
-    if any(ratio > 1.0 for ratio in high.values()):
-        yield missing(
-            "innovations", f"it rejects measurements: {words}", "correct the sensor or its settings"
-        )
-    elif high:
-        yield note("innovations", f"measurements hardly agree: {words}", "wait, or correct the sensor")
-    else:
-        largest = max((ratio for ratio in ratios.values() if isfinite(ratio)), default=0.0)
-        yield good("innovations", f"measurements agree, largest ratio {largest:.2f}")
+    yield agreement("innovations", report.ratios, 1.0, "ratio")
 
 
 def _offboard(record: Record) -> Checks:
-    version = record.latest.get("AUTOPILOT_VERSION")
     advice = "use PX4 1.13 or later"
     if record.modes and OFFBOARD.custom_mode not in record.modes:
         yield missing("offboard", "not among its modes", advice)
-    elif version is None:
-        yield note("offboard", "it does not report its capabilities", advice)
-    elif not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED:
-        yield missing("offboard", "takes no local setpoints", advice)
     else:
-        yield good("offboard", "takes velocities in body axes")
+        yield takes_velocities(record, "offboard", advice)
 
 
 def _streams(record: Record) -> Checks:
@@ -262,25 +251,9 @@ def _battery(record: Record) -> Checks:
 
 def _limits(record: Record) -> Checks:
     """Parameters that slow the drone down or end the flight."""
-    parameters = record.parameters
-    if not parameters:
-        yield note("parameters", "no parameter was received", "check that the link is not read-only")
-        return
-    slowest: tuple[tuple[Subject, float, str], ...] = (
-        ("MPC_XY_VEL_MAX", 1.0, "m/s"),
-        ("MPC_Z_VEL_MAX_UP", 1.0, "m/s"),
-        ("MPC_Z_VEL_MAX_DN", 1.0, "m/s"),
-        ("MC_YAWRATE_MAX", 60.0, "deg/s"),
-    )
-    for name, minimum, unit in slowest:
-        value = parameters.get(name)
-        if value is not None and value < minimum:
-            yield missing(name, f"{value:g} {unit}", f"set it to {minimum:g} or more")
+    yield from slow_limits(record, _SLOWEST)
     yield from _fence(record)
-    preflight_s = parameters.get("COM_DISARM_PRFLT", 0.0)
-    if 0.0 < preflight_s < 5.0:
-        advice = "set it to 10: take-off begins with a slow ramp"
-        yield missing("COM_DISARM_PRFLT", f"{preflight_s:g} s", advice)
+    yield from early_disarming(record, "COM_DISARM_PRFLT")
 
 
 def _fence(record: Record) -> Checks:

@@ -25,7 +25,6 @@ from framerunner.wire.ardupilot_messages import (
     EKF_STATUS_REPORT_ID,
     EXTERNAL_NAVIGATION,
     POSE_ARRIVAL_EARLY_MS,
-    has_position,
 )
 from framerunner.wire.dialect import Message, mavlink
 from offboard.safety.check import Check, Checks, Outcome, good, missing, note
@@ -93,20 +92,16 @@ class ArduPilotPoses:
             return vision_position(pose, stamp_us, settings)
         return odometry(pose, stamp_us, settings, mavlink.MAV_FRAME_LOCAL_FRD)
 
-    def innovation_ratio(self, estimator: Message) -> float:
-        """EKF_STATUS_REPORT's variances are ratios of innovations to their gates."""
-        return float(max(estimator.pos_horiz_variance, estimator.pos_vert_variance))
-
     def is_fused(self, facts: Facts) -> bool | None:
         """Poses arrive, external navigation is its source, it has a position, and that is where they say."""
-        latest, parameters = facts.record.latest, facts.record.parameters
-        report, system = latest.get(self.estimator), latest.get("SYS_STATUS")
+        report, parameters = facts.record.estimator, facts.record.parameters
+        system = facts.record.latest.get("SYS_STATUS")
         if report is None:
             return None
         arrive = system is None or bool(system.onboard_control_sensors_health & VISION)
         source = parameters.get("EK3_SRC1_POSXY", EXTERNAL_NAVIGATION)
         near = facts.comparison.distance_m < FAR_M
-        return arrive and source == EXTERNAL_NAVIGATION and has_position(report) and near
+        return arrive and source == EXTERNAL_NAVIGATION and report.has_position and near
 
     def why_not_fused(self, facts: Facts) -> str:
         """By its parameters, whether poses arrive, and its estimator's state."""
@@ -114,10 +109,10 @@ class ArduPilotPoses:
             return "set the parameters that are named below"
         if facts.sent == 0:
             return "let the source send"
-        system, report = facts.record.latest.get("SYS_STATUS"), facts.record.latest[self.estimator]
+        system, report = facts.record.latest.get("SYS_STATUS"), facts.record.estimator
         if system is not None and not system.onboard_control_sensors_health & VISION:
             return "no poses arrive now: see the poses above, and whether the link is fast enough"
-        if not has_position(report):
+        if report is not None and not report.has_position:
             return "keep it still for half a minute after its start; then see the axes below"
         return "see the innovation ratio and the axes below"
 

@@ -43,10 +43,6 @@ class Px4Poses:
         """ODOMETRY in NED."""
         return odometry(pose, stamp_us, settings, mavlink.MAV_FRAME_LOCAL_NED)
 
-    def innovation_ratio(self, estimator: Message) -> float:
-        """As ESTIMATOR_STATUS has it."""
-        return float(max(estimator.pos_horiz_ratio, estimator.pos_vert_ratio))
-
     def is_fused(self, facts: Facts) -> bool | None:
         """By the health of vision where it is sent, else by the estimator's aiding and the distance."""
         record = facts.record

@@ -113,8 +113,8 @@ class Vehicle:
         if kind == "ATTITUDE":
             rates = (message.rollspeed, message.pitchspeed, message.yawspeed)
             self.rates_rad_s.append((message.time_boot_ms * 1000, *rates))
-        elif kind == self.dialect.estimator:
-            self.worst_ratio = max(self.worst_ratio, self.dialect.innovation_ratio(message))
+        elif kind == self.dialect.estimator and (status := self.record.estimator) is not None:
+            self.worst_ratio = max(self.worst_ratio, status.ratios["position"], status.ratios["height"])
         return None
 
     def listened(self, now_s: float) -> None:

@@ -48,7 +48,7 @@ class KeptState:
     """What a vehicle had before.
 
     Attributes:
-        uid: of the vehicle, as `identity`; empty: the file does not say.
+        uid: of the vehicle, as `VehicleClient.identity`; empty: the file does not say.
         parameters: old values.
         fence: the old fence, empty if there was none; None: it was not replaced.
     """

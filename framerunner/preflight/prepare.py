@@ -10,8 +10,7 @@ from datetime import datetime
 
 from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
-from framerunner.preflight.card import FlightCard, make_card
-from framerunner.preflight.card_files import HTML_NAME, write_card
+from framerunner.preflight.card import HTML_NAME, FlightCard, make_card, write_card
 from framerunner.preflight.keys import HINT, has_terminal
 from framerunner.preflight.link import open_client
 from framerunner.preflight.run import PreflightSettings, run_preflight, tell

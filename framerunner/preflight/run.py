@@ -18,7 +18,6 @@ from framerunner.errors import UserError
 from framerunner.flying.plan import FlightPlan
 from framerunner.geometry.axes import Alignment, Pose
 from framerunner.preflight.check_names import CHECK_NAMES, RENAMED, REPLACED
-from framerunner.preflight.estimator import estimator_facts, has_global_position
 from framerunner.preflight.kept import OPTION, KeptState, write_kept
 from framerunner.preflight.link import PreflightClient, autopilot_of, open_client
 from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
@@ -39,8 +38,6 @@ from offboard.safety.failsafes import failsafe_checks, failsafe_rows, rows_by_kn
 from offboard.safety.fence import FlightFence, flight_fence
 from offboard.safety.rules import AbortAction
 from offboard.safety.vehicle_checks import (
-    BatteryFacts,
-    LinkFacts,
     battery_check,
     calibration_checks,
     camera_checks,
@@ -137,7 +134,7 @@ class _Measured:
     """What was found on the link, on a thread."""
 
     record: Record
-    link: LinkFacts
+    round_trips_s: tuple[float, ...]
     checks: tuple[Check, ...]
     changes: tuple[ParameterChange, ...]
     kept: Path | None
@@ -171,9 +168,9 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
             for each in examine(record)
             if each.name not in REPLACED  # by checks with a limit
         ),
-        estimator_check(estimator_facts(record, autopilot_of(record))),
-        battery_check(_battery(record)),
-        *link_checks(measured.link),
+        estimator_check(record.estimator, "EKF_STATUS_REPORT" if record.is_ardupilot else "ESTIMATOR_STATUS"),
+        battery_check(*_charge(record)),
+        *link_checks(record.packets.lost_share, measured.round_trips_s, TIME_REQUESTS),
         *measured.checks,
         _caps_check(plan, fence),
     ]
@@ -209,8 +206,8 @@ def _measure(
         listen(client, LISTEN_S)
         record = client.session
         autopilot = autopilot_of(record)
-        facts = LinkFacts(record.packets.lost_share, client.round_trips_s(), TIME_REQUESTS)
-        has_position = has_global_position(record, autopilot)
+        round_trips_s = client.round_trips_s()
+        has_position = record.has_global_position
         checks: list[Check] = []
         rows = failsafe_rows(autopilot, settings.abort)
         if not rows:
@@ -231,7 +228,7 @@ def _measure(
         numbers = {name: each.value for name, each in values.items()}
         checks += failsafe_checks(numbers, fence, has_global_position=has_position, rows=rows)
         checks.append(upload.check())
-    return _Measured(record, facts, tuple(checks), changes, kept)
+    return _Measured(record, round_trips_s, tuple(checks), changes, kept)
 
 
 def _keep(
@@ -324,7 +321,7 @@ class _FenceUpload:
         if autopilot not in FENCED:
             advice = "set one by hand, then accept it by --accept fence"
             return Check(name, Outcome.FAIL, "not uploaded: this autopilot's is not known", limit, advice)
-        if not has_global_position(record, autopilot):
+        if not record.has_global_position:
             words = "the vehicle has no global position, so its fence has no effect"
             advice = "only the app's box and a net keep it in; put up a net"
             return Check(name, Outcome.NOTE, words, limit, advice)
@@ -350,13 +347,14 @@ def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
     return Check("caps", Outcome.PASS, value, limit)
 
 
-def _battery(record: Record) -> BatteryFacts:
+def _charge(record: Record) -> tuple[float, float]:
+    """Of the battery, percent and volts; NaN: not reported."""
     status = record.latest.get("SYS_STATUS")
     if status is None:
-        return BatteryFacts(nan, nan)
+        return nan, nan
     percent = nan if status.battery_remaining < 0 else float(status.battery_remaining)
     volts = nan if status.voltage_battery in (0, 65535) else status.voltage_battery / 1000
-    return BatteryFacts(percent, volts)
+    return percent, volts
 
 
 def _vehicle_words(record: Record) -> str:

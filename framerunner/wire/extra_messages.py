@@ -55,12 +55,11 @@ def _message_class(definition: Any, bitmasks: set[str], dialect: Any) -> Any:  #
         self._fieldnames = self.fieldnames
         self._instance_field, self._instance_offset = self.instance_field, self.instance_offset
         for field, value in zip(fields, values, strict=True):
-            is_text = field.type == "char"
-            setattr(
-                self, field.name, value.split(b"\0", 1)[0].decode("ascii", "replace") if is_text else value
-            )
-            if is_text:
+            if field.type == "char":
                 setattr(self, f"_{field.name}_raw", value)
+                setattr(self, field.name, value.split(b"\0", 1)[0].decode("ascii", "replace"))
+            else:
+                setattr(self, field.name, value)
 
     def pack(self: Any, mav: Any, force_mavlink1: bool = False) -> Any:  # noqa: ANN401
         values: list[Any] = []

@@ -119,5 +119,5 @@ class DirectMessages:
 def _encoded(message: Message) -> MavlinkMessage:
     fields = message.to_dict()
     name = fields.pop("mavpackettype")
-    target = (fields.get("target_system", 0), fields.get("target_component", 0))
-    return MavlinkMessage(name, 0, 0, *target, json.dumps(fields))
+    system_id, component_id = fields.get("target_system", 0), fields.get("target_component", 0)
+    return MavlinkMessage(name, 0, 0, system_id, component_id, json.dumps(fields))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import degrees, isfinite, isnan
 from statistics import median
 
+from framerunner.wire.session.estimator import EstimatorStatus
 from offboard.safety.check import Check, Outcome, passed
 
 BATTERY_PERCENT = 40.0
@@ -18,50 +20,6 @@ CLOCK_TOLERANCE_S = 0.05  # of the vehicle's clock as the link shows it
 MIN_CAMERA_RATE_HZ = 8.0
 MAX_CAMERA_GAP_S = 0.5
 OLD_CALIBRATION_DAYS = 90
-
-
-@dataclass(frozen=True, slots=True)
-class BatteryFacts:
-    """What a vehicle reports of its battery; NaN: nothing."""
-
-    percent: float
-    voltage_v: float
-
-
-@dataclass(frozen=True, slots=True)
-class EstimatorFacts:
-    """What the estimator of a vehicle that stands reports.
-
-    Attributes:
-        reported: it was received; without it the other fields mean nothing.
-        has_attitude: the estimator knows its attitude.
-        has_position: likewise, horizontally, relative or absolute.
-        has_height: likewise.
-        largest_ratio: the largest of the innovations' test ratios.
-        message: that reports it.
-    """
-
-    reported: bool
-    has_attitude: bool = False
-    has_position: bool = False
-    has_height: bool = False
-    largest_ratio: float = 0.0
-    message: str = "ESTIMATOR_STATUS"
-
-
-@dataclass(frozen=True, slots=True)
-class LinkFacts:
-    """What was measured of the link.
-
-    Attributes:
-        lost_share: of the vehicle's packets, 0 to 1.
-        round_trips_s: of TIMESYNC requests that were answered.
-        requests: how many were sent.
-    """
-
-    lost_share: float
-    round_trips_s: tuple[float, ...]
-    requests: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,51 +68,62 @@ class CalibrationFacts:
     mounting_days: int | None = None
 
 
-def battery_check(facts: BatteryFacts) -> Check:
-    """Whether the battery is charged for a try and the way back."""
-    if isnan(facts.percent):
+def battery_check(percent: float, voltage_v: float) -> Check:
+    """Whether the battery is charged for a try and the way back; NaN: the vehicle reports nothing."""
+    if isnan(percent):
         advice = "measure it, then accept it by --accept battery"
         return Check("battery", Outcome.FAIL, "its charge is not reported", f"{BATTERY_PERCENT:g} %", advice)
-    volts = "" if isnan(facts.voltage_v) else f", {facts.voltage_v:.1f} V"
-    good = facts.percent >= BATTERY_PERCENT
-    value = f"{facts.percent:.0f} %{volts}"
+    volts = "" if isnan(voltage_v) else f", {voltage_v:.1f} V"
+    good = percent >= BATTERY_PERCENT
+    value = f"{percent:.0f} %{volts}"
     return passed("battery", good, value, f"{BATTERY_PERCENT:g} % or more", "charge it")
 
 
-def estimator_check(facts: EstimatorFacts) -> Check:
-    """Whether the estimator knows where the drone is, and its measurements agree."""
+def estimator_check(status: EstimatorStatus | None, message: str) -> Check:
+    """Whether the estimator knows where the drone is, and its measurements agree.
+
+    Args:
+        status: what it reports while the drone stands; None: nothing.
+        message: that reports it.
+    """
     name, limit = "estimator", f"ratios up to {MAX_RATIO:g}"
-    if not facts.reported:
-        return Check(name, Outcome.FAIL, f"no {facts.message} is received", limit, "let the link carry it")
+    if status is None:
+        return Check(name, Outcome.FAIL, f"no {message} is received", limit, "let the link carry it")
     known = {
-        "attitude": facts.has_attitude,
-        "position": facts.has_position,
-        "height": facts.has_height,
+        "attitude": status.has_attitude,
+        "position": status.has_position,
+        "height": status.has_height,
     }
     unknown = [what for what, is_known in known.items() if not is_known]
     if unknown:
         advice = "wait for its estimate; see docs/real-drone.md, step 6"
         return Check(name, Outcome.FAIL, f"it does not know its {' and '.join(unknown)}", limit, advice)
-    good = isfinite(facts.largest_ratio) and facts.largest_ratio <= MAX_RATIO
+    good = isfinite(status.largest_ratio) and status.largest_ratio <= MAX_RATIO
     advice = "keep the drone still, or correct the sensor that disagrees"
-    return passed(name, good, f"largest ratio of an innovation {facts.largest_ratio:.2f}", limit, advice)
+    return passed(name, good, f"largest ratio of an innovation {status.largest_ratio:.2f}", limit, advice)
 
 
-def link_checks(facts: LinkFacts) -> list[Check]:
-    """Whether the link loses little and answers soon."""
+def link_checks(lost_share: float, round_trips_s: Sequence[float], requests: int) -> list[Check]:
+    """Whether the link loses little and answers soon.
+
+    Args:
+        lost_share: of the vehicle's packets, 0 to 1.
+        round_trips_s: of requests for its time that were answered.
+        requests: how many were sent.
+    """
     loss = passed(
         "link loss",
-        facts.lost_share <= MAX_LOST_SHARE,
-        f"{facts.lost_share:.1%} of packets lost",
+        lost_share <= MAX_LOST_SHARE,
+        f"{lost_share:.1%} of packets lost",
         f"{MAX_LOST_SHARE:.0%}",
         "move nearer, or use a better link",
     )
     limit, advice = f"{1000 * MAX_ROUND_TRIP_S:g} ms", "use a faster link"
-    if len(facts.round_trips_s) < MIN_ANSWERS:
-        value = f"{len(facts.round_trips_s)} of {facts.requests} time requests answered"
+    if len(round_trips_s) < MIN_ANSWERS:
+        value = f"{len(round_trips_s)} of {requests} time requests answered"
         late = Check("link latency", Outcome.FAIL, value, limit, "check that the link takes requests")
         return [loss, late]
-    middle_s, worst_s = median(facts.round_trips_s), max(facts.round_trips_s)
+    middle_s, worst_s = median(round_trips_s), max(round_trips_s)
     value = f"round trip {1000 * middle_s:.0f} ms, at worst {1000 * worst_s:.0f} ms"
     return [loss, passed("link latency", worst_s <= MAX_ROUND_TRIP_S, value, limit, advice)]
 

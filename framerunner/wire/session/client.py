@@ -13,9 +13,9 @@ from framerunner.wire.session.session import (
     Request,
     Session,
     VehicleError,
-    identity,
 )
 from framerunner.wire.transports.vehicle_link import VehicleLink
+from framerunner.wire.vehicle_identity import is_simulator, vehicle_uid
 
 FIND_S = 10.0
 TIME_REQUESTS = 20
@@ -82,9 +82,11 @@ class VehicleClient(Generic[S]):
         return request.answer
 
     def identity(self) -> tuple[str, bool]:
-        """See `identity`."""
+        """The number of its hardware, or ""; whether it says that it is framerunner's simulated drone."""
         version = self.answer(self.session.message(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, tries=3))
-        return identity(version, self.session.vehicle)
+        if version is None:
+            return "", False
+        return vehicle_uid(version), is_simulator(version.uid, self.session.vehicle)
 
     def read_parameters(self, names: list[str]) -> dict[str, ParameterValue]:
         """Read parameters; those that the vehicle does not answer for are left out."""

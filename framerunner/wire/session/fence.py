@@ -89,25 +89,29 @@ def download_fence(client: VehicleClient[S]) -> tuple[FenceItem, ...]:
     Raises:
         VehicleError: the vehicle does not answer.
     """
-    session, target = client.session, (client.session.vehicle, AUTOPILOT_COMPONENT_ID)
+    session, system_id = client.session, client.session.vehicle
 
     def count_of(message: Message) -> int | None:
         is_count = message.get_type() == "MISSION_COUNT" and message.mission_type == FENCE
         return int(message.count) if is_count else None
 
-    request = mavlink.MAVLink_mission_request_list_message(*target, FENCE)
+    request = mavlink.MAVLink_mission_request_list_message(system_id, AUTOPILOT_COMPONENT_ID, FENCE)
     count = client.answer(session.request(request, count_of))
     if count is None or count > MAX_ITEMS:
         raise VehicleError("the vehicle does not tell its fence; check that it takes fences")
     items = []
     for seq in range(count):
-        request = mavlink.MAVLink_mission_request_int_message(*target, seq, FENCE)
+        request = mavlink.MAVLink_mission_request_int_message(system_id, AUTOPILOT_COMPONENT_ID, seq, FENCE)
         item = client.answer(session.request(request, partial(_numbered, seq)))
         if item is None:
             raise VehicleError(f"the vehicle does not tell item {seq + 1} of its fence; check the link")
         params = (item.param1, item.param2, item.param3, item.param4)
         items.append(FenceItem(item.command, item.frame, params, item.x, item.y, item.z))
-    session.send(mavlink.MAVLink_mission_ack_message(*target, mavlink.MAV_MISSION_ACCEPTED, FENCE))
+    session.send(
+        mavlink.MAVLink_mission_ack_message(
+            system_id, AUTOPILOT_COMPONENT_ID, mavlink.MAV_MISSION_ACCEPTED, FENCE
+        )
+    )
     client.turn()
     return tuple(items)
 

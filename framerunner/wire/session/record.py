@@ -18,6 +18,7 @@ from framerunner.wire.dialect import (
 )
 from framerunner.wire.framing import missing_before
 from framerunner.wire.px4_modes import mode_words
+from framerunner.wire.session.estimator import EstimatorStatus
 from framerunner.wire.session.senders import Senders
 from framerunner.wire.session.session import Heartbeat, ParameterValue, Session
 from framerunner.wire.status_text import TextAssembler
@@ -194,6 +195,19 @@ class Record(Session):
         """The kind of autopilot in words."""
         number = self.latest["HEARTBEAT"].autopilot
         return _AUTOPILOTS.get(number, f"autopilot {number}")
+
+    @property
+    def estimator(self) -> EstimatorStatus | None:
+        """What its estimator reports; None: nothing."""
+        message = self.latest.get("EKF_STATUS_REPORT" if self.is_ardupilot else "ESTIMATOR_STATUS")
+        return None if message is None else EstimatorStatus.of(message)
+
+    @property
+    def has_global_position(self) -> bool:
+        """It knows where on Earth it is, so its fence has an effect."""
+        estimator = self.estimator
+        is_placed = estimator is not None and estimator.has_global_position
+        return is_placed and "GPS_GLOBAL_ORIGIN" in self.latest
 
     @property
     def type_name(self) -> str:

@@ -28,7 +28,6 @@ from framerunner.wire.dialect import (
     request_parameter,
     request_rate,
 )
-from framerunner.wire.vehicle_identity import is_simulator, vehicle_uid
 from framerunner.wire.vehicle_telemetry import VehicleTelemetry
 
 ANSWER_S = 0.5
@@ -291,11 +290,6 @@ class Session:
         """Let a message be among those that are due next."""
         self._unsent.append(message)
 
-    def add(self, request: Request[T]) -> Request[T]:
-        """Send a request until it is over, from the next `due` on."""
-        self._requests.append(request)
-        return request
-
     def request(
         self,
         message: Message,
@@ -312,7 +306,9 @@ class Session:
             tries: how often it is sent.
             every_s: time between; after the last time the answer is awaited for so long.
         """
-        return self.add(Request(message, answer, tries=tries, every_s=every_s))
+        request = Request(message, answer, tries=tries, every_s=every_s)
+        self._requests.append(request)
+        return request
 
     def command(
         self,
@@ -381,10 +377,3 @@ class Session:
         if message.get_type() != "PARAM_VALUE" or message.param_id != name:
             return None
         return ParameterValue.of(message, bytewise=not self.is_ardupilot)
-
-
-def identity(version: Message | None, system_id: int) -> tuple[str, bool]:
-    """The number of a vehicle's hardware, and whether it says that it is framerunner's simulated drone."""
-    if version is None:
-        return "", False
-    return vehicle_uid(version), is_simulator(version.uid, system_id)

@@ -1,16 +1,14 @@
 from dataclasses import replace
-from math import nan
+from math import inf, nan
 
 import pytest
 
 from framerunner.errors import SettingError
+from framerunner.wire.session.estimator import EstimatorStatus
 from offboard.safety.check import Check, Outcome, accept, check_names, failures
 from offboard.safety.vehicle_checks import (
-    BatteryFacts,
     CalibrationFacts,
     CameraFacts,
-    EstimatorFacts,
-    LinkFacts,
     battery_check,
     calibration_checks,
     camera_checks,
@@ -18,8 +16,8 @@ from offboard.safety.vehicle_checks import (
     link_checks,
 )
 
-ESTIMATOR = EstimatorFacts(True, True, True, True, 0.1)
-LINK = LinkFacts(0.0, (0.02,) * 20, 20)
+ESTIMATOR = EstimatorStatus(True, True, True, True, {"position": 0.1})
+LINK = {"lost_share": 0.0, "round_trips_s": (0.02,) * 20, "requests": 20}
 CAMERA = CameraFacts(30.0, 0.05, 0.1, assumed_age_s=0.1, assumed_by="--camera-delay", size_px=(320, 240))
 
 
@@ -29,9 +27,9 @@ def failed(*checks):
 
 def test_a_good_drone_passes():
     checks = [
-        battery_check(BatteryFacts(80.0, 12.0)),
-        estimator_check(ESTIMATOR),
-        *link_checks(LINK),
+        battery_check(80.0, 12.0),
+        estimator_check(ESTIMATOR, "ESTIMATOR_STATUS"),
+        *link_checks(**LINK),
         *camera_checks(CAMERA),
     ]
     assert {check.outcome for check in checks} == {Outcome.PASS}
@@ -40,7 +38,7 @@ def test_a_good_drone_passes():
 
 @pytest.mark.parametrize("percent", [39.0, 0.0, nan])
 def test_a_low_or_unknown_charge_fails(percent):
-    check = battery_check(BatteryFacts(percent, nan))
+    check = battery_check(percent, nan)
     assert check.outcome is Outcome.FAIL
     assert check.advice
 
@@ -48,12 +46,13 @@ def test_a_low_or_unknown_charge_fails(percent):
 @pytest.mark.parametrize(
     "changed",
     [
-        *({"reported": False}, {"has_attitude": False}, {"has_position": False}, {"has_height": False}),
-        *({"largest_ratio": 0.6}, {"largest_ratio": nan}),
+        *({"has_attitude": False}, {"has_position": False}, {"has_height": False}),
+        *({"ratios": {"position": 0.6}}, {"ratios": {"height": inf}}),
     ],
 )
 def test_an_estimator_that_does_not_know_fails(changed):
-    assert failed(estimator_check(replace(ESTIMATOR, **changed))) == ["estimator"]
+    assert failed(estimator_check(replace(ESTIMATOR, **changed), "ESTIMATOR_STATUS")) == ["estimator"]
+    assert failed(estimator_check(None, "ESTIMATOR_STATUS")) == ["estimator"]
 
 
 @pytest.mark.parametrize(
@@ -65,7 +64,7 @@ def test_an_estimator_that_does_not_know_fails(changed):
     ],
 )
 def test_a_bad_link_fails(changed, names):
-    assert failed(*link_checks(replace(LINK, **changed))) == names
+    assert failed(*link_checks(**(LINK | changed))) == names
 
 
 @pytest.mark.parametrize(
