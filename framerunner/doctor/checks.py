@@ -22,7 +22,7 @@ from framerunner.doctor.subjects import Subject, good, missing, note
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.px4_modes import OFFBOARD
 from framerunner.wire.session.record import Record
-from offboard.safety.check import Check, Checks, Outcome
+from offboard.safety.check import Check, Checks, failures
 
 WANTED_HZ = 50.0  # as `fly` and `camera` request
 LOW_HZ = 20.0  # the mission's own rate
@@ -93,7 +93,7 @@ _HEIGHT_SOURCE = {0: "barometer", 1: "GPS", 2: "range finder", 3: "vision"}
 
 def can_fly(findings: list[Check]) -> bool:
     """Whether nothing is missing."""
-    return all(each.outcome is not Outcome.FAIL for each in findings)
+    return not failures(findings)
 
 
 def examine(record: Record) -> list[Check]:

@@ -78,11 +78,9 @@ class MocapSession:
         messages = self._link.receive(wait_s)
         arrived_s = clock() if messages else now_s
         for message in messages:
-            answer = self.vehicle.take(message, arrived_s)
-            if answer is not None:
-                self._link.send(answer)
+            self.vehicle.take(message, arrived_s)
             self._source.take(message, arrived_s)
-        for request in self.vehicle.requests(arrived_s):
+        for request in self.vehicle.due(arrived_s):
             self._link.send(request)
         self._pass_poses(clock())
 
@@ -109,7 +107,7 @@ class MocapSession:
         taken_s = timed.taken_s - settings.delay_s
         if timed.vehicle_time_us is not None and offset_s is not None:
             taken_s = timed.vehicle_time_us / 1e6 - offset_s
-        if not self.vehicle.found or taken_s - self._newest_s < (1.0 - _EARLY) / settings.rate_hz:
+        if self.vehicle.system_id is None or taken_s - self._newest_s < (1.0 - _EARLY) / settings.rate_hz:
             return
         self._newest_s = taken_s
         pose = with_forward(timed.pose, settings.forward_deg)
@@ -124,7 +122,7 @@ class MocapSession:
 
     def note_use(self, fused: bool | None, comparison: PoseComparison, span_s: float) -> None:
         """Note whether the vehicle uses the poses and how it moves, once for each `span_s`."""
-        boot = self.vehicle.record.telemetry.restarts
+        boot = self.vehicle.telemetry.restarts
         if fused:
             self._used_in_boot = boot
         elif fused is False and self._used_in_boot == boot and not self.silent:
@@ -140,7 +138,7 @@ class MocapSession:
         vehicle, source = self.vehicle, self._source
         vehicle.listened(now_s)
         return Facts(
-            record=vehicle.record,
+            record=vehicle,
             comparison=self._compare(),
             sent=self.sent,
             rate_hz=self._rate_hz(now_s),
@@ -166,7 +164,7 @@ class MocapSession:
     def _compare(self) -> PoseComparison:
         """The poses against what the vehicle reports now; of axes and delay, what was last seen in motion."""
         rates: Sequence[tuple[int, float, float, float]] = list(self.vehicle.rates_rad_s)
-        found = self._motion.compare(self.vehicle.record.telemetry, rates)
+        found = self._motion.compare(self.vehicle.telemetry, rates)
         if found.moves:
             self._in_motion = found
         seen = self._in_motion

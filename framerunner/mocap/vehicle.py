@@ -30,8 +30,8 @@ _STATE_S = 5.0  # for which a state counts that is requested twice a second
 _LOW = 0.6  # share of the wanted rate
 
 
-class Vehicle:
-    """One vehicle on one link, seen by its messages.
+class Vehicle(Record):
+    """The session with the vehicle, and what it has sent.
 
     Times in seconds are those of this program's clock, whose zero is its start.
 
@@ -41,7 +41,6 @@ class Vehicle:
         zero_s: reading of the clock of the time stamps at this program's time 0.
 
     Attributes:
-        record: all that it has sent.
         answers: to its TIMESYNC requests, sent.
         rates_rad_s: the latest body rates with vehicle time in microseconds: (time, forward, right, down).
         worst_ratio: the largest innovation ratio of position or height.
@@ -50,7 +49,7 @@ class Vehicle:
     def __init__(
         self, needs_truth_hz: float = 0.0, origin: Origin | None = None, zero_s: float = 0.0
     ) -> None:
-        self.record = Record(heartbeat="companion")
+        super().__init__(heartbeat="companion")
         self.answers = 0
         self.rates_rad_s: deque[tuple[int, float, float, float]] = deque(maxlen=2000)
         self.worst_ratio = 0.0
@@ -62,14 +61,9 @@ class Vehicle:
         self._due_s = {"timesync": 0.0, "parameter": 0.0, "origin": 0.0}
 
     @property
-    def found(self) -> bool:
-        """Whether a vehicle has been heard."""
-        return self.record.system_id is not None
-
-    @property
     def dialect(self) -> PoseDialect:
         """How its autopilot gets poses, by its heartbeats."""
-        return dialect_of(self.record)
+        return dialect_of(self)
 
     @property
     def offset_s(self) -> float | None:
@@ -99,55 +93,55 @@ class Vehicle:
         """Whether PX4 has got enough answers to convert time stamps."""
         return self.answers >= _CONVERGED
 
-    def take(self, message: Message, now_s: float) -> Message | None:
-        """Take a message; the answer to send, if there is one."""
-        self.record.take(message, now_s)
-        if not self.record.is_from_autopilot(message):
-            return None
+    def take(self, message: Message, now_s: float) -> bool:
+        """Take any message; see `Record.take`."""
+        is_newest, kind = super().take(message, now_s), message.get_type()
+        if not self.is_from_autopilot(message):
+            return False
         self._follow_restarts()
-        kind = message.get_type()
         if kind == "TIMESYNC":
-            return self._synchronise(message, now_s)
-        if kind == "HEARTBEAT" and self.record.is_ardupilot:
+            self._synchronise(message, now_s)
+        elif kind == "HEARTBEAT" and self.is_ardupilot:
             add_ardupilot_messages()
-        if kind == "ATTITUDE":
+        elif kind == "ATTITUDE":
             rates = (message.rollspeed, message.pitchspeed, message.yawspeed)
             self.rates_rad_s.append((message.time_boot_ms * 1000, *rates))
-        elif kind == self.dialect.estimator and (status := self.record.estimator) is not None:
+        elif kind == self.dialect.estimator and (status := self.estimator) is not None:
             self.worst_ratio = max(self.worst_ratio, status.ratios["position"], status.ratios["height"])
-        return None
+        return is_newest
 
     def listened(self, now_s: float) -> None:
         """All that has come by now was taken; a state of the estimator that is not renewed is forgotten."""
-        record = self.record
-        record.listened_s = now_s
+        self.listened_s = now_s
         for kind in (self.dialect.estimator, "SYS_STATUS"):
-            if now_s - record.times_s.get(kind, (now_s, now_s))[1] > _STATE_S:
-                record.latest.pop(kind, None)
+            if now_s - self.times_s.get(kind, (now_s, now_s))[1] > _STATE_S:
+                self.latest.pop(kind, None)
 
     def _follow_restarts(self) -> None:
         """Forget what a vehicle loses when it is restarted."""
-        restarts = self.record.telemetry.restarts
+        restarts = self.telemetry.restarts
         if restarts != self._restarts:
             self._restarts = restarts
             for kind in ("GPS_GLOBAL_ORIGIN", self.dialect.estimator, "SYS_STATUS"):
-                self.record.latest.pop(kind, None)
+                self.latest.pop(kind, None)
             self._asked_origin = False
             self._offsets.clear()
 
-    def _synchronise(self, message: Message, now_s: float) -> Message | None:
+    def _synchronise(self, message: Message, now_s: float) -> None:
         if message.tc1 == 0:
             self.answers += 1
-            return mavlink.MAVLink_timesync_message(self.stamp_us(now_s) * 1000, message.ts1)
+            self.send(mavlink.MAVLink_timesync_message(self.stamp_us(now_s) * 1000, message.ts1))
+            return
         round_trip_s = now_s + self._zero_s - message.ts1 / 1e9
         if 0.0 <= round_trip_s < 1.0:
             self._offsets.append((round_trip_s, message.tc1 / 1e9 - (now_s - round_trip_s / 2.0)))
-        return None
 
-    def requests(self, now_s: float) -> Iterator[Message]:
-        """What is due to be sent, except poses. Only rates of this link and a missing origin are set."""
-        yield from self.record.due(now_s)
-        system_id = self.record.system_id
+    def due(self, now_s: float) -> list[Message]:
+        """What is to be sent, except poses. Only rates of this link and a missing origin are set."""
+        return [*super().due(now_s), *self._regular(now_s)]
+
+    def _regular(self, now_s: float) -> Iterator[Message]:
+        system_id = self.system_id
         if system_id is None:
             return
         if self._is_due("timesync", now_s, _TIMESYNC_S):
@@ -167,7 +161,7 @@ class Vehicle:
 
     def _parameter_request(self, system_id: int, now_s: float) -> Iterator[Message]:
         names = self.dialect.parameters
-        missing = [name for name in names if name not in self.record.parameters]
+        missing = [name for name in names if name not in self.parameters]
         if not missing:
             self._due_s["parameter"] = now_s + 5.0  # they may be changed meanwhile
             missing = [*names]
@@ -182,15 +176,15 @@ class Vehicle:
             wanted[name] = (number, self._truth_hz)
         if self._rates is None:
             self._rates = RateWatch(dict(wanted.values()), _LOW, _REQUEST_S, now_s)
-        counts = {number: self.record.counts.get(name, 0) for name, (number, _) in wanted.items()}
+        counts = {number: self.counts.get(name, 0) for name, (number, _) in wanted.items()}
         return self._rates.requests(system_id, counts, now_s)
 
     def _origin_requests(self, system_id: int) -> Iterator[Message]:
         """Ask for the origin until it is known; set it if there is none and one was given."""
-        if "GPS_GLOBAL_ORIGIN" in self.record.latest:
+        if "GPS_GLOBAL_ORIGIN" in self.latest:
             self._asked_origin = False
             return
-        if self._asked_origin and self._origin is not None and not self.record.armed:
+        if self._asked_origin and self._origin is not None and not self.armed:
             yield mavlink.MAVLink_set_gps_global_origin_message(
                 system_id,
                 degrees_e7(self._origin.latitude_deg),

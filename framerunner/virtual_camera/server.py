@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 import time
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
+from framerunner.monitor.link_thread import LinkThread
 from framerunner.virtual_camera.camera import VirtualCamera
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.session.session import RateWatch, Session, pose_rates
 from framerunner.wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
-from framerunner.wire.transports.urls import LinkError
 from framerunner.wire.transports.vehicle_link import VehicleLink
 from scenarios.task import Task
 from sitl.video import VideoServer
@@ -26,7 +24,6 @@ _MAX_RATE_REQUESTS = 5
 _UPDATE_S = 0.1
 _RATE_PERIOD_S = 2.0
 _WAITING_LINE_S = 10.0
-_RECEIVE_S = 0.1
 
 Say = Callable[[str], None]
 """Called with lines for people."""
@@ -52,9 +49,7 @@ class CameraServer:
         self._watch = _TelemetryWatch(say, link.url)
         # Over udpout the vehicle cannot send before it has received something.
         self._session = Session(heartbeat="companion", telemetry=camera.telemetry)
-        self._to_send: deque[Message] = deque()  # by the thread that reads
-        self._stop = threading.Event()
-        self._failed: asyncio.Future[None] | None = None
+        self._thread = LinkThread(lambda: link, self._take, lambda _level, text: say(text), reopens=False)
         self._rates = _new_rates()
         self._restarts = 0
         self._has_gimbal = False
@@ -66,13 +61,10 @@ class CameraServer:
             VideoError: the TCP port is in use.
             LinkError: the link failed.
         """
-        loop = asyncio.get_running_loop()
-        self._failed = loop.create_future()
         self._video.add_json(REFEREE_PATH, self._referee_answer)
         scenario = self._camera.plan.scenario
         task = Task.of(scenario, show_layout=self._show_layout)
         self._video.add_json(SCENARIO_PATH, lambda _query: task.model_dump(mode="json"))
-        reader = threading.Thread(target=self._read, args=(loop,), name="telemetry", daemon=True)
         updates: asyncio.Task[None] | None = None
         try:
             await self._video.start()
@@ -80,36 +72,15 @@ class CameraServer:
                 f"camera of {scenario.name}: video on {self._video.url} (Ctrl-C stops); "
                 f"listening for a vehicle on {self._link.url}"
             )
-            reader.start()
             updates = asyncio.create_task(self._update_forever())
-            await self._failed
+            await self._thread.run()
         finally:
-            self._stop.set()
             if updates is not None:
                 updates.cancel()
             await self._video.close()
-            if reader.ident is not None:
-                await asyncio.to_thread(reader.join)
             self._link.close()
 
-    def _read(self, loop: asyncio.AbstractEventLoop) -> None:
-        """On the only thread that uses the link: send, wait for packets, pass them to the loop."""
-        while not self._stop.is_set():
-            try:
-                while self._to_send:
-                    self._link.send(self._to_send.popleft())
-                messages = self._link.receive(_RECEIVE_S)
-            except LinkError as error:
-                loop.call_soon_threadsafe(self._fail, error)
-                return
-            if messages and not self._stop.is_set():
-                loop.call_soon_threadsafe(self._take, messages)
-
-    def _fail(self, error: LinkError) -> None:
-        if self._failed is not None and not self._failed.done():
-            self._failed.set_exception(error)
-
-    def _take(self, messages: list[Message]) -> None:
+    def _take(self, messages: Sequence[Message], _host: str) -> None:
         session = self._session
         for message in messages:
             is_found, now_s = session.system_id is not None, time.monotonic()
@@ -140,7 +111,8 @@ class CameraServer:
         """Send heartbeats, request rates, and report telemetry that is no longer received."""
         while True:
             now_s = time.monotonic()
-            self._to_send += self._session.due(now_s)
+            for message in self._session.due(now_s):
+                self._thread.send(message)
             self._watch.check(now_s)
             if self._session.system_id is not None:
                 self._request_rates(self._session.system_id, now_s)
@@ -157,7 +129,8 @@ class CameraServer:
                 f"than the {WANTED_HZ:.0f} Hz requested; the video is no smoother than that"
             )
         else:
-            self._to_send += requests
+            for request in requests:
+                self._session.send(request)
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
         return self._camera.standing(query.get("state", ""), query.get("ended")).model_dump(mode="json")

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import threading
 from collections.abc import Awaitable
 from math import inf
 from typing import Any
@@ -28,8 +27,8 @@ from mavsdk.asyncio import MavsdkError
 from framerunner.wire import ardupilot_modes
 from framerunner.wire.dialect import mavlink
 from offboard.drone import ResponsePrior, VelocityCommand
-from offboard.link.dialect import AutopilotKind, Dialect, ModeNames
-from offboard.link.direct import DirectMessages
+from offboard.link.dialect import AutopilotKind, ModeNames
+from offboard.link.direct import DirectDialect, DirectMessages
 from offboard.link.stepped import SteppedDialect
 from offboard.link.telemetry import TelemetryFeed
 
@@ -93,7 +92,7 @@ class Setpoints:
             self._messages.send_command(mavlink.MAV_CMD_NAV_TAKEOFF, *(0.0,) * 6, self._takeoff_height_m)
 
 
-class ArduPilotDialect(Dialect):
+class ArduPilotDialect(DirectDialect):
     """One ArduCopter, by MAVSDK's plugins `action` and `mavlink_direct`; see the module and `Dialect`.
 
     Args:
@@ -115,34 +114,15 @@ class ArduPilotDialect(Dialect):
         system_id: int,
         room_above_m: float = inf,
     ) -> None:
+        super().__init__(direct, system_id)
         self._action = action
-        self._messages = DirectMessages(direct, system_id)
         self._setpoints = Setpoints(self._messages, feed, room_above_m)
-        self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
-        self._sent_since_repeat = False
-        self._lock = threading.Lock()  # the watchdog's thread sends, too
 
     async def request_streams(self) -> None:
         """Request what a flight needs; what is refused is missing later, in words."""
         for message_id, rate_hz in STREAMS_HZ.items():
             with contextlib.suppress(MavsdkError):
                 await self._command_long(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz)
-
-    def send(self, command: VelocityCommand) -> None:
-        """Send a velocity; on the ground, request take-off if it climbs."""
-        with self._lock:
-            if self.ended:
-                return
-            self._command, self._sent_since_repeat = command, True
-            with contextlib.suppress(MavsdkError):  # the link is closed; telemetry shows that
-                self._setpoints.send(command)
-
-    def repeat(self) -> None:
-        """Send the last velocity again if nothing was sent since the last call."""
-        command, sent = self._command, self._sent_since_repeat
-        if command is not None and not sent:
-            self.send(command)
-        self._sent_since_repeat = False
 
     async def request_offboard(self) -> None:
         """Request GUIDED."""
@@ -151,16 +131,6 @@ class ArduPilotDialect(Dialect):
     async def request_hold(self) -> None:
         """End the setpoints until the next one, and request BRAKE."""
         await asyncio.to_thread(self.request_hold_blocking)
-
-    def request_hold_blocking(self) -> None:
-        """The same from a thread, which waits for the answer."""
-        self._command = None
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.kind.hold)
-
-    def request_land_blocking(self) -> None:
-        """End the setpoints permanently and request LAND, from a thread."""
-        self.end()
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.kind.land)
 
     async def arm(self) -> None:
         """Arm."""
@@ -176,13 +146,11 @@ class ArduPilotDialect(Dialect):
         self._command = None
         await self._action.land()
 
-    def end(self) -> None:
-        """End the setpoints permanently."""
-        with self._lock:
-            self.ended, self._command = True, None
-
     async def _command_long(self, number: int, *parameters: float) -> None:
         await asyncio.to_thread(self._messages.command, number, *parameters)
+
+    def _transmit(self, command: VelocityCommand) -> None:
+        self._setpoints.send(command)
 
 
 class SteppedArduPilotDialect(SteppedDialect):

@@ -5,7 +5,9 @@ They are pymavlink's here, as for all clients of vehicles; the plugin's are JSON
 
 from __future__ import annotations
 
+import contextlib
 import json
+import threading
 from collections.abc import Callable
 from math import nan
 from typing import Any
@@ -15,6 +17,7 @@ from mavsdk.plugins.mavlink_direct import MavlinkMessage
 
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, command_long, mavlink
 from offboard.drone import VelocityCommand
+from offboard.link.dialect import Dialect
 
 _VELOCITY_AND_YAW_RATE = (
     mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
@@ -121,3 +124,53 @@ def _encoded(message: Message) -> MavlinkMessage:
     name = fields.pop("mavpackettype")
     system_id, component_id = fields.get("target_system", 0), fields.get("target_component", 0)
     return MavlinkMessage(name, 0, 0, system_id, component_id, json.dumps(fields))
+
+
+class DirectDialect(Dialect):
+    """A vehicle whose velocities are sent here: each at once, and the last one again in each tick.
+
+    Args:
+        direct: MAVSDK's asyncio plugin.
+        system_id: the vehicle's.
+    """
+
+    def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
+        self._messages = DirectMessages(direct, system_id)
+        self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
+        self._sent_since_repeat = False
+        self._lock = threading.Lock()  # the watchdog's thread sends, too
+
+    def send(self, command: VelocityCommand) -> None:
+        """Send a velocity; ignored after `end`."""
+        with self._lock:
+            if self.ended:
+                return
+            self._command, self._sent_since_repeat = command, True
+            with contextlib.suppress(MavsdkError):  # the link is closed; telemetry shows that
+                self._transmit(command)
+
+    def repeat(self) -> None:
+        """Send the last velocity again if nothing was sent since the last call."""
+        command, sent = self._command, self._sent_since_repeat
+        if command is not None and not sent:
+            self.send(command)
+        self._sent_since_repeat = False
+
+    def request_hold_blocking(self) -> None:
+        """End the setpoints until the next one, and request hold, from a thread that waits for the answer."""
+        self._command = None
+        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.kind.hold)
+
+    def request_land_blocking(self) -> None:
+        """End the setpoints permanently and request landing, from a thread, which waits for the answer."""
+        self.end()
+        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.kind.land)
+
+    def end(self) -> None:
+        """End the setpoints permanently; from any thread."""
+        with self._lock:
+            self.ended, self._command = True, None
+
+    def _transmit(self, command: VelocityCommand) -> None:
+        """Send a velocity now."""
+        self._messages.send_velocity(command)

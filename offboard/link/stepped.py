@@ -15,9 +15,9 @@ from typing import Any
 
 from framerunner.wire.dialect import MAVSDK_SYSTEM_ID, Message, mavlink
 from framerunner.wire.session.session import Request, Session
-from offboard.drone import DroneError, VelocityCommand
-from offboard.link.dialect import Dialect, TickExchange
-from offboard.link.direct import CommandRefusedError, DirectMessages, subscribe, synchronous
+from offboard.drone import DroneError
+from offboard.link.dialect import TickExchange
+from offboard.link.direct import CommandRefusedError, DirectDialect, DirectMessages, subscribe, synchronous
 
 ECHO_LIMIT_S = 20.0  # wall time for the answer to a PING, on the busiest machine
 _ECHO_AGAIN_S = 0.5  # wall time after which another one is sent
@@ -57,7 +57,7 @@ class _Echo:
             self._echo.set_result(None)
 
 
-class SteppedDialect(Dialect):
+class SteppedDialect(DirectDialect):
     """A vehicle, by MAVSDK's plugin `mavlink_direct`; see the module and `Dialect`.
 
     Requests are sent when a method is called; what it returns waits for the answer.
@@ -68,9 +68,7 @@ class SteppedDialect(Dialect):
     """
 
     def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
-        self._messages = DirectMessages(direct, system_id)
-        self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
-        self._sent_since_tick = False
+        super().__init__(direct, system_id)
         self._echo = _Echo(self._messages, direct, self.kind.name)
         self._session = Session(MAVSDK_SYSTEM_ID, system_id)
         self._loop = asyncio.get_running_loop()
@@ -83,9 +81,7 @@ class SteppedDialect(Dialect):
 
     async def before_tick(self) -> None:
         """Wait until the vehicle has all that was sent; a velocity is sent again if there was no new one."""
-        if self._command is not None and not self._sent_since_tick:
-            self.send(self._command)
-        self._sent_since_tick = False
+        super().repeat()
         await self._until_taken()
 
     async def after_tick(self) -> None:
@@ -94,11 +90,8 @@ class SteppedDialect(Dialect):
         for _ in range(_TURNS):
             await asyncio.sleep(0)
 
-    def send(self, command: VelocityCommand) -> None:
-        """Send a velocity; ignored after `end`."""
-        if not self.ended:
-            self._command, self._sent_since_tick = command, True
-            self._transmit(command)
+    def repeat(self) -> None:
+        """Nothing: `before_tick` does."""
 
     def request_offboard(self) -> Awaitable[None]:
         """Request the mode that follows setpoints."""
@@ -108,16 +101,6 @@ class SteppedDialect(Dialect):
         """End the setpoints until the next one, and request hold."""
         self._command = None
         return self._set_mode(self.kind.hold)
-
-    def request_hold_blocking(self) -> None:
-        """The same from a thread, which waits for the answer."""
-        self._command = None
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.kind.hold)
-
-    def request_land_blocking(self) -> None:
-        """End the setpoints permanently and request landing, from a thread, which waits for the answer."""
-        self.end()
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.kind.land)
 
     def arm(self) -> Awaitable[None]:
         """Arm."""
@@ -133,17 +116,9 @@ class SteppedDialect(Dialect):
         self._command = None
         return self._set_mode(self.kind.land)
 
-    def end(self) -> None:
-        """End the setpoints permanently; from any thread."""
-        self.ended, self._command = True, None
-
     async def _until_taken(self) -> None:
         """Wait until the vehicle has all that was sent."""
         await self._echo.wait()
-
-    def _transmit(self, command: VelocityCommand) -> None:
-        """Send a velocity now."""
-        self._messages.send_velocity(command)
 
     def _set_mode(self, parameters: tuple[float, ...]) -> Awaitable[None]:
         return self._request(mavlink.MAV_CMD_DO_SET_MODE, *parameters)

@@ -141,7 +141,7 @@ def test_what_a_vehicle_has_told_before_it_died_does_not_count():
 
 def test_an_estimator_that_tells_nothing_more_is_not_known_to_use_the_poses():
     trial = Trial().run(8.0)
-    trial.session.vehicle.record.heard_s = trial.now_s + 6.0  # by its heartbeats
+    trial.session.vehicle.heard_s = trial.now_s + 6.0  # by its heartbeats
     assert is_fused(trial.session.facts(trial.now_s + 6.0)) is None
 
 
