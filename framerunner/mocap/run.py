@@ -15,7 +15,7 @@ from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.session import MocapSession
 from framerunner.mocap.sources import PoseSource
 from framerunner.wire.transports.vehicle_link import VehicleLink
-from offboard.safety.check import Check
+from offboard.safety.check import Check, failures
 
 _WAIT_S = 0.002
 _LINE_S = 1.0
