@@ -5,6 +5,7 @@ The header fields are those of https://mavlink.io/en/guide/serialization.html.
 
 from __future__ import annotations
 
+import binascii
 from struct import Struct
 from sys import maxsize
 
@@ -29,10 +30,20 @@ _KNOWN_IDS[list(CRC_EXTRA)] = True
 _MAX_PAYLOAD_BYTES_V1 = np.full(_ID_COUNT_V1, -1)  # by message id; -1: unknown
 _MAX_PAYLOAD_BYTES_V1[list(_PAYLOAD_BYTES_V1)] = list(_PAYLOAD_BYTES_V1.values())
 
-_HEADER = Struct("<BBBBBBBHB")
+HEADER_V2 = Struct("<BBBBBBBHB")
+_REVERSED = bytes(int(f"{value:08b}"[::-1], 2) for value in range(256))
 _CAPACITY_BYTES = 1 << 16  # the largest datagram fits
 _WINDOW_BYTES = 2048  # of noise, searched in one step
 _MAX_TRIES = 64  # of headers found in it, in one step
+
+
+def checksum(data: bytes | bytearray, seed: int) -> int:
+    """MAVLink's checksum of a packet without its marker: CRC-16/MCRF4XX over the data and the seed.
+
+    It is the CRC that `binascii.crc_hqx` computes, with the bits of each byte and of the result reversed.
+    """
+    crc = binascii.crc_hqx(data.translate(_REVERSED) + _REVERSED[seed : seed + 1], 0xFFFF)
+    return _REVERSED[crc & 0xFF] << 8 | _REVERSED[crc >> 8]
 
 
 def packet_length(data: bytes | bytearray, start: int) -> int | None:
@@ -207,8 +218,9 @@ class PacketReader:
             return False
         self.checksums += 1
         end = start + header + data[start + 1]
-        crc = int(mavlink.x25crc(bytes(data[start + 1 : end]) + bytes((extra,))).crc)
-        return data[end] == crc & 0xFF and data[end + 1] == crc >> 8
+        return int.from_bytes(data[end : end + CHECKSUM_BYTES], "little") == checksum(
+            data[start + 1 : end], extra
+        )
 
     def _is_unknown(self, start: int, length: int) -> bool:
         """Whether to accept a packet of an unknown message, whose checksum cannot be tested.
@@ -249,12 +261,12 @@ class Packet:
         del message._pack
         number = message.get_msgId()
         self._template = bytearray(
-            _HEADER.pack(
+            HEADER_V2.pack(
                 MARKER_V2, len(payload), 0, 0, 0, system_id, component_id, number & 0xFFFF, number >> 16
             )
         )
         self._template += payload + b"\0\0"
-        self._crc_extra = bytes((message.crc_extra,))
+        self._crc_extra = message.crc_extra
         self.component_id = component_id
         self.length = len(self._template)
         self.is_heartbeat = message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
@@ -264,9 +276,8 @@ class Packet:
         packet = self._template
         packet[2] = SIGNED if signed else 0
         packet[4] = sequence
-        crc = mavlink.x25crc(bytes(packet[1:-CHECKSUM_BYTES]) + self._crc_extra).crc
-        packet[-2] = crc & 0xFF
-        packet[-1] = crc >> 8
+        crc = checksum(packet[1:-CHECKSUM_BYTES], self._crc_extra)
+        packet[-CHECKSUM_BYTES:] = crc.to_bytes(CHECKSUM_BYTES, "little")
         return bytes(packet)
 
 
