@@ -63,8 +63,7 @@ def _examine(drone: str, seconds: float, camera: str | None, calibration: Calibr
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from framerunner.doctor.camera import LOOK_S, examine_camera
-    from framerunner.doctor.camera_times import measure_camera
+    from framerunner.doctor.camera_times import LOOK_S, examine_camera, measure_camera
     from framerunner.doctor.checks import can_fly, examine
     from framerunner.doctor.listen import COMPONENT_ID, SYSTEM_ID, listen
     from framerunner.doctor.page import findings_table, print_page

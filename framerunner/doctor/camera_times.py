@@ -9,13 +9,21 @@ from datetime import date
 from itertools import pairwise
 from statistics import median
 
-from framerunner.camera_calibration.camera_delay import CameraDelay
-from offboard.safety.vehicle_checks import CalibrationFacts, CameraFacts
+from framerunner.camera_calibration.camera_delay import CameraDelay, delay_of
+from offboard.safety.check import Check
+from offboard.safety.vehicle_checks import (
+    CalibrationFacts,
+    CameraFacts,
+    calibration_checks,
+    camera_checks,
+)
 from vision.calibration.model import Calibration
 from vision.sources import open_source
 from vision.types import CameraError
 
 _FIRST_S = 5.0
+LOOK_S = 3.0
+"""For how long images are received."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +95,23 @@ async def measure_camera(url: str, seconds: float, size_px: tuple[int, int] | No
     if not received:
         return CameraTimes(problem=f"no image within {_FIRST_S:g} s")
     return CameraTimes(tuple(received), tuple(stamps), size)
+
+
+def examine_camera(
+    times: CameraTimes | None, calibration: Calibration | None, clock_ms: tuple[int, float] | None
+) -> list[Check]:
+    """What was measured of the camera, and whether its lens, mounting and delay are known.
+
+    Args:
+        times: of its images; None: no camera was given.
+        calibration: None: none was given.
+        clock_ms: vehicle time in milliseconds at a monotonic wall time, seconds; None: not known.
+    """
+    checks: list[Check] = []
+    if times is not None:
+        checks += camera_checks(times.facts(clock_ms, delay_of(None, calibration)))
+    checks += calibration_checks(calibration_facts(calibration, (0, 0) if times is None else times.size_px))
+    return checks
 
 
 def calibration_facts(calibration: Calibration | None, size_px: tuple[int, int]) -> CalibrationFacts:

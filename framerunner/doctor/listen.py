@@ -69,7 +69,7 @@ _ARDUPILOT_STREAMS_HZ = {  # it sends none by itself; these are requested for th
 }
 
 
-def listen(client: VehicleClient[Record], seconds: float) -> None:
+def listen(client: VehicleClient, seconds: float) -> None:
     """Receive and request, for some seconds of wall time."""
     record, link = client.session, client.link
     if record.is_ardupilot:

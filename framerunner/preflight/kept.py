@@ -14,8 +14,8 @@ from pathlib import Path
 
 from framerunner.errors import SettingError
 from framerunner.files.text_file import TextError, read_text
-from framerunner.preflight.link import PreflightClient
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
+from framerunner.wire.session.client import VehicleClient
 from framerunner.wire.session.fence import MAX_ITEMS, FenceItem, upload_fence
 from framerunner.wire.session.session import ParameterValue, VehicleError
 
@@ -145,7 +145,7 @@ def check_vehicle(kept: KeptState, path: Path, uid: str) -> None:
     )
 
 
-def restore(client: PreflightClient, kept: KeptState, tell: Callable[[str], None]) -> None:
+def restore(client: VehicleClient, kept: KeptState, tell: Callable[[str], None]) -> None:
     """Return parameters and fence to a disarmed vehicle.
 
     Args:

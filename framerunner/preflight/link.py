@@ -7,16 +7,13 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
-from framerunner.wire.dialect import MAVSDK_SYSTEM_ID, mavlink
+from framerunner.wire.dialect import MAVSDK_SYSTEM_ID
 from framerunner.wire.session.client import VehicleClient
 from framerunner.wire.session.record import Record
-from framerunner.wire.session.session import Session, VehicleError
+from framerunner.wire.session.session import VehicleError
 from framerunner.wire.transports.vehicle_link import VehicleLink
 
 COMPONENT_ID = 190
-_AUTOPILOTS = {mavlink.MAV_AUTOPILOT_PX4: "px4", mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot"}
-
-PreflightClient = VehicleClient[Record]
 
 
 def open_link(url: str) -> VehicleLink:
@@ -28,7 +25,7 @@ def open_link(url: str) -> VehicleLink:
 
 
 @contextmanager
-def open_client(url: str, cancelled: threading.Event | None = None) -> Iterator[PreflightClient]:
+def open_client(url: str, cancelled: threading.Event | None = None) -> Iterator[VehicleClient]:
     """A vehicle that was found on a link, which is closed at the end.
 
     Args:
@@ -49,8 +46,3 @@ def open_client(url: str, cancelled: threading.Event | None = None) -> Iterator[
         client = VehicleClient(link, record, time.monotonic, progress)
         client.find()
         yield client
-
-
-def autopilot_of(session: Session) -> str:
-    """A vehicle's autopilot, as the table of failsafes names it: px4, ardupilot, or other."""
-    return _AUTOPILOTS.get(session.autopilot, "other")

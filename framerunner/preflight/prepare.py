@@ -15,7 +15,6 @@ from framerunner.preflight.keys import HINT, has_terminal
 from framerunner.preflight.link import open_client
 from framerunner.preflight.run import PreflightSettings, run_preflight, tell
 from framerunner.preflight.settings import HardwareSettings
-from framerunner.wire.session.client import is_alone
 from framerunner.wire.transports.urls import parse_url
 from offboard.safety.check import failures
 from offboard.safety.operator import Operator
@@ -60,7 +59,7 @@ async def own_simulator_id(drone_url: str, camera_url: str | None) -> int | None
     def ask() -> int | None:
         with open_client(drone_url, cancelled) as client:
             _, is_own_simulator = client.identity()
-            return client.session.vehicle if is_own_simulator and is_alone(client) else None
+            return client.session.vehicle if is_own_simulator and client.is_alone() else None
 
     try:
         return await asyncio.to_thread(ask)

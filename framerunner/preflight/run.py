@@ -19,10 +19,10 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.geometry.axes import Alignment, Pose
 from framerunner.preflight.check_names import CHECK_NAMES, RENAMED, REPLACED
 from framerunner.preflight.kept import OPTION, KeptState, write_kept
-from framerunner.preflight.link import PreflightClient, autopilot_of, open_client
+from framerunner.preflight.link import open_client
 from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
 from framerunner.wire.dialect import degrees_e7
-from framerunner.wire.session.client import TIME_REQUESTS
+from framerunner.wire.session.client import TIME_REQUESTS, VehicleClient
 from framerunner.wire.session.fence import (
     FenceItem,
     Vertex,
@@ -46,7 +46,7 @@ from offboard.safety.vehicle_checks import (
 )
 
 LISTEN_S = 5.0
-FENCED = ("px4", "ardupilot")
+FENCED = ("PX4", "ArduPilot")
 """Autopilots that take a fence as mission items."""
 CAMERA_S = 3.0
 KEPT_PARAMETERS = "parameters-before{}.params"
@@ -205,11 +205,10 @@ def _measure(
     with open_client(settings.drone_url, cancelled) as client:
         listen(client, LISTEN_S)
         record = client.session
-        autopilot = autopilot_of(record)
         round_trips_s = client.round_trips_s()
         has_position = record.has_global_position
         checks: list[Check] = []
-        rows = failsafe_rows(autopilot, settings.abort)
+        rows = failsafe_rows(record.autopilot_name.lower(), settings.abort)
         if not rows:
             advice = "check them by hand, then accept it by --accept failsafes"
             checks.append(Check("failsafes", Outcome.FAIL, "no table for this autopilot", "", advice))
@@ -232,7 +231,7 @@ def _measure(
 
 
 def _keep(
-    client: PreflightClient,
+    client: VehicleClient,
     wanted: Mapping[str, float],
     values: Mapping[str, ParameterValue],
     upload: _FenceUpload,
@@ -284,7 +283,7 @@ class _FenceUpload:
         replaces: the vehicle has another one, which is replaced.
     """
 
-    def __init__(self, client: PreflightClient, plan: FlightPlan, fence: FlightFence) -> None:
+    def __init__(self, client: VehicleClient, plan: FlightPlan, fence: FlightFence) -> None:
         self._client = client
         self._limit = f"{len(fence.corners_arena_m)} corners within {fence.radius_m:g} m of the start"
         self._wanted: tuple[FenceItem, ...] = ()
@@ -315,10 +314,9 @@ class _FenceUpload:
     def _obstacle(self, plan: FlightPlan, fence: FlightFence) -> Check | None:
         """Why none can be uploaded; None if it can."""
         record, name, limit = self._client.session, "fence", self._limit
-        autopilot = autopilot_of(record)
         if record.armed:
             return Check(name, Outcome.FAIL, "not uploaded to an armed vehicle", limit, "land and disarm it")
-        if autopilot not in FENCED:
+        if record.autopilot_name not in FENCED:
             advice = "set one by hand, then accept it by --accept fence"
             return Check(name, Outcome.FAIL, "not uploaded: this autopilot's is not known", limit, advice)
         if not record.has_global_position:

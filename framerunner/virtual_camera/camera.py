@@ -15,7 +15,7 @@ from framerunner.geometry.rotations import quaternion_from_yaw, yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.vehicle_telemetry import AHEAD_US, VehiclePose, VehicleTelemetry
-from offboard.link.gimbal_feed import GimbalAttitude, gimbal_attitude
+from offboard.link.gimbal import GimbalAttitude, gimbal_attitude
 from scenarios.models import Scenario, TrueState
 from scenarios.result import LocalFrame, Standing
 from sitl.camera import FIRST_EXPOSURE_US, Camera, Motion

@@ -29,7 +29,7 @@ from framerunner.wire.status_text import plain
 from framerunner.wire.vehicle_telemetry import MessageOrder
 from offboard.arming import Arming
 from offboard.link.direct import subscribe
-from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
+from offboard.link.gimbal import GimbalAttitude, gimbal_attitude
 
 TICK_US = 50_000
 LAG_GROWTH_S = 2e-5  # with each attitude: 1 ms a second, more than clocks differ
@@ -81,7 +81,7 @@ class TelemetryFeed:
         self.position_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self.velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self.position_us = 0
-        self._gimbal = GimbalFeed()
+        self._gimbal: GimbalAttitude | None = None
         self.arming = Arming()  # with the heartbeats
         self.mode = ""  # name of the flight mode, such as "OFFBOARD"
         self.landed = True  # from EXTENDED_SYS_STATE
@@ -119,7 +119,7 @@ class TelemetryFeed:
         self._loop = asyncio.get_running_loop()
         plugin.subscribe_attitude_euler(self._on_attitude)
         subscribe(direct, "LOCAL_POSITION_NED", self._on_position)
-        self._gimbal.subscribe(direct)
+        subscribe(direct, "GIMBAL_DEVICE_ATTITUDE_STATUS", self._on_gimbal)
         plugin.subscribe_armed(self._on_armed)
         if numbered_modes:
             subscribe(direct, "HEARTBEAT", partial(_take_mode, self, numbered_modes))
@@ -235,7 +235,7 @@ class TelemetryFeed:
                 self.position_us,
                 radians(euler.roll_deg),
                 radians(euler.pitch_deg),
-                self._gimbal.newest,
+                self._gimbal,
                 self.landed,
             )
             self._samples.append(self.sample)
@@ -251,6 +251,9 @@ class TelemetryFeed:
         self.position_us = position_us
         self._position_received_s = self._clock()
         self.positions += 1
+
+    def _on_gimbal(self, message: Message) -> None:
+        self._gimbal = gimbal_attitude(message) or self._gimbal
 
     def _on_armed(self, armed: bool, _user: object) -> None:
         self.arming.see_heartbeat(bool(armed))

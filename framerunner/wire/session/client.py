@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from framerunner.wire.session.record import Record
@@ -11,7 +11,6 @@ from framerunner.wire.session.session import (
     ANSWER_S,
     ParameterValue,
     Request,
-    Session,
     VehicleError,
 )
 from framerunner.wire.transports.vehicle_link import VehicleLink
@@ -25,12 +24,11 @@ _HEARTBEATS_S = 1.2  # in which each vehicle sends one
 _SAME = 1e-6  # of a value that was set and read back, relative
 
 T = TypeVar("T")
-S = TypeVar("S", bound=Session)
 Progress = Callable[[str, float], None]
 """Called with what is being done and how far it is, 0 to 1. What it raises ends all waiting."""
 
 
-class VehicleClient(Generic[S]):
+class VehicleClient:
     """A session and the link to its vehicle.
 
     Args:
@@ -43,7 +41,7 @@ class VehicleClient(Generic[S]):
     def __init__(
         self,
         link: VehicleLink,
-        session: S,
+        session: Record,
         clock: Callable[[], float],
         progress: Progress = lambda _what, _share: None,
     ) -> None:
@@ -126,9 +124,8 @@ class VehicleClient(Generic[S]):
         self.run(ANSWER_S)
         return tuple(found)
 
-
-def is_alone(client: VehicleClient[Record]) -> bool:
-    """Whether no other vehicle with the same id is heard until each has sent a heartbeat."""
-    client.run(_HEARTBEATS_S)
-    addresses = client.link.addresses(client.session.vehicle, AUTOPILOT_COMPONENT_ID)
-    return len(addresses) <= 1 and not client.session.senders.problem
+    def is_alone(self) -> bool:
+        """Whether no other vehicle with the same id is heard until each has sent a heartbeat."""
+        self.run(_HEARTBEATS_S)
+        addresses = self.link.addresses(self.session.vehicle, AUTOPILOT_COMPONENT_ID)
+        return len(addresses) <= 1 and not self.session.senders.problem

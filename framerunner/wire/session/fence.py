@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
-from framerunner.wire.session.client import S, VehicleClient
+from framerunner.wire.session.client import VehicleClient
 from framerunner.wire.session.session import VehicleError, Wait
 
 FENCE = mavlink.MAV_MISSION_TYPE_FENCE
@@ -50,7 +50,7 @@ def polygon_fence(vertices: Sequence[Vertex]) -> tuple[FenceItem, ...]:
     return tuple(FenceItem(_INCLUSION, mavlink.MAV_FRAME_GLOBAL, params, x, y) for x, y in vertices)
 
 
-def upload_fence(client: VehicleClient[S], items: Sequence[FenceItem]) -> None:
+def upload_fence(client: VehicleClient, items: Sequence[FenceItem]) -> None:
     """Replace the vehicle's fence; without items it has none afterwards.
 
     Raises:
@@ -83,7 +83,7 @@ def upload_fence(client: VehicleClient[S], items: Sequence[FenceItem]) -> None:
         raise VehicleError(f"the vehicle refuses the fence: {words.replace('_', ' ')}")
 
 
-def download_fence(client: VehicleClient[S]) -> tuple[FenceItem, ...]:
+def download_fence(client: VehicleClient) -> tuple[FenceItem, ...]:
     """The fence that the vehicle has; empty if it has none.
 
     Raises:

@@ -2,8 +2,7 @@
 
 from datetime import date, timedelta
 
-from framerunner.doctor.camera import examine_camera
-from framerunner.doctor.camera_times import CameraTimes
+from framerunner.doctor.camera_times import CameraTimes, examine_camera
 from offboard.safety.check import Outcome
 from vision.calibration.model import Calibration, Mounting
 

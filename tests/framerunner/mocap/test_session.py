@@ -278,7 +278,7 @@ def test_an_origin_is_set_in_a_px4_only_if_one_is_given(origin):
     heartbeat = mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3)
     for message in reader.feed(heartbeat.pack(mavlink.MAVLink(None, 1, 1))):
         vehicle.take(message, 0.0)
-    kinds = {message.get_type() for tick in range(30) for message in vehicle.requests(tick / 10)}
+    kinds = {message.get_type() for tick in range(30) for message in vehicle.due(tick / 10)}
     assert ("SET_GPS_GLOBAL_ORIGIN" in kinds) == (origin is not None)
 
 

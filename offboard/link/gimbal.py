@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any
 
 from framerunner.geometry.rotations import multiply, normalized, quaternion_from_yaw
 from framerunner.geometry.vectors import Quaternion
 from framerunner.wire.dialect import Message
-from offboard.link.direct import subscribe
 
 _YAW_LOCK, _YAW_IN_VEHICLE_FRAME, _YAW_IN_EARTH_FRAME = 16, 32, 64  # GIMBAL_DEVICE_FLAGS
 _MIN_LENGTH = 0.5  # of a quaternion that is one
@@ -36,23 +34,3 @@ def gimbal_attitude(message: Message) -> GimbalAttitude | None:
     to_north = bool(flags & _YAW_IN_EARTH_FRAME) or (locked and not flags & _YAW_IN_VEHICLE_FRAME)
     w, x, y, z = q
     return GimbalAttitude(normalized((w, x, y, z)), to_north)
-
-
-class GimbalFeed:
-    """Keeps the newest attitude; it is written on MAVSDK's thread.
-
-    Attributes:
-        newest: None before the first, and without a gimbal.
-    """
-
-    def __init__(self) -> None:
-        self.newest: GimbalAttitude | None = None
-
-    def subscribe(self, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
-        """Subscribe to MAVSDK's synchronous plugin `mavlink_direct`."""
-        subscribe(direct, "GIMBAL_DEVICE_ATTITUDE_STATUS", self._on_attitude)
-
-    def _on_attitude(self, message: Message) -> None:
-        attitude = gimbal_attitude(message)
-        if attitude is not None:
-            self.newest = attitude
