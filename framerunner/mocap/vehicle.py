@@ -54,7 +54,6 @@ class Vehicle(Record):
         self.rates_rad_s: deque[tuple[int, float, float, float]] = deque(maxlen=2000)
         self.worst_ratio = 0.0
         self._truth_hz, self._origin, self._zero_s = needs_truth_hz, origin, zero_s
-        self._rates: RateWatch | None = None  # once the autopilot is known
         self._restarts = 0
         self._asked_origin = False  # a second ago, without an answer
         self._offsets: deque[tuple[float, float]] = deque(maxlen=_KEPT)  # round trip, offset
@@ -144,11 +143,12 @@ class Vehicle(Record):
         system_id = self.system_id
         if system_id is None:
             return
+        if self.rates is None:  # what is received less is requested; never less than the link has already
+            self.rates = RateWatch(dict(self._streams.values()), _LOW, _REQUEST_S, now_s)
         if self._is_due("timesync", now_s, _TIMESYNC_S):
             yield mavlink.MAVLink_timesync_message(0, self.stamp_us(now_s) * 1000)
         if self._is_due("parameter", now_s, _PARAMETER_S):
             yield from self._parameter_request(system_id, now_s)
-        yield from self._rate_requests(system_id, now_s)
         wants_origin = self.dialect.needs_origin or self._origin is not None
         if wants_origin and self._is_due("origin", now_s, _ORIGIN_S):
             yield from self._origin_requests(system_id)
@@ -168,16 +168,19 @@ class Vehicle(Record):
         name = missing[int(now_s / _PARAMETER_S) % len(missing)]
         yield request_parameter(system_id, name)
 
-    def _rate_requests(self, system_id: int, now_s: float) -> list[Message]:
-        """Request what comes too slowly; never less than the link has already."""
-        wanted = dict(self.dialect.streams_hz)
+    @property
+    def _streams(self) -> dict[str, tuple[int, float]]:
+        """Number and wanted rate of each message that is requested, by name."""
+        streams = dict(self.dialect.streams_hz)
         if self._truth_hz:
             name, number = self.dialect.truth
-            wanted[name] = (number, self._truth_hz)
-        if self._rates is None:
-            self._rates = RateWatch(dict(wanted.values()), _LOW, _REQUEST_S, now_s)
-        counts = {number: self.counts.get(name, 0) for name, (number, _) in wanted.items()}
-        return self._rates.requests(system_id, counts, now_s)
+            streams[name] = (number, self._truth_hz)
+        return streams
+
+    @property
+    def stream_counts(self) -> dict[int, int]:
+        """Numbers of these messages so far."""
+        return {number: self.counts.get(name, 0) for name, (number, _) in self._streams.items()}
 
     def _origin_requests(self, system_id: int) -> Iterator[Message]:
         """Ask for the origin until it is known; set it if there is none and one was given."""

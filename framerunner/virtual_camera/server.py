@@ -121,7 +121,7 @@ class CameraServer:
     def _request_rates(self, vehicle: int, now_s: float) -> None:
         """Request higher rates where they are too low; after some requests, report the low rates."""
         rates = self._rates
-        requests = rates.requests(vehicle, self._session.pose_counts, now_s)
+        requests = rates.requests(vehicle, self._session.stream_counts, now_s)
         if requests and not rates.left:
             attitude_hz, position_hz = rates.rates_hz.values()
             self._say(

@@ -290,7 +290,7 @@ class Vehicle:
             self._callbacks.notice("warning", f"drone {self.id}, mission: {mission.problem}")
 
     def _send_requests(self, now_s: float) -> None:
-        counts = self._session.pose_counts
+        counts = self._session.stream_counts
         requests = [
             self._boot_time.due(now_s) if self._telemetry.boot_unix_us is None else None,
             self.camera.request(now_s),

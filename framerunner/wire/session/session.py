@@ -195,7 +195,7 @@ class RateWatch:
 def pose_rates(
     wanted_hz: float, enough: float, period_s: float, now_s: float, max_requests: int
 ) -> RateWatch:
-    """Of attitudes and positions; see `RateWatch` and `Session.pose_counts`."""
+    """Of attitudes and positions; see `RateWatch`."""
     ids = (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
     return RateWatch(dict.fromkeys(ids, wanted_hz), enough, period_s, now_s, max_requests)
 
@@ -212,6 +212,7 @@ class Session:
         system_id: None before it is heard.
         telemetry: what it reports.
         autopilot: MAV_AUTOPILOT, by its heartbeats; None before the first.
+        rates: streams that are requested when they come too slowly; None: none are.
     """
 
     def __init__(
@@ -225,6 +226,7 @@ class Session:
         self.system_id = system_id
         self.telemetry = VehicleTelemetry() if telemetry is None else telemetry
         self.autopilot: int | None = None
+        self.rates: RateWatch | None = None
         self._own_system_id = own_system_id
         self._heartbeat = heartbeat
         self._beat_due_s = -inf
@@ -249,8 +251,8 @@ class Session:
         return self.telemetry.armed
 
     @property
-    def pose_counts(self) -> dict[int, int]:
-        """Numbers of attitudes and positions so far, for `pose_rates`."""
+    def stream_counts(self) -> dict[int, int]:
+        """Numbers of messages so far of the streams whose rates are watched: attitudes and positions."""
         ids = (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
         return dict(zip(ids, (self.telemetry.attitudes, self.telemetry.positions), strict=True))
 
@@ -284,6 +286,8 @@ class Session:
                 message = request.due(now_s)
                 messages += [] if message is None else [message]
         self._requests = [each for each in self._requests if not each.over]
+        if self.rates is not None and self.system_id is not None:
+            messages += self.rates.requests(self.system_id, self.stream_counts, now_s)
         return messages
 
     def send(self, message: Message) -> None:
