@@ -7,6 +7,7 @@ Vehicle and fence are in comments, which QGroundControl skips.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
@@ -28,19 +29,16 @@ _NAME_BYTES = 16
 _FIELDS = 5
 _ITEM_FIELDS = 10
 _MAX_FILE_BYTES = 1 << 20  # thousands of parameters
-_MAX_FLOAT = 3.4028235e38  # of 32 bits, as MAVLink sends them
-_WHOLE = {  # MAV_PARAM_TYPE and the numbers that it can hold; PARAM_SET has no place for 64 bits
-    kind: range(-(1 << bits - 1), 1 << bits - 1) if signed else range(1 << bits)
-    for kind, bits, signed in (
-        (mavlink.MAV_PARAM_TYPE_UINT8, 8, False),
-        (mavlink.MAV_PARAM_TYPE_INT8, 8, True),
-        (mavlink.MAV_PARAM_TYPE_UINT16, 16, False),
-        (mavlink.MAV_PARAM_TYPE_INT16, 16, True),
-        (mavlink.MAV_PARAM_TYPE_UINT32, 32, False),
-        (mavlink.MAV_PARAM_TYPE_INT32, 32, True),
-    )
+_ITEM_LAYOUT = "<HB5f2i"  # command, frame, params and z, x and y, as MAVLink sends them
+_LAYOUTS = {  # by MAV_PARAM_TYPE; PARAM_SET has no place for 64 bits
+    mavlink.MAV_PARAM_TYPE_UINT8: "<B",
+    mavlink.MAV_PARAM_TYPE_INT8: "<b",
+    mavlink.MAV_PARAM_TYPE_UINT16: "<H",
+    mavlink.MAV_PARAM_TYPE_INT16: "<h",
+    mavlink.MAV_PARAM_TYPE_UINT32: "<I",
+    mavlink.MAV_PARAM_TYPE_INT32: "<i",
+    _FLOAT: "<f",
 }
-_INT32 = _WHOLE[mavlink.MAV_PARAM_TYPE_INT32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,9 +176,7 @@ def _parsed_item(text: str) -> FenceItem:
         raise ValueError(text)
     params = (float(fields[2]), float(fields[3]), float(fields[4]), float(fields[5]))
     command, frame, x, y, z = *map(int, (*fields[:2], *fields[6:8])), float(fields[8])
-    floats_fit = all(not isfinite(each) or abs(each) <= _MAX_FLOAT for each in (*params, z))  # unused: NaN
-    if not floats_fit or not (0 <= command < 1 << 16 and 0 <= frame < 1 << 8 and x in _INT32 and y in _INT32):
-        raise ValueError(text)
+    _check_fits(_ITEM_LAYOUT, command, frame, *params, z, x, y)
     return FenceItem(command, frame, params, x, y, z)
 
 
@@ -189,11 +185,17 @@ def _parsed(line: str) -> ParameterValue:
     if len(fields) != _FIELDS:
         raise ValueError(line)
     name, value, kind = fields[2], float(fields[3]), int(fields[4])
-    sendable = (
-        abs(value) <= _MAX_FLOAT
-        if kind == _FLOAT
-        else value.is_integer() and int(value) in _WHOLE.get(kind, ())
-    )
-    if not name.isascii() or not name.isprintable() or not 0 < len(name) <= _NAME_BYTES or not sendable:
+    if kind not in _LAYOUTS or not isfinite(value) or (kind != _FLOAT and not value.is_integer()):
+        raise ValueError(line)
+    _check_fits(_LAYOUTS[kind], value if kind == _FLOAT else int(value))
+    if not name.isascii() or not name.isprintable() or not 0 < len(name) <= _NAME_BYTES:
         raise ValueError(line)
     return ParameterValue(name, value, kind)
+
+
+def _check_fits(layout: str, *numbers: float) -> None:
+    """Raise ValueError if MAVLink's fields cannot hold the numbers."""
+    try:
+        struct.pack(layout, *numbers)
+    except (struct.error, OverflowError) as error:
+        raise ValueError(str(error)) from None
