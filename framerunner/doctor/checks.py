@@ -225,7 +225,7 @@ def _streams(record: Record) -> Checks:
 
 def _link(record: Record) -> Checks:
     lost = record.packets.lost_share
-    words = f"{lost:.1%} of {record.packets.passed} packets lost"
+    words = f"{lost:.1%} of {record.packets.sent} packets lost"
     if record.silence:
         yield missing("link", f"the vehicle was {record.silence}: all this is old", "is it still running?")
     elif lost > LOST_SHARE:

@@ -15,6 +15,7 @@ from framerunner.wire.dialect import (
     Message,
     command_long,
     mavlink,
+    message_name,
     request_message,
     request_parameter,
     request_rate,
@@ -39,13 +40,16 @@ PARAMETERS = (
     *("MPC_XY_VEL_P_ACC", "MPC_Z_VEL_MAX_DN", "MPC_Z_VEL_MAX_UP"),
     *("NAV_DLL_ACT", "NAV_RCL_ACT", "RTL_RETURN_ALT"),
 )
-_ONCE = {
-    "AUTOPILOT_VERSION": mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-    "HOME_POSITION": mavlink.MAVLINK_MSG_ID_HOME_POSITION,
-    "GPS_GLOBAL_ORIGIN": mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
-    "ESTIMATOR_STATUS": mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
-    "AVAILABLE_MODES": mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES,
-}
+_ARDUPILOT_ONCE = (
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+    mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+)
+_ONCE = (
+    *_ARDUPILOT_ONCE,
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+    mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES,
+)
 ARDUPILOT_PARAMETERS = (
     *("BATT_FS_LOW_ACT", "BATT_MONITOR", "DISARM_DELAY"),
     *("EK3_SRC1_POSXY", "EK3_SRC1_POSZ", "EK3_SRC1_VELXY", "EK3_SRC1_YAW", "VISO_TYPE"),
@@ -54,26 +58,19 @@ ARDUPILOT_PARAMETERS = (
     *("GUID_OPTIONS", "GUID_TIMEOUT", "LAND_SPEED", "RTL_ALT"),
     *("WPNAV_ACCEL", "WPNAV_SPEED", "WPNAV_SPEED_DN", "WPNAV_SPEED_UP"),
 )
-_ARDUPILOT_ONCE = {
-    "AUTOPILOT_VERSION": mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-    "HOME_POSITION": mavlink.MAVLINK_MSG_ID_HOME_POSITION,
-    "GPS_GLOBAL_ORIGIN": mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
-}
 _ARDUPILOT_STREAMS_HZ = {  # it sends none by itself; these are requested for this link until its next start
-    "ATTITUDE": (mavlink.MAVLINK_MSG_ID_ATTITUDE, 50.0),
-    "LOCAL_POSITION_NED": (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 50.0),
-    "SYS_STATUS": (mavlink.MAVLINK_MSG_ID_SYS_STATUS, 2.0),
-    "EXTENDED_SYS_STATE": (mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, 2.0),
-    "GPS_RAW_INT": (mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, 2.0),
-    "EKF_STATUS_REPORT": (EKF_STATUS_REPORT_ID, 2.0),
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: 2.0,
+    EKF_STATUS_REPORT_ID: 2.0,
 }
 
 
 def listen(client: VehicleClient, seconds: float) -> None:
     """Receive and request, for some seconds of wall time."""
     record, link = client.session, client.link
-    if record.is_ardupilot:
-        add_ardupilot_messages()
     began_s = request_s = client.clock()
     requested_s = -10.0
     prearm_s = began_s + _PREARM_S
@@ -104,11 +101,12 @@ def open_requests(record: Record) -> Iterator[Message]:
     """The requests that have not been answered yet."""
     system_id = record.vehicle
     if record.is_ardupilot:
-        for name, (number, rate_hz) in _ARDUPILOT_STREAMS_HZ.items():
-            if name not in record.latest:
+        add_ardupilot_messages()
+        for number, rate_hz in _ARDUPILOT_STREAMS_HZ.items():
+            if message_name(number) not in record.latest:
                 yield request_rate(system_id, number, rate_hz)
-    for name, number in (_ARDUPILOT_ONCE if record.is_ardupilot else _ONCE).items():
-        if name not in record.latest:
+    for number in _ARDUPILOT_ONCE if record.is_ardupilot else _ONCE:
+        if message_name(number) not in record.latest:
             yield request_message(system_id, number)
     for name in ARDUPILOT_PARAMETERS if record.is_ardupilot else PARAMETERS:
         if name not in record.parameters:

@@ -74,15 +74,15 @@ class ArduPilotPoses:
         *(rule.name for rule in _RULES),
         *("VISO_DELAY_MS", "VISO_POS_M_NSE", "VISO_YAW_M_NSE", "VISO_QUAL_MIN", "INS_GYRO_FILTER"),
     )
-    streams_hz: Mapping[str, tuple[int, float]] = MappingProxyType(
+    streams_hz: Mapping[int, float] = MappingProxyType(
         {
-            "ATTITUDE": (mavlink.MAVLINK_MSG_ID_ATTITUDE, 50.0),
-            "LOCAL_POSITION_NED": (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 30.0),
-            "EKF_STATUS_REPORT": (EKF_STATUS_REPORT_ID, 2.0),
-            "SYS_STATUS": (mavlink.MAVLINK_MSG_ID_SYS_STATUS, 2.0),
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
+            EKF_STATUS_REPORT_ID: 2.0,
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
         }
     )
-    truth = ("SIM_STATE", mavlink.MAVLINK_MSG_ID_SIM_STATE)
+    truth = mavlink.MAVLINK_MSG_ID_SIM_STATE
     estimator = "EKF_STATUS_REPORT"
     needs_origin = True
 

@@ -25,17 +25,17 @@ class Px4Poses:
         *("EKF2_EV_CTRL", "EKF2_EV_DELAY", "EKF2_EV_NOISE_MD", "EKF2_EVP_NOISE", "EKF2_EVA_NOISE"),
         *("EKF2_GPS_CTRL", "EKF2_HGT_REF", "EKF2_MAG_TYPE"),
     )
-    streams_hz: Mapping[str, tuple[int, float]] = MappingProxyType(
+    streams_hz: Mapping[int, float] = MappingProxyType(
         {
-            "ATTITUDE": (mavlink.MAVLINK_MSG_ID_ATTITUDE, 50.0),
-            "LOCAL_POSITION_NED": (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 30.0),
-            "ESTIMATOR_STATUS": (mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, 2.0),
-            "SYS_STATUS": (mavlink.MAVLINK_MSG_ID_SYS_STATUS, 2.0),
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
+            mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
             # PX4's filter estimates the drift per answer, so this rate must stay the same.
-            "TIMESYNC": (mavlink.MAVLINK_MSG_ID_TIMESYNC, 20.0),
+            mavlink.MAVLINK_MSG_ID_TIMESYNC: 20.0,
         }
     )
-    truth = ("HIL_STATE_QUATERNION", mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION)
+    truth = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
     estimator = "ESTIMATOR_STATUS"
     needs_origin = False
 

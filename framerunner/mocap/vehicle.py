@@ -13,6 +13,7 @@ from framerunner.wire.dialect import (
     Message,
     degrees_e7,
     mavlink,
+    message_name,
     millimetres,
     request_message,
     request_parameter,
@@ -144,7 +145,7 @@ class Vehicle(Record):
         if system_id is None:
             return
         if self.rates is None:  # what is received less is requested; never less than the link has already
-            self.rates = RateWatch(dict(self._streams.values()), _LOW, _REQUEST_S, now_s)
+            self.rates = RateWatch(self._streams_hz, _LOW, _REQUEST_S, now_s)
         if self._is_due("timesync", now_s, _TIMESYNC_S):
             yield mavlink.MAVLink_timesync_message(0, self.stamp_us(now_s) * 1000)
         if self._is_due("parameter", now_s, _PARAMETER_S):
@@ -169,18 +170,15 @@ class Vehicle(Record):
         yield request_parameter(system_id, name)
 
     @property
-    def _streams(self) -> dict[str, tuple[int, float]]:
-        """Number and wanted rate of each message that is requested, by name."""
-        streams = dict(self.dialect.streams_hz)
-        if self._truth_hz:
-            name, number = self.dialect.truth
-            streams[name] = (number, self._truth_hz)
-        return streams
+    def _streams_hz(self) -> dict[int, float]:
+        """Wanted rates, by message id."""
+        truth = {self.dialect.truth: self._truth_hz} if self._truth_hz else {}
+        return {**self.dialect.streams_hz, **truth}
 
     @property
     def stream_counts(self) -> dict[int, int]:
         """Numbers of these messages so far."""
-        return {number: self.counts.get(name, 0) for name, (number, _) in self._streams.items()}
+        return {number: self.counts.get(message_name(number), 0) for number in self._streams_hz}
 
     def _origin_requests(self, system_id: int) -> Iterator[Message]:
         """Ask for the origin until it is known; set it if there is none and one was given."""

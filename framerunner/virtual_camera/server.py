@@ -12,6 +12,7 @@ from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.session.session import RateWatch, Session, pose_rates
 from framerunner.wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
 from framerunner.wire.transports.vehicle_link import VehicleLink
+from framerunner.wire.vehicle_telemetry import VehicleTelemetry
 from scenarios.task import Task
 from sitl.video import VideoServer
 
@@ -46,7 +47,7 @@ class CameraServer:
         self._link = link
         self._video = video
         self._say = say
-        self._watch = _TelemetryWatch(say, link.url)
+        self._watch = _TelemetryWatch(say, link.url, camera.telemetry)
         # Over udpout the vehicle cannot send before it has received something.
         self._session = Session(heartbeat="companion", telemetry=camera.telemetry)
         self._thread = LinkThread(lambda: link, self._take, lambda _level, text: say(text), reopens=False)
@@ -92,7 +93,6 @@ class CameraServer:
                 self._camera.take_gimbal(message)
             elif session.is_from_autopilot(message):
                 self._camera.follow(message)
-                self._watch.see(message.get_type(), now_s)
         if self._camera.restarts != self._restarts:
             self._restarts = self._camera.restarts
             self._rates = _new_rates()
@@ -144,27 +144,22 @@ def _new_rates() -> RateWatch:
 class _TelemetryWatch:
     """Says once what is missing and once when it is received again."""
 
-    def __init__(self, say: Say, url: str) -> None:
+    def __init__(self, say: Say, url: str, telemetry: VehicleTelemetry) -> None:
         self._say = say
         self._url = url
-        self._seen_s: dict[str, float] = {}
+        self._telemetry = telemetry
         self._began_s = time.monotonic()
         self._waiting_said = False
         self._placed: bool | None = None
         self.stale = False  # attitude or position is no longer received
 
-    def see(self, kind: str, now_s: float) -> None:
-        self._seen_s["ATTITUDE" if kind == "ATTITUDE_QUATERNION" else kind] = now_s
-
     def check(self, now_s: float) -> None:
         """Say what has not been received for too long, or is received again."""
-        ages = {
-            name: now_s - self._seen_s.get(key, self._began_s)
-            for name, key in (("attitude", "ATTITUDE"), ("local position", "LOCAL_POSITION_NED"))
-        }
-        missing = [name for name, age_s in ages.items() if age_s > STALE_S]
+        telemetry = self._telemetry
+        heard_s = {"attitude": telemetry.attitude_heard_s, "local position": telemetry.position_heard_s}
+        missing = [name for name, at_s in heard_s.items() if now_s - max(at_s, self._began_s) > STALE_S]
         words = " and no ".join(missing)
-        if not {"ATTITUDE", "LOCAL_POSITION_NED"} <= set(self._seen_s):
+        if min(heard_s.values()) < self._began_s:
             if missing and not self._waiting_said and now_s - self._began_s > _WAITING_LINE_S:
                 self._waiting_said = True
                 self._say(f"still no {words} on {self._url}; no images until they are received")

@@ -86,6 +86,11 @@ def request_parameter(system_id: int, name: str) -> Message:
     return mavlink.MAVLink_param_request_read_message(system_id, AUTOPILOT_COMPONENT_ID, name.encode(), -1)
 
 
+def message_name(message_id: int) -> str:
+    """The name of a message that the dialect has, such as "ATTITUDE"."""
+    return str(mavlink.mavlink_map[message_id].msgname)
+
+
 def event_id(name: str) -> int:
     """Id of an autopilot's EVENT: its component, then 24 bits of its name's FNV-1a hash, as in PX4."""
     number = 0x811C9DC5

@@ -300,7 +300,41 @@ def message_id_of(data: bytes | bytearray, start: int = 0) -> int:
     return int.from_bytes(data[start + 7 : start + 10], "little")
 
 
-def missing_before(sequence: int, last: int, max_missing: int = 127) -> int:
-    """How many packets of a sender are missing after its last one; -1: this one is late or doubled."""
-    missing = (sequence - last - 1) % 256
-    return missing if missing <= max_missing else -1
+class SequenceCounter:
+    """Packets of one sender, counted against their numbers.
+
+    Args:
+        max_missing: a number that is farther ahead is that of a late or doubled packet.
+
+    Attributes:
+        received: packets.
+        missing: packets that were sent meanwhile; one that is late is missing no longer.
+    """
+
+    __slots__ = ("_last", "_max_missing", "missing", "received")
+
+    def __init__(self, max_missing: int = 127) -> None:
+        self._max_missing = max_missing
+        self._last: int | None = None
+        self.received = self.missing = 0
+
+    def take(self, sequence: int) -> int:
+        """Count a packet by its number, 0 to 255; how many are missing before it, or -1: it is late."""
+        self.received += 1
+        missing = 0 if self._last is None else (sequence - self._last - 1) % 256
+        if missing > self._max_missing:
+            missing = -1
+        else:
+            self._last = sequence
+        self.missing += missing
+        return missing
+
+    @property
+    def sent(self) -> int:
+        """Packets that were sent, by their numbers."""
+        return self.received + self.missing
+
+    @property
+    def lost_share(self) -> float:
+        """Of the packets sent, 0 to 1."""
+        return max(0.0, self.missing / self.sent) if self.sent > 0 else 0.0

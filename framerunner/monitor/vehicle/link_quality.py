@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from framerunner.wire.framing import missing_before
+from framerunner.wire.framing import SequenceCounter
 
 _SPAN_S = 10
 _MAX_MISSING = 200  # a sequence number that is farther ahead belongs to a packet that was overtaken
@@ -30,7 +30,7 @@ class LinkQuality:
 
     def __init__(self, now_s: float) -> None:
         self.heard_s = now_s
-        self._sequence: int | None = None
+        self._packets = SequenceCounter(_MAX_MISSING)
         self._seconds: deque[_Second] = deque([_Second(now_s)], maxlen=_SPAN_S)
 
     def count(self, sequence: int, now_s: float) -> None:
@@ -41,16 +41,11 @@ class LinkQuality:
             second = _Second(now_s)
             self._seconds.append(second)
         second.heard += 1
-        if self._sequence is not None:
-            missing = missing_before(sequence, self._sequence, _MAX_MISSING)
-            second.lost += missing  # -1: counted as missing before, and received now
-            if missing < 0:
-                return
-        self._sequence = sequence
+        second.lost += self._packets.take(sequence)  # -1: counted as missing before, and received now
 
     def forget_sequence(self) -> None:
         """Accept any next sequence number: the vehicle has restarted."""
-        self._sequence = None
+        self._packets = SequenceCounter(_MAX_MISSING)
 
     def age_s(self, now_s: float) -> float:
         """Time since the last packet."""

@@ -16,7 +16,7 @@ from framerunner.wire.dialect import (
     is_vehicle,
     mavlink,
 )
-from framerunner.wire.framing import missing_before
+from framerunner.wire.framing import SequenceCounter
 from framerunner.wire.px4_modes import mode_words
 from framerunner.wire.session.estimator import EstimatorStatus
 from framerunner.wire.session.senders import Senders
@@ -76,31 +76,6 @@ class ArmingReport:
                 self.failures = (*self.failures, words)
 
 
-class StreamCounter:
-    """Packets of one component, counted against their sequence numbers."""
-
-    def __init__(self) -> None:
-        self._last: int | None = None
-        self.received = 0
-        self.passed = 0  # sent meanwhile, by their numbers
-
-    def take(self, sequence: int) -> None:
-        """Count a packet by its number, 0 to 255; one that is received after its successor is not lost."""
-        self.received += 1
-        if self._last is None:
-            self.passed, self._last = 1, sequence
-            return
-        missing = missing_before(sequence, self._last)
-        if missing >= 0:
-            self.passed += missing + 1
-            self._last = sequence
-
-    @property
-    def lost_share(self) -> float:
-        """Of the packets sent, 0 to 1."""
-        return max(0.0, 1.0 - self.received / self.passed) if self.passed else 0.0
-
-
 class Record(Session):
     """A session that keeps what its vehicle sends; see `Session` for the arguments.
 
@@ -135,7 +110,7 @@ class Record(Session):
         self.latest: dict[str, Message] = {}
         self.counts: dict[str, int] = {}
         self.times_s: dict[str, tuple[float, float]] = {}
-        self.packets = StreamCounter()
+        self.packets = SequenceCounter()
         self.octets = 0
         self.cameras: set[int] = set()
         self.stations: set[tuple[int, int]] = set()

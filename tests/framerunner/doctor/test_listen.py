@@ -13,8 +13,9 @@ from framerunner.cli import run
 from framerunner.doctor import listen
 from framerunner.doctor.listen import PARAMETERS
 from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import SequenceCounter
 from framerunner.wire.session.client import VehicleClient
-from framerunner.wire.session.record import SUMMARY, Record, StreamCounter
+from framerunner.wire.session.record import SUMMARY, Record
 from framerunner.wire.session.session import ParameterValue, VehicleError
 
 HARMLESS = {"HEARTBEAT", "COMMAND_LONG", "PARAM_REQUEST_READ"}
@@ -52,18 +53,18 @@ def heard(*messages, system=1, component=1):
 def test_lost_packets_are_counted_by_their_numbers(first, count, share, seed):
     chance = random.Random(seed)
     kept = [0, *(k for k in range(1, count - 1) if chance.random() >= share), max(count - 1, 0)]
-    counter = StreamCounter()
+    counter = SequenceCounter()
     for number in sorted(set(kept)):
         counter.take((first + number) % 256)
-    assert counter.passed == count
+    assert counter.sent == count
     assert counter.lost_share == pytest.approx(1 - len(set(kept)) / count)
 
 
 def test_swapped_and_doubled_packets_are_no_loss():
-    counter = StreamCounter()
+    counter = SequenceCounter()
     for number in (254, 0, 255, 1, 1, 2):
         counter.take(number)
-    assert counter.passed == 5
+    assert counter.sent == 5
     assert counter.lost_share == 0.0
 
 
