@@ -12,7 +12,6 @@ from statistics import median
 from framerunner.camera_calibration.camera_delay import CameraDelay, delay_of
 from offboard.safety.check import Check
 from offboard.safety.vehicle_checks import (
-    CalibrationFacts,
     CameraFacts,
     calibration_checks,
     camera_checks,
@@ -110,34 +109,12 @@ def examine_camera(
     checks: list[Check] = []
     if times is not None:
         checks += camera_checks(times.facts(clock_ms, delay_of(None, calibration)))
-    checks += calibration_checks(calibration_facts(calibration, (0, 0) if times is None else times.size_px))
-    return checks
+    size_px = (0, 0) if times is None else times.size_px
+    return checks + calibration_checks(calibration, size_px, days_since)
 
 
-def calibration_facts(calibration: Calibration | None, size_px: tuple[int, int]) -> CalibrationFacts:
-    """What the checks need to know of a calibration today.
-
-    Args:
-        calibration: None: there is none.
-        size_px: width and height of the camera's images; zeros: there was none.
-    """
-    if calibration is None:
-        return CalibrationFacts(size_px=size_px)
-    calibrated_px, mounting = (calibration.width_px, calibration.height_px), calibration.mounting
-    made_days = _days_since(calibration.made_on)
-    if mounting is None:
-        return CalibrationFacts(calibrated_px, size_px, made_days=made_days)
-    return CalibrationFacts(
-        calibrated_px,
-        size_px,
-        mounting.angles_frd_rad,
-        mounting.angles_std_rad,
-        made_days=made_days,
-        mounting_days=_days_since(mounting.measured_on),
-    )
-
-
-def _days_since(day: str | None) -> int | None:
+def days_since(day: str | None) -> int | None:
+    """Days from a day, year-month-day, to today; None: there is no such day."""
     with contextlib.suppress(ValueError):  # such as the 30th of February
         if day is not None:
             return (date.today() - date.fromisoformat(day)).days

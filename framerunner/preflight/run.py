@@ -11,7 +11,7 @@ from math import nan
 from pathlib import Path
 
 from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
-from framerunner.doctor.camera_times import CameraTimes, calibration_facts, measure_camera
+from framerunner.doctor.camera_times import CameraTimes, days_since, measure_camera
 from framerunner.doctor.checks import examine
 from framerunner.doctor.listen import listen
 from framerunner.errors import UserError
@@ -178,7 +178,7 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
         clock_ms = record.clock_ms[-1] if record.clock_ms else None
         checks += camera_checks(times.facts(clock_ms, settings.camera_delay))
         if plan.chart.vision == "frames":
-            checks += calibration_checks(calibration_facts(plan.calibration, times.size_px))
+            checks += calibration_checks(plan.calibration, times.size_px, days_since)
     accepted = tuple(accept(checks, settings.accepted))
     vehicle = _vehicle_words(record)
     return PreflightReport(vehicle, record.vehicle, accepted, fence, measured.changes, measured.kept)

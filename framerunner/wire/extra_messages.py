@@ -31,7 +31,6 @@ def add_to(dialect: Any) -> None:  # noqa: ANN401 - a module that was made by py
     """Add what a dialect lacks: classes and numbers of messages, enums and their values."""
     names = vars(dialect)
     definitions = MAVXML(str(_DEFINITIONS), PROTOCOL_2_0)
-    bitmasks = {enum.name for enum in definitions.enum if enum.bitmask}
     for enum in definitions.enum:
         made = dialect.enums.setdefault(enum.name, dialect.Enum())
         made.bitmask = bool(enum.bitmask)
@@ -39,13 +38,13 @@ def add_to(dialect: Any) -> None:  # noqa: ANN401 - a module that was made by py
             made.setdefault(entry.value, dialect.EnumEntry(entry.name, entry.description))
             names.setdefault(entry.name, entry.value)
     for message in definitions.message:
-        made = _message_class(message, bitmasks, dialect)
+        made = _message_class(message, dialect)
         dialect.mavlink_map.setdefault(message.id, made)
         names.setdefault(made.__name__, made)
         names.setdefault(f"MAVLINK_MSG_ID_{message.name}", message.id)
 
 
-def _message_class(definition: Any, bitmasks: set[str], dialect: Any) -> Any:  # noqa: ANN401
+def _message_class(definition: Any, dialect: Any) -> Any:  # noqa: ANN401
     """The class of a message, as pymavlink's generator writes it."""
     fields, ordered = definition.fields, definition.ordered_fields
     instance = next((field for field in fields if field.instance), None)
@@ -82,10 +81,6 @@ def _message_class(definition: Any, bitmasks: set[str], dialect: Any) -> Any:  #
         "fieldnames": [field.name for field in fields],
         "ordered_fieldnames": [field.name for field in ordered],
         "fieldtypes": [field.type for field in fields],
-        "fielddisplays_by_name": {field.name: "bitmask" for field in fields if field.enum in bitmasks},
-        "fieldenums_by_name": {field.name: field.enum for field in fields if field.enum},
-        "fieldunits_by_name": {field.name: field.units.strip("[]") for field in fields if field.units},
-        "native_format": bytearray(("<" + "".join(_FORMATS[field.type] for field in ordered)).encode()),
         "orders": [ordered.index(field) for field in fields],
         "lengths": [1 if field.type == "char" else max(1, field.array_length) for field in ordered],
         "array_lengths": [field.array_length for field in ordered],

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, isfinite, isnan
 from statistics import median
 
 from framerunner.wire.session.estimator import EstimatorStatus
 from offboard.safety.check import Check, Outcome, passed
+from vision.calibration.model import Calibration, Mounting
 
 BATTERY_PERCENT = 40.0
 MAX_LOST_SHARE = 0.05
@@ -45,27 +46,6 @@ class CameraFacts:
     assumed_by: str = ""
     size_px: tuple[int, int] = (0, 0)
     problem: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class CalibrationFacts:
-    """What is known of the camera's calibration.
-
-    Attributes:
-        calibrated_px: width and height of the images that it was made from; None: there is no calibration.
-        size_px: width and height of the camera's images; zeros: there was none.
-        angles_frd_rad: roll, pitch and yaw of the camera on the drone; None: never measured.
-        angles_std_rad: their standard deviations; None: not known.
-        made_days: since the lens was calibrated; None: not known.
-        mounting_days: likewise, since the mounting was measured.
-    """
-
-    calibrated_px: tuple[int, int] | None = None
-    size_px: tuple[int, int] = (0, 0)
-    angles_frd_rad: tuple[float, float, float] | None = None
-    angles_std_rad: tuple[float, float, float] | None = None
-    made_days: int | None = None
-    mounting_days: int | None = None
 
 
 def battery_check(percent: float, voltage_v: float) -> Check:
@@ -162,33 +142,43 @@ def _camera_delay_check(facts: CameraFacts) -> Check:
     return passed(name, good, value, limit, advice)
 
 
-def calibration_checks(facts: CalibrationFacts) -> list[Check]:
-    """Whether the camera's lens and its mounting on the drone were measured, for missions that map frames."""
+def calibration_checks(
+    calibration: Calibration | None, size_px: tuple[int, int], days_since: Callable[[str | None], int | None]
+) -> list[Check]:
+    """Whether the camera's lens and its mounting on the drone were measured, for missions that map frames.
+
+    Args:
+        calibration: of the camera; None: there is none.
+        size_px: width and height of the camera's images; zeros: there was none.
+        days_since: a day that the calibration names; None: not known.
+    """
     name = "camera calibration"
-    if facts.calibrated_px is None:
+    if calibration is None:
         advice = "run framerunner camera calibrate, then camera extrinsics, and give --calibration"
         return [Check(name, Outcome.NOTE, "none: the scenario's camera is assumed", "", advice)]
-    (width, height), (seen_width, seen_height) = facts.calibrated_px, facts.size_px
-    limit = f"images of {width} × {height}"
-    if any(facts.size_px) and facts.size_px != facts.calibrated_px:
-        value = f"images have {seen_width} × {seen_height}"
+    calibrated_px, mounting = (calibration.width_px, calibration.height_px), calibration.mounting
+    mounted = _mounting_check(mounting, None if mounting is None else days_since(mounting.measured_on))
+    limit = f"images of {calibrated_px[0]} × {calibrated_px[1]}"
+    if any(size_px) and size_px != calibrated_px:
+        value = f"images have {size_px[0]} × {size_px[1]}"
         advice = "calibrate it with images as it gives them in flight"
-        return [Check(name, Outcome.FAIL, value, limit, advice), _mounting_check(facts)]
+        return [Check(name, Outcome.FAIL, value, limit, advice), mounted]
     advice = "make it again if lens, focus or resolution were changed since"
-    return [_aged(Check(name, Outcome.PASS, "made", limit), facts.made_days, advice), _mounting_check(facts)]
+    made_days = days_since(calibration.made_on)
+    return [_aged(Check(name, Outcome.PASS, "made", limit), made_days, advice), mounted]
 
 
-def _mounting_check(facts: CalibrationFacts) -> Check:
+def _mounting_check(mounting: Mounting | None, days: int | None) -> Check:
     name = "camera mounting"
-    if facts.angles_frd_rad is None:
+    if mounting is None:
         value = "never measured; the camera is taken to look straight ahead"
         return Check(name, Outcome.NOTE, value, "", "run framerunner camera extrinsics")
-    roll, pitch, yaw = (degrees(angle) for angle in facts.angles_frd_rad)
+    roll, pitch, yaw = (degrees(angle) for angle in mounting.angles_frd_rad)
     value = f"roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"
-    if facts.angles_std_rad is not None:
-        value += f" (1 sigma {', '.join(f'{degrees(each):.2f}' for each in facts.angles_std_rad)})"
+    if mounting.angles_std_rad is not None:
+        value += f" (1 sigma {', '.join(f'{degrees(each):.2f}' for each in mounting.angles_std_rad)})"
     advice = "measure it again if the camera or the drone's markers were moved since"
-    return _aged(Check(name, Outcome.PASS, f"{value}, measured"), facts.mounting_days, advice)
+    return _aged(Check(name, Outcome.PASS, f"{value}, measured"), days, advice)
 
 
 def _aged(check: Check, days: int | None, advice: str) -> Check:

@@ -7,7 +7,6 @@ from framerunner.errors import SettingError
 from framerunner.wire.session.estimator import EstimatorStatus
 from offboard.safety.check import Check, Outcome, accept, check_names, failures
 from offboard.safety.vehicle_checks import (
-    CalibrationFacts,
     CameraFacts,
     battery_check,
     calibration_checks,
@@ -15,6 +14,7 @@ from offboard.safety.vehicle_checks import (
     estimator_check,
     link_checks,
 )
+from vision.calibration.model import Calibration, Mounting
 
 ESTIMATOR = EstimatorStatus(True, True, True, True, {"position": 0.1})
 LINK = {"lost_share": 0.0, "round_trips_s": (0.02,) * 20, "requests": 20}
@@ -110,22 +110,35 @@ def test_a_name_that_is_no_checks_is_told_with_all_names():
         check_names(["x"], ["banana", "Apple"])
 
 
+SIZE_PX = (320, 240)
+
+
+def calibrated(width_px=320, height_px=240, *, mounting=None):
+    lens = Calibration.ideal(width_px, height_px, 200.0)
+    return lens.model_copy(update={"made_on": "2026-11-20", "mounting": mounting})
+
+
+def days_since(days):
+    return lambda day: None if day is None else days
+
+
 def test_a_mounting_that_was_never_measured_is_noted_and_another_size_fails():
-    size_px, straight = (320, 240), (0.0, 0.1, 0.0)
-    (none,) = calibration_checks(CalibrationFacts(size_px=size_px))
-    lens, unmeasured = calibration_checks(CalibrationFacts(size_px, size_px, made_days=3))
+    (none,) = calibration_checks(None, SIZE_PX, days_since(3))
+    lens, unmeasured = calibration_checks(calibrated(), SIZE_PX, days_since(3))
     assert (none.outcome, lens.outcome, unmeasured.outcome) == (Outcome.NOTE, Outcome.PASS, Outcome.NOTE)
     assert "never measured" in unmeasured.value and "camera extrinsics" in unmeasured.advice
-    _, measured = calibration_checks(
-        CalibrationFacts(size_px, size_px, straight, (0.001, 0.002, 0.003), made_days=3, mounting_days=0)
+    mounting = Mounting(
+        angles_frd_rad=(0.0, 0.1, 0.0), angles_std_rad=(0.001, 0.002, 0.003), measured_on="2026-11-20"
     )
+    _, measured = calibration_checks(calibrated(mounting=mounting), SIZE_PX, days_since(0))
     assert measured.outcome is Outcome.PASS
     assert measured.value == "roll 0.0, pitch 5.7, yaw 0.0 degrees (1 sigma 0.06, 0.11, 0.17), measured today"
-    other_size, _ = calibration_checks(CalibrationFacts((640, 480), size_px, straight))
+    other_size, _ = calibration_checks(calibrated(640, 480, mounting=mounting), SIZE_PX, days_since(0))
     assert failed(other_size) == ["camera calibration"]
 
 
 @pytest.mark.parametrize(("days", "outcome"), [(90, Outcome.PASS), (91, Outcome.NOTE), (None, Outcome.NOTE)])
 def test_an_old_calibration_is_noted(days, outcome):
-    facts = CalibrationFacts((320, 240), (320, 240), (0.0, 0.0, 0.0), made_days=days, mounting_days=days)
-    assert [each.outcome for each in calibration_checks(facts)] == [outcome, outcome]
+    mounting = Mounting(angles_frd_rad=(0.0, 0.0, 0.0), measured_on="2026-11-20")
+    checks = calibration_checks(calibrated(mounting=mounting), SIZE_PX, days_since(days))
+    assert [each.outcome for each in checks] == [outcome, outcome]
