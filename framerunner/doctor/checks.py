@@ -7,7 +7,7 @@ the estimate is; parameters show only what was requested.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite
+from math import isfinite, isnan
 
 from framerunner.doctor import ardupilot
 from framerunner.doctor.common import (
@@ -235,15 +235,14 @@ def _link(record: Record) -> Checks:
 
 
 def _battery(record: Record) -> Checks:
-    status = record.latest.get("SYS_STATUS")
-    if status is None or status.battery_remaining < 0:
+    percent, volts = record.charge
+    if isnan(percent):
         yield note("battery", "its charge is not reported", "measure it")
         return
-    volts = "" if status.voltage_battery in (0, 65535) else f", {status.voltage_battery / 1000:.1f} V"
-    words = f"{status.battery_remaining} %{volts}"
-    if status.battery_remaining <= 100 * record.parameters.get("BAT_CRIT_THR", 0.07):
+    words = f"{percent:.0f} %" + ("" if isnan(volts) else f", {volts:.1f} V")
+    if percent <= 100 * record.parameters.get("BAT_CRIT_THR", 0.07):
         yield missing("battery", words, "charge it: it would land at once")
-    elif status.battery_remaining < BATTERY_PERCENT:
+    elif percent < BATTERY_PERCENT:
         yield note("battery", words, "charge it: a try takes three minutes")
     else:
         yield good("battery", words)

@@ -7,7 +7,6 @@ import sys
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import nan
 from pathlib import Path
 
 from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
@@ -169,7 +168,7 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
             if each.name not in REPLACED  # by checks with a limit
         ),
         estimator_check(record.estimator, "EKF_STATUS_REPORT" if record.is_ardupilot else "ESTIMATOR_STATUS"),
-        battery_check(*_charge(record)),
+        battery_check(*record.charge),
         *link_checks(record.packets.lost_share, measured.round_trips_s, TIME_REQUESTS),
         *measured.checks,
         _caps_check(plan, fence),
@@ -343,16 +342,6 @@ def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
     if limits.forward_m_s > caps.level_m_s or max(limits.up_m_s, limits.down_m_s) > caps.vertical_m_s:
         return Check("caps", Outcome.NOTE, value, limit, "they are below what the mission may ask for")
     return Check("caps", Outcome.PASS, value, limit)
-
-
-def _charge(record: Record) -> tuple[float, float]:
-    """Of the battery, percent and volts; NaN: not reported."""
-    status = record.latest.get("SYS_STATUS")
-    if status is None:
-        return nan, nan
-    percent = nan if status.battery_remaining < 0 else float(status.battery_remaining)
-    volts = nan if status.voltage_battery in (0, 65535) else status.voltage_battery / 1000
-    return percent, volts
 
 
 def _vehicle_words(record: Record) -> str:

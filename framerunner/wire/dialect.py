@@ -37,7 +37,7 @@ def is_vehicle(message: Message) -> bool:
 
 def companion_heartbeat() -> Message:
     """The HEARTBEAT of a companion computer, which changes nothing at the vehicle."""
-    return _heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
+    return component_heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
 
 
 def ground_station_heartbeat() -> Message:
@@ -45,10 +45,11 @@ def ground_station_heartbeat() -> Message:
 
     PX4 sends its texts (STATUSTEXT) only on links where it receives this, and its loss is a failsafe.
     """
-    return _heartbeat(mavlink.MAV_TYPE_GCS)
+    return component_heartbeat(mavlink.MAV_TYPE_GCS)
 
 
-def _heartbeat(kind: int) -> Message:
+def component_heartbeat(kind: int) -> Message:
+    """The HEARTBEAT of a component of some MAV_TYPE that is no autopilot."""
     return mavlink.MAVLink_heartbeat_message(
         kind, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, _MAVLINK_VERSION
     )

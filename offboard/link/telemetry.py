@@ -134,14 +134,8 @@ class TelemetryFeed:
 
         Ticks that were not waited for are skipped.
         """
-        try:
-            # Not wait_for: before Python 3.12 it loses a cancellation that arrives together with the tick,
-            # and then a loop under a time limit never ends.
-            async with asyncio.timeout(timeout_s):
-                while self.sample is self._taken:  # woken for a tick that was taken with the one before
-                    self._new_tick.clear()
-                    await self._new_tick.wait()
-        except TimeoutError:
+        # Woken for a tick that was taken with the one before, it waits on.
+        if not await self._woken_until(lambda: self.sample is not self._taken, timeout_s):
             return False
         self._taken = self.sample
         return True
@@ -160,13 +154,20 @@ class TelemetryFeed:
 
     async def tick(self, number: int, timeout_s: float) -> bool:
         """Wait for the tick of this number, or a later one; False after `timeout_s` of wall time."""
+        is_there = await self._woken_until(lambda: self.tick_number >= number, timeout_s)
+        self._taken = self.sample
+        return is_there
+
+    async def _woken_until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Look at each tick whether a condition holds; False after a wall time."""
         with contextlib.suppress(TimeoutError):
+            # Not wait_for: before Python 3.12 it loses a cancellation that arrives together with the tick,
+            # and then a loop under a time limit never ends.
             async with asyncio.timeout(timeout_s):
-                while self.tick_number < number:
+                while not condition():
                     self._new_tick.clear()
                     await self._new_tick.wait()
-        self._taken = self.sample
-        return self.tick_number >= number
+        return condition()
 
     def time_at_us(self, wall_s: float) -> int | None:
         """Vehicle time at a monotonic wall time, as telemetry shows it; None before the first attitude."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections import deque
 from dataclasses import dataclass
-from math import dist, isfinite
+from math import dist, isfinite, nan
 
 from framerunner.wire import ardupilot_modes
 from framerunner.wire.dialect import (
@@ -170,6 +170,15 @@ class Record(Session):
         """The kind of autopilot in words."""
         number = self.latest["HEARTBEAT"].autopilot
         return _AUTOPILOTS.get(number, f"autopilot {number}")
+
+    @property
+    def charge(self) -> tuple[float, float]:
+        """Of the battery by SYS_STATUS, percent and volts; NaN: not reported."""
+        status = self.latest.get("SYS_STATUS")
+        if status is None:
+            return nan, nan
+        percent = nan if status.battery_remaining < 0 else float(status.battery_remaining)
+        return percent, nan if status.voltage_battery in (0, 65535) else status.voltage_battery / 1000
 
     @property
     def estimator(self) -> EstimatorStatus | None:
