@@ -155,10 +155,6 @@ parameters: $(VENV)/installed-dev ## write docs/parameters.md from the declarati
 failsafes: $(VENV)/installed-dev ## write the tables of failsafes in the documents from their data
 	$(BIN)/python -m offboard.safety.failsafes
 
-.PHONY: messages
-messages: $(VENV)/installed-dev ## generate framerunner/wire/extra_messages.py again from framerunner/wire/extra_messages.xml
-	$(BIN)/python -m tests.framerunner.wire.generate_messages
-
 .PHONY: result-schema
 result-schema: $(VENV)/installed-dev ## write docs/result.schema.json again from the type FlightResult
 	$(BIN)/python -m scenarios.result > docs/result.schema.json

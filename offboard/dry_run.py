@@ -32,7 +32,7 @@ class DryRunDrone(MavsdkDrone):
         await self._requester.request(
             "offboard mode",
             self._stream.request_offboard(),
-            lambda: self._feed.mode == self._stream.modes.offboard,
+            lambda: self._feed.mode == self._stream.kind.modes.offboard,
         )
         self._runs = True
 

@@ -18,15 +18,23 @@ from framerunner.wire.transports.urls import parse_url
 from offboard.drone import DroneError, DroneState, ResponsePrior, VelocityCommand
 from offboard.keep_in_box import Box, confine
 from offboard.link.autopilots import open_dialect
-from offboard.link.commands import PendingRequests, synchronous
 from offboard.link.companion import Companion
 from offboard.link.connections import check_is_free, new_mavsdk, open_connections
 from offboard.link.dialect import Dialect
+from offboard.link.direct import synchronous
 from offboard.link.process_guard import ProcessGuard
 from offboard.link.reported_state import reported_state
 from offboard.link.resets import ResetFeed, followed
 from offboard.link.telemetry import CHECKS, TelemetryFeed, pose_of
-from offboard.link.ticks import CONFIRM_S, SHOWN_S, Requester, TickSource, VehicleClock, not_shown
+from offboard.link.ticks import (
+    CONFIRM_S,
+    SHOWN_S,
+    PendingRequests,
+    Requester,
+    TickSource,
+    VehicleClock,
+    not_shown,
+)
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
@@ -180,7 +188,7 @@ class MavsdkDrone:
         room_m = inf if self._box is None else self._box.high_m[2] - self._start_arena.position_m[2]
         steps = self._ticks.steps
         self._dialect = new = await open_dialect(system, self._direct, self._feed, room_m, stepped=steps)
-        self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct), new.numbered_modes)
+        self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct), new.kind.numbered_modes)
         if new.response_prior is not ResponsePrior.OWN:
             self._resets.subscribe(synchronous(self._direct))
         if new.exchange is None:
@@ -188,7 +196,7 @@ class MavsdkDrone:
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then determine the axes."""
-        limit_s = self._ready_limit_s or self._stream.ready_limit_s
+        limit_s = self._ready_limit_s or self._stream.kind.ready_limit_s
         await self._ticks.begin_exchange(self._stream, self._requests)
         try:
             await self._wait_for_checks(limit_s)
@@ -214,7 +222,7 @@ class MavsdkDrone:
         in a hall, without GPS, they never pass; offboard's do. So offboard is tried when only they fail.
         ArduPilot's first mode requires less than GUIDED, so it always enters that.
         """
-        if self._stream.checks_in_offboard:
+        if self._stream.kind.checks_in_offboard:
             async with asyncio.timeout(limit_s):
                 while not self._in_offboard and not self._feed.armed:
                     with contextlib.suppress(MavsdkError):  # refused without a position
@@ -251,7 +259,7 @@ class MavsdkDrone:
         await self._stream_before_offboard()
         self._watchdog.start()
         try:
-            offboard, request = self._stream.modes.offboard, self._stream.request_offboard()
+            offboard, request = self._stream.kind.modes.offboard, self._stream.request_offboard()
             await self._requester.request(
                 f"{offboard.lower()} mode", request, lambda: self._feed.mode == offboard
             )
@@ -299,7 +307,7 @@ class MavsdkDrone:
             return feed.arming.is_armed(feed.time_us)
 
         self._commanding = False
-        request, land = self._stream.land(), self._stream.modes.land
+        request, land = self._stream.land(), self._stream.kind.modes.land
         await self._requester.request("landing", request, lambda: feed.mode == land or not armed())
         self._watchdog.stop()
         limit_us = feed.time_us + int(LAND_LIMIT_S * 1e6)
@@ -319,7 +327,7 @@ class MavsdkDrone:
             await self.hold()
             return
         await self._know_mode()
-        modes, mode = self._dialect.modes, self._feed.mode
+        modes, mode = self._dialect.kind.modes, self._feed.mode
         if mode not in (modes.offboard, modes.land) and not (demanded and mode not in modes.pilot):
             await self.hold()
             return
@@ -336,7 +344,7 @@ class MavsdkDrone:
         if self._dialect is None:
             return
         await self._know_mode()
-        modes = self._dialect.modes
+        modes = self._dialect.kind.modes
         if self._in_offboard:
             await self._leave_offboard()
             if (mode := self._feed.mode) != modes.hold and mode not in modes.pilot:
@@ -433,7 +441,7 @@ class MavsdkDrone:
 
     @property
     def _in_offboard(self) -> bool:
-        return self._feed.mode == self._stream.modes.offboard
+        return self._feed.mode == self._stream.kind.modes.offboard
 
     def _send(self, command: VelocityCommand) -> None:
         if not self._watchdog.tripped_after_s:
@@ -477,7 +485,7 @@ class MavsdkDrone:
             raise DroneError(not_shown(self._feed, "arming"))
         if not self._commanding or self._pilot_has_it:
             return
-        leaves = not state.offboard and state.mode not in self._stream.modes.pilot
+        leaves = not state.offboard and state.mode not in self._stream.kind.modes.pilot
         if not state.armed or (leaves and not self._feed.armed):
             raise DroneError(f"the vehicle was disarmed by others{self._feed.recent_texts()}")
         if leaves:

@@ -9,22 +9,18 @@ import asyncio
 import time
 from collections.abc import Callable
 from contextlib import closing
+from math import inf
 from typing import TYPE_CHECKING
 
 from framerunner.camera_calibration.mounting_report import MountingSearch, search_mounting
 from framerunner.geometry.axes import flip_quaternion, flip_vector
 from framerunner.geometry.vectors import Vec3
-from framerunner.preflight.session import open_link
-from framerunner.wire.dialect import (
-    AUTOPILOT_COMPONENT_ID,
-    Message,
-    companion_heartbeat,
-    is_vehicle,
-    mavlink,
-    request_rate,
-)
+from framerunner.preflight.link import open_link
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.session.client import VehicleClient
+from framerunner.wire.session.record import Record
+from framerunner.wire.session.session import pose_rates
 from framerunner.wire.simulator_api import SimulatorApi
-from framerunner.wire.vehicle_telemetry import VehicleTelemetry
 from offboard.drone import DroneError
 from offboard.link.telemetry import least_lag
 from vision.calibration.motion import MotionReport
@@ -33,24 +29,22 @@ from vision.sources import open_source
 from vision.types import CameraFrame, Detections
 
 if TYPE_CHECKING:
-    from framerunner.wire.transports.vehicle_link import VehicleLink
     from scenarios.task import Task
     from vision.calibration.model import Calibration
 
-_RECEIVE_S = 0.05
-_BEAT_S = 1.0
 _FIND_S = 10.0
 _REPORT_S = 5.0
 _MIN_S = 20.0
 """Time that is watched at least, so that errors that go on for seconds are averaged."""
 _WANTED_HZ = 50.0
-_ENOUGH_REPORTS = 80  # a second: attitudes and positions, 40 each
+_ENOUGH = 0.8  # share of these, of attitudes and positions
+_MEASURED_S = 1.0
 _MAX_REQUESTS = 5
 _ATTITUDES = (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mavlink.MAVLINK_MSG_ID_ATTITUDE)
 
 
-class Watched:
-    """Telemetry and images of a drone.
+class Watched(Record):
+    """The session with a drone, and images of its camera.
 
     Args:
         calibration: of its camera.
@@ -60,49 +54,41 @@ class Watched:
         reports: the drone's states, axes north, west, up.
         images: what was seen.
         stamped: whether the images have times of their own.
-        vehicle: MAVLink id; None until it is heard.
+        ended: the drone is watched no longer; a thread uses the link until then.
     """
 
     def __init__(self, calibration: Calibration, task: Task | None) -> None:
+        super().__init__(heartbeat="companion")
+        self.rates = pose_rates(_WANTED_HZ, _ENOUGH, _MEASURED_S, time.monotonic(), _MAX_REQUESTS)
+        self.ended = False
         self.reports: list[MotionReport] = []
         self.images: list[Detections] = []
         self.stamped = False
-        self.vehicle: int | None = None
         smooth = task is not None and task.camera.effects is not None
         self._detect = new_detector(
             "frames", calibration=calibration, rendered=task is not None, smooth=smooth
         )
-        self._telemetry = VehicleTelemetry()
         self._lag_s: float | None = None
 
-    def take_messages(self, messages: list[Message], now_s: float) -> None:
-        """Take what was received at a monotonic wall time."""
-        telemetry = self._telemetry
-        for message in messages:
-            if self.vehicle is None and is_vehicle(message):
-                self.vehicle = message.get_srcSystem()
-            if (message.get_srcSystem(), message.get_srcComponent()) != (
-                self.vehicle,
-                AUTOPILOT_COMPONENT_ID,
-            ):
-                continue
-            if not telemetry.take(message, now_s):
-                continue
-            attitude, position = telemetry.attitude, telemetry.position
-            if message.get_msgId() in _ATTITUDES and attitude is not None:
-                self._lag_s = least_lag(self._lag_s, now_s - attitude.time_us * 1e-6)
-            if attitude is not None and position is not None:
-                self.reports.append(
-                    MotionReport(
-                        attitude.time_us,
-                        position.time_us,
-                        flip_vector(position.position_ned_m),
-                        flip_vector(position.velocity_ned_m_s),
-                        flip_quaternion(attitude.attitude_ned),
-                    )
+    def take(self, message: Message, now_s: float) -> bool:
+        """Take a message that was received at a monotonic wall time; see `Session.take`."""
+        is_newest, telemetry = super().take(message, now_s), self.telemetry
+        attitude, position = telemetry.attitude, telemetry.position
+        if is_newest and message.get_msgId() in _ATTITUDES and attitude is not None:
+            self._lag_s = least_lag(self._lag_s, now_s - attitude.time_us * 1e-6)
+        if is_newest and attitude is not None and position is not None:
+            self.reports.append(
+                MotionReport(
+                    attitude.time_us,
+                    position.time_us,
+                    flip_vector(position.position_ned_m),
+                    flip_vector(position.velocity_ned_m_s),
+                    flip_quaternion(attitude.attitude_ned),
                 )
+            )
         if telemetry.restarts:
             raise DroneError("the vehicle has restarted; start the measurement again")
+        return is_newest
 
     def take_frame(self, frame: CameraFrame) -> None:
         """Take an image; one without a time stamp has the vehicle time of its arrival."""
@@ -162,8 +148,8 @@ async def measure_live(
     """
     watched = Watched(calibration, await _rendered_task(camera_url))
     with closing(open_link(drone_url)) as link:
-        reading = _Reading(link, watched)
-        reader = asyncio.create_task(reading.run())
+        client = VehicleClient(link, watched, time.monotonic)
+        reader = asyncio.create_task(asyncio.to_thread(client.run, inf, "", lambda: watched.ended))
         viewer = asyncio.create_task(_watch_camera(camera_url, watched))
         tasks = [reader, viewer]
         try:
@@ -173,13 +159,13 @@ async def measure_live(
         except TimeoutError:
             raise DroneError(_silent(watched, drone_url)) from None
         finally:
-            reading.stopped = True  # a thread uses the link until then
+            watched.ended = True
             viewer.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
 
 def _silent(watched: Watched, drone_url: str) -> str:
-    if watched.vehicle is None:
+    if watched.system_id is None:
         return (
             f"no vehicle was heard on {drone_url} within {_FIND_S:g} s; "
             "is it running and sending to this address?"
@@ -236,40 +222,3 @@ def _raise_from(tasks: list[asyncio.Task[None]]) -> None:
     for task in tasks:
         if task.done() and not task.cancelled() and (error := task.exception()) is not None:
             raise error
-
-
-class _Reading:
-    """Reads a link, and asks the vehicle for what is needed."""
-
-    def __init__(self, link: VehicleLink, watched: Watched) -> None:
-        self.stopped = False
-        self._link, self._watched = link, watched
-        self._requests = 0
-        self._reports = 0
-
-    async def run(self) -> None:
-        """Read until stopped; raises `LinkError` if the link fails."""
-        beat_s = -_BEAT_S
-        while not self.stopped:
-            now_s = time.monotonic()
-            if now_s - beat_s >= _BEAT_S:
-                beat_s = now_s
-                # Over udpout the vehicle cannot send before it has received something.
-                self._link.send(companion_heartbeat())
-                self._ask_for_rates()
-            messages, now_s = await asyncio.to_thread(self._receive)
-            self._watched.take_messages(messages, now_s)
-
-    def _receive(self) -> tuple[list[Message], float]:
-        messages = self._link.receive(_RECEIVE_S)
-        return messages, time.monotonic()
-
-    def _ask_for_rates(self) -> None:
-        """Once a second: request poses more often if fewer came than are needed."""
-        vehicle, reports = self._watched.vehicle, len(self._watched.reports)
-        few, self._reports = reports - self._reports < _ENOUGH_REPORTS, reports
-        if vehicle is None or not few or self._requests >= _MAX_REQUESTS:
-            return
-        self._requests += 1
-        for number in (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED):
-            self._link.send(request_rate(vehicle, number, _WANTED_HZ))

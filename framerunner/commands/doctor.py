@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -62,14 +63,16 @@ def _examine(drone: str, seconds: float, camera: str | None, calibration: Calibr
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from framerunner.doctor.camera import LOOK_S, examine_camera
-    from framerunner.doctor.camera_times import measure_camera
+    from framerunner.doctor.camera_times import LOOK_S, examine_camera, measure_camera
     from framerunner.doctor.checks import can_fly, examine
-    from framerunner.doctor.listen import COMPONENT_ID, FIND_S, SYSTEM_ID, Record, find, listen
+    from framerunner.doctor.listen import COMPONENT_ID, SYSTEM_ID, listen
     from framerunner.doctor.page import findings_table, print_page
+    from framerunner.wire.session.client import VehicleClient
+    from framerunner.wire.session.record import Record
+    from framerunner.wire.session.session import VehicleError
     from framerunner.wire.transports.vehicle_link import VehicleLink
 
-    record = Record()
+    record, silent = Record(SYSTEM_ID, heartbeat="ground station"), ""
     errors, page = Console(stderr=True), Console(highlight=False)
     bar = Progress(TextColumn("{task.description}"), BarColumn(), console=errors, transient=True)
     with closing(VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)) as link, bar:
@@ -78,9 +81,12 @@ def _examine(drone: str, seconds: float, camera: str | None, calibration: Calibr
         def show(what: str, share: float) -> None:
             bar.update(task, description=what, completed=share)
 
-        heard = find(link, record, show)
-        if heard:
-            listen(link, record, seconds, show)
+        client = VehicleClient(link, record, time.monotonic, show)
+        try:
+            client.find()
+            listen(client, seconds)
+        except VehicleError as error:
+            silent = str(error)
         times = None
         if camera is not None:
             show("watching the camera", 0.0)
@@ -88,12 +94,11 @@ def _examine(drone: str, seconds: float, camera: str | None, calibration: Calibr
     of_camera = []
     if camera is not None or calibration is not None:
         of_camera = examine_camera(times, calibration, record.clock_ms[-1] if record.clock_ms else None)
-    if heard:
+    if not silent:
         findings = examine(record) + of_camera
         print_page(page, link.url, record, findings)
         return 0 if can_fly(findings) else 1
-    silent = f"no vehicle was heard on {link.url} within {FIND_S:g} s; "
-    errors.print(f"{silent}is it running and sending to this address?", highlight=False, soft_wrap=True)
+    errors.print(silent, highlight=False, soft_wrap=True)
     if of_camera:
         page.print(findings_table(of_camera))
     return 1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from contextlib import closing
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -103,8 +102,7 @@ def preflight(
 
 
 def _check(plan: FlightPlan, settings: PreflightSettings) -> int:
-    from framerunner.preflight.card import make_card
-    from framerunner.preflight.card_files import HTML_NAME, write_card
+    from framerunner.preflight.card import HTML_NAME, make_card, write_card
     from framerunner.preflight.run import run_preflight, tell
     from offboard.safety.rules import SafetyRules
 
@@ -121,12 +119,11 @@ def _check(plan: FlightPlan, settings: PreflightSettings) -> int:
 
 def _restore(drone: str, path: Path, *, any_vehicle: bool) -> int:
     from framerunner.preflight.kept import check_vehicle, load_kept, restore
-    from framerunner.preflight.session import VehicleSession, open_link
+    from framerunner.preflight.link import open_client
 
     kept = load_kept(path)
-    with closing(open_link(drone)) as link:
-        session = VehicleSession(link)
+    with open_client(drone) as client:
         if not any_vehicle:
-            check_vehicle(kept, path, session.uid)
-        restore(session, kept, lambda line: print(line, flush=True))
+            check_vehicle(kept, path, client.identity()[0])
+        restore(client, kept, lambda line: print(line, flush=True))
     return 0

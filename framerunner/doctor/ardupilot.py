@@ -6,17 +6,20 @@ measurements agree; its sources are parameters, EK3_SRC1_*.
 
 from __future__ import annotations
 
-from framerunner.doctor.findings import Findings, Level
-from framerunner.doctor.listen import Record
-from framerunner.doctor.subjects import Subject, finding, good, missing, note
-from framerunner.wire import ardupilot_modes
-from framerunner.wire.ardupilot_messages import (
-    EKF_ATTITUDE,
-    EKF_POS_VERT_ABS,
-    EXTERNAL_NAVIGATION,
-    has_position,
+from framerunner.doctor.common import (
+    CHALLENGE_HEIGHT_M,
+    CHALLENGE_REACH_M,
+    agreement,
+    early_disarming,
+    slow_limits,
+    takes_velocities,
 )
+from framerunner.doctor.subjects import Subject, good, missing, note
+from framerunner.wire import ardupilot_modes
+from framerunner.wire.ardupilot_messages import EXTERNAL_NAVIGATION
 from framerunner.wire.dialect import mavlink
+from framerunner.wire.session.record import Record
+from offboard.safety.check import Checks
 
 _GUIDE = "docs/ardupilot.md, section 5"
 _GPS = 3
@@ -26,27 +29,26 @@ _HEIGHT_SOURCES = {0: "nothing", 1: "barometer", 2: "range finder", _GPS: "GPS",
 _HEIGHT_SOURCES |= {EXTERNAL_NAVIGATION: "external navigation"}
 _ACCURATE_MM = 100.0
 _BAD_VARIANCE = 0.8  # of EKF_STATUS_REPORT: ArduPilot's FS_EKF_THRESH
-_HIGH_VARIANCE = 0.5
-_CHALLENGE_HEIGHT_M, _CHALLENGE_REACH_M = 3.0, 8.0
 
 
-def autopilot(record: Record) -> Findings:
+_SLOWEST: tuple[tuple[Subject, float, str], ...] = (
+    ("WPNAV_SPEED", 100.0, "cm/s"),
+    ("WPNAV_SPEED_UP", 100.0, "cm/s"),
+    ("WPNAV_SPEED_DN", 50.0, "cm/s"),
+)
+
+
+def autopilot(record: Record) -> Checks:
     """Whether it is ArduCopter, whose GUIDED mode takes velocities."""
     heartbeat = record.latest["HEARTBEAT"]
     if not ardupilot_modes.is_arducopter(heartbeat):
         yield missing("autopilot", f"ArduPilot, {record.type_name}", "the challenge needs a multicopter")
         return
     yield good("autopilot", f"ArduPilot, {record.type_name}")
-    version = record.latest.get("AUTOPILOT_VERSION")
-    if version is None:
-        yield note("guided", "it does not report its capabilities", "use ArduCopter 4.5 or later")
-    elif not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED:
-        yield missing("guided", "takes no local setpoints", "use ArduCopter 4.5 or later")
-    else:
-        yield good("guided", "takes velocities in body axes")
+    yield takes_velocities(record, "guided", "use ArduCopter 4.5 or later")
 
 
-def health(record: Record) -> Findings:
+def health(record: Record) -> Checks:
     """The pre-arm checks; ArduPilot reports its reasons as texts."""
     status = record.latest.get("SYS_STATUS")
     if status is None:
@@ -61,38 +63,25 @@ def health(record: Record) -> Findings:
     yield missing("pre-arm checks", f"not passed: {reasons}" if reasons else "not passed", advice)
 
 
-def estimator(record: Record) -> Findings:
+def estimator(record: Record) -> Checks:
     """Which states the estimator has, and whether measurements agree with them."""
-    report = record.latest.get("EKF_STATUS_REPORT")
+    report = record.estimator
     if report is None:
         yield note("estimator", "it does not report its state (EKF_STATUS_REPORT)")
         return
-    if not report.flags & EKF_ATTITUDE:
+    if not report.has_attitude:
         yield missing("estimator", "it does not know its attitude", "keep the drone still for some seconds")
         return
-    variances = {
-        "velocity": report.velocity_variance,
-        "position": report.pos_horiz_variance,
-        "height": report.pos_vert_variance,
-        "heading": report.compass_variance,
-    }
-    high = {name: value for name, value in variances.items() if value > _HIGH_VARIANCE}
-    words = ", ".join(f"{name} {value:.2f}" for name, value in high.items())
-    if any(value >= _BAD_VARIANCE for value in high.values()):
-        yield missing("estimator", f"it rejects measurements: {words}", "correct the sensor or its settings")
-    elif high:
-        yield note("estimator", f"measurements hardly agree: {words}", "wait, or correct the sensor")
-    else:
-        yield good("estimator", f"measurements agree, largest variance {max(variances.values()):.2f}")
+    yield agreement("estimator", report.ratios, _BAD_VARIANCE, "variance")
 
 
-def position(record: Record) -> Findings:
+def position(record: Record) -> Checks:
     """Where its position and height are from."""
-    report, parameters = record.latest.get("EKF_STATUS_REPORT"), record.parameters
+    report, parameters = record.estimator, record.parameters
     source = int(parameters.get("EK3_SRC1_POSXY", _GPS))
     words = _POSITION_SOURCES.get(source, f"source {source}")
     advice = f"give it its position by motion capture or visual odometry: {_GUIDE}"
-    if report is not None and not has_position(report):
+    if report is not None and not report.has_position:
         if source == EXTERNAL_NAVIGATION:
             advice = f"send poses and set its origin, as `framerunner mocap --origin` does: {_GUIDE}"
         yield missing("position", f"the estimator has none; its source is {words}", advice)
@@ -110,11 +99,11 @@ def position(record: Record) -> Findings:
     yield from _height(record, advice)
 
 
-def _height(record: Record, advice: str) -> Findings:
-    report = record.latest.get("EKF_STATUS_REPORT")
+def _height(record: Record, advice: str) -> Checks:
+    report = record.estimator
     source = int(record.parameters.get("EK3_SRC1_POSZ", 1))
     words = _HEIGHT_SOURCES.get(source, f"source {source}")
-    if report is not None and not report.flags & EKF_POS_VERT_ABS:
+    if report is not None and not report.has_height:
         yield missing("height", f"the estimator has none; its source is {words}", advice)
     elif source == EXTERNAL_NAVIGATION:
         yield good("height", f"by {words}")
@@ -123,31 +112,18 @@ def _height(record: Record, advice: str) -> Findings:
         yield note("height", text, f"take it from external navigation (EK3_SRC1_POSZ 6): {_GUIDE}")
 
 
-def limits(record: Record) -> Findings:
+def limits(record: Record) -> Checks:
     """Parameters that slow the drone down or end the flight."""
     parameters = record.parameters
-    if not parameters:
-        yield note("parameters", "no parameter was received", "check that the link is not read-only")
-        return
-    slowest: tuple[tuple[Subject, float], ...] = (
-        ("WPNAV_SPEED", 100.0),
-        ("WPNAV_SPEED_UP", 100.0),
-        ("WPNAV_SPEED_DN", 50.0),
-    )
-    for name, minimum in slowest:
-        value = parameters.get(name)
-        if value is not None and value < minimum:
-            yield missing(name, f"{value:g} cm/s", f"set it to {minimum:g} or more")
-    delay_s = parameters.get("DISARM_DELAY", 10.0)
-    if 0.0 < delay_s < 5.0:
-        yield missing("DISARM_DELAY", f"{delay_s:g} s", "set it to 10: take-off begins with a slow ramp")
+    yield from slow_limits(record, _SLOWEST)
+    yield from early_disarming(record, "DISARM_DELAY")
     if int(parameters.get("GUID_OPTIONS", 0)) & 48:
         advice = "set GUID_OPTIONS to 0: the app needs position and velocity control"
         yield missing("GUID_OPTIONS", f"{parameters['GUID_OPTIONS']:g}", advice)
     if parameters.get("FENCE_ENABLE"):
         fences: tuple[tuple[Subject, float], ...] = (
-            ("FENCE_ALT_MAX", _CHALLENGE_HEIGHT_M),
-            ("FENCE_RADIUS", _CHALLENGE_REACH_M),
+            ("FENCE_ALT_MAX", CHALLENGE_HEIGHT_M),
+            ("FENCE_RADIUS", CHALLENGE_REACH_M),
         )
         for name, minimum in fences:
             value = parameters.get(name)
@@ -155,14 +131,15 @@ def limits(record: Record) -> Findings:
                 yield missing(name, f"fence at {value:g} m", f"the challenge needs {minimum:g} m")
 
 
-def failsafes(record: Record) -> Findings:
+def failsafes(record: Record) -> Checks:
     """What the drone does without commands, for a person to confirm."""
     parameters = record.parameters
     timeout_s = parameters.get("GUID_TIMEOUT")
     if timeout_s is not None:
         advice = "" if 0.5 <= timeout_s <= 1.0 else "set GUID_TIMEOUT to 1: until then it flies on"
-        level = Level.NOTE if advice else Level.GOOD
-        yield finding(level, "setpoints lost", f"it stops and hovers after {timeout_s:g} s", advice)
+        yield (note if advice else good)(
+            "setpoints lost", f"it stops and hovers after {timeout_s:g} s", advice
+        )
     station = parameters.get("FS_GCS_ENABLE")
     if station is not None:
         climb_m = parameters.get("RTL_ALT", 1500.0) / 100
@@ -173,7 +150,7 @@ def failsafes(record: Record) -> Findings:
             advice = "under a roof set FS_GCS_ENABLE to 5 (land)"
         elif station == 5.0:
             words = "land"
-        yield finding(Level.NOTE if advice else Level.GOOD, "ground station lost", words, advice)
+        yield (note if advice else good)("ground station lost", words, advice)
     if parameters.get("FS_THR_ENABLE") == 1.0:
         advice = "under a roof set FS_THR_ENABLE to 3 (land)"
         yield note("radio control lost", "return, which climbs to RTL_ALT first", advice)

@@ -9,13 +9,20 @@ from datetime import date
 from itertools import pairwise
 from statistics import median
 
-from framerunner.camera_calibration.camera_delay import CameraDelay
-from offboard.safety.vehicle_checks import CalibrationFacts, CameraFacts
+from framerunner.camera_calibration.camera_delay import CameraDelay, delay_of
+from offboard.safety.check import Check
+from offboard.safety.vehicle_checks import (
+    CameraFacts,
+    calibration_checks,
+    camera_checks,
+)
 from vision.calibration.model import Calibration
 from vision.sources import open_source
 from vision.types import CameraError
 
 _FIRST_S = 5.0
+LOOK_S = 3.0
+"""For how long images are received."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,30 +96,25 @@ async def measure_camera(url: str, seconds: float, size_px: tuple[int, int] | No
     return CameraTimes(tuple(received), tuple(stamps), size)
 
 
-def calibration_facts(calibration: Calibration | None, size_px: tuple[int, int]) -> CalibrationFacts:
-    """What the checks need to know of a calibration today.
+def examine_camera(
+    times: CameraTimes | None, calibration: Calibration | None, clock_ms: tuple[int, float] | None
+) -> list[Check]:
+    """What was measured of the camera, and whether its lens, mounting and delay are known.
 
     Args:
-        calibration: None: there is none.
-        size_px: width and height of the camera's images; zeros: there was none.
+        times: of its images; None: no camera was given.
+        calibration: None: none was given.
+        clock_ms: vehicle time in milliseconds at a monotonic wall time, seconds; None: not known.
     """
-    if calibration is None:
-        return CalibrationFacts(size_px=size_px)
-    calibrated_px, mounting = (calibration.width_px, calibration.height_px), calibration.mounting
-    made_days = _days_since(calibration.made_on)
-    if mounting is None:
-        return CalibrationFacts(calibrated_px, size_px, made_days=made_days)
-    return CalibrationFacts(
-        calibrated_px,
-        size_px,
-        mounting.angles_frd_rad,
-        mounting.angles_std_rad,
-        made_days=made_days,
-        mounting_days=_days_since(mounting.measured_on),
-    )
+    checks: list[Check] = []
+    if times is not None:
+        checks += camera_checks(times.facts(clock_ms, delay_of(None, calibration)))
+    size_px = (0, 0) if times is None else times.size_px
+    return checks + calibration_checks(calibration, size_px, days_since)
 
 
-def _days_since(day: str | None) -> int | None:
+def days_since(day: str | None) -> int | None:
+    """Days from a day, year-month-day, to today; None: there is no such day."""
     with contextlib.suppress(ValueError):  # such as the 30th of February
         if day is not None:
             return (date.today() - date.fromisoformat(day)).days

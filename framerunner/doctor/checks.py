@@ -7,28 +7,36 @@ the estimate is; parameters show only what was requested.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite
+from math import isfinite, isnan
 
 from framerunner.doctor import ardupilot
-from framerunner.doctor.findings import Finding, Findings, Level
-from framerunner.doctor.listen import Record
-from framerunner.doctor.subjects import Subject
-from framerunner.doctor.subjects import finding as _finding
-from framerunner.doctor.subjects import good as _good
-from framerunner.doctor.subjects import missing as _missing
-from framerunner.doctor.subjects import note as _note
+from framerunner.doctor.common import (
+    CHALLENGE_HEIGHT_M,
+    CHALLENGE_REACH_M,
+    agreement,
+    early_disarming,
+    slow_limits,
+    takes_velocities,
+)
+from framerunner.doctor.subjects import Subject, good, missing, note
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.px4_modes import OFFBOARD
+from framerunner.wire.session.record import Record
+from offboard.safety.check import Check, Checks, failures
 
 WANTED_HZ = 50.0  # as `fly` and `camera` request
 LOW_HZ = 20.0  # the mission's own rate
 LOST_SHARE = 0.05
 BATTERY_PERCENT = 40
-CHALLENGE_HEIGHT_M = 3.0  # frames are at up to 2 m, the mission climbs from them
-CHALLENGE_REACH_M = 8.0
 ACCURATE_M = 0.1  # standard deviation; PX4 reports 0.3 with GPS, 0.01 with motion capture
 WANDER_M = 0.1
 _GUIDE = "docs/real-drone.md, step 6"
+_SLOWEST: tuple[tuple[Subject, float, str], ...] = (
+    ("MPC_XY_VEL_MAX", 1.0, "m/s"),
+    ("MPC_Z_VEL_MAX_UP", 1.0, "m/s"),
+    ("MPC_Z_VEL_MAX_DN", 1.0, "m/s"),
+    ("MC_YAWRATE_MAX", 60.0, "deg/s"),
+)
 _EV_POSITION, _EV_HEIGHT = 1, 2  # bits of EKF2_EV_CTRL
 _SLOW_ESTIMATOR = (
     # name, upper limit, unit
@@ -48,7 +56,6 @@ _MEASURING = (
     | mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION
     | mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION
 )
-HIGH_RATIO = 0.5  # of an innovation to what its gate lets pass; PX4 does not arm above it
 _ATTITUDES = ("ATTITUDE", "ATTITUDE_QUATERNION")
 _MULTICOPTERS = (
     mavlink.MAV_TYPE_QUADROTOR,
@@ -84,49 +91,49 @@ _LOW_BATTERY = {0: "warns", 2: "lands", 3: "returns, then lands"}
 _HEIGHT_SOURCE = {0: "barometer", 1: "GPS", 2: "range finder", 3: "vision"}
 
 
-def can_fly(findings: list[Finding]) -> bool:
+def can_fly(findings: list[Check]) -> bool:
     """Whether nothing is missing."""
-    return all(finding.level is not Level.MISSING for finding in findings)
+    return not failures(findings)
 
 
-def examine(record: Record) -> list[Finding]:
+def examine(record: Record) -> list[Check]:
     """All findings, in the order in which a flight needs them."""
     checks = _ARDUPILOT_CHECKS if record.is_ardupilot else _CHECKS
-    return [finding for check in checks for finding in check(record)]
+    return [finding for judge in checks for finding in judge(record)]
 
 
-def _one_vehicle(record: Record) -> Findings:
+def _one_vehicle(record: Record) -> Checks:
     """Whether all packets of the system id are of one vehicle."""
     problem = record.senders.problem
     if problem:
         advice = "switch the other one off, or give it another id (MAV_SYS_ID; ArduPilot: SYSID_THISMAV)"
-        yield _missing("one vehicle", problem, advice)
+        yield missing("one vehicle", problem, advice)
 
 
-def _autopilot(record: Record) -> Findings:
+def _autopilot(record: Record) -> Checks:
     heartbeat = record.latest["HEARTBEAT"]
     if heartbeat.autopilot != mavlink.MAV_AUTOPILOT_PX4:
-        yield _missing(
+        yield missing(
             "autopilot", record.autopilot_name, "fly uses the modes of PX4 and ArduPilot; use one of them"
         )
     elif heartbeat.type not in _MULTICOPTERS:
-        yield _missing("autopilot", f"PX4, {record.type_name}", "the challenge needs a multicopter")
+        yield missing("autopilot", f"PX4, {record.type_name}", "the challenge needs a multicopter")
     else:
-        yield _good("autopilot", f"PX4, {record.type_name}")
+        yield good("autopilot", f"PX4, {record.type_name}")
 
 
-def _armed(record: Record) -> Findings:
+def _armed(record: Record) -> Checks:
     if record.armed:
-        yield _missing("armed", f"in {record.mode_name}", "land and disarm; fly arms by itself")
+        yield missing("armed", f"in {record.mode_name}", "land and disarm; fly arms by itself")
     elif record.telemetry.landed is False:
-        yield _missing("landed", "it reports that it is in the air", "put it down; restart it")
+        yield missing("landed", "it reports that it is in the air", "put it down; restart it")
     else:
-        yield _good("state", f"disarmed on the ground, in {record.mode_name}")
+        yield good("state", f"disarmed on the ground, in {record.mode_name}")
     if record.latest["HEARTBEAT"].system_status >= mavlink.MAV_STATE_CRITICAL:
-        yield _missing("failsafe", record.state_name, "see its status texts below")
+        yield missing("failsafe", record.state_name, "see its status texts below")
 
 
-def _health(record: Record) -> Findings:
+def _health(record: Record) -> Checks:
     """Pre-arm checks and unhealthy sensors.
 
     PX4's checks are those of its present mode. Hold requires a global position; offboard, which `fly` enters,
@@ -134,7 +141,7 @@ def _health(record: Record) -> Findings:
     """
     status = record.latest.get("SYS_STATUS")
     if status is None:
-        yield _missing("health", "no SYS_STATUS", "let the link carry it; see MAV_x_MODE")
+        yield missing("health", "no SYS_STATUS", "let the link carry it; see MAV_x_MODE")
         return
     unhealthy = status.onboard_control_sensors_enabled & status.onboard_control_sensors_present
     unhealthy &= ~status.onboard_control_sensors_health
@@ -144,25 +151,25 @@ def _health(record: Record) -> Findings:
     if not ready and not record.armed and record.arming.ready_for_offboard:
         words = "passed for offboard, where fly arms it"
         also = "" if mode == "offboard" else f"; not in {mode}"  # in it they fail until setpoints come
-        yield _good("pre-arm checks", words + also)
+        yield good("pre-arm checks", words + also)
     elif not ready and not record.armed:
         reasons = "; ".join((*record.arming.failures, *((unhealthy_names,) if unhealthy_names else ())))
         words = f"not passed in {mode}" + (f": {reasons}" if reasons else "")
         advice = "correct what is named, here and below"
         if record.arming.armable_modes is None:
             advice = "it reports no reasons; fly may pass in offboard, which needs no global position"
-        yield _missing("pre-arm checks", words, advice)
+        yield missing("pre-arm checks", words, advice)
     elif unhealthy_names:
-        yield _note("health", f"unhealthy: {unhealthy_names}", "correct it before flying")
+        yield note("health", f"unhealthy: {unhealthy_names}", "correct it before flying")
     else:
-        yield _good("pre-arm checks", "passed")
+        yield good("pre-arm checks", "passed")
 
 
 def _names(bits: int) -> str:
     return ", ".join(name for bit, name in _SENSORS.items() if bits & bit)
 
 
-def _sensors(record: Record) -> Findings:
+def _sensors(record: Record) -> Checks:
     """What the estimator relies on: PX4 enables what is there, the simulated drone what it uses."""
     status = record.latest.get("SYS_STATUS")
     if status is None:
@@ -175,53 +182,31 @@ def _sensors(record: Record) -> Findings:
     words += [f"not on {_names(idle)}"] if idle else []
     words += [f"{_names(failing)} {'fails' if failing.bit_count() == 1 else 'fail'}"] if failing else []
     advice = "correct what fails before flying" if failing else ""
-    yield _finding(Level.NOTE if failing else Level.GOOD, "sensors", "; ".join(words), advice)
+    yield (note if failing else good)("sensors", "; ".join(words), advice)
 
 
-def _innovations(record: Record) -> Findings:
+def _innovations(record: Record) -> Checks:
     """Whether the measurements agree with the estimate."""
-    status = record.latest.get("ESTIMATOR_STATUS")
-    if status is None:
+    report = record.estimator
+    if report is None:
         return
-    if not status.flags & mavlink.ESTIMATOR_ATTITUDE:
-        yield _missing("estimator", "it does not know its attitude", "keep the drone still for some seconds")
+    if not report.has_attitude:
+        yield missing("estimator", "it does not know its attitude", "keep the drone still for some seconds")
         return
-    if status.flags & mavlink.ESTIMATOR_ACCEL_ERROR:
-        yield _missing("estimator", "its accelerometer measures wrongly", "calibrate it, damp vibration")
-    ratios = {
-        "velocity": status.vel_ratio,
-        "position": status.pos_horiz_ratio,
-        "height": status.pos_vert_ratio,
-        "heading": status.mag_ratio,
-        "height above ground": status.hagl_ratio,
-    }
-    high = {name: ratio for name, ratio in ratios.items() if ratio > HIGH_RATIO}
-    words = ", ".join(f"{name} {ratio:.2f}" for name, ratio in high.items())
-    if any(ratio > 1.0 for ratio in high.values()):
-        yield _missing(
-            "innovations", f"it rejects measurements: {words}", "correct the sensor or its settings"
-        )
-    elif high:
-        yield _note("innovations", f"measurements hardly agree: {words}", "wait, or correct the sensor")
-    else:
-        largest = max((ratio for ratio in ratios.values() if isfinite(ratio)), default=0.0)
-        yield _good("innovations", f"measurements agree, largest ratio {largest:.2f}")
+    if record.latest["ESTIMATOR_STATUS"].flags & mavlink.ESTIMATOR_ACCEL_ERROR:
+        yield missing("estimator", "its accelerometer measures wrongly", "calibrate it, damp vibration")
+    yield agreement("innovations", report.ratios, 1.0, "ratio")
 
 
-def _offboard(record: Record) -> Findings:
-    version = record.latest.get("AUTOPILOT_VERSION")
+def _offboard(record: Record) -> Checks:
     advice = "use PX4 1.13 or later"
     if record.modes and OFFBOARD.custom_mode not in record.modes:
-        yield _missing("offboard", "not among its modes", advice)
-    elif version is None:
-        yield _note("offboard", "it does not report its capabilities", advice)
-    elif not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED:
-        yield _missing("offboard", "takes no local setpoints", advice)
+        yield missing("offboard", "not among its modes", advice)
     else:
-        yield _good("offboard", "takes velocities in body axes")
+        yield takes_velocities(record, "offboard", advice)
 
 
-def _streams(record: Record) -> Findings:
+def _streams(record: Record) -> Checks:
     streams: tuple[tuple[tuple[str, ...], Subject], ...] = (
         (_ATTITUDES, "attitude"),
         (("LOCAL_POSITION_NED",), "local position"),
@@ -230,64 +215,47 @@ def _streams(record: Record) -> Findings:
         rate_hz = max(record.rate_hz(kind) for kind in kinds)
         if rate_hz == 0.0:
             advice = "give it GPS, optical flow, vision or motion capture; wait for its estimate"
-            yield _missing(what, f"no {' or '.join(kinds)} is received", advice)
+            yield missing(what, f"no {' or '.join(kinds)} is received", advice)
         elif rate_hz < LOW_HZ:
             advice = f"fly requests {WANTED_HZ:g} Hz; use a link that can carry it"
-            yield _note(what, f"only {rate_hz:.0f} Hz", advice)
+            yield note(what, f"only {rate_hz:.0f} Hz", advice)
         else:
-            yield _good(what, f"{rate_hz:.0f} Hz")
+            yield good(what, f"{rate_hz:.0f} Hz")
 
 
-def _link(record: Record) -> Findings:
+def _link(record: Record) -> Checks:
     lost = record.packets.lost_share
-    words = f"{lost:.1%} of {record.packets.passed} packets lost"
+    words = f"{lost:.1%} of {record.packets.sent} packets lost"
     if record.silence:
-        yield _missing("link", f"the vehicle was {record.silence}: all this is old", "is it still running?")
+        yield missing("link", f"the vehicle was {record.silence}: all this is old", "is it still running?")
     elif lost > LOST_SHARE:
-        yield _missing("link", words, "move nearer, or use a better link")
+        yield missing("link", words, "move nearer, or use a better link")
     else:
-        yield _good("link", words)
+        yield good("link", words)
 
 
-def _battery(record: Record) -> Findings:
-    status = record.latest.get("SYS_STATUS")
-    if status is None or status.battery_remaining < 0:
-        yield _note("battery", "its charge is not reported", "measure it")
+def _battery(record: Record) -> Checks:
+    percent, volts = record.charge
+    if isnan(percent):
+        yield note("battery", "its charge is not reported", "measure it")
         return
-    volts = "" if status.voltage_battery in (0, 65535) else f", {status.voltage_battery / 1000:.1f} V"
-    words = f"{status.battery_remaining} %{volts}"
-    if status.battery_remaining <= 100 * record.parameters.get("BAT_CRIT_THR", 0.07):
-        yield _missing("battery", words, "charge it: it would land at once")
-    elif status.battery_remaining < BATTERY_PERCENT:
-        yield _note("battery", words, "charge it: a try takes three minutes")
+    words = f"{percent:.0f} %" + ("" if isnan(volts) else f", {volts:.1f} V")
+    if percent <= 100 * record.parameters.get("BAT_CRIT_THR", 0.07):
+        yield missing("battery", words, "charge it: it would land at once")
+    elif percent < BATTERY_PERCENT:
+        yield note("battery", words, "charge it: a try takes three minutes")
     else:
-        yield _good("battery", words)
+        yield good("battery", words)
 
 
-def _limits(record: Record) -> Findings:
+def _limits(record: Record) -> Checks:
     """Parameters that slow the drone down or end the flight."""
-    parameters = record.parameters
-    if not parameters:
-        yield _note("parameters", "no parameter was received", "check that the link is not read-only")
-        return
-    slowest: tuple[tuple[Subject, float, str], ...] = (
-        ("MPC_XY_VEL_MAX", 1.0, "m/s"),
-        ("MPC_Z_VEL_MAX_UP", 1.0, "m/s"),
-        ("MPC_Z_VEL_MAX_DN", 1.0, "m/s"),
-        ("MC_YAWRATE_MAX", 60.0, "deg/s"),
-    )
-    for name, minimum, unit in slowest:
-        value = parameters.get(name)
-        if value is not None and value < minimum:
-            yield _missing(name, f"{value:g} {unit}", f"set it to {minimum:g} or more")
+    yield from slow_limits(record, _SLOWEST)
     yield from _fence(record)
-    preflight_s = parameters.get("COM_DISARM_PRFLT", 0.0)
-    if 0.0 < preflight_s < 5.0:
-        advice = "set it to 10: take-off begins with a slow ramp"
-        yield _missing("COM_DISARM_PRFLT", f"{preflight_s:g} s", advice)
+    yield from early_disarming(record, "COM_DISARM_PRFLT")
 
 
-def _fence(record: Record) -> Findings:
+def _fence(record: Record) -> Checks:
     parameters = record.parameters
     limits: tuple[tuple[Subject, float], ...] = (
         ("GF_MAX_VER_DIST", CHALLENGE_HEIGHT_M),
@@ -298,17 +266,17 @@ def _fence(record: Record) -> Findings:
     status = record.latest.get("ESTIMATOR_STATUS")
     if status is not None and not status.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS:
         text = "PX4's fence has no effect without a global position"
-        yield _note("fence", text, "put a net around the flying space")
+        yield note("fence", text, "put a net around the flying space")
         return
     for name, minimum_m in limits:
         value = parameters.get(name, 0.0)
         if 0.0 < value < minimum_m:
-            yield _missing(
+            yield missing(
                 name, f"fence at {value:g} m", f"the challenge needs {minimum_m:g} m; set more, or 0"
             )
 
 
-def _failsafes(record: Record) -> Findings:
+def _failsafes(record: Record) -> Checks:
     """What the drone does without commands, for a person to confirm."""
     parameters = record.parameters
     climb_m = parameters.get("RTL_RETURN_ALT")
@@ -322,26 +290,24 @@ def _failsafes(record: Record) -> Findings:
         elif action == 3:
             words += climbs
         advice = "under a roof set COM_OBL_RC_ACT to 4 (land)" if "return" in words else ""
-        yield _finding(Level.NOTE if advice else Level.GOOD, "setpoints lost", f"{words}{after}", advice)
+        yield (note if advice else good)("setpoints lost", f"{words}{after}", advice)
     if loss_s is not None and loss_s < 0.5:
-        yield _missing(
-            "COM_OF_LOSS_T", f"{loss_s:g} s", "set it to 1: the app's watchdog needs half a second"
-        )
+        yield missing("COM_OF_LOSS_T", f"{loss_s:g} s", "set it to 1: the app's watchdog needs half a second")
     station = parameters.get("NAV_DLL_ACT")
     if station is not None:
         words = _LINK_LOSS.get(int(station), f"action {station:g}")
         needed = "; it arms only while it receives one's heartbeats, which fly sends" if station else ""
-        yield _good("ground station lost", words + (climbs if station == 2 else "") + needed)
+        yield good("ground station lost", words + (climbs if station == 2 else "") + needed)
     low = parameters.get("COM_LOW_BAT_ACT")
     if low is not None:
-        yield _good("battery low", _LOW_BATTERY.get(int(low), f"action {low:g}"))
+        yield good("battery low", _LOW_BATTERY.get(int(low), f"action {low:g}"))
 
 
-def _position(record: Record) -> Findings:
+def _position(record: Record) -> Checks:
     """Whether the position is accurate to a part of a frame's opening."""
     status = record.latest.get("ESTIMATOR_STATUS")
     if status is None:
-        yield _note("position", "it does not report what its estimate is made from")
+        yield note("position", "it does not report what its estimate is made from")
         return
     advice = f"give it its position by motion capture or visual odometry: {_GUIDE}"
     if int(record.parameters.get("EKF2_EV_CTRL", 0)) & _EV_POSITION:
@@ -350,7 +316,7 @@ def _position(record: Record) -> Findings:
             f"MOCAP) at 50 Hz, as `framerunner mocap` does: {_GUIDE}"
         )
     if not status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_REL:
-        yield _missing("position", "no sensor measures the drone's position", advice)
+        yield missing("position", "no sensor measures the drone's position", advice)
         return
     sources = ["GPS"] if status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS else []
     sources += ["vision"] if _vision_in_use(record, status) else []
@@ -358,33 +324,33 @@ def _position(record: Record) -> Findings:
     source = " and ".join(sources) or "optical flow or another relative sensor"
     accuracy_m = status.pos_horiz_accuracy
     if accuracy_m <= ACCURATE_M:
-        yield _good("position", f"by {source}, estimated accuracy {accuracy_m:.2f} m")
+        yield good("position", f"by {source}, estimated accuracy {accuracy_m:.2f} m")
         return
     accuracy = f"estimated accuracy {accuracy_m:.1f} m" if isfinite(accuracy_m) else "unknown accuracy"
     text = f"by {source}, {accuracy}: the drone will stray; a frame's opening is 0.38 m wide"
-    yield _missing("position", text, advice)
+    yield missing("position", text, advice)
 
 
-def _height(record: Record) -> Findings:
+def _height(record: Record) -> Checks:
     """Whether the height is from something better than air pressure or GPS."""
     status, parameters = record.latest.get("ESTIMATOR_STATUS"), record.parameters
     if status is None:
         return
     reference = parameters.get("EKF2_HGT_REF")
     if not status.flags & mavlink.ESTIMATOR_POS_VERT_ABS:
-        yield _missing("height", "no sensor measures the drone's height", f"see {_GUIDE}")
+        yield missing("height", "no sensor measures the drone's height", f"see {_GUIDE}")
         return
     accuracy_m = status.pos_vert_accuracy
     accuracy = f"estimated accuracy {accuracy_m:.2f} m"
     if reference is None:
         fine = accuracy_m <= ACCURATE_M
         advice = "" if fine else f"take height from vision or a range finder: {_GUIDE}"
-        yield _finding(Level.GOOD if fine else Level.MISSING, "height", accuracy, advice)
+        yield (good if fine else missing)("height", accuracy, advice)
         return
     requested = _HEIGHT_SOURCE.get(int(reference), "unknown means")
     source = _height_source(record, status, requested)
     if source in ("vision", "range finder") and accuracy_m <= ACCURATE_M:
-        yield _good("height", f"by {source}, {accuracy}")
+        yield good("height", f"by {source}, {accuracy}")
         return
     advice = "as for the position"
     if requested != "vision":
@@ -393,10 +359,10 @@ def _height(record: Record) -> Findings:
         advice = f"set EKF2_EV_CTRL to 15: {_GUIDE}"
     but = "" if source == requested else f", though EKF2_HGT_REF asks for {requested}"
     text = f"by {source}{but}, {accuracy}; in flight it drifts, and a frame's opening is 0.18 m high"
-    yield _missing("height", text, advice)
+    yield missing("height", text, advice)
 
 
-def _vision_settings(record: Record) -> Findings:
+def _vision_settings(record: Record) -> Checks:
     """With vision: whether the estimate follows it closely."""
     status = record.latest.get("ESTIMATOR_STATUS")
     if status is None or not _vision_in_use(record, status):
@@ -409,19 +375,19 @@ def _vision_settings(record: Record) -> Findings:
     if slow:
         text = f"follows vision too slowly for the frames: {', '.join(slow)}"
         advice = "set what docs/real-drone.md, step 6, advises, then restart the drone"
-        yield _missing("estimator", text, advice)
+        yield missing("estimator", text, advice)
 
 
-def _still(record: Record) -> Findings:
+def _still(record: Record) -> Checks:
     """Whether the position stays the same while the drone stands."""
     if not record.places or record.armed:
         return
     wander_m = record.wander_m
     if wander_m > WANDER_M:
         text = f"drifts {wander_m:.2f} m while it stands; a frame's opening is 0.18 m high"
-        yield _note("estimate", text, f"see {_GUIDE}")
+        yield note("estimate", text, f"see {_GUIDE}")
     else:
-        yield _good("estimate", f"still within {wander_m:.2f} m")
+        yield good("estimate", f"still within {wander_m:.2f} m")
 
 
 def _vision_in_use(record: Record, status: Message) -> bool:
@@ -454,7 +420,7 @@ def _height_source(record: Record, status: Message, requested: str) -> str:
     return requested if present.get(requested) else "barometer"
 
 
-_CHECKS: tuple[Callable[[Record], Findings], ...] = (
+_CHECKS: tuple[Callable[[Record], Checks], ...] = (
     _one_vehicle,
     _autopilot,
     _armed,
@@ -472,7 +438,7 @@ _CHECKS: tuple[Callable[[Record], Findings], ...] = (
     _limits,
     _failsafes,
 )
-_ARDUPILOT_CHECKS: tuple[Callable[[Record], Findings], ...] = (
+_ARDUPILOT_CHECKS: tuple[Callable[[Record], Checks], ...] = (
     _one_vehicle,
     ardupilot.autopilot,
     _armed,

@@ -11,12 +11,12 @@ from rich.table import Table
 from rich.text import Text
 
 from framerunner.doctor.checks import can_fly
-from framerunner.doctor.findings import Finding, Level
-from framerunner.doctor.listen import Record
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.px4_modes import mode_words
+from framerunner.wire.session.record import Record
+from offboard.safety.check import Check, Outcome, failures
 
-_MARKS = {Level.GOOD: "[green]ok[/]", Level.NOTE: "[yellow]note[/]", Level.MISSING: "[red]MISSING[/]"}
+_MARKS = {Outcome.PASS: "[green]ok[/]", Outcome.NOTE: "[yellow]note[/]", Outcome.FAIL: "[red]MISSING[/]"}
 _STREAMS = (
     *("HEARTBEAT", "ATTITUDE", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"),
     *("SYS_STATUS", "EXTENDED_SYS_STATE", "BATTERY_STATUS", "DISTANCE_SENSOR", "ODOMETRY"),
@@ -34,12 +34,12 @@ _CAPABILITIES = {
 _RELEASES = {0: " dev", 64: " alpha", 128: " beta", 192: " rc"}  # last byte of flight_sw_version; else final
 
 
-def print_page(console: Console, url: str, record: Record, findings: list[Finding]) -> None:
+def print_page(console: Console, url: str, record: Record, findings: list[Check]) -> None:
     """Print what was received on a URL, and the findings."""
     console.print(Group(*_page(url, record, findings)))
 
 
-def _page(url: str, record: Record, findings: list[Finding]) -> Iterator[RenderableType]:
+def _page(url: str, record: Record, findings: list[Check]) -> Iterator[RenderableType]:
     yield Text(f"Vehicle {record.system_id} on {url}", style="bold")
     facts = _table("", "")
     for name, value in _facts(record):
@@ -58,17 +58,17 @@ def _page(url: str, record: Record, findings: list[Finding]) -> Iterator[Rendera
     if can_fly(findings):
         yield Text("It can fly the challenge.", style="bold green")
     else:
-        count = sum(finding.level is Level.MISSING for finding in findings)
+        count = len(failures(findings))
         things = "one thing is" if count == 1 else f"{count} things are"
         yield Text(f"It cannot fly the challenge yet: {things} missing.", style="bold red")
 
 
-def findings_table(findings: list[Finding]) -> Table:
+def findings_table(findings: list[Check]) -> Table:
     """A row for each finding: how much it matters, its subject, what is the case, what to do."""
     found = Table(show_header=False, box=None, pad_edge=False)
     for finding in findings:
         advice = f"[dim]{escape(finding.advice)}[/]"
-        found.add_row(_MARKS[finding.level], escape(finding.subject), escape(finding.text), advice)
+        found.add_row(_MARKS[finding.outcome], escape(finding.name), escape(finding.value), advice)
     return found
 
 

@@ -5,9 +5,10 @@ Checks before arming are accepted by these names, so all are known before a vehi
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Protocol
 
-from framerunner.doctor.findings import Finding, Level
+from offboard.safety import check
+from offboard.safety.check import Check
 
 Subject = Literal[
     # Of both autopilots.
@@ -59,21 +60,13 @@ Subject = Literal[
 CAMERA_SUBJECTS = ("camera", "camera delay", "camera calibration", "camera mounting")
 
 
-def finding(level: Level, subject: Subject, text: str, advice: str = "") -> Finding:
-    """A finding of the doctor; see `Finding`."""
-    return Finding(level, subject, text, advice)
+class _Judge(Protocol):
+    """Makes a check of a known name."""
+
+    def __call__(self, name: Subject, value: str, advice: str = "") -> Check:
+        """See `offboard.safety.check.good` and the others."""
 
 
-def good(subject: Subject, text: str, advice: str = "") -> Finding:
-    """Nothing is wrong."""
-    return Finding(Level.GOOD, subject, text, advice)
-
-
-def note(subject: Subject, text: str, advice: str = "") -> Finding:
-    """Worth knowing."""
-    return Finding(Level.NOTE, subject, text, advice)
-
-
-def missing(subject: Subject, text: str, advice: str = "") -> Finding:
-    """Something that the challenge needs is missing."""
-    return Finding(Level.MISSING, subject, text, advice)
+good: _Judge = check.good
+note: _Judge = check.note
+missing: _Judge = check.missing

@@ -28,7 +28,7 @@ from framerunner.geometry.rotations import normalized, quaternion_from_euler
 from framerunner.geometry.vectors import Vec3
 from offboard.arming import Arming
 from offboard.drone import DroneError, DroneState, VelocityCommand
-from offboard.link.gimbal_feed import GimbalAttitude
+from offboard.link.gimbal import GimbalAttitude
 from offboard.safety.caps import CapKeeper
 from scenarios.models import TrueState
 from sitl.payload.gimbal import SimulatedGimbal

@@ -7,21 +7,17 @@ seconds, so a constant delay of all of them has no effect: it is a parameter, VI
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import pi, sqrt
 from types import MappingProxyType
 
-from framerunner.doctor.findings import Finding, Findings, Level
 from framerunner.mocap.facts import (
     DELAY_S,
     FAR_M,
     VISION,
     Facts,
     SendSettings,
-    good,
-    missing,
-    note,
 )
 from framerunner.mocap.messages import odometry, vision_position
 from framerunner.mocap.poses import Pose
@@ -29,9 +25,9 @@ from framerunner.wire.ardupilot_messages import (
     EKF_STATUS_REPORT_ID,
     EXTERNAL_NAVIGATION,
     POSE_ARRIVAL_EARLY_MS,
-    has_position,
 )
 from framerunner.wire.dialect import Message, mavlink
+from offboard.safety.check import Check, Checks, Outcome, good, missing, note
 
 _FAR_DELAY_S = 0.05  # 5 cm at 1 m/s
 _MAX_DELAY_MS = 250.0
@@ -44,49 +40,24 @@ class _Rule:
     """A parameter and the values that let the poses be used."""
 
     name: str
-    allowed: tuple[int, ...]
-    level: Level
     text: str  # what another value means
-    advice: str
+    allowed: tuple[int, ...] = (EXTERNAL_NAVIGATION,)
+    advice: str = "set it to 6"
+    judge: Callable[[str, str, str], Check] = missing
 
 
 _RULES = (
-    _Rule("AHRS_EKF_TYPE", (3,), Level.MISSING, "its estimator is not EKF3", "set it to 3"),
-    _Rule(
-        "VISO_TYPE",
-        (1,),
-        Level.MISSING,
-        "it takes no poses by MAVLink",
-        "set it to 1, then restart the vehicle",
-    ),
-    _Rule("VISO_SCALE", (1,), Level.MISSING, "it multiplies positions by this", "set it to 1"),
-    _Rule(
-        "EK3_SRC1_POSXY",
-        (EXTERNAL_NAVIGATION,),
-        Level.MISSING,
-        "its position is not that of the poses",
-        "set it to 6",
-    ),
-    _Rule(
-        "EK3_SRC1_POSZ",
-        (EXTERNAL_NAVIGATION,),
-        Level.NOTE,
-        "its height is not that of the poses",
-        "set it to 6",
-    ),
-    _Rule(
-        "EK3_SRC1_YAW",
-        (EXTERNAL_NAVIGATION,),
-        Level.NOTE,
-        "its heading is not that of the poses",
-        "set it to 6",
-    ),
+    _Rule("AHRS_EKF_TYPE", "its estimator is not EKF3", (3,), "set it to 3"),
+    _Rule("VISO_TYPE", "it takes no poses by MAVLink", (1,), "set it to 1, then restart the vehicle"),
+    _Rule("VISO_SCALE", "it multiplies positions by this", (1,), "set it to 1"),
+    _Rule("EK3_SRC1_POSXY", "its position is not that of the poses"),
+    _Rule("EK3_SRC1_POSZ", "its height is not that of the poses", judge=note),
+    _Rule("EK3_SRC1_YAW", "its heading is not that of the poses", judge=note),
     *(
         _Rule(
             name,
-            (0, EXTERNAL_NAVIGATION),
-            Level.MISSING,
             "its velocity is from another sensor",
+            (0, EXTERNAL_NAVIGATION),
             "set it to 0, or to 6 if the source has velocities",
         )
         for name in _VELOCITIES
@@ -103,15 +74,15 @@ class ArduPilotPoses:
         *(rule.name for rule in _RULES),
         *("VISO_DELAY_MS", "VISO_POS_M_NSE", "VISO_YAW_M_NSE", "VISO_QUAL_MIN", "INS_GYRO_FILTER"),
     )
-    streams_hz: Mapping[str, tuple[int, float]] = MappingProxyType(
+    streams_hz: Mapping[int, float] = MappingProxyType(
         {
-            "ATTITUDE": (mavlink.MAVLINK_MSG_ID_ATTITUDE, 50.0),
-            "LOCAL_POSITION_NED": (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 30.0),
-            "EKF_STATUS_REPORT": (EKF_STATUS_REPORT_ID, 2.0),
-            "SYS_STATUS": (mavlink.MAVLINK_MSG_ID_SYS_STATUS, 2.0),
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
+            EKF_STATUS_REPORT_ID: 2.0,
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
         }
     )
-    truth = ("SIM_STATE", mavlink.MAVLINK_MSG_ID_SIM_STATE)
+    truth = mavlink.MAVLINK_MSG_ID_SIM_STATE
     estimator = "EKF_STATUS_REPORT"
     needs_origin = True
 
@@ -121,31 +92,27 @@ class ArduPilotPoses:
             return vision_position(pose, stamp_us, settings)
         return odometry(pose, stamp_us, settings, mavlink.MAV_FRAME_LOCAL_FRD)
 
-    def innovation_ratio(self, estimator: Message) -> float:
-        """EKF_STATUS_REPORT's variances are ratios of innovations to their gates."""
-        return float(max(estimator.pos_horiz_variance, estimator.pos_vert_variance))
-
     def is_fused(self, facts: Facts) -> bool | None:
         """Poses arrive, external navigation is its source, it has a position, and that is where they say."""
-        latest, parameters = facts.record.latest, facts.record.parameters
-        report, system = latest.get(self.estimator), latest.get("SYS_STATUS")
+        report, parameters = facts.record.estimator, facts.record.parameters
+        system = facts.record.latest.get("SYS_STATUS")
         if report is None:
             return None
         arrive = system is None or bool(system.onboard_control_sensors_health & VISION)
         source = parameters.get("EK3_SRC1_POSXY", EXTERNAL_NAVIGATION)
         near = facts.comparison.distance_m < FAR_M
-        return arrive and source == EXTERNAL_NAVIGATION and has_position(report) and near
+        return arrive and source == EXTERNAL_NAVIGATION and report.has_position and near
 
     def why_not_fused(self, facts: Facts) -> str:
         """By its parameters, whether poses arrive, and its estimator's state."""
-        if any(finding.level is Level.MISSING for finding in _wrong_parameters(facts)):
+        if any(finding.outcome is Outcome.FAIL for finding in _wrong_parameters(facts)):
             return "set the parameters that are named below"
         if facts.sent == 0:
             return "let the source send"
-        system, report = facts.record.latest.get("SYS_STATUS"), facts.record.latest[self.estimator]
+        system, report = facts.record.latest.get("SYS_STATUS"), facts.record.estimator
         if system is not None and not system.onboard_control_sensors_health & VISION:
             return "no poses arrive now: see the poses above, and whether the link is fast enough"
-        if not has_position(report):
+        if report is not None and not report.has_position:
             return "keep it still for half a minute after its start; then see the axes below"
         return "see the innovation ratio and the axes below"
 
@@ -153,7 +120,7 @@ class ArduPilotPoses:
         """Never: each parameter has its own line."""
         return None
 
-    def settings(self, facts: Facts) -> Findings:
+    def settings(self, facts: Facts) -> Checks:
         """Its parameters, one line for each that is wrong, and --delay."""
         found, parameters = list(_wrong_parameters(facts)), facts.record.parameters
         yield from found
@@ -178,7 +145,7 @@ class ArduPilotPoses:
             return "it is not that of the poses", "set EK3_SRC1_YAW to 6"
         return "", "choose --frame or --forward, then restart the vehicle"
 
-    def delay(self, facts: Facts) -> Findings:
+    def delay(self, facts: Facts) -> Checks:
         """VISO_DELAY_MS against the age of poses on their arrival."""
         behind_gyro_s = facts.comparison.delay_s + facts.settings.delay_s + facts.transit_s
         age_s = behind_gyro_s + _gyro_delay_s(facts.record.parameters.get("INS_GYRO_FILTER", 0.0))
@@ -193,8 +160,7 @@ class ArduPilotPoses:
             yield good("delay", words)
             return
         advice = f"VISO_DELAY_MS is {given_ms:g}: set it to {wanted_ms:.0f}, then restart the vehicle"
-        level = Level.MISSING if wrong_s > _FAR_DELAY_S else Level.NOTE
-        yield Finding(level, "delay", words, advice)
+        yield (missing if wrong_s > _FAR_DELAY_S else note)("delay", words, advice)
 
 
 def _gyro_delay_s(cutoff_hz: float) -> float:
@@ -202,12 +168,12 @@ def _gyro_delay_s(cutoff_hz: float) -> float:
     return sqrt(2.0) / (2.0 * pi * cutoff_hz) if cutoff_hz > 0.0 else 0.0
 
 
-def _wrong_parameters(facts: Facts) -> Findings:
+def _wrong_parameters(facts: Facts) -> Checks:
     parameters = facts.record.parameters
     for rule in _RULES:
         value = parameters.get(rule.name)
         if value is not None and value not in rule.allowed:
-            yield Finding(rule.level, rule.name, f"{value:g}: {rule.text}", rule.advice)
+            yield rule.judge(rule.name, f"{value:g}: {rule.text}", rule.advice)
     if facts.sent and not facts.has_velocity:
         for name in _VELOCITIES:
             if parameters.get(name) == EXTERNAL_NAVIGATION:

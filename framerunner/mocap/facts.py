@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
-from framerunner.doctor.findings import Finding, Level
-from framerunner.doctor.listen import Record
 from framerunner.mocap.motion import PoseComparison
 from framerunner.wire.dialect import mavlink
+from framerunner.wire.session.record import Record
 
 NEAR_M, FAR_M = 0.10, 0.5
 DELAY_S = 0.02  # difference that matters
 VISION = int(mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION)
-
-good = partial(Finding, Level.GOOD)
-note = partial(Finding, Level.NOTE)
-missing = partial(Finding, Level.MISSING)
 
 
 @dataclass(frozen=True, slots=True)

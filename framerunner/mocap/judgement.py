@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from math import isfinite, isnan
 
-from framerunner.doctor.findings import Finding, Level
 from framerunner.mocap.dialects import dialect_of
-from framerunner.mocap.facts import NEAR_M, Facts, Unused, good, missing, note
+from framerunner.mocap.facts import NEAR_M, Facts, Unused
+from offboard.safety.check import Check, Checks, good, missing, note
 
 MIN_RATE_HZ = 30.0
 GAP_S = 0.2
@@ -47,7 +46,7 @@ def line(facts: Facts) -> str:
     return " · ".join(parts)
 
 
-def judge(facts: Facts) -> list[Finding]:
+def judge(facts: Facts) -> list[Check]:
     """All findings, in the order in which they need to be right; of a vehicle that is gone, only that."""
     if facts.record.silence:
         advice = "is it running and sending to this address? What it used before is not known to hold"
@@ -59,7 +58,7 @@ def judge(facts: Facts) -> list[Finding]:
     ]
 
 
-def _sent(facts: Facts) -> Iterator[Finding]:
+def _sent(facts: Facts) -> Checks:
     words = (
         f"{facts.sent} sent, {facts.rate_hz:.0f} a second, longest gap {facts.longest_gap_s * 1000:.0f} ms"
     )
@@ -77,7 +76,7 @@ def _sent(facts: Facts) -> Iterator[Finding]:
         )
 
 
-def _fused(facts: Facts) -> Iterator[Finding]:
+def _fused(facts: Facts) -> Checks:
     dialect = dialect_of(facts.record)
     fused, part = dialect.is_fused(facts), dialect.used_in_part(facts)
     if fused is None:
@@ -93,8 +92,9 @@ def _fused(facts: Facts) -> Iterator[Finding]:
     ratio = f"innovation ratio up to {facts.worst_ratio:.2f}"
     if facts.worst_ratio > 1.0:
         recovered = fused and facts.comparison.distance_m <= NEAR_M
-        level = Level.NOTE if recovered else Level.MISSING
-        yield Finding(level, "innovation", f"{ratio}: it rejected poses", "see gaps, axes and delay")
+        yield (note if recovered else missing)(
+            "innovation", f"{ratio}: it rejected poses", "see gaps, axes and delay"
+        )
     elif fused:
         yield good("innovation", ratio)
     yield from dialect.settings(facts)
@@ -106,7 +106,7 @@ def _wants_origin(facts: Facts) -> bool:
     return dialect_of(facts.record).needs_origin or facts.settings.origin is not None
 
 
-def _origin(facts: Facts) -> Finding:
+def _origin(facts: Facts) -> Check:
     told = facts.record.latest.get("GPS_GLOBAL_ORIGIN")
     if told is not None:
         place = f"{told.latitude / 1e7:.7g}, {told.longitude / 1e7:.7g}, {told.altitude / 1e3:.4g} m"
@@ -120,7 +120,7 @@ def _origin(facts: Facts) -> Finding:
     return missing("origin", text, "wait for its estimator to start, some 20 s after the vehicle")
 
 
-def _unused(unused: Unused) -> Finding:
+def _unused(unused: Unused) -> Check:
     words = f"for {unused.seconds:.0f} s it did not use the poses that came"
     if unused.farthest_m:
         words += f", up to {unused.farthest_m:.1f} m from them"
@@ -129,7 +129,7 @@ def _unused(unused: Unused) -> Finding:
     return missing("used", words, "see axes and delay; carry it by hand before it flies")
 
 
-def _near(facts: Facts) -> Iterator[Finding]:
+def _near(facts: Facts) -> Checks:
     distance_m = facts.comparison.distance_m
     if isnan(distance_m):
         yield note("position", "the vehicle reports none that could be compared", "")
@@ -140,7 +140,7 @@ def _near(facts: Facts) -> Iterator[Finding]:
         yield good("position", f"{distance_m * 100:.1f} cm from the pose of the same time")
 
 
-def _axes(facts: Facts) -> Iterator[Finding]:
+def _axes(facts: Facts) -> Checks:
     comparison = facts.comparison
     if comparison.axes:
         advice = "choose --frame and --forward by the axes of the motion capture and of its body"
@@ -156,7 +156,7 @@ def _axes(facts: Facts) -> Iterator[Finding]:
         yield good("axes", f"right, by its gyroscope (correlation {comparison.correlation:.2f})")
 
 
-def _tilt(facts: Facts) -> Iterator[Finding]:
+def _tilt(facts: Facts) -> Checks:
     tilt_deg = facts.comparison.tilt_deg
     if tilt_deg > TILT_DEG:
         advice = "choose --frame, or set the body level in the motion capture's software"
@@ -165,7 +165,7 @@ def _tilt(facts: Facts) -> Iterator[Finding]:
         yield good("tilt", f"within {tilt_deg:.1f}° of the vehicle's")
 
 
-def _heading(facts: Facts) -> Iterator[Finding]:
+def _heading(facts: Facts) -> Checks:
     heading_deg = facts.comparison.heading_deg
     if isnan(heading_deg):
         return
@@ -177,6 +177,6 @@ def _heading(facts: Facts) -> Iterator[Finding]:
     yield missing("heading", words, advice)
 
 
-def _delay(facts: Facts) -> Iterator[Finding]:
+def _delay(facts: Facts) -> Checks:
     if not isnan(facts.comparison.delay_s):
         yield from dialect_of(facts.record).delay(facts)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from framerunner.doctor.findings import Findings
-from framerunner.mocap.facts import DELAY_S, FAR_M, NEAR_M, VISION, Facts, SendSettings, good, note
+from framerunner.mocap.facts import DELAY_S, FAR_M, NEAR_M, VISION, Facts, SendSettings
 from framerunner.mocap.messages import odometry
 from framerunner.mocap.poses import Pose
 from framerunner.wire.dialect import Message, mavlink
+from offboard.safety.check import Checks, good, note
 
 _POSITION, _HEIGHT, _VELOCITY, _YAW = 1, 2, 4, 8  # bits of EKF2_EV_CTRL
 _WANTED = _POSITION | _HEIGHT | _VELOCITY | _YAW
@@ -25,27 +25,23 @@ class Px4Poses:
         *("EKF2_EV_CTRL", "EKF2_EV_DELAY", "EKF2_EV_NOISE_MD", "EKF2_EVP_NOISE", "EKF2_EVA_NOISE"),
         *("EKF2_GPS_CTRL", "EKF2_HGT_REF", "EKF2_MAG_TYPE"),
     )
-    streams_hz: Mapping[str, tuple[int, float]] = MappingProxyType(
+    streams_hz: Mapping[int, float] = MappingProxyType(
         {
-            "ATTITUDE": (mavlink.MAVLINK_MSG_ID_ATTITUDE, 50.0),
-            "LOCAL_POSITION_NED": (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 30.0),
-            "ESTIMATOR_STATUS": (mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, 2.0),
-            "SYS_STATUS": (mavlink.MAVLINK_MSG_ID_SYS_STATUS, 2.0),
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
+            mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
             # PX4's filter estimates the drift per answer, so this rate must stay the same.
-            "TIMESYNC": (mavlink.MAVLINK_MSG_ID_TIMESYNC, 20.0),
+            mavlink.MAVLINK_MSG_ID_TIMESYNC: 20.0,
         }
     )
-    truth = ("HIL_STATE_QUATERNION", mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION)
+    truth = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
     estimator = "ESTIMATOR_STATUS"
     needs_origin = False
 
     def pose_message(self, pose: Pose, stamp_us: int, settings: SendSettings) -> Message:
         """ODOMETRY in NED."""
         return odometry(pose, stamp_us, settings, mavlink.MAV_FRAME_LOCAL_NED)
-
-    def innovation_ratio(self, estimator: Message) -> float:
-        """As ESTIMATOR_STATUS has it."""
-        return float(max(estimator.pos_horiz_ratio, estimator.pos_vert_ratio))
 
     def is_fused(self, facts: Facts) -> bool | None:
         """By the health of vision where it is sent, else by the estimator's aiding and the distance."""
@@ -80,7 +76,7 @@ class Px4Poses:
             return None
         return f"EKF2_EV_CTRL is {control}", "set it to 15"
 
-    def settings(self, facts: Facts) -> Findings:
+    def settings(self, facts: Facts) -> Checks:
         """The reference of height."""
         reference = facts.record.parameters.get("EKF2_HGT_REF")
         if reference is not None and int(reference) != _HEIGHT_BY_VISION:
@@ -93,7 +89,7 @@ class Px4Poses:
             return "it is not that of the poses", "set EKF2_EV_CTRL to 15 and EKF2_MAG_TYPE to 5"
         return "", "choose --frame or --forward; without a compass restart the vehicle"
 
-    def delay(self, facts: Facts) -> Findings:
+    def delay(self, facts: Facts) -> Checks:
         """EKF2_EV_DELAY, after TIMESYNC has converged."""
         delay_s = facts.comparison.delay_s
         given_ms = facts.record.parameters.get("EKF2_EV_DELAY", 0.0)

@@ -9,13 +9,13 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.page import findings_table
 from framerunner.mocap.facts import Facts, SendSettings
 from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.session import MocapSession
 from framerunner.mocap.sources import PoseSource
 from framerunner.wire.transports.vehicle_link import VehicleLink
+from offboard.safety.check import Check, failures
 
 _WAIT_S = 0.002
 _LINE_S = 1.0
@@ -60,7 +60,7 @@ def run_session(
             live.stop()
         if facts is not None:
             _report(console, session, link.url, facts)
-    return session.vehicle.found and all(finding.level is not Level.MISSING for finding in judge(facts))
+    return session.vehicle.system_id is not None and not failures(judge(facts))
 
 
 def _run(
@@ -78,7 +78,7 @@ def _run(
             line_s = now_s + _LINE_S
             facts = session.facts(now_s)
             session.note_use(is_fused(facts), facts.comparison, _LINE_S)
-            show(line(facts) if session.vehicle.found else "waiting for a vehicle")
+            show(line(facts) if session.vehicle.system_id is not None else "waiting for a vehicle")
 
 
 def _shower(console: Console, live: Live | None) -> Callable[[str], None]:
@@ -97,15 +97,15 @@ def _shower(console: Console, live: Live | None) -> Callable[[str], None]:
 
 
 def _report(console: Console, session: MocapSession, url: str, facts: Facts) -> None:
-    if not session.vehicle.found:
+    if session.vehicle.system_id is None:
         console.print(
             f"no vehicle was heard on {url}; is it running and sending to this address?",
             highlight=False,
             soft_wrap=True,
         )
         return
-    findings: list[Finding] = judge(facts)
-    vehicle = session.vehicle.record
+    findings: list[Check] = judge(facts)
+    vehicle = session.vehicle
     words = (
         f"Vehicle {vehicle.system_id} ({vehicle.autopilot_name}) on {url}, poses from {session.source.label}"
     )

@@ -5,30 +5,20 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 from framerunner.mocap.facts import Facts, SendSettings, Unused
 from framerunner.mocap.motion import MotionCheck, PoseComparison, SentPose
 from framerunner.mocap.poses import with_forward
 from framerunner.mocap.sources import PoseSource, TimedPose
 from framerunner.mocap.vehicle import Vehicle
-from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.transports.vehicle_link import VehicleLink
 
 SYSTEM_ID = 248  # the doctor has 247
 COMPONENT_ID = mavlink.MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY
 SILENT_S = 0.2  # without a new pose for so long, the source has stopped
 _EARLY = 0.2  # share of a period by which a pose may come early
 _RATE_SPAN_S = 2.0
-
-
-class Link(Protocol):
-    """What is needed of a link, as `VehicleLink` has it."""
-
-    def receive(self, timeout_s: float) -> list[Message]:
-        """Wait for messages."""
-
-    def send(self, message: Message) -> None:
-        """Send a message."""
 
 
 class MocapSession:
@@ -53,7 +43,7 @@ class MocapSession:
 
     def __init__(
         self,
-        link: Link,
+        link: VehicleLink,
         source: PoseSource,
         settings: SendSettings,
         say: Callable[[str], None],
@@ -88,11 +78,9 @@ class MocapSession:
         messages = self._link.receive(wait_s)
         arrived_s = clock() if messages else now_s
         for message in messages:
-            answer = self.vehicle.take(message, arrived_s)
-            if answer is not None:
-                self._link.send(answer)
+            self.vehicle.take(message, arrived_s)
             self._source.take(message, arrived_s)
-        for request in self.vehicle.requests(arrived_s):
+        for request in self.vehicle.due(arrived_s):
             self._link.send(request)
         self._pass_poses(clock())
 
@@ -119,7 +107,7 @@ class MocapSession:
         taken_s = timed.taken_s - settings.delay_s
         if timed.vehicle_time_us is not None and offset_s is not None:
             taken_s = timed.vehicle_time_us / 1e6 - offset_s
-        if not self.vehicle.found or taken_s - self._newest_s < (1.0 - _EARLY) / settings.rate_hz:
+        if self.vehicle.system_id is None or taken_s - self._newest_s < (1.0 - _EARLY) / settings.rate_hz:
             return
         self._newest_s = taken_s
         pose = with_forward(timed.pose, settings.forward_deg)
@@ -134,7 +122,7 @@ class MocapSession:
 
     def note_use(self, fused: bool | None, comparison: PoseComparison, span_s: float) -> None:
         """Note whether the vehicle uses the poses and how it moves, once for each `span_s`."""
-        boot = self.vehicle.record.telemetry.restarts
+        boot = self.vehicle.telemetry.restarts
         if fused:
             self._used_in_boot = boot
         elif fused is False and self._used_in_boot == boot and not self.silent:
@@ -150,7 +138,7 @@ class MocapSession:
         vehicle, source = self.vehicle, self._source
         vehicle.listened(now_s)
         return Facts(
-            record=vehicle.record,
+            record=vehicle,
             comparison=self._compare(),
             sent=self.sent,
             rate_hz=self._rate_hz(now_s),
@@ -176,7 +164,7 @@ class MocapSession:
     def _compare(self) -> PoseComparison:
         """The poses against what the vehicle reports now; of axes and delay, what was last seen in motion."""
         rates: Sequence[tuple[int, float, float, float]] = list(self.vehicle.rates_rad_s)
-        found = self._motion.compare(self.vehicle.record.telemetry, rates)
+        found = self._motion.compare(self.vehicle.telemetry, rates)
         if found.moves:
             self._in_motion = found
         seen = self._in_motion

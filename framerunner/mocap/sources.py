@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import socket
 import sys
+from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import dataclass
 from math import cos, inf, isnan, radians
 from pathlib import Path
 from random import Random
 from subprocess import DEVNULL, PIPE, Popen, TimeoutExpired
-from typing import Protocol
 
 from framerunner.extras import install_advice, is_installed
 from framerunner.geometry.rotations import multiply, normalized
@@ -41,7 +41,7 @@ class TimedPose:
     vehicle_time_us: int | None = None  # if the source gives it in vehicle time
 
 
-class PoseSource(Protocol):
+class PoseSource(ABC):
     """Delivers poses as they come.
 
     Attributes:
@@ -52,19 +52,22 @@ class PoseSource(Protocol):
         needs_truth: it is made from a simulated vehicle's true pose.
     """
 
-    label: str
-    ended: bool
-    fault: str
-    faults: int
-    needs_truth: bool
+    ended = False
+    fault = ""
+    faults = 0
+    needs_truth = False
 
+    def __init__(self, label: str) -> None:
+        self.label = label
+
+    @abstractmethod
     def poll(self, now_s: float) -> list[TimedPose]:
         """The poses that have come since the last call, oldest first."""
 
-    def take(self, message: Message, now_s: float) -> None:
+    def take(self, message: Message, now_s: float) -> None:  # noqa: B027 - most need none
         """Take a message of the vehicle, of which a source may be made."""
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 - some have nothing open
         """Close it."""
 
 
@@ -104,7 +107,7 @@ class SourceClock:
         return now_s - max(late_s, 0.0) if late_s <= MAX_LATE_S else None
 
 
-class FileSource:
+class FileSource(PoseSource):
     """Plays a file of poses in real time, once.
 
     Raises:
@@ -112,8 +115,7 @@ class FileSource:
     """
 
     def __init__(self, path: Path, axes: Axes, name: str | None) -> None:
-        self.label = str(path)
-        self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, False
+        super().__init__(str(path))
         self._poses = deque(read_poses(path, axes, name))
         self._began_s: float | None = None
         self._first_s = self._poses[0].time_s
@@ -131,14 +133,8 @@ class FileSource:
         self.ended = not self._poses
         return due
 
-    def take(self, message: Message, now_s: float) -> None:
-        """Not needed."""
 
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-class UdpSource:
+class UdpSource(PoseSource):
     """Lines of JSON in UDP datagrams.
 
     Args:
@@ -149,11 +145,10 @@ class UdpSource:
     """
 
     def __init__(self, receiver: UdpSocket, label: str, axes: Axes, name: str | None) -> None:
+        super().__init__(label)
         self._socket, self._axes, self._name = receiver, axes, name
         self._any_name = name is None
         self._clock = SourceClock()
-        self.label = label
-        self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, False
 
     def poll(self, now_s: float) -> list[TimedPose]:
         """Those that have arrived; a line that is no pose is counted."""
@@ -185,9 +180,6 @@ class UdpSource:
         if self._any_name and name != self._name:
             raise PoseError(f"name: {name} is tracked as well as {self._name}; choose one with --body")
         return self._any_name or name == self._name
-
-    def take(self, message: Message, now_s: float) -> None:
-        """Not needed."""
 
     def close(self) -> None:
         """Close the socket."""
@@ -245,7 +237,7 @@ class ServerSource(UdpSource):
         super().close()
 
 
-class SitlSource:
+class SitlSource(PoseSource):
     """The true state that a simulated vehicle sends: HIL_STATE_QUATERNION, or ArduPilot's SIM_STATE.
 
     Its origin is where the vehicle is first heard. White noise is added, as a motion capture has it: the
@@ -256,11 +248,12 @@ class SitlSource:
         attitude_noise_rad: standard deviation about each axis.
     """
 
+    needs_truth = True
+
     def __init__(self, position_noise_m: float = 0.002, attitude_noise_rad: float = 0.003) -> None:
+        super().__init__("the simulator's truth")
         self._noise = (position_noise_m, attitude_noise_rad)
         self._random = Random(1)
-        self.label = "the simulator's truth"
-        self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, True
         self._origin: tuple[int, int, float] | None = None
         self._taken: list[TimedPose] = []
 
@@ -287,9 +280,6 @@ class SitlSource:
         """Those that have come."""
         taken, self._taken = self._taken, []
         return taken
-
-    def close(self) -> None:
-        """Nothing is open."""
 
 
 @dataclass(frozen=True, slots=True)

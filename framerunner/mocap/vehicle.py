@@ -6,22 +6,21 @@ from collections import deque
 from collections.abc import Iterator
 from statistics import median
 
-from framerunner.doctor.listen import Record
 from framerunner.mocap.dialects import PoseDialect, dialect_of
 from framerunner.mocap.facts import Origin
 from framerunner.wire.ardupilot_messages import add_ardupilot_messages
 from framerunner.wire.dialect import (
-    AUTOPILOT_COMPONENT_ID,
     Message,
-    companion_heartbeat,
     degrees_e7,
     mavlink,
+    message_name,
     millimetres,
     request_message,
-    request_rate,
+    request_parameter,
 )
+from framerunner.wire.session.record import Record
+from framerunner.wire.session.session import RateWatch
 
-_HEARTBEAT_S = 1.0
 _REQUEST_S = 1.0
 _PARAMETER_S = 0.05
 _ORIGIN_S = 1.0
@@ -32,8 +31,8 @@ _STATE_S = 5.0  # for which a state counts that is requested twice a second
 _LOW = 0.6  # share of the wanted rate
 
 
-class Vehicle:
-    """One vehicle on one link, seen by its messages.
+class Vehicle(Record):
+    """The session with the vehicle, and what it has sent.
 
     Times in seconds are those of this program's clock, whose zero is its start.
 
@@ -43,7 +42,6 @@ class Vehicle:
         zero_s: reading of the clock of the time stamps at this program's time 0.
 
     Attributes:
-        record: all that it has sent.
         answers: to its TIMESYNC requests, sent.
         rates_rad_s: the latest body rates with vehicle time in microseconds: (time, forward, right, down).
         worst_ratio: the largest innovation ratio of position or height.
@@ -52,7 +50,7 @@ class Vehicle:
     def __init__(
         self, needs_truth_hz: float = 0.0, origin: Origin | None = None, zero_s: float = 0.0
     ) -> None:
-        self.record = Record()
+        super().__init__(heartbeat="companion")
         self.answers = 0
         self.rates_rad_s: deque[tuple[int, float, float, float]] = deque(maxlen=2000)
         self.worst_ratio = 0.0
@@ -60,19 +58,12 @@ class Vehicle:
         self._restarts = 0
         self._asked_origin = False  # a second ago, without an answer
         self._offsets: deque[tuple[float, float]] = deque(maxlen=_KEPT)  # round trip, offset
-        self._due_s = {"heartbeat": 0.0, "rates": 0.5, "timesync": 0.0, "parameter": 0.0, "origin": 0.0}
-        self._counted: dict[str, int] = {}
-        self._counted_s = 0.0
-
-    @property
-    def found(self) -> bool:
-        """Whether a vehicle has been heard."""
-        return self.record.system_id is not None
+        self._due_s = {"timesync": 0.0, "parameter": 0.0, "origin": 0.0}
 
     @property
     def dialect(self) -> PoseDialect:
         """How its autopilot gets poses, by its heartbeats."""
-        return dialect_of(self.record)
+        return dialect_of(self)
 
     @property
     def offset_s(self) -> float | None:
@@ -102,66 +93,63 @@ class Vehicle:
         """Whether PX4 has got enough answers to convert time stamps."""
         return self.answers >= _CONVERGED
 
-    def take(self, message: Message, now_s: float) -> Message | None:
-        """Take a message; the answer to send, if there is one."""
-        self.record.take(message, now_s)
-        if message.get_srcSystem() != self.record.system_id:
-            return None
-        if message.get_srcComponent() != AUTOPILOT_COMPONENT_ID:
-            return None
+    def take(self, message: Message, now_s: float) -> bool:
+        """Take any message; see `Record.take`."""
+        is_newest, kind = super().take(message, now_s), message.get_type()
+        if not self.is_from_autopilot(message):
+            return False
         self._follow_restarts()
-        kind = message.get_type()
         if kind == "TIMESYNC":
-            return self._synchronise(message, now_s)
-        if kind == "HEARTBEAT" and self.record.is_ardupilot:
+            self._synchronise(message, now_s)
+        elif kind == "HEARTBEAT" and self.is_ardupilot:
             add_ardupilot_messages()
-        if kind == "ATTITUDE":
+        elif kind == "ATTITUDE":
             rates = (message.rollspeed, message.pitchspeed, message.yawspeed)
             self.rates_rad_s.append((message.time_boot_ms * 1000, *rates))
-        elif kind == self.dialect.estimator:
-            self.worst_ratio = max(self.worst_ratio, self.dialect.innovation_ratio(message))
-        return None
+        elif kind == self.dialect.estimator and (status := self.estimator) is not None:
+            self.worst_ratio = max(self.worst_ratio, status.ratios["position"], status.ratios["height"])
+        return is_newest
 
     def listened(self, now_s: float) -> None:
         """All that has come by now was taken; a state of the estimator that is not renewed is forgotten."""
-        record = self.record
-        record.listened_s = now_s
+        self.listened_s = now_s
         for kind in (self.dialect.estimator, "SYS_STATUS"):
-            if now_s - record.times_s.get(kind, (now_s, now_s))[1] > _STATE_S:
-                record.latest.pop(kind, None)
+            if now_s - self.times_s.get(kind, (now_s, now_s))[1] > _STATE_S:
+                self.latest.pop(kind, None)
 
     def _follow_restarts(self) -> None:
         """Forget what a vehicle loses when it is restarted."""
-        restarts = self.record.telemetry.restarts
+        restarts = self.telemetry.restarts
         if restarts != self._restarts:
             self._restarts = restarts
             for kind in ("GPS_GLOBAL_ORIGIN", self.dialect.estimator, "SYS_STATUS"):
-                self.record.latest.pop(kind, None)
+                self.latest.pop(kind, None)
             self._asked_origin = False
             self._offsets.clear()
 
-    def _synchronise(self, message: Message, now_s: float) -> Message | None:
+    def _synchronise(self, message: Message, now_s: float) -> None:
         if message.tc1 == 0:
             self.answers += 1
-            return mavlink.MAVLink_timesync_message(self.stamp_us(now_s) * 1000, message.ts1)
+            self.send(mavlink.MAVLink_timesync_message(self.stamp_us(now_s) * 1000, message.ts1))
+            return
         round_trip_s = now_s + self._zero_s - message.ts1 / 1e9
         if 0.0 <= round_trip_s < 1.0:
             self._offsets.append((round_trip_s, message.tc1 / 1e9 - (now_s - round_trip_s / 2.0)))
-        return None
 
-    def requests(self, now_s: float) -> Iterator[Message]:
-        """What is due to be sent, except poses. Only rates of this link and a missing origin are set."""
-        if self._is_due("heartbeat", now_s, _HEARTBEAT_S):
-            yield companion_heartbeat()  # over udpout the vehicle cannot send before it has this address
-        system_id = self.record.system_id
+    def due(self, now_s: float) -> list[Message]:
+        """What is to be sent, except poses. Only rates of this link and a missing origin are set."""
+        return [*super().due(now_s), *self._regular(now_s)]
+
+    def _regular(self, now_s: float) -> Iterator[Message]:
+        system_id = self.system_id
         if system_id is None:
             return
+        if self.rates is None:  # what is received less is requested; never less than the link has already
+            self.rates = RateWatch(self._streams_hz, _LOW, _REQUEST_S, now_s)
         if self._is_due("timesync", now_s, _TIMESYNC_S):
             yield mavlink.MAVLink_timesync_message(0, self.stamp_us(now_s) * 1000)
         if self._is_due("parameter", now_s, _PARAMETER_S):
             yield from self._parameter_request(system_id, now_s)
-        if self._is_due("rates", now_s, _REQUEST_S):
-            yield from self._rate_requests(system_id, now_s)
         wants_origin = self.dialect.needs_origin or self._origin is not None
         if wants_origin and self._is_due("origin", now_s, _ORIGIN_S):
             yield from self._origin_requests(system_id)
@@ -174,32 +162,30 @@ class Vehicle:
 
     def _parameter_request(self, system_id: int, now_s: float) -> Iterator[Message]:
         names = self.dialect.parameters
-        missing = [name for name in names if name not in self.record.parameters]
+        missing = [name for name in names if name not in self.parameters]
         if not missing:
             self._due_s["parameter"] = now_s + 5.0  # they may be changed meanwhile
             missing = [*names]
         name = missing[int(now_s / _PARAMETER_S) % len(missing)]
-        yield mavlink.MAVLink_param_request_read_message(system_id, AUTOPILOT_COMPONENT_ID, name.encode(), -1)
+        yield request_parameter(system_id, name)
 
-    def _rate_requests(self, system_id: int, now_s: float) -> Iterator[Message]:
-        """Request what comes too slowly; never less than the link has already."""
-        counts, span_s = self.record.counts, now_s - self._counted_s
-        wanted = dict(self.dialect.streams_hz)
-        if self._truth_hz:
-            name, number = self.dialect.truth
-            wanted[name] = (number, self._truth_hz)
-        for name, (number, wanted_hz) in wanted.items():
-            received_hz = (counts.get(name, 0) - self._counted.get(name, 0)) / span_s
-            if received_hz < _LOW * wanted_hz:
-                yield request_rate(system_id, number, wanted_hz)
-        self._counted, self._counted_s = dict(counts), now_s
+    @property
+    def _streams_hz(self) -> dict[int, float]:
+        """Wanted rates, by message id."""
+        truth = {self.dialect.truth: self._truth_hz} if self._truth_hz else {}
+        return {**self.dialect.streams_hz, **truth}
+
+    @property
+    def stream_counts(self) -> dict[int, int]:
+        """Numbers of these messages so far."""
+        return {number: self.counts.get(message_name(number), 0) for number in self._streams_hz}
 
     def _origin_requests(self, system_id: int) -> Iterator[Message]:
         """Ask for the origin until it is known; set it if there is none and one was given."""
-        if "GPS_GLOBAL_ORIGIN" in self.record.latest:
+        if "GPS_GLOBAL_ORIGIN" in self.latest:
             self._asked_origin = False
             return
-        if self._asked_origin and self._origin is not None and not self.record.armed:
+        if self._asked_origin and self._origin is not None and not self.armed:
             yield mavlink.MAVLink_set_gps_global_origin_message(
                 system_id,
                 degrees_e7(self._origin.latitude_deg),

@@ -30,6 +30,7 @@ class LinkThread:
         open_link: opens it; raises `LinkError`.
         take: called with received messages and the host they came from, "" on a serial line.
         say: called with level and one line for people.
+        reopens: a link that fails is opened again, and closed at the end; else its end is that of `run`.
 
     Attributes:
         problem: what is wrong with the link now; "" if nothing is.
@@ -37,11 +38,17 @@ class LinkThread:
     """
 
     def __init__(
-        self, open_link: Callable[[], VehicleLink], take: Callable[[Sequence[Message], str], None], say: Say
+        self,
+        open_link: Callable[[], VehicleLink],
+        take: Callable[[Sequence[Message], str], None],
+        say: Say,
+        *,
+        reopens: bool = True,
     ) -> None:
         self._open_link = open_link
         self._take = take
         self._say = say
+        self._reopens = reopens
         self._received: deque[tuple[str, Message]] = deque(maxlen=_MAX_RECEIVED)
         self._to_send: deque[Message] = deque(maxlen=_MAX_TO_SEND)
         self._is_called = False
@@ -54,6 +61,7 @@ class LinkThread:
         """Read and write until cancelled.
 
         Raises:
+            LinkError: the link has failed and is not opened again.
             Exception: the thread ended with a fault.
         """
         loop = asyncio.get_running_loop()
@@ -82,6 +90,8 @@ class LinkThread:
                     pause_s = _FIRST_PAUSE_S
                     self._carry(loop, link)
                 except LinkError as error:
+                    if not self._reopens:
+                        raise
                     self._to_send.clear()
                     loop.call_soon_threadsafe(self._failed, str(error), time.monotonic())
                     self._halt.wait(pause_s)
@@ -103,7 +113,8 @@ class LinkThread:
                         self._is_called = True
                         loop.call_soon_threadsafe(self._hand_over)
         finally:
-            link.close()
+            if self._reopens:
+                link.close()
 
     def _hand_over(self) -> None:
         self._is_called = False

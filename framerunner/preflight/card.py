@@ -6,9 +6,12 @@ import getpass
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from framerunner.preflight.run import PreflightReport
+from framerunner.runs.run_folder import warn
+from framerunner.wire.operator_messages import CardSection, Row
 from offboard.safety.check import Outcome
 
 if TYPE_CHECKING:
@@ -24,14 +27,7 @@ PROCEDURE = (
     "A fence, a failsafe or the app's box acts: let the drone land; find the cause before the next start.",
 )
 """What the operator does when something goes wrong."""
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """A table of the card; the first column names what the others tell."""
-
-    title: str
-    rows: tuple[tuple[str, ...], ...]
+HTML_NAME, PDF_NAME = "flight_card.html", "flight_card.pdf"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +35,7 @@ class FlightCard:
     """The card's contents, for people."""
 
     title: str
-    sections: tuple[Section, ...]
+    sections: tuple[CardSection, ...]
 
 
 def make_card(
@@ -89,14 +85,19 @@ def make_card(
     return FlightCard(
         f"Flight card: {plan.scenario.name}",
         (
-            Section("Flight", flight),
-            Section("Caps and fence", limits),
-            Section("Failed checks that the operator accepts", overridden or (("none", ""),)),
-            Section("Parameters changed: name, before, now", changes or (("none", "", ""),)),
-            Section("Abort procedure", tuple((str(n), step) for n, step in enumerate(PROCEDURE, 1))),
-            Section("Checks: name, result, value, allowed, what to do", _check_rows(report)),
+            table("Flight", flight),
+            table("Caps and fence", limits),
+            table("Failed checks that the operator accepts", overridden or (("none", ""),)),
+            table("Parameters changed: name, before, now", changes or (("none", "", ""),)),
+            table("Abort procedure", tuple((str(n), step) for n, step in enumerate(PROCEDURE, 1))),
+            table("Checks: name, result, value, allowed, what to do", _check_rows(report)),
         ),
     )
+
+
+def table(title: str, rows: tuple[tuple[str, ...], ...]) -> CardSection:
+    """A table; the first column names what the others tell."""
+    return CardSection(title=title, rows=tuple(Row(cells=cells) for cells in rows))
 
 
 def _hold_words(hold_s: float) -> str:
@@ -109,11 +110,34 @@ def _check_rows(report: PreflightReport) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def wrapped_rows(section: Section, widths: Sequence[int]) -> list[tuple[list[str], ...]]:
+def wrapped_rows(section: CardSection, widths: Sequence[int]) -> list[tuple[list[str], ...]]:
     """A section's rows with each cell broken into lines of at most a column's width in characters."""
     from textwrap import wrap
 
     return [
-        tuple(wrap(cell, width) or [""] for cell, width in zip(row, widths, strict=False))
+        tuple(wrap(cell, width) or [""] for cell, width in zip(row.cells, widths, strict=False))
         for row in section.rows
     ]
+
+
+def write_card(card: FlightCard, folder: Path) -> None:
+    """Write the card as a page and as a PDF; what cannot be written is reported on standard error."""
+    try:
+        (folder / HTML_NAME).write_text(card_html(card), encoding="utf-8")
+    except OSError as error:
+        warn(f"cannot write '{folder / HTML_NAME}': {error.strerror or error}")
+    try:
+        from framerunner.preflight.card_pdf import write_pdf
+
+        write_pdf(card, folder / PDF_NAME)
+    except OSError as error:
+        warn(f"cannot write '{folder / PDF_NAME}': {error.strerror or error}")
+
+
+def card_html(card: FlightCard) -> str:
+    """The card as a page without scripts; all texts are escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("framerunner.preflight", "templates")
+    page = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return page.get_template("flight_card.html.j2").render(card=card)

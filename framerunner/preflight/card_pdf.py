@@ -8,7 +8,8 @@ from pathlib import Path
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
-from framerunner.preflight.card import FlightCard, Section, wrapped_rows
+from framerunner.preflight.card import FlightCard, wrapped_rows
+from framerunner.wire.operator_messages import CardSection
 
 _PAGE_IN = (8.27, 11.69)
 _TOP, _BOTTOM, _LEFT = 0.96, 0.04, 0.06
@@ -52,11 +53,11 @@ def write_pdf(card: FlightCard, path: Path) -> None:
         pages.savefig(figure)
 
 
-def _lines(section: Section) -> Iterator[_Line]:
+def _lines(section: CardSection) -> Iterator[_Line]:
     yield "title", 2.0 * _LINE, (section.title,), "black"
-    widths = _WIDTHS[len(section.rows[0])]
+    widths = _WIDTHS[len(section.rows[0].cells)]
     for row, cells in zip(section.rows, wrapped_rows(section, widths), strict=True):
-        colour = _COLOURS.get(row[1], "black") if len(row) == 5 else "black"
+        colour = _COLOURS.get(row.cells[1], "black") if len(row.cells) == 5 else "black"
         for number in range(max(map(len, cells))):
             texts = tuple(cell[number] if number < len(cell) else "" for cell in cells)
             yield "row", (1.25 if number == 0 else 1.0) * _LINE, texts, colour

@@ -7,6 +7,7 @@ Vehicle and fence are in comments, which QGroundControl skips.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
@@ -14,11 +15,10 @@ from pathlib import Path
 
 from framerunner.errors import SettingError
 from framerunner.files.text_file import TextError, read_text
-from framerunner.preflight.fence_upload import MAX_ITEMS, FenceItem, upload_fence
-from framerunner.preflight.parameters import ParameterValue, set_parameter
-from framerunner.preflight.session import VehicleSession
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
-from offboard.drone import DroneError
+from framerunner.wire.session.client import VehicleClient
+from framerunner.wire.session.fence import MAX_ITEMS, FenceItem, upload_fence
+from framerunner.wire.session.session import ParameterValue, VehicleError
 
 OPTION = "--restore-parameters"
 OVERRIDE = "--any-vehicle"
@@ -29,19 +29,16 @@ _NAME_BYTES = 16
 _FIELDS = 5
 _ITEM_FIELDS = 10
 _MAX_FILE_BYTES = 1 << 20  # thousands of parameters
-_MAX_FLOAT = 3.4028235e38  # of 32 bits, as MAVLink sends them
-_WHOLE = {  # MAV_PARAM_TYPE and the numbers that it can hold; PARAM_SET has no place for 64 bits
-    kind: range(-(1 << bits - 1), 1 << bits - 1) if signed else range(1 << bits)
-    for kind, bits, signed in (
-        (mavlink.MAV_PARAM_TYPE_UINT8, 8, False),
-        (mavlink.MAV_PARAM_TYPE_INT8, 8, True),
-        (mavlink.MAV_PARAM_TYPE_UINT16, 16, False),
-        (mavlink.MAV_PARAM_TYPE_INT16, 16, True),
-        (mavlink.MAV_PARAM_TYPE_UINT32, 32, False),
-        (mavlink.MAV_PARAM_TYPE_INT32, 32, True),
-    )
+_ITEM_LAYOUT = "<HB5f2i"  # command, frame, params and z, x and y, as MAVLink sends them
+_LAYOUTS = {  # by MAV_PARAM_TYPE; PARAM_SET has no place for 64 bits
+    mavlink.MAV_PARAM_TYPE_UINT8: "<B",
+    mavlink.MAV_PARAM_TYPE_INT8: "<b",
+    mavlink.MAV_PARAM_TYPE_UINT16: "<H",
+    mavlink.MAV_PARAM_TYPE_INT16: "<h",
+    mavlink.MAV_PARAM_TYPE_UINT32: "<I",
+    mavlink.MAV_PARAM_TYPE_INT32: "<i",
+    _FLOAT: "<f",
 }
-_INT32 = _WHOLE[mavlink.MAV_PARAM_TYPE_INT32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +46,7 @@ class KeptState:
     """What a vehicle had before.
 
     Attributes:
-        uid: of the vehicle, as `VehicleSession.uid`; empty: the file does not say.
+        uid: of the vehicle, as `VehicleClient.identity`; empty: the file does not say.
         parameters: old values.
         fence: the old fence, empty if there was none; None: it was not replaced.
     """
@@ -146,24 +143,24 @@ def check_vehicle(kept: KeptState, path: Path, uid: str) -> None:
     )
 
 
-def restore(session: VehicleSession, kept: KeptState, tell: Callable[[str], None]) -> None:
+def restore(client: VehicleClient, kept: KeptState, tell: Callable[[str], None]) -> None:
     """Return parameters and fence to a disarmed vehicle.
 
     Args:
-        session: with the vehicle.
+        client: of the vehicle.
         kept: what it had.
         tell: called with a line for each thing that was returned.
 
     Raises:
-        DroneError: the vehicle is armed, or one thing could not be set; those before it are.
+        VehicleError: the vehicle is armed, or one thing could not be set; those before it are.
     """
-    if session.record.armed:
-        raise DroneError("the vehicle is armed; land and disarm it before its parameters are changed")
+    if client.session.armed:
+        raise VehicleError("the vehicle is armed; land and disarm it before its parameters are changed")
     for parameter in kept.parameters:
-        set_parameter(session, parameter)
+        client.set_parameter(parameter)
         tell(f"{parameter.name} is {parameter.value:g} now")
     if kept.fence is not None:
-        upload_fence(session, kept.fence)
+        upload_fence(client, kept.fence)
         count = len(kept.fence)
         tell(f"the fence has {count} items, as before" if count else "there is no fence, as before")
 
@@ -179,9 +176,7 @@ def _parsed_item(text: str) -> FenceItem:
         raise ValueError(text)
     params = (float(fields[2]), float(fields[3]), float(fields[4]), float(fields[5]))
     command, frame, x, y, z = *map(int, (*fields[:2], *fields[6:8])), float(fields[8])
-    floats_fit = all(not isfinite(each) or abs(each) <= _MAX_FLOAT for each in (*params, z))  # unused: NaN
-    if not floats_fit or not (0 <= command < 1 << 16 and 0 <= frame < 1 << 8 and x in _INT32 and y in _INT32):
-        raise ValueError(text)
+    _check_fits(_ITEM_LAYOUT, command, frame, *params, z, x, y)
     return FenceItem(command, frame, params, x, y, z)
 
 
@@ -190,11 +185,17 @@ def _parsed(line: str) -> ParameterValue:
     if len(fields) != _FIELDS:
         raise ValueError(line)
     name, value, kind = fields[2], float(fields[3]), int(fields[4])
-    sendable = (
-        abs(value) <= _MAX_FLOAT
-        if kind == _FLOAT
-        else value.is_integer() and int(value) in _WHOLE.get(kind, ())
-    )
-    if not name.isascii() or not name.isprintable() or not 0 < len(name) <= _NAME_BYTES or not sendable:
+    if kind not in _LAYOUTS or not isfinite(value) or (kind != _FLOAT and not value.is_integer()):
+        raise ValueError(line)
+    _check_fits(_LAYOUTS[kind], value if kind == _FLOAT else int(value))
+    if not name.isascii() or not name.isprintable() or not 0 < len(name) <= _NAME_BYTES:
         raise ValueError(line)
     return ParameterValue(name, value, kind)
+
+
+def _check_fits(layout: str, *numbers: float) -> None:
+    """Raise ValueError if MAVLink's fields cannot hold the numbers."""
+    try:
+        struct.pack(layout, *numbers)
+    except (struct.error, OverflowError) as error:
+        raise ValueError(str(error)) from None

@@ -21,11 +21,9 @@ from framerunner.wire.operator_messages import (
     MAX_LINE_BYTES,
     AnswerMessage,
     BeatMessage,
-    CardSection,
     EndMessage,
     FlightMessage,
     PageMessage,
-    Row,
 )
 from offboard.safety.operator import Operator
 from offboard.safety.operator_pages import BEAT_S, OperatorPages
@@ -106,11 +104,7 @@ class OperatorLink:
 
     def show_card(self, card: FlightCard, failed: tuple[str, ...]) -> None:
         """Show the flight card, and the names of checks that prevent arming."""
-        sections = tuple(
-            CardSection(title=each.title, rows=tuple(Row(cells=cells) for cells in each.rows))
-            for each in card.sections
-        )
-        self._flight = self._flight.model_copy(update={"sections": sections, "failed": failed})
+        self._flight = self._flight.model_copy(update={"sections": card.sections, "failed": failed})
         self._send(self._flight)
 
     async def _open(self) -> asyncio.StreamReader:

@@ -6,16 +6,14 @@ import asyncio
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import closing
 from datetime import datetime
 
 from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
-from framerunner.preflight.card import FlightCard, make_card
-from framerunner.preflight.card_files import HTML_NAME, write_card
+from framerunner.preflight.card import HTML_NAME, FlightCard, make_card, write_card
 from framerunner.preflight.keys import HINT, has_terminal
+from framerunner.preflight.link import open_client
 from framerunner.preflight.run import PreflightSettings, run_preflight, tell
-from framerunner.preflight.session import VehicleSession, open_link
 from framerunner.preflight.settings import HardwareSettings
 from framerunner.wire.transports.urls import parse_url
 from offboard.safety.check import failures
@@ -53,15 +51,15 @@ async def own_simulator_id(drone_url: str, camera_url: str | None) -> int | None
     Raises:
         CameraError: the camera's URL can be no camera.
         LinkError: the address is bad, or the link cannot be opened.
-        DroneError: no vehicle is heard.
+        VehicleError: no vehicle is heard.
     """
     _check_urls(drone_url, camera_url)
     cancelled = threading.Event()
 
     def ask() -> int | None:
-        with closing(open_link(drone_url)) as link:
-            session = VehicleSession(link, cancelled)
-            return session.system_id if session.is_own_simulator and session.is_alone() else None
+        with open_client(drone_url, cancelled) as client:
+            _, is_own_simulator = client.identity()
+            return client.session.vehicle if is_own_simulator and client.is_alone() else None
 
     try:
         return await asyncio.to_thread(ask)
@@ -103,7 +101,7 @@ async def prepare(
         LinkError: the drone's address is bad, or its link cannot be opened.
         CameraError: the camera's URL can be no camera.
         NotArmedError: a check has failed that the operator does not accept.
-        DroneError: the vehicle is not heard or does not answer.
+        VehicleError: the vehicle is not heard or does not answer.
         SettingError: a name that is accepted is no check's, or old values cannot be kept.
     """
     _check_urls(checks.drone_url, checks.camera_url)

@@ -5,23 +5,24 @@ from __future__ import annotations
 import asyncio
 import sys
 import threading
-from collections.abc import Mapping, Sequence
-from contextlib import closing
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import nan
 from pathlib import Path
 
 from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
-from framerunner.doctor.camera_times import CameraTimes, calibration_facts, measure_camera
+from framerunner.doctor.camera_times import CameraTimes, days_since, measure_camera
 from framerunner.doctor.checks import examine
-from framerunner.doctor.findings import Finding, Level
-from framerunner.doctor.listen import Record
+from framerunner.doctor.listen import listen
 from framerunner.errors import UserError
 from framerunner.flying.plan import FlightPlan
 from framerunner.geometry.axes import Alignment, Pose
 from framerunner.preflight.check_names import CHECK_NAMES, RENAMED, REPLACED
-from framerunner.preflight.estimator import estimator_facts, has_global_position
-from framerunner.preflight.fence_upload import (
+from framerunner.preflight.kept import OPTION, KeptState, write_kept
+from framerunner.preflight.link import open_client
+from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from framerunner.wire.dialect import degrees_e7
+from framerunner.wire.session.client import TIME_REQUESTS, VehicleClient
+from framerunner.wire.session.fence import (
     FenceItem,
     Vertex,
     download_fence,
@@ -29,19 +30,13 @@ from framerunner.preflight.fence_upload import (
     polygon_fence,
     upload_fence,
 )
-from framerunner.preflight.kept import OPTION, KeptState, write_kept
-from framerunner.preflight.parameters import ParameterValue, read_parameters, set_parameter
-from framerunner.preflight.session import TIME_REQUESTS, VehicleSession, open_link
-from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
-from framerunner.wire.dialect import degrees_e7
-from offboard.drone import DroneError
+from framerunner.wire.session.record import Record
+from framerunner.wire.session.session import ParameterValue, VehicleError
 from offboard.safety.check import Check, Outcome, accept, check_names, failures, passed
 from offboard.safety.failsafes import failsafe_checks, failsafe_rows, rows_by_known_names, values_to_set
 from offboard.safety.fence import FlightFence, flight_fence
 from offboard.safety.rules import AbortAction
 from offboard.safety.vehicle_checks import (
-    BatteryFacts,
-    LinkFacts,
     battery_check,
     calibration_checks,
     camera_checks,
@@ -50,11 +45,10 @@ from offboard.safety.vehicle_checks import (
 )
 
 LISTEN_S = 5.0
-FENCED = ("px4", "ardupilot")
+FENCED = ("PX4", "ArduPilot")
 """Autopilots that take a fence as mission items."""
 CAMERA_S = 3.0
 KEPT_PARAMETERS = "parameters-before{}.params"
-_OUTCOMES = {Level.GOOD: Outcome.PASS, Level.NOTE: Outcome.NOTE, Level.MISSING: Outcome.FAIL}
 
 
 class NotArmedError(UserError):
@@ -139,9 +133,7 @@ class _Measured:
     """What was found on the link, on a thread."""
 
     record: Record
-    system_id: int
-    autopilot: str
-    link: LinkFacts
+    round_trips_s: tuple[float, ...]
     checks: tuple[Check, ...]
     changes: tuple[ParameterChange, ...]
     kept: Path | None
@@ -151,7 +143,7 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
     """Check a disarmed vehicle and its camera; takes some eight seconds.
 
     Raises:
-        DroneError: the vehicle is not heard or does not answer.
+        VehicleError: the vehicle is not heard or does not answer.
         LinkError: its link cannot be opened.
         SettingError: a name that is accepted is no check's, or the old parameters cannot be kept.
     """
@@ -170,10 +162,14 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
             await asyncio.gather(watching, return_exceptions=True)
     record = measured.record
     checks = [
-        *_doctors(examine(record)),
-        estimator_check(estimator_facts(record, measured.autopilot)),
-        battery_check(_battery(record)),
-        *link_checks(measured.link),
+        *(
+            replace(each, name=RENAMED.get(each.name, each.name))
+            for each in examine(record)
+            if each.name not in REPLACED  # by checks with a limit
+        ),
+        estimator_check(record.estimator, "EKF_STATUS_REPORT" if record.is_ardupilot else "ESTIMATOR_STATUS"),
+        battery_check(*record.charge),
+        *link_checks(record.packets.lost_share, measured.round_trips_s, TIME_REQUESTS),
         *measured.checks,
         _caps_check(plan, fence),
     ]
@@ -181,10 +177,10 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
         clock_ms = record.clock_ms[-1] if record.clock_ms else None
         checks += camera_checks(times.facts(clock_ms, settings.camera_delay))
         if plan.chart.vision == "frames":
-            checks += calibration_checks(calibration_facts(plan.calibration, times.size_px))
+            checks += calibration_checks(plan.calibration, times.size_px, days_since)
     accepted = tuple(accept(checks, settings.accepted))
-    vehicle, system_id = _vehicle_words(record), measured.system_id
-    return PreflightReport(vehicle, system_id, accepted, fence, measured.changes, measured.kept)
+    vehicle = _vehicle_words(record)
+    return PreflightReport(vehicle, record.vehicle, accepted, fence, measured.changes, measured.kept)
 
 
 def tell(report: PreflightReport) -> None:
@@ -205,37 +201,36 @@ def _measure(
     plan: FlightPlan, settings: PreflightSettings, fence: FlightFence, cancelled: threading.Event
 ) -> _Measured:
     """All that is done on the link; blocks."""
-    with closing(open_link(settings.drone_url)) as link:
-        session = VehicleSession(link, cancelled)
-        session.listen(LISTEN_S)
-        record = session.record
-        facts = LinkFacts(record.packets.lost_share, session.round_trips_s(), TIME_REQUESTS)
-        has_position = has_global_position(record, session.autopilot)
+    with open_client(settings.drone_url, cancelled) as client:
+        listen(client, LISTEN_S)
+        record = client.session
+        round_trips_s = client.round_trips_s()
+        has_position = record.has_global_position
         checks: list[Check] = []
-        rows = failsafe_rows(session.autopilot, settings.abort)
+        rows = failsafe_rows(record.autopilot_name.lower(), settings.abort)
         if not rows:
             advice = "check them by hand, then accept it by --accept failsafes"
             checks.append(Check("failsafes", Outcome.FAIL, "no table for this autopilot", "", advice))
-        values = read_parameters(session, [name for row in rows for name in row.names])
+        values = client.read_parameters([name for row in rows for name in row.names])
         rows = rows_by_known_names(rows, values)
         wanted: dict[str, float] = {}
         if settings.set_parameters and not record.armed:
             numbers = {name: each.value for name, each in values.items()}
             wanted = values_to_set(numbers, fence, has_global_position=has_position, rows=rows)
-        upload = _FenceUpload(session, plan, fence)
-        kept = _keep(session, wanted, values, upload, settings.folder)
+        upload = _FenceUpload(client, plan, fence)
+        kept = _keep(client, wanted, values, upload, settings.folder)
         for name, value in wanted.items():
-            set_parameter(session, ParameterValue(name, value, values[name].kind))
+            client.set_parameter(ParameterValue(name, value, values[name].kind))
         changes = tuple(ParameterChange(name, values[name].value, value) for name, value in wanted.items())
-        values |= read_parameters(session, wanted)
+        values |= client.read_parameters([*wanted])
         numbers = {name: each.value for name, each in values.items()}
         checks += failsafe_checks(numbers, fence, has_global_position=has_position, rows=rows)
         checks.append(upload.check())
-    return _Measured(record, session.system_id, session.autopilot, facts, tuple(checks), changes, kept)
+    return _Measured(record, round_trips_s, tuple(checks), changes, kept)
 
 
 def _keep(
-    session: VehicleSession,
+    client: VehicleClient,
     wanted: Mapping[str, float],
     values: Mapping[str, ParameterValue],
     upload: _FenceUpload,
@@ -249,8 +244,9 @@ def _keep(
     if not wanted and not upload.replaces:
         return None
     fence = upload.before if upload.replaces else None
-    kept, path = KeptState(session.uid, tuple(values[name] for name in wanted), fence), _unused(folder)
-    write_kept(path, session.system_id, kept)
+    uid, _ = client.identity()
+    kept, path = KeptState(uid, tuple(values[name] for name in wanted), fence), _unused(folder)
+    write_kept(path, client.session.vehicle, kept)
     what = " and ".join((*(["old values"] if wanted else []), *(["old fence"] if upload.replaces else [])))
     hint = f"return them by framerunner preflight {OPTION} {path}"
     print(f"{what}: {path}; {hint}", file=sys.stderr, flush=True)
@@ -286,16 +282,16 @@ class _FenceUpload:
         replaces: the vehicle has another one, which is replaced.
     """
 
-    def __init__(self, session: VehicleSession, plan: FlightPlan, fence: FlightFence) -> None:
-        self._session = session
+    def __init__(self, client: VehicleClient, plan: FlightPlan, fence: FlightFence) -> None:
+        self._client = client
         self._limit = f"{len(fence.corners_arena_m)} corners within {fence.radius_m:g} m of the start"
         self._wanted: tuple[FenceItem, ...] = ()
         self.before: tuple[FenceItem, ...] | None = None
         self.problem = self._obstacle(plan, fence)
         if self.problem is None:
             try:
-                self.before = download_fence(session)
-            except DroneError as error:
+                self.before = download_fence(client)
+            except VehicleError as error:
                 advice = "none is uploaded, as the old one would be lost; or fly in a net and --accept fence"
                 self.problem = Check("fence", Outcome.FAIL, str(error), self._limit, advice)
         self.replaces = self.before is not None and not is_same_fence(self.before, self._wanted)
@@ -307,22 +303,22 @@ class _FenceUpload:
             return self.problem
         try:
             if self.replaces:
-                upload_fence(self._session, self._wanted)
-            same = is_same_fence(download_fence(self._session), self._wanted)
-        except DroneError as error:
+                upload_fence(self._client, self._wanted)
+            same = is_same_fence(download_fence(self._client), self._wanted)
+        except VehicleError as error:
             return Check(name, Outcome.FAIL, str(error), limit, "or fly inside a net and --accept fence")
         value = "uploaded and read back" if same else "another fence is read back"
         return passed(name, same, value, limit, "try again; another station may write to it")
 
     def _obstacle(self, plan: FlightPlan, fence: FlightFence) -> Check | None:
         """Why none can be uploaded; None if it can."""
-        record, name, limit = self._session.record, "fence", self._limit
+        record, name, limit = self._client.session, "fence", self._limit
         if record.armed:
             return Check(name, Outcome.FAIL, "not uploaded to an armed vehicle", limit, "land and disarm it")
-        if self._session.autopilot not in FENCED:
+        if record.autopilot_name not in FENCED:
             advice = "set one by hand, then accept it by --accept fence"
             return Check(name, Outcome.FAIL, "not uploaded: this autopilot's is not known", limit, advice)
-        if not has_global_position(record, self._session.autopilot):
+        if not record.has_global_position:
             words = "the vehicle has no global position, so its fence has no effect"
             advice = "only the app's box and a net keep it in; put up a net"
             return Check(name, Outcome.NOTE, words, limit, advice)
@@ -346,30 +342,6 @@ def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
     if limits.forward_m_s > caps.level_m_s or max(limits.up_m_s, limits.down_m_s) > caps.vertical_m_s:
         return Check("caps", Outcome.NOTE, value, limit, "they are below what the mission may ask for")
     return Check("caps", Outcome.PASS, value, limit)
-
-
-def _doctors(findings: Sequence[Finding]) -> list[Check]:
-    """The doctor's findings, but for those that other checks replace."""
-    return [
-        Check(
-            RENAMED.get(each.subject, each.subject),
-            _OUTCOMES[each.level],
-            each.text,
-            "",
-            each.advice,
-        )
-        for each in findings
-        if each.subject not in REPLACED
-    ]
-
-
-def _battery(record: Record) -> BatteryFacts:
-    status = record.latest.get("SYS_STATUS")
-    if status is None:
-        return BatteryFacts(nan, nan)
-    percent = nan if status.battery_remaining < 0 else float(status.battery_remaining)
-    volts = nan if status.voltage_battery in (0, 65535) else status.voltage_battery / 1000
-    return BatteryFacts(percent, volts)
 
 
 def _vehicle_words(record: Record) -> str:

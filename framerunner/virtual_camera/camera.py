@@ -15,7 +15,7 @@ from framerunner.geometry.rotations import quaternion_from_yaw, yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.vehicle_telemetry import AHEAD_US, VehiclePose, VehicleTelemetry
-from offboard.link.gimbal_feed import GimbalAttitude, gimbal_attitude
+from offboard.link.gimbal import GimbalAttitude, gimbal_attitude
 from scenarios.models import Scenario, TrueState
 from scenarios.result import LocalFrame, Standing
 from sitl.camera import FIRST_EXPOSURE_US, Camera, Motion
@@ -114,11 +114,11 @@ class VirtualCamera:
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._wait_us = max(0, round(scenario.camera.latency_s * 1e6) - REPORT_GAP_US)
         self.restarts = 0  # of the vehicle
+        self.telemetry = VehicleTelemetry()
         self._restart()
 
     def _restart(self) -> None:
         """Set the state of a vehicle of which nothing is known."""
-        self.telemetry = VehicleTelemetry()
         start = self.plan.start_pose
         self.placement = Placement(Pose(start[:3], start[3]))
         self._referee = self.plan.new_referee()
@@ -136,16 +136,20 @@ class VirtualCamera:
 
     def take_gimbal(self, message: Message) -> None:
         """Take a GIMBAL_DEVICE_ATTITUDE_STATUS of the vehicle."""
-        attitude = gimbal_attitude(tuple(message.q), message.flags)
+        attitude = gimbal_attitude(message)
         if attitude is not None:
             self._gimbal, self._gimbal_us = attitude, self.telemetry.time_us
 
     def take(self, message: Message) -> None:
         """Take one of the vehicle's messages; those without its pose or state are ignored."""
+        self.telemetry.take(message)
+        self.follow(message)
+
+    def follow(self, message: Message) -> None:
+        """Follow the vehicle, whose message the telemetry has taken."""
         telemetry = self.telemetry
-        telemetry.take(message)
-        if telemetry.restarts:
-            self.restarts += 1
+        if telemetry.restarts != self.restarts:
+            self.restarts = telemetry.restarts
             self._restart()
         elif message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
             self.placement.see_heartbeat(telemetry.time_us, telemetry.armed)

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 import time
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
+from framerunner.monitor.link_thread import LinkThread
 from framerunner.virtual_camera.camera import VirtualCamera
-from framerunner.wire.dialect import (
-    AUTOPILOT_COMPONENT_ID,
-    Message,
-    companion_heartbeat,
-    is_vehicle,
-    mavlink,
-    request_rate,
-)
+from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.session.session import RateWatch, Session, pose_rates
 from framerunner.wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
-from framerunner.wire.transports.urls import LinkError
 from framerunner.wire.transports.vehicle_link import VehicleLink
+from framerunner.wire.vehicle_telemetry import VehicleTelemetry
 from scenarios.task import Task
 from sitl.video import VideoServer
 
@@ -27,13 +20,11 @@ STALE_S = 0.5  # wall time without attitude or position, after which no image is
 SYSTEM_ID = 246  # MAVSDK has 245, ground stations 255
 COMPONENT_ID = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER
 WANTED_HZ = 50.0
-ENOUGH_HZ = 40.0
+ENOUGH = 0.8  # share of that
 _MAX_RATE_REQUESTS = 5
 _UPDATE_S = 0.1
-_HEARTBEAT_S = 1.0
 _RATE_PERIOD_S = 2.0
 _WAITING_LINE_S = 10.0
-_RECEIVE_S = 0.1
 
 Say = Callable[[str], None]
 """Called with lines for people."""
@@ -56,13 +47,11 @@ class CameraServer:
         self._link = link
         self._video = video
         self._say = say
-        self._watch = _TelemetryWatch(say, link.url)
-        self._vehicle: int | None = None
-        self._to_send: deque[Message] = deque()  # by the thread that reads
-        self._stop = threading.Event()
-        self._failed: asyncio.Future[None] | None = None
-        self._reports = (0, 0)  # of attitude and position when the rates were measured last
-        self._rate_requests = 0
+        self._watch = _TelemetryWatch(say, link.url, camera.telemetry)
+        # Over udpout the vehicle cannot send before it has received something.
+        self._session = Session(heartbeat="companion", telemetry=camera.telemetry)
+        self._thread = LinkThread(lambda: link, self._take, lambda _level, text: say(text), reopens=False)
+        self._rates = _new_rates()
         self._restarts = 0
         self._has_gimbal = False
 
@@ -73,13 +62,10 @@ class CameraServer:
             VideoError: the TCP port is in use.
             LinkError: the link failed.
         """
-        loop = asyncio.get_running_loop()
-        self._failed = loop.create_future()
         self._video.add_json(REFEREE_PATH, self._referee_answer)
         scenario = self._camera.plan.scenario
         task = Task.of(scenario, show_layout=self._show_layout)
         self._video.add_json(SCENARIO_PATH, lambda _query: task.model_dump(mode="json"))
-        reader = threading.Thread(target=self._read, args=(loop,), name="telemetry", daemon=True)
         updates: asyncio.Task[None] | None = None
         try:
             await self._video.start()
@@ -87,49 +73,29 @@ class CameraServer:
                 f"camera of {scenario.name}: video on {self._video.url} (Ctrl-C stops); "
                 f"listening for a vehicle on {self._link.url}"
             )
-            reader.start()
             updates = asyncio.create_task(self._update_forever())
-            await self._failed
+            await self._thread.run()
         finally:
-            self._stop.set()
             if updates is not None:
                 updates.cancel()
             await self._video.close()
-            if reader.ident is not None:
-                await asyncio.to_thread(reader.join)
             self._link.close()
 
-    def _read(self, loop: asyncio.AbstractEventLoop) -> None:
-        """On the only thread that uses the link: send, wait for packets, pass them to the loop."""
-        while not self._stop.is_set():
-            try:
-                while self._to_send:
-                    self._link.send(self._to_send.popleft())
-                messages = self._link.receive(_RECEIVE_S)
-            except LinkError as error:
-                loop.call_soon_threadsafe(self._fail, error)
-                return
-            if messages and not self._stop.is_set():
-                loop.call_soon_threadsafe(self._take, messages)
-
-    def _fail(self, error: LinkError) -> None:
-        if self._failed is not None and not self._failed.done():
-            self._failed.set_exception(error)
-
-    def _take(self, messages: list[Message]) -> None:
+    def _take(self, messages: Sequence[Message], _host: str) -> None:
+        session = self._session
         for message in messages:
-            if self._vehicle is None and is_vehicle(message):
-                self._vehicle = message.get_srcSystem()
-                self._say(f"vehicle {self._vehicle} found")
-            sender = (message.get_srcSystem(), message.get_srcComponent())
-            if message.get_type() == "GIMBAL_DEVICE_ATTITUDE_STATUS" and sender[0] == self._vehicle:
+            is_found, now_s = session.system_id is not None, time.monotonic()
+            session.take(message, now_s)
+            if session.system_id is not None and not is_found:
+                self._say(f"vehicle {session.system_id} found")
+            is_gimbals = message.get_type() == "GIMBAL_DEVICE_ATTITUDE_STATUS"
+            if is_gimbals and message.get_srcSystem() == session.system_id:
                 self._camera.take_gimbal(message)
-            elif self._vehicle is not None and sender == (self._vehicle, AUTOPILOT_COMPONENT_ID):
-                self._camera.take(message)
-                self._watch.see(message.get_type(), time.monotonic())
+            elif session.is_from_autopilot(message):
+                self._camera.follow(message)
         if self._camera.restarts != self._restarts:
             self._restarts = self._camera.restarts
-            self._reports, self._rate_requests = (0, 0), 0
+            self._rates = _new_rates()
             self._say("the vehicle has restarted; the arena is placed again")
         self._watch.report_placement(self._camera)
         if self._camera.has_gimbal is not self._has_gimbal:
@@ -143,70 +109,57 @@ class CameraServer:
 
     async def _update_forever(self) -> None:
         """Send heartbeats, request rates, and report telemetry that is no longer received."""
-        beat_s, rates_s = float("-inf"), time.monotonic()
         while True:
             now_s = time.monotonic()
-            if now_s - beat_s >= _HEARTBEAT_S:
-                beat_s = now_s
-                # Over udpout the vehicle cannot send before it has received something.
-                self._to_send.append(companion_heartbeat())
+            for message in self._session.due(now_s):
+                self._thread.send(message)
             self._watch.check(now_s)
-            if self._vehicle is not None and now_s - rates_s >= _RATE_PERIOD_S:
-                self._request_rates(self._vehicle, now_s - rates_s)
-                rates_s = now_s
+            if self._session.system_id is not None:
+                self._request_rates(self._session.system_id, now_s)
             await asyncio.sleep(_UPDATE_S)
 
-    def _request_rates(self, vehicle: int, span_s: float) -> None:
+    def _request_rates(self, vehicle: int, now_s: float) -> None:
         """Request higher rates where they are too low; after some requests, report the low rates."""
-        reports = (self._camera.telemetry.attitudes, self._camera.telemetry.positions)
-        attitude_hz, position_hz = (
-            (now - before) / span_s for now, before in zip(reports, self._reports, strict=True)
-        )
-        self._reports = reports
-        if min(attitude_hz, position_hz) >= ENOUGH_HZ or self._rate_requests > _MAX_RATE_REQUESTS:
-            return
-        self._rate_requests += 1
-        if self._rate_requests > _MAX_RATE_REQUESTS:
+        rates = self._rates
+        requests = rates.requests(vehicle, self._session.stream_counts, now_s)
+        if requests and not rates.left:
+            attitude_hz, position_hz = rates.rates_hz.values()
             self._say(
                 f"attitude is received at {attitude_hz:.0f} Hz and position at {position_hz:.0f} Hz, less "
                 f"than the {WANTED_HZ:.0f} Hz requested; the video is no smoother than that"
             )
-            return
-        for number, rate_hz in (
-            (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, attitude_hz),
-            (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, position_hz),
-        ):
-            if rate_hz < ENOUGH_HZ:
-                self._to_send.append(request_rate(vehicle, number, WANTED_HZ))
+        else:
+            for request in requests:
+                self._session.send(request)
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
         return self._camera.standing(query.get("state", ""), query.get("ended")).model_dump(mode="json")
 
 
+def _new_rates() -> RateWatch:
+    """Of one boot; instead of the last request it is said that they are low."""
+    return pose_rates(WANTED_HZ, ENOUGH, _RATE_PERIOD_S, time.monotonic(), _MAX_RATE_REQUESTS + 1)
+
+
 class _TelemetryWatch:
     """Says once what is missing and once when it is received again."""
 
-    def __init__(self, say: Say, url: str) -> None:
+    def __init__(self, say: Say, url: str, telemetry: VehicleTelemetry) -> None:
         self._say = say
         self._url = url
-        self._seen_s: dict[str, float] = {}
+        self._telemetry = telemetry
         self._began_s = time.monotonic()
         self._waiting_said = False
         self._placed: bool | None = None
         self.stale = False  # attitude or position is no longer received
 
-    def see(self, kind: str, now_s: float) -> None:
-        self._seen_s["ATTITUDE" if kind == "ATTITUDE_QUATERNION" else kind] = now_s
-
     def check(self, now_s: float) -> None:
         """Say what has not been received for too long, or is received again."""
-        ages = {
-            name: now_s - self._seen_s.get(key, self._began_s)
-            for name, key in (("attitude", "ATTITUDE"), ("local position", "LOCAL_POSITION_NED"))
-        }
-        missing = [name for name, age_s in ages.items() if age_s > STALE_S]
+        telemetry = self._telemetry
+        heard_s = {"attitude": telemetry.attitude_heard_s, "local position": telemetry.position_heard_s}
+        missing = [name for name, at_s in heard_s.items() if now_s - max(at_s, self._began_s) > STALE_S]
         words = " and no ".join(missing)
-        if not {"ATTITUDE", "LOCAL_POSITION_NED"} <= set(self._seen_s):
+        if min(heard_s.values()) < self._began_s:
             if missing and not self._waiting_said and now_s - self._began_s > _WAITING_LINE_S:
                 self._waiting_said = True
                 self._say(f"still no {words} on {self._url}; no images until they are received")

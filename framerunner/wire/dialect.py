@@ -19,11 +19,10 @@ Message = Any  # a pymavlink message; its classes are made at run time and have 
 
 AUTOPILOT_COMPONENT_ID = 1
 BROADCAST = 0
+MAVSDK_SYSTEM_ID = 245  # of a ground station, as the app is one
 _MAVLINK_VERSION = 3
 
-_own = vars(mavlink)
-mavlink.mavlink_map.update(extra_messages.mavlink_map | mavlink.mavlink_map)
-_own.update({name: value for name, value in vars(extra_messages).items() if name not in _own})
+extra_messages.add_to(mavlink)
 
 
 def is_vehicle(message: Message) -> bool:
@@ -38,7 +37,7 @@ def is_vehicle(message: Message) -> bool:
 
 def companion_heartbeat() -> Message:
     """The HEARTBEAT of a companion computer, which changes nothing at the vehicle."""
-    return _heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
+    return component_heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
 
 
 def ground_station_heartbeat() -> Message:
@@ -46,10 +45,11 @@ def ground_station_heartbeat() -> Message:
 
     PX4 sends its texts (STATUSTEXT) only on links where it receives this, and its loss is a failsafe.
     """
-    return _heartbeat(mavlink.MAV_TYPE_GCS)
+    return component_heartbeat(mavlink.MAV_TYPE_GCS)
 
 
-def _heartbeat(kind: int) -> Message:
+def component_heartbeat(kind: int) -> Message:
+    """The HEARTBEAT of a component of some MAV_TYPE that is no autopilot."""
     return mavlink.MAVLink_heartbeat_message(
         kind, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, _MAVLINK_VERSION
     )
@@ -80,6 +80,24 @@ def command_long(
 def request_message(system_id: int, message_id: int, component_id: int = AUTOPILOT_COMPONENT_ID) -> Message:
     """Request a message once (REQUEST_MESSAGE)."""
     return command_long(system_id, mavlink.MAV_CMD_REQUEST_MESSAGE, message_id, component_id=component_id)
+
+
+def request_parameter(system_id: int, name: str) -> Message:
+    """Request a parameter by its name (PARAM_REQUEST_READ)."""
+    return mavlink.MAVLink_param_request_read_message(system_id, AUTOPILOT_COMPONENT_ID, name.encode(), -1)
+
+
+def message_name(message_id: int) -> str:
+    """The name of a message that the dialect has, such as "ATTITUDE"."""
+    return str(mavlink.mavlink_map[message_id].msgname)
+
+
+def event_id(name: str) -> int:
+    """Id of an autopilot's EVENT: its component, then 24 bits of its name's FNV-1a hash, as in PX4."""
+    number = 0x811C9DC5
+    for byte in name.encode():
+        number = (number ^ byte) * 0x01000193 & 0xFFFFFFFF
+    return AUTOPILOT_COMPONENT_ID << 24 | number & 0xFFFFFF
 
 
 def request_rate(system_id: int, message_id: int, rate_hz: float) -> Message:

@@ -5,6 +5,7 @@ The header fields are those of https://mavlink.io/en/guide/serialization.html.
 
 from __future__ import annotations
 
+import binascii
 from struct import Struct
 from sys import maxsize
 
@@ -29,10 +30,20 @@ _KNOWN_IDS[list(CRC_EXTRA)] = True
 _MAX_PAYLOAD_BYTES_V1 = np.full(_ID_COUNT_V1, -1)  # by message id; -1: unknown
 _MAX_PAYLOAD_BYTES_V1[list(_PAYLOAD_BYTES_V1)] = list(_PAYLOAD_BYTES_V1.values())
 
-_HEADER = Struct("<BBBBBBBHB")
+HEADER_V2 = Struct("<BBBBBBBHB")
+_REVERSED = bytes(int(f"{value:08b}"[::-1], 2) for value in range(256))
 _CAPACITY_BYTES = 1 << 16  # the largest datagram fits
 _WINDOW_BYTES = 2048  # of noise, searched in one step
 _MAX_TRIES = 64  # of headers found in it, in one step
+
+
+def checksum(data: bytes | bytearray, seed: int) -> int:
+    """MAVLink's checksum of a packet without its marker: CRC-16/MCRF4XX over the data and the seed.
+
+    It is the CRC that `binascii.crc_hqx` computes, with the bits of each byte and of the result reversed.
+    """
+    crc = binascii.crc_hqx(data.translate(_REVERSED) + _REVERSED[seed : seed + 1], 0xFFFF)
+    return _REVERSED[crc & 0xFF] << 8 | _REVERSED[crc >> 8]
 
 
 def packet_length(data: bytes | bytearray, start: int) -> int | None:
@@ -207,8 +218,9 @@ class PacketReader:
             return False
         self.checksums += 1
         end = start + header + data[start + 1]
-        crc = int(mavlink.x25crc(bytes(data[start + 1 : end]) + bytes((extra,))).crc)
-        return data[end] == crc & 0xFF and data[end + 1] == crc >> 8
+        return int.from_bytes(data[end : end + CHECKSUM_BYTES], "little") == checksum(
+            data[start + 1 : end], extra
+        )
 
     def _is_unknown(self, start: int, length: int) -> bool:
         """Whether to accept a packet of an unknown message, whose checksum cannot be tested.
@@ -249,12 +261,12 @@ class Packet:
         del message._pack
         number = message.get_msgId()
         self._template = bytearray(
-            _HEADER.pack(
+            HEADER_V2.pack(
                 MARKER_V2, len(payload), 0, 0, 0, system_id, component_id, number & 0xFFFF, number >> 16
             )
         )
         self._template += payload + b"\0\0"
-        self._crc_extra = bytes((message.crc_extra,))
+        self._crc_extra = message.crc_extra
         self.component_id = component_id
         self.length = len(self._template)
         self.is_heartbeat = message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
@@ -264,9 +276,8 @@ class Packet:
         packet = self._template
         packet[2] = SIGNED if signed else 0
         packet[4] = sequence
-        crc = mavlink.x25crc(bytes(packet[1:-CHECKSUM_BYTES]) + self._crc_extra).crc
-        packet[-2] = crc & 0xFF
-        packet[-1] = crc >> 8
+        crc = checksum(packet[1:-CHECKSUM_BYTES], self._crc_extra)
+        packet[-CHECKSUM_BYTES:] = crc.to_bytes(CHECKSUM_BYTES, "little")
         return bytes(packet)
 
 
@@ -289,7 +300,41 @@ def message_id_of(data: bytes | bytearray, start: int = 0) -> int:
     return int.from_bytes(data[start + 7 : start + 10], "little")
 
 
-def missing_before(sequence: int, last: int, max_missing: int = 127) -> int:
-    """How many packets of a sender are missing after its last one; -1: this one is late or doubled."""
-    missing = (sequence - last - 1) % 256
-    return missing if missing <= max_missing else -1
+class SequenceCounter:
+    """Packets of one sender, counted against their numbers.
+
+    Args:
+        max_missing: a number that is farther ahead is that of a late or doubled packet.
+
+    Attributes:
+        received: packets.
+        missing: packets that were sent meanwhile; one that is late is missing no longer.
+    """
+
+    __slots__ = ("_last", "_max_missing", "missing", "received")
+
+    def __init__(self, max_missing: int = 127) -> None:
+        self._max_missing = max_missing
+        self._last: int | None = None
+        self.received = self.missing = 0
+
+    def take(self, sequence: int) -> int:
+        """Count a packet by its number, 0 to 255; how many are missing before it, or -1: it is late."""
+        self.received += 1
+        missing = 0 if self._last is None else (sequence - self._last - 1) % 256
+        if missing > self._max_missing:
+            missing = -1
+        else:
+            self._last = sequence
+        self.missing += missing
+        return missing
+
+    @property
+    def sent(self) -> int:
+        """Packets that were sent, by their numbers."""
+        return self.received + self.missing
+
+    @property
+    def lost_share(self) -> float:
+        """Of the packets sent, 0 to 1."""
+        return max(0.0, self.missing / self.sent) if self.sent > 0 else 0.0

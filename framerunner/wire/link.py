@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 
 from framerunner.wire.dialect import Message, mavlink
-from framerunner.wire.framing import Packet, PacketReader, missing_before
+from framerunner.wire.framing import Packet, PacketReader, SequenceCounter
 from framerunner.wire.signing import Signing
 
 _RATE_WINDOW_US = 1_000_000
@@ -41,7 +41,7 @@ class Traffic:
     messages_received: int = 0
     bytes_received: int = 0
     messages_lost: int = 0
-    _sequences: dict[tuple[int, int], int] = field(default_factory=dict)  # latest number by sender
+    _senders: dict[tuple[int, int], SequenceCounter] = field(default_factory=dict)
     _window: tuple[int, int, int] = (0, 0, 0)  # time, bytes sent and received at its start
     _rates_bytes_s: tuple[int, int] = (0, 0)
 
@@ -49,16 +49,12 @@ class Traffic:
         """Count a valid packet: its sender's system and component id, its number, its size in bytes."""
         self.messages_received += 1
         self.bytes_received += size
-        last = self._sequences.get(sender)
-        if last is None:
-            if len(self._sequences) >= _MAX_SENDERS:
+        counter = self._senders.get(sender)
+        if counter is None:
+            if len(self._senders) >= _MAX_SENDERS:
                 return
-        else:
-            missing = missing_before(sequence, last)
-            if missing < 0:
-                return
-            self.messages_lost += missing
-        self._sequences[sender] = sequence
+            counter = self._senders[sender] = SequenceCounter()
+        self.messages_lost += max(0, counter.take(sequence))
 
     def rates_bytes_s(self, time_us: int) -> tuple[int, int]:
         """Bytes sent and received a second, over the last second or more."""

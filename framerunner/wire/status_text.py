@@ -1,12 +1,12 @@
-"""STATUSTEXT: a text joined from its pieces, without control characters."""
+"""STATUSTEXT: a text cut into pieces, and joined from them, without control characters."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from framerunner.wire.dialect import Message
+from framerunner.wire.dialect import Message, mavlink
 
-_PIECE_BYTES = 50
+PIECE_BYTES = 50
 _MAX_PIECES = 10
 _MAX_CHARS = 500
 _TIMEOUT_S = 2.0  # of an incomplete text
@@ -47,7 +47,7 @@ class TextAssembler:
         parts = self._incomplete.setdefault(key, _IncompleteText(message.severity, {}, now_s))
         if message.chunk_seq < _MAX_PIECES:
             parts.pieces[message.chunk_seq] = raw
-        if len(raw.split(b"\0", 1)[0]) < _PIECE_BYTES or message.chunk_seq >= _MAX_PIECES - 1:
+        if len(raw.split(b"\0", 1)[0]) < PIECE_BYTES or message.chunk_seq >= _MAX_PIECES - 1:
             done += self._joined(key)
         return done
 
@@ -67,6 +67,17 @@ def plain(raw: bytes | str, max_chars: int = _MAX_CHARS) -> str:
     """A text without control characters, shortened; bytes are read as UTF-8 up to a zero byte."""
     text = raw if isinstance(raw, str) else raw.split(b"\0", 1)[0].decode("utf-8", "replace")
     return "".join(sign if sign.isprintable() else " " for sign in text)[:max_chars].strip()
+
+
+def statustexts(severity: int, data: bytes, number: int) -> list[Message]:
+    """A text as one STATUSTEXT or, if it is too long, as several, with a number above zero."""
+    if len(data) <= PIECE_BYTES:
+        return [mavlink.MAVLink_statustext_message(severity, data, 0, 0)]
+    # A text that fills its last piece needs an empty one after it, or the receiver waits for more.
+    return [
+        mavlink.MAVLink_statustext_message(severity, data[start : start + PIECE_BYTES], number, place)
+        for place, start in enumerate(range(0, len(data) + 1, PIECE_BYTES))
+    ]
 
 
 def _text(component: int, severity: int, raw: bytes) -> list[Text]:

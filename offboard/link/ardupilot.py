@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import threading
+from collections.abc import Awaitable
 from math import inf
 from typing import Any
 
@@ -27,11 +27,11 @@ from mavsdk.asyncio import MavsdkError
 from framerunner.wire import ardupilot_modes
 from framerunner.wire.dialect import mavlink
 from offboard.drone import ResponsePrior, VelocityCommand
-from offboard.link.dialect import ModeNames
-from offboard.link.direct import DirectMessages
+from offboard.link.dialect import AutopilotKind, ModeNames
+from offboard.link.direct import DirectDialect, DirectMessages
+from offboard.link.stepped import SteppedDialect
 from offboard.link.telemetry import TelemetryFeed
 
-READY_LIMIT_S = 90.0  # wall time; its estimator uses GPS some 40 s after its start
 TAKEOFF_HEIGHT_M = 1.0  # requested; velocities take over as soon as the drone is off the ground
 TAKEOFF_SHARE = 0.7  # likewise, of the room below the ceiling at most
 TAKEOFF_CLIMB_M_S = 0.05  # a command on the ground to climb faster than this is a take-off
@@ -43,7 +43,16 @@ STREAMS_HZ = {
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
 }
-ARDUPILOT_MODES = ModeNames(offboard="GUIDED", hold="BRAKE", land="LAND", pilot=ardupilot_modes.PILOT_MODES)
+ARDUPILOT = AutopilotKind(
+    name="ArduPilot",
+    modes=ModeNames(offboard="GUIDED", hold="BRAKE", land="LAND", pilot=ardupilot_modes.PILOT_MODES),
+    offboard=(1.0, float(ardupilot_modes.GUIDED)),
+    hold=(1.0, float(ardupilot_modes.BRAKE)),
+    land=(1.0, float(ardupilot_modes.LAND)),
+    ready_limit_s=90.0,  # its estimator uses GPS some 40 s after its start
+    checks_in_offboard=True,
+    numbered_modes=ardupilot_modes.NAMES,
+)
 
 
 class Setpoints:
@@ -73,7 +82,7 @@ class Setpoints:
     def _stands_ready(self) -> bool:
         """Armed in GUIDED on the ground."""
         feed = self._feed
-        return feed.landed and feed.mode == ARDUPILOT_MODES.offboard and feed.arming.is_armed(feed.time_us)
+        return feed.landed and feed.mode == ARDUPILOT.modes.offboard and feed.arming.is_armed(feed.time_us)
 
     def _take_off(self) -> None:
         """Request take-off, and again when the drone is still on the ground after some seconds."""
@@ -83,7 +92,7 @@ class Setpoints:
             self._messages.send_command(mavlink.MAV_CMD_NAV_TAKEOFF, *(0.0,) * 6, self._takeoff_height_m)
 
 
-class ArduPilotDialect:
+class ArduPilotDialect(DirectDialect):
     """One ArduCopter, by MAVSDK's plugins `action` and `mavlink_direct`; see the module and `Dialect`.
 
     Args:
@@ -94,12 +103,8 @@ class ArduPilotDialect:
         room_above_m: from the start to the ceiling, which its take-off must not reach.
     """
 
-    modes = ARDUPILOT_MODES
-    numbered_modes = ardupilot_modes.NAMES
+    kind = ARDUPILOT
     response_prior = ResponsePrior.UNKNOWN
-    checks_in_offboard = True
-    exchange = None
-    ready_limit_s = READY_LIMIT_S
 
     def __init__(
         self,
@@ -109,13 +114,9 @@ class ArduPilotDialect:
         system_id: int,
         room_above_m: float = inf,
     ) -> None:
-        self.ended = False
+        super().__init__(direct, system_id)
         self._action = action
-        self._messages = DirectMessages(direct, system_id)
         self._setpoints = Setpoints(self._messages, feed, room_above_m)
-        self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
-        self._sent_since_repeat = False
-        self._lock = threading.Lock()  # the watchdog's thread sends, too
 
     async def request_streams(self) -> None:
         """Request what a flight needs; what is refused is missing later, in words."""
@@ -123,39 +124,13 @@ class ArduPilotDialect:
             with contextlib.suppress(MavsdkError):
                 await self._command_long(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz)
 
-    def send(self, command: VelocityCommand) -> None:
-        """Send a velocity; on the ground, request take-off if it climbs."""
-        with self._lock:
-            if self.ended:
-                return
-            self._command, self._sent_since_repeat = command, True
-            with contextlib.suppress(MavsdkError):  # the link is closed; telemetry shows that
-                self._setpoints.send(command)
-
-    def repeat(self) -> None:
-        """Send the last velocity again if nothing was sent since the last call."""
-        command, sent = self._command, self._sent_since_repeat
-        if command is not None and not sent:
-            self.send(command)
-        self._sent_since_repeat = False
-
     async def request_offboard(self) -> None:
         """Request GUIDED."""
-        await self._set_mode(ardupilot_modes.GUIDED)
+        await self._command_long(mavlink.MAV_CMD_DO_SET_MODE, *self.kind.offboard)
 
     async def request_hold(self) -> None:
         """End the setpoints until the next one, and request BRAKE."""
         await asyncio.to_thread(self.request_hold_blocking)
-
-    def request_hold_blocking(self) -> None:
-        """The same from a thread, which waits for the answer."""
-        self._command = None
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(ardupilot_modes.BRAKE))
-
-    def request_land_blocking(self) -> None:
-        """End the setpoints permanently and request LAND, from a thread."""
-        self.end()
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(ardupilot_modes.LAND))
 
     async def arm(self) -> None:
         """Arm."""
@@ -171,13 +146,52 @@ class ArduPilotDialect:
         self._command = None
         await self._action.land()
 
-    def end(self) -> None:
-        """End the setpoints permanently."""
-        with self._lock:
-            self.ended, self._command = True, None
-
-    async def _set_mode(self, number: int) -> None:
-        await self._command_long(mavlink.MAV_CMD_DO_SET_MODE, 1.0, float(number))
-
     async def _command_long(self, number: int, *parameters: float) -> None:
         await asyncio.to_thread(self._messages.command, number, *parameters)
+
+    def _transmit(self, command: VelocityCommand) -> None:
+        self._setpoints.send(command)
+
+
+class SteppedArduPilotDialect(SteppedDialect):
+    """One ArduCopter; see `SteppedDialect`.
+
+    ArduPilot's loop stands while its simulator does not answer, so it returns no PING then; the simulator
+    does that for it (`sitl.ardupilot.relay`). All that was sent before is given to it when time goes on.
+
+    Args:
+        direct: MAVSDK's asyncio plugin.
+        feed: the vehicle's telemetry, which shows whether it is on the ground.
+        system_id: the vehicle's.
+        room_above_m: from the start to the ceiling, which its take-off must not reach.
+    """
+
+    kind = ARDUPILOT
+    response_prior = ResponsePrior.UNKNOWN
+
+    def __init__(
+        self,
+        direct: Any,  # noqa: ANN401 - MAVSDK is untyped
+        feed: TelemetryFeed,
+        system_id: int,
+        room_above_m: float = inf,
+    ) -> None:
+        super().__init__(direct, system_id)
+        self._setpoints = Setpoints(self._messages, feed, room_above_m)
+
+    def request_streams(self) -> Awaitable[None]:
+        """Request what a flight needs, before time goes on; what is refused is missing later, in words."""
+        number, streams = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, list(STREAMS_HZ.items())
+        for message_id, rate_hz in streams[:-1]:
+            self._messages.send_command(number, message_id, 1e6 / rate_hz)
+        message_id, rate_hz = streams[-1]
+        return _answered(self._request(number, message_id, 1e6 / rate_hz))
+
+    def _transmit(self, command: VelocityCommand) -> None:
+        self._setpoints.send(command)
+
+
+async def _answered(request: Awaitable[None]) -> None:
+    """Wait for an answer, whatever it is."""
+    with contextlib.suppress(MavsdkError):
+        await request

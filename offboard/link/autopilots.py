@@ -13,10 +13,9 @@ from mavsdk.asyncio.plugins.offboard import OffboardAsync
 
 from framerunner.wire.vehicle_identity import is_simulator
 from offboard.drone import DroneError, ResponsePrior
-from offboard.link.ardupilot import ArduPilotDialect
-from offboard.link.dialect import Dialect, Px4Dialect
-from offboard.link.stepped_ardupilot import SteppedArduPilotDialect
-from offboard.link.stepped_px4 import SteppedPx4Dialect
+from offboard.link.ardupilot import ArduPilotDialect, SteppedArduPilotDialect
+from offboard.link.dialect import Dialect
+from offboard.link.px4 import Px4Dialect, SteppedPx4Dialect
 from offboard.link.telemetry import TelemetryFeed
 
 _IDENTITY_TRIES = 15

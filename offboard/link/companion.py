@@ -19,7 +19,7 @@ from math import inf
 from typing import Any
 
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, companion_heartbeat, mavlink
-from framerunner.wire.framing import packed
+from framerunner.wire.framing import HEADER_BYTES_V2, message_id_of, packed, source_of
 from framerunner.wire.mission_tunnel import (
     COMPONENT_ID,
     DETECTIONS_TYPE,
@@ -32,17 +32,17 @@ from framerunner.wire.mission_tunnel import (
     encode_detections,
     encode_state,
 )
+from framerunner.wire.status_text import PIECE_BYTES, statustexts
 
 BEAT_S = 0.05  # wall time between two calls of `beat`
 PIECES_A_BEAT = 2  # of new documents: 6 kB/s at most, so that a slow link has room for setpoints
 REPEAT_BEATS = 10  # between two pieces of the repeated documents
 SILENT_S = 0.25  # wall time without a new state after which the last one is repeated
 FINAL_GAP_S = 0.15
-_TEXT_BYTES = 50  # of one STATUSTEXT
 _MAX_TEXT_CHUNKS = 4
 _TUNNEL_BYTES = 128
 _MAX_PACKETS_A_BEAT = 1000
-_MAVLINK_2 = 0xFD  # the first byte of a packet
+_HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
 _URGENT = (DocumentKind.HISTORY,)
 # Pieces not sent yet: the mission's own document is the longest, and maps are many.
@@ -65,7 +65,7 @@ class Companion:
         self._port: socket.socket | None = None
         self._peer: Any = None
         self._sender: Any = None
-        self._autopilot = b""  # its system and component id
+        self._autopilot = (0, 0)  # its system and component id
         self._task: asyncio.Task[None] | None = None
         self._documents: dict[DocumentKind, list[bytes]] = {}
         self._unsent: dict[DocumentKind, deque[bytes]] = {}
@@ -90,7 +90,7 @@ class Companion:
     def announce(self, system_id: int) -> None:
         """Send as a component of this vehicle from now on (within a running event loop)."""
         self._sender = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=COMPONENT_ID)
-        self._autopilot = bytes((system_id, AUTOPILOT_COMPONENT_ID))
+        self._autopilot = (system_id, AUTOPILOT_COMPONENT_ID)
         if self._task is None:
             self._task = asyncio.create_task(self._keep_beating(), name="companion")
 
@@ -137,16 +137,11 @@ class Companion:
 
     def send_text(self, text: str) -> None:
         """Send a STATUSTEXT of severity INFO, in several messages if it is too long for one."""
-        data = text.encode("utf-8", "replace")[: _MAX_TEXT_CHUNKS * _TEXT_BYTES]
-        severity = mavlink.MAV_SEVERITY_INFO
-        if len(data) <= _TEXT_BYTES:
-            self._send(mavlink.MAVLink_statustext_message(severity, data))
-            return
-        self._text_id = self._text_id % 0xFFFF + 1
-        # The last one must end with a zero, so there is one more if the text fills them exactly.
-        for number in range(len(data) // _TEXT_BYTES + 1):
-            chunk = data[number * _TEXT_BYTES : (number + 1) * _TEXT_BYTES]
-            self._send(mavlink.MAVLink_statustext_message(severity, chunk, self._text_id, number))
+        data = text.encode("utf-8", "replace")[: _MAX_TEXT_CHUNKS * PIECE_BYTES]
+        if len(data) > PIECE_BYTES:
+            self._text_id = self._text_id % 0xFFFF + 1
+        for message in statustexts(mavlink.MAV_SEVERITY_INFO, data, self._text_id):
+            self._send(message)
 
     def beat(self) -> None:
         """Send what is due between ticks: heartbeat, pieces of documents, the last state again."""
@@ -200,10 +195,8 @@ class Companion:
         return found
 
     def _is_heartbeat(self, data: bytes) -> bool:
-        if len(data) < 10:
-            return False
-        source, message_id = (data[5:7], data[7:10]) if data[0] == _MAVLINK_2 else (data[3:5], data[5:6])
-        return source == self._autopilot and not any(message_id)
+        is_whole = len(data) >= HEADER_BYTES_V2
+        return is_whole and source_of(data) == self._autopilot and message_id_of(data) == _HEARTBEAT
 
     def _next_unsent(self, kinds: tuple[DocumentKind, ...]) -> bytes | None:
         for kind in kinds:

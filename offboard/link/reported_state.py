@@ -34,7 +34,7 @@ def reported_state(
         yaw=pose.yaw_rad,
         velocity_arena_m_s=alignment.vector(sample.velocity_ned_m_s),
         armed=feed.arming.is_armed(sample.time_us),
-        offboard=feed.mode == dialect.modes.offboard,
+        offboard=feed.mode == dialect.kind.modes.offboard,
         mode=feed.mode,
         landed=sample.landed,
         position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),

@@ -8,11 +8,10 @@ watched: it only returns to the frame of its sensors, and its flights in lockste
 from __future__ import annotations
 
 import contextlib
-import json
 import logging
 from collections import deque
 from dataclasses import dataclass
-from math import degrees, dist, isfinite, nan, pi, radians, remainder
+from math import degrees, dist, isfinite, pi, radians, remainder
 from typing import Any
 
 from mavsdk.asyncio import MavsdkError
@@ -20,9 +19,10 @@ from mavsdk.asyncio import MavsdkError
 from framerunner.geometry.axes import Alignment, Pose
 from framerunner.geometry.rotations import rotation, to_world, yaw_of
 from framerunner.geometry.vectors import Vec3
-from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from framerunner.wire.vehicle_telemetry import MessageOrder
 from offboard.drone import DroneError
+from offboard.link.direct import subscribe
 
 RATE_HZ = 10.0
 MAX_STEP_S = 0.3  # between two reports, from which a jump can be told from motion
@@ -71,7 +71,7 @@ class ResetFeed:
     def subscribe(self, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
         """Subscribe to MAVSDK's synchronous plugin `mavlink_direct`."""
         self._is_wanted = True
-        direct.subscribe_message("ODOMETRY", self._on_odometry)
+        subscribe(direct, "ODOMETRY", self._on_odometry)
 
     async def request(self, plugin: Any) -> None:  # noqa: ANN401
         """Request reports, by MAVSDK's asyncio `telemetry`, if the vehicle sends none; it may refuse."""
@@ -83,14 +83,11 @@ class ResetFeed:
         """The resets since the last call, oldest first; None: by how much is not known."""
         return [self._jumps.popleft() for _ in range(len(self._jumps))]
 
-    def _on_odometry(self, message: Any, _user: object) -> None:  # noqa: ANN401
-        fields = json.loads(message.fields_json)
-        if (
-            message.component_id != AUTOPILOT_COMPONENT_ID
-            or fields["frame_id"] != mavlink.MAV_FRAME_LOCAL_NED
-        ):
+    def _on_odometry(self, message: Message) -> None:
+        is_autopilots = message.get_srcComponent() == AUTOPILOT_COMPONENT_ID
+        if not is_autopilots or message.frame_id != mavlink.MAV_FRAME_LOCAL_NED:
             return  # it is for the vehicle, or of another frame
-        now, last = _report(fields), self._last
+        now, last = _report(message), self._last
         if not self._order.is_next(now.time_us):
             return
         self.heard, self._last = True, now
@@ -126,18 +123,12 @@ def followed(alignment: Alignment, jump: Jump | None) -> Alignment:
     return Alignment(place, jump.reported)
 
 
-def _report(fields: dict[str, Any]) -> _Report:
-    def number(name: str) -> float:
-        value = fields[name]
-        return nan if value is None else float(value)  # JSON cannot express values that are not finite
-
-    w, x, y, z = (nan if each is None else float(each) for each in fields["q"])
-    attitude, velocity = (w, x, y, z), (number("vx"), number("vy"), number("vz"))
+def _report(message: Message) -> _Report:
+    w, x, y, z = message.q
+    attitude, velocity = (w, x, y, z), (message.vx, message.vy, message.vz)
     matrix = rotation(attitude)
-    if fields["child_frame_id"] != mavlink.MAV_FRAME_LOCAL_NED:
+    if message.child_frame_id != mavlink.MAV_FRAME_LOCAL_NED:
         velocity = to_world(matrix, *velocity)
-    pose = Pose((number("x"), number("y"), number("z")), yaw_of(attitude))
-    _, _, yaw_rate_rad_s = to_world(matrix, number("rollspeed"), number("pitchspeed"), number("yawspeed"))
-    return _Report(
-        int(fields["time_usec"]), int(fields.get("reset_counter", 0)), pose, velocity, yaw_rate_rad_s
-    )
+    pose = Pose((message.x, message.y, message.z), yaw_of(attitude))
+    _, _, yaw_rate_rad_s = to_world(matrix, message.rollspeed, message.pitchspeed, message.yawspeed)
+    return _Report(message.time_usec, message.reset_counter, pose, velocity, yaw_rate_rad_s)

@@ -8,17 +8,16 @@ the autopilot has it. So a flight in the same simulation is the same again.
 from __future__ import annotations
 
 import asyncio
-import json
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Awaitable
-from typing import Any, ClassVar
+from math import inf
+from typing import Any
 
-from framerunner.wire.dialect import mavlink
-from offboard.drone import DroneError, VelocityCommand
-from offboard.link.commands import synchronous
+from framerunner.wire.dialect import MAVSDK_SYSTEM_ID, Message, mavlink
+from framerunner.wire.session.session import Request, Session
+from offboard.drone import DroneError
 from offboard.link.dialect import TickExchange
-from offboard.link.direct import CommandRefusedError, DirectMessages
+from offboard.link.direct import CommandRefusedError, DirectDialect, DirectMessages, subscribe, synchronous
 
 ECHO_LIMIT_S = 20.0  # wall time for the answer to a PING, on the busiest machine
 _ECHO_AGAIN_S = 0.5  # wall time after which another one is sent
@@ -35,7 +34,7 @@ class _Echo:
         self._loop = asyncio.get_running_loop()
         self._sequence = 0
         self._echo: asyncio.Future[None] | None = None
-        synchronous(direct).subscribe_message("PING", self._on_ping)
+        subscribe(synchronous(direct), "PING", self._on_ping)
 
     async def wait(self) -> None:
         """Send a PING, and wait until it comes back."""
@@ -45,47 +44,20 @@ class _Echo:
         while not echo.done():
             if time.monotonic() > end_s:
                 raise DroneError(f"link lost: {self._name} has not returned a PING for {ECHO_LIMIT_S:g} s")
-            self._messages.send_ping(self._sequence)
+            self._messages.send(mavlink.MAVLink_ping_message(0, self._sequence, 0, 0))
             await asyncio.wait((echo,), timeout=_ECHO_AGAIN_S)
 
-    def _on_ping(self, message: Any, _user: object) -> None:  # noqa: ANN401
+    def _on_ping(self, message: Message) -> None:
         """On MAVSDK's thread. PX4 sends PINGs of its own, too, to nobody."""
-        fields = json.loads(message.fields_json)
-        if fields["target_system"]:
-            self._loop.call_soon_threadsafe(self._returned, fields["seq"])
+        if message.target_system:
+            self._loop.call_soon_threadsafe(self._returned, message.seq)
 
     def _returned(self, sequence: int) -> None:
         if self._echo is not None and sequence == self._sequence and not self._echo.done():
             self._echo.set_result(None)
 
 
-class _Requests:
-    """MAV_CMDs, whose answers are awaited while time goes on."""
-
-    def __init__(self, messages: DirectMessages, direct: Any) -> None:  # noqa: ANN401
-        self._messages = messages
-        self._loop = asyncio.get_running_loop()
-        self._answers: dict[int, asyncio.Future[int]] = {}  # by the number of the command
-        synchronous(direct).subscribe_message("COMMAND_ACK", self._on_answer)
-
-    def send(self, number: int, *parameters: float) -> Awaitable[None]:
-        """Send a command at once; what is returned waits for the answer, and raises `CommandRefusedError`."""
-        answer: asyncio.Future[int] = self._loop.create_future()
-        self._answers[number] = answer
-        self._messages.send_command(number, *parameters)
-        return _accepted(answer)
-
-    def _on_answer(self, message: Any, _user: object) -> None:  # noqa: ANN401
-        fields = json.loads(message.fields_json)
-        self._loop.call_soon_threadsafe(self._answered, fields["command"], fields["result"])
-
-    def _answered(self, number: int, result: int) -> None:
-        answer = self._answers.get(number)
-        if answer is not None and not answer.done() and result != mavlink.MAV_RESULT_IN_PROGRESS:
-            answer.set_result(result)
-
-
-class SteppedDialect(ABC):
+class SteppedDialect(DirectDialect):
     """A vehicle, by MAVSDK's plugin `mavlink_direct`; see the module and `Dialect`.
 
     Requests are sent when a method is called; what it returns waits for the answer.
@@ -95,18 +67,12 @@ class SteppedDialect(ABC):
         system_id: the vehicle's.
     """
 
-    NAME: ClassVar[str]  # of the autopilot, for people
-    OFFBOARD: ClassVar[tuple[float, ...]]  # parameters of MAV_CMD_DO_SET_MODE
-    HOLD: ClassVar[tuple[float, ...]]
-    LAND: ClassVar[tuple[float, ...]]
-
     def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
-        self.ended = False
-        self._messages = DirectMessages(direct, system_id)
-        self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
-        self._sent_since_tick = False
-        self._echo = _Echo(self._messages, direct, self.NAME)
-        self._requests = _Requests(self._messages, direct)
+        super().__init__(direct, system_id)
+        self._echo = _Echo(self._messages, direct, self.kind.name)
+        self._session = Session(MAVSDK_SYSTEM_ID, system_id)
+        self._loop = asyncio.get_running_loop()
+        subscribe(synchronous(direct), "COMMAND_ACK", self._on_answer)
 
     @property
     def exchange(self) -> TickExchange:
@@ -115,9 +81,7 @@ class SteppedDialect(ABC):
 
     async def before_tick(self) -> None:
         """Wait until the vehicle has all that was sent; a velocity is sent again if there was no new one."""
-        if self._command is not None and not self._sent_since_tick:
-            self.send(self._command)
-        self._sent_since_tick = False
+        super().repeat()
         await self._until_taken()
 
     async def after_tick(self) -> None:
@@ -126,37 +90,17 @@ class SteppedDialect(ABC):
         for _ in range(_TURNS):
             await asyncio.sleep(0)
 
-    @abstractmethod
-    def request_streams(self) -> Awaitable[None]:
-        """Request what the vehicle does not send by itself, or too rarely."""
-
-    def send(self, command: VelocityCommand) -> None:
-        """Send a velocity; ignored after `end`."""
-        if not self.ended:
-            self._command, self._sent_since_tick = command, True
-            self._transmit(command)
-
-    def repeat(self) -> None:  # noqa: B027 - it is complete
+    def repeat(self) -> None:
         """Nothing: `before_tick` does."""
 
     def request_offboard(self) -> Awaitable[None]:
         """Request the mode that follows setpoints."""
-        return self._set_mode(self.OFFBOARD)
+        return self._set_mode(self.kind.offboard)
 
     def request_hold(self) -> Awaitable[None]:
         """End the setpoints until the next one, and request hold."""
         self._command = None
-        return self._set_mode(self.HOLD)
-
-    def request_hold_blocking(self) -> None:
-        """The same from a thread, which waits for the answer."""
-        self._command = None
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.HOLD)
-
-    def request_land_blocking(self) -> None:
-        """End the setpoints permanently and request landing, from a thread, which waits for the answer."""
-        self.end()
-        self._messages.command(mavlink.MAV_CMD_DO_SET_MODE, *self.LAND)
+        return self._set_mode(self.kind.hold)
 
     def arm(self) -> Awaitable[None]:
         """Arm."""
@@ -170,33 +114,37 @@ class SteppedDialect(ABC):
     def land(self) -> Awaitable[None]:
         """Request landing where the vehicle is."""
         self._command = None
-        return self._set_mode(self.LAND)
-
-    def end(self) -> None:
-        """End the setpoints permanently; from any thread."""
-        self.ended, self._command = True, None
+        return self._set_mode(self.kind.land)
 
     async def _until_taken(self) -> None:
         """Wait until the vehicle has all that was sent."""
         await self._echo.wait()
 
-    def _transmit(self, command: VelocityCommand) -> None:
-        """Send a velocity now."""
-        self._messages.send_velocity(command)
-
     def _set_mode(self, parameters: tuple[float, ...]) -> Awaitable[None]:
         return self._request(mavlink.MAV_CMD_DO_SET_MODE, *parameters)
 
+    def _on_answer(self, message: Message) -> None:
+        """On MAVSDK's thread."""
+        self._loop.call_soon_threadsafe(self._session.take, message, time.monotonic())
+
     def _request(self, number: int, *parameters: float) -> Awaitable[None]:
-        return self._requests.send(number, *parameters)
+        """Send a command at once; what is returned waits for the answer, and raises `CommandRefusedError`."""
+        over = asyncio.Event()
+        request = self._session.command(number, *parameters, urgent=True, tries=1, every_s=inf)
+        request.on_over = over.set
+        for message in self._session.due(time.monotonic()):
+            self._messages.send(message)
+        return _accepted(request, over)
 
 
-async def _accepted(answer: asyncio.Future[int]) -> None:
+async def _accepted(request: Request[int], over: asyncio.Event) -> None:
     """Wait for an answer. Raises `CommandRefusedError` if it is another one than "accepted"."""
     try:
         async with asyncio.timeout(_ANSWER_LIMIT_S):
-            result = await answer
+            await over.wait()
     except TimeoutError:
-        raise CommandRefusedError("TIMEOUT") from None
-    if result != mavlink.MAV_RESULT_ACCEPTED:
-        raise CommandRefusedError.of(result)
+        request.end()
+    if request.answer is None:
+        raise CommandRefusedError("TIMEOUT")
+    if request.answer != mavlink.MAV_RESULT_ACCEPTED:
+        raise CommandRefusedError.of(request.answer)

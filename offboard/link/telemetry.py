@@ -12,24 +12,24 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import nan, radians
+from math import radians
 from typing import Any
 
 from framerunner.geometry.axes import Pose
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.vectors import Quaternion, Vec3
-from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message
 from framerunner.wire.mission_tunnel import TEXT_PREFIX
 from framerunner.wire.status_text import plain
 from framerunner.wire.vehicle_telemetry import MessageOrder
 from offboard.arming import Arming
-from offboard.link.gimbal_feed import GimbalAttitude, GimbalFeed
+from offboard.link.direct import subscribe
+from offboard.link.gimbal import GimbalAttitude, gimbal_attitude
 
 TICK_US = 50_000
 LAG_GROWTH_S = 2e-5  # with each attitude: 1 ms a second, more than clocks differ
@@ -81,7 +81,7 @@ class TelemetryFeed:
         self.position_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self.velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self.position_us = 0
-        self._gimbal = GimbalFeed()
+        self._gimbal: GimbalAttitude | None = None
         self.arming = Arming()  # with the heartbeats
         self.mode = ""  # name of the flight mode, such as "OFFBOARD"
         self.landed = True  # from EXTENDED_SYS_STATE
@@ -118,11 +118,11 @@ class TelemetryFeed:
         """
         self._loop = asyncio.get_running_loop()
         plugin.subscribe_attitude_euler(self._on_attitude)
-        direct.subscribe_message("LOCAL_POSITION_NED", self._on_position)
-        self._gimbal.subscribe(direct)
+        subscribe(direct, "LOCAL_POSITION_NED", self._on_position)
+        subscribe(direct, "GIMBAL_DEVICE_ATTITUDE_STATUS", self._on_gimbal)
         plugin.subscribe_armed(self._on_armed)
         if numbered_modes:
-            direct.subscribe_message("HEARTBEAT", partial(_take_mode, self, numbered_modes))
+            subscribe(direct, "HEARTBEAT", partial(_take_mode, self, numbered_modes))
         else:
             plugin.subscribe_flight_mode(self._on_mode)
         plugin.subscribe_landed_state(self._on_landed)
@@ -134,14 +134,8 @@ class TelemetryFeed:
 
         Ticks that were not waited for are skipped.
         """
-        try:
-            # Not wait_for: before Python 3.12 it loses a cancellation that arrives together with the tick,
-            # and then a loop under a time limit never ends.
-            async with asyncio.timeout(timeout_s):
-                while self.sample is self._taken:  # woken for a tick that was taken with the one before
-                    self._new_tick.clear()
-                    await self._new_tick.wait()
-        except TimeoutError:
+        # Woken for a tick that was taken with the one before, it waits on.
+        if not await self._woken_until(lambda: self.sample is not self._taken, timeout_s):
             return False
         self._taken = self.sample
         return True
@@ -160,13 +154,20 @@ class TelemetryFeed:
 
     async def tick(self, number: int, timeout_s: float) -> bool:
         """Wait for the tick of this number, or a later one; False after `timeout_s` of wall time."""
+        is_there = await self._woken_until(lambda: self.tick_number >= number, timeout_s)
+        self._taken = self.sample
+        return is_there
+
+    async def _woken_until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Look at each tick whether a condition holds; False after a wall time."""
         with contextlib.suppress(TimeoutError):
+            # Not wait_for: before Python 3.12 it loses a cancellation that arrives together with the tick,
+            # and then a loop under a time limit never ends.
             async with asyncio.timeout(timeout_s):
-                while self.tick_number < number:
+                while not condition():
                     self._new_tick.clear()
                     await self._new_tick.wait()
-        self._taken = self.sample
-        return self.tick_number >= number
+        return condition()
 
     def time_at_us(self, wall_s: float) -> int | None:
         """Vehicle time at a monotonic wall time, as telemetry shows it; None before the first attitude."""
@@ -235,23 +236,25 @@ class TelemetryFeed:
                 self.position_us,
                 radians(euler.roll_deg),
                 radians(euler.pitch_deg),
-                self._gimbal.newest,
+                self._gimbal,
                 self.landed,
             )
             self._samples.append(self.sample)
             self.tick_number = tick  # after its sample, for tasks that look at the number
             self._wake()
 
-    def _on_position(self, message: Any, _user: object) -> None:  # noqa: ANN401
-        fields = json.loads(message.fields_json)
-        position_us = fields["time_boot_ms"] * 1000
+    def _on_position(self, message: Message) -> None:
+        position_us = message.time_boot_ms * 1000
         if not self._position_order.is_next(position_us):
             return
-        self.position_ned_m = (_number(fields["x"]), _number(fields["y"]), _number(fields["z"]))
-        self.velocity_ned_m_s = (_number(fields["vx"]), _number(fields["vy"]), _number(fields["vz"]))
+        self.position_ned_m = (message.x, message.y, message.z)
+        self.velocity_ned_m_s = (message.vx, message.vy, message.vz)
         self.position_us = position_us
         self._position_received_s = self._clock()
         self.positions += 1
+
+    def _on_gimbal(self, message: Message) -> None:
+        self._gimbal = gimbal_attitude(message) or self._gimbal
 
     def _on_armed(self, armed: bool, _user: object) -> None:
         self.arming.see_heartbeat(bool(armed))
@@ -287,10 +290,10 @@ def pose_of(feed: TelemetryFeed) -> Pose:
     return Pose(feed.position_ned_m, feed.yaw_ned_rad)
 
 
-def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Any, _user: object) -> None:  # noqa: ANN401
-    """Take the mode in an autopilot's HEARTBEAT, of `mavlink_direct`."""
-    if heartbeat.component_id == AUTOPILOT_COMPONENT_ID:
-        number = json.loads(heartbeat.fields_json)["custom_mode"]
+def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Message) -> None:
+    """Take the mode in an autopilot's HEARTBEAT."""
+    if heartbeat.get_srcComponent() == AUTOPILOT_COMPONENT_ID:
+        number = heartbeat.custom_mode
         feed.mode = names.get(number, f"mode {number}")
 
 
@@ -303,8 +306,3 @@ def least_lag(before_s: float | None, lag_s: float) -> float:
     if before_s is None:
         return lag_s
     return max(min(before_s + LAG_GROWTH_S, lag_s), lag_s - MAX_JITTER_S)
-
-
-def _number(value: float | None) -> float:
-    """JSON cannot express values that are not finite; MAVSDK writes null."""
-    return nan if value is None else value

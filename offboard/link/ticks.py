@@ -14,7 +14,6 @@ from typing import Any, Protocol
 from mavsdk.asyncio import MavsdkError
 
 from offboard.drone import DroneError, VelocityCommand
-from offboard.link.commands import PendingRequests
 from offboard.link.dialect import Dialect, TickExchange
 from offboard.link.telemetry import TICK_US, TelemetryFeed
 
@@ -24,7 +23,36 @@ TICK_LOST_S = 0.5  # wall time; a tick whose telemetry has not arrived by then w
 _MAX_LOST_IN_A_ROW = 10
 WANTED_RATE_HZ = 50.0
 CONFIRM_S = 6.0  # until one of the heartbeats, one a second, shows what was requested
+_MAX_REQUEST_S = 10.0  # MAVSDK gives a request up before that
 SHOWN_S = 1.5  # wall time until a heartbeat, one a second, shows the new mode
+
+
+class PendingRequests:
+    """Requests to MAVSDK. Each blocks a thread until its answer, and must end before MAVSDK is destroyed."""
+
+    def __init__(self) -> None:
+        self._pending: set[asyncio.Future[object]] = set()
+
+    async def wait(self, request: Awaitable[object]) -> None:
+        """Wait for the answer; the request continues even if this wait is cancelled.
+
+        Raises:
+            MavsdkError: it was refused, or not answered.
+        """
+        future = asyncio.ensure_future(request)
+        self._pending.add(future)
+        future.add_done_callback(self._done)
+        await asyncio.shield(future)
+
+    async def wait_for_all(self) -> None:
+        """Wait until none is pending."""
+        if self._pending:
+            await asyncio.wait(self._pending, timeout=_MAX_REQUEST_S)
+
+    def _done(self, future: asyncio.Future[object]) -> None:
+        self._pending.discard(future)
+        if not future.cancelled():
+            future.exception()  # read, so that asyncio does not warn if the wait was cancelled
 
 
 async def request_rates(feed: TelemetryFeed, plugin: Any, *, stands: bool = False) -> None:  # noqa: ANN401

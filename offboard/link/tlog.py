@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 from typing import BinaryIO, cast
 
-from framerunner.wire.dialect import mavlink
+from framerunner.wire.dialect import component_heartbeat, mavlink
 
 LOGGER_COMPONENT = 155  # MAV_COMP_ID_LOG
 RECEIVE_BUFFER_BYTES = 4 << 20
@@ -95,8 +95,5 @@ class TlogRecorder(asyncio.DatagramProtocol):
 
     def _send_heartbeat(self) -> None:
         sender = mavlink.MAVLink(None, srcSystem=self._system_id, srcComponent=LOGGER_COMPONENT)
-        heartbeat = sender.heartbeat_encode(
-            mavlink.MAV_TYPE_LOG, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE
-        )
         if self._transport is not None:
-            self._transport.sendto(heartbeat.pack(sender), self._peer)
+            self._transport.sendto(component_heartbeat(mavlink.MAV_TYPE_LOG).pack(sender), self._peer)

@@ -1,8 +1,8 @@
-"""One check before arming: what was found, what is allowed, what to do."""
+"""One check of a drone, before arming too: what was found, what is allowed, what to do."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from enum import Enum
@@ -46,6 +46,24 @@ class Check:
         limit = f" (allowed: {self.limit})" if self.limit else ""
         advice = f"; {self.advice}" if self.advice else ""
         return f"{self.outcome.value:8s} {self.name}: {self.value}{limit}{advice}"
+
+
+Checks = Iterator[Check]
+
+
+def good(name: str, value: str, advice: str = "") -> Check:
+    """Nothing is wrong."""
+    return Check(name, Outcome.PASS, value, advice=advice)
+
+
+def note(name: str, value: str, advice: str = "") -> Check:
+    """Worth knowing."""
+    return Check(name, Outcome.NOTE, value, advice=advice)
+
+
+def missing(name: str, value: str, advice: str = "") -> Check:
+    """Something that a flight needs is missing."""
+    return Check(name, Outcome.FAIL, value, advice=advice)
 
 
 def passed(name: str, good: bool, value: str, limit: str, advice: str) -> Check:

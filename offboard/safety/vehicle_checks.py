@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, isfinite, isnan
 from statistics import median
 
+from framerunner.wire.session.estimator import EstimatorStatus
 from offboard.safety.check import Check, Outcome, passed
+from vision.calibration.model import Calibration, Mounting
 
 BATTERY_PERCENT = 40.0
 MAX_LOST_SHARE = 0.05
@@ -18,50 +21,6 @@ CLOCK_TOLERANCE_S = 0.05  # of the vehicle's clock as the link shows it
 MIN_CAMERA_RATE_HZ = 8.0
 MAX_CAMERA_GAP_S = 0.5
 OLD_CALIBRATION_DAYS = 90
-
-
-@dataclass(frozen=True, slots=True)
-class BatteryFacts:
-    """What a vehicle reports of its battery; NaN: nothing."""
-
-    percent: float
-    voltage_v: float
-
-
-@dataclass(frozen=True, slots=True)
-class EstimatorFacts:
-    """What the estimator of a vehicle that stands reports.
-
-    Attributes:
-        reported: it was received; without it the other fields mean nothing.
-        has_attitude: the estimator knows its attitude.
-        has_position: likewise, horizontally, relative or absolute.
-        has_height: likewise.
-        largest_ratio: the largest of the innovations' test ratios.
-        message: that reports it.
-    """
-
-    reported: bool
-    has_attitude: bool = False
-    has_position: bool = False
-    has_height: bool = False
-    largest_ratio: float = 0.0
-    message: str = "ESTIMATOR_STATUS"
-
-
-@dataclass(frozen=True, slots=True)
-class LinkFacts:
-    """What was measured of the link.
-
-    Attributes:
-        lost_share: of the vehicle's packets, 0 to 1.
-        round_trips_s: of TIMESYNC requests that were answered.
-        requests: how many were sent.
-    """
-
-    lost_share: float
-    round_trips_s: tuple[float, ...]
-    requests: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,72 +48,62 @@ class CameraFacts:
     problem: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class CalibrationFacts:
-    """What is known of the camera's calibration.
-
-    Attributes:
-        calibrated_px: width and height of the images that it was made from; None: there is no calibration.
-        size_px: width and height of the camera's images; zeros: there was none.
-        angles_frd_rad: roll, pitch and yaw of the camera on the drone; None: never measured.
-        angles_std_rad: their standard deviations; None: not known.
-        made_days: since the lens was calibrated; None: not known.
-        mounting_days: likewise, since the mounting was measured.
-    """
-
-    calibrated_px: tuple[int, int] | None = None
-    size_px: tuple[int, int] = (0, 0)
-    angles_frd_rad: tuple[float, float, float] | None = None
-    angles_std_rad: tuple[float, float, float] | None = None
-    made_days: int | None = None
-    mounting_days: int | None = None
-
-
-def battery_check(facts: BatteryFacts) -> Check:
-    """Whether the battery is charged for a try and the way back."""
-    if isnan(facts.percent):
+def battery_check(percent: float, voltage_v: float) -> Check:
+    """Whether the battery is charged for a try and the way back; NaN: the vehicle reports nothing."""
+    if isnan(percent):
         advice = "measure it, then accept it by --accept battery"
         return Check("battery", Outcome.FAIL, "its charge is not reported", f"{BATTERY_PERCENT:g} %", advice)
-    volts = "" if isnan(facts.voltage_v) else f", {facts.voltage_v:.1f} V"
-    good = facts.percent >= BATTERY_PERCENT
-    value = f"{facts.percent:.0f} %{volts}"
+    volts = "" if isnan(voltage_v) else f", {voltage_v:.1f} V"
+    good = percent >= BATTERY_PERCENT
+    value = f"{percent:.0f} %{volts}"
     return passed("battery", good, value, f"{BATTERY_PERCENT:g} % or more", "charge it")
 
 
-def estimator_check(facts: EstimatorFacts) -> Check:
-    """Whether the estimator knows where the drone is, and its measurements agree."""
+def estimator_check(status: EstimatorStatus | None, message: str) -> Check:
+    """Whether the estimator knows where the drone is, and its measurements agree.
+
+    Args:
+        status: what it reports while the drone stands; None: nothing.
+        message: that reports it.
+    """
     name, limit = "estimator", f"ratios up to {MAX_RATIO:g}"
-    if not facts.reported:
-        return Check(name, Outcome.FAIL, f"no {facts.message} is received", limit, "let the link carry it")
+    if status is None:
+        return Check(name, Outcome.FAIL, f"no {message} is received", limit, "let the link carry it")
     known = {
-        "attitude": facts.has_attitude,
-        "position": facts.has_position,
-        "height": facts.has_height,
+        "attitude": status.has_attitude,
+        "position": status.has_position,
+        "height": status.has_height,
     }
     unknown = [what for what, is_known in known.items() if not is_known]
     if unknown:
         advice = "wait for its estimate; see docs/real-drone.md, step 6"
         return Check(name, Outcome.FAIL, f"it does not know its {' and '.join(unknown)}", limit, advice)
-    good = isfinite(facts.largest_ratio) and facts.largest_ratio <= MAX_RATIO
+    good = isfinite(status.largest_ratio) and status.largest_ratio <= MAX_RATIO
     advice = "keep the drone still, or correct the sensor that disagrees"
-    return passed(name, good, f"largest ratio of an innovation {facts.largest_ratio:.2f}", limit, advice)
+    return passed(name, good, f"largest ratio of an innovation {status.largest_ratio:.2f}", limit, advice)
 
 
-def link_checks(facts: LinkFacts) -> list[Check]:
-    """Whether the link loses little and answers soon."""
+def link_checks(lost_share: float, round_trips_s: Sequence[float], requests: int) -> list[Check]:
+    """Whether the link loses little and answers soon.
+
+    Args:
+        lost_share: of the vehicle's packets, 0 to 1.
+        round_trips_s: of requests for its time that were answered.
+        requests: how many were sent.
+    """
     loss = passed(
         "link loss",
-        facts.lost_share <= MAX_LOST_SHARE,
-        f"{facts.lost_share:.1%} of packets lost",
+        lost_share <= MAX_LOST_SHARE,
+        f"{lost_share:.1%} of packets lost",
         f"{MAX_LOST_SHARE:.0%}",
         "move nearer, or use a better link",
     )
     limit, advice = f"{1000 * MAX_ROUND_TRIP_S:g} ms", "use a faster link"
-    if len(facts.round_trips_s) < MIN_ANSWERS:
-        value = f"{len(facts.round_trips_s)} of {facts.requests} time requests answered"
+    if len(round_trips_s) < MIN_ANSWERS:
+        value = f"{len(round_trips_s)} of {requests} time requests answered"
         late = Check("link latency", Outcome.FAIL, value, limit, "check that the link takes requests")
         return [loss, late]
-    middle_s, worst_s = median(facts.round_trips_s), max(facts.round_trips_s)
+    middle_s, worst_s = median(round_trips_s), max(round_trips_s)
     value = f"round trip {1000 * middle_s:.0f} ms, at worst {1000 * worst_s:.0f} ms"
     return [loss, passed("link latency", worst_s <= MAX_ROUND_TRIP_S, value, limit, advice)]
 
@@ -193,33 +142,43 @@ def _camera_delay_check(facts: CameraFacts) -> Check:
     return passed(name, good, value, limit, advice)
 
 
-def calibration_checks(facts: CalibrationFacts) -> list[Check]:
-    """Whether the camera's lens and its mounting on the drone were measured, for missions that map frames."""
+def calibration_checks(
+    calibration: Calibration | None, size_px: tuple[int, int], days_since: Callable[[str | None], int | None]
+) -> list[Check]:
+    """Whether the camera's lens and its mounting on the drone were measured, for missions that map frames.
+
+    Args:
+        calibration: of the camera; None: there is none.
+        size_px: width and height of the camera's images; zeros: there was none.
+        days_since: a day that the calibration names; None: not known.
+    """
     name = "camera calibration"
-    if facts.calibrated_px is None:
+    if calibration is None:
         advice = "run framerunner camera calibrate, then camera extrinsics, and give --calibration"
         return [Check(name, Outcome.NOTE, "none: the scenario's camera is assumed", "", advice)]
-    (width, height), (seen_width, seen_height) = facts.calibrated_px, facts.size_px
-    limit = f"images of {width} × {height}"
-    if any(facts.size_px) and facts.size_px != facts.calibrated_px:
-        value = f"images have {seen_width} × {seen_height}"
+    calibrated_px, mounting = (calibration.width_px, calibration.height_px), calibration.mounting
+    mounted = _mounting_check(mounting, None if mounting is None else days_since(mounting.measured_on))
+    limit = f"images of {calibrated_px[0]} × {calibrated_px[1]}"
+    if any(size_px) and size_px != calibrated_px:
+        value = f"images have {size_px[0]} × {size_px[1]}"
         advice = "calibrate it with images as it gives them in flight"
-        return [Check(name, Outcome.FAIL, value, limit, advice), _mounting_check(facts)]
+        return [Check(name, Outcome.FAIL, value, limit, advice), mounted]
     advice = "make it again if lens, focus or resolution were changed since"
-    return [_aged(Check(name, Outcome.PASS, "made", limit), facts.made_days, advice), _mounting_check(facts)]
+    made_days = days_since(calibration.made_on)
+    return [_aged(Check(name, Outcome.PASS, "made", limit), made_days, advice), mounted]
 
 
-def _mounting_check(facts: CalibrationFacts) -> Check:
+def _mounting_check(mounting: Mounting | None, days: int | None) -> Check:
     name = "camera mounting"
-    if facts.angles_frd_rad is None:
+    if mounting is None:
         value = "never measured; the camera is taken to look straight ahead"
         return Check(name, Outcome.NOTE, value, "", "run framerunner camera extrinsics")
-    roll, pitch, yaw = (degrees(angle) for angle in facts.angles_frd_rad)
+    roll, pitch, yaw = (degrees(angle) for angle in mounting.angles_frd_rad)
     value = f"roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"
-    if facts.angles_std_rad is not None:
-        value += f" (1 sigma {', '.join(f'{degrees(each):.2f}' for each in facts.angles_std_rad)})"
+    if mounting.angles_std_rad is not None:
+        value += f" (1 sigma {', '.join(f'{degrees(each):.2f}' for each in mounting.angles_std_rad)})"
     advice = "measure it again if the camera or the drone's markers were moved since"
-    return _aged(Check(name, Outcome.PASS, f"{value}, measured"), facts.mounting_days, advice)
+    return _aged(Check(name, Outcome.PASS, f"{value}, measured"), days, advice)
 
 
 def _aged(check: Check, days: int | None, advice: str) -> Check:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.dialect import Message, companion_heartbeat, mavlink
 from framerunner.wire.framing import HEADER_BYTES_V2, MARKERS, PacketReader, message_id_of, packed
 from framerunner.wire.transports.sockets import Address, UdpSocket, connect_udp
 from sitl.autopilots.sole_sender import SoleSender
@@ -71,8 +71,7 @@ class AppRelay:
         commands as PX4 takes them, with NaN, at which ArduPilot's simulation ends with a floating point
         exception.
         """
-        kind, none = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
-        self._tell(mavlink.MAVLink_heartbeat_message(kind, none, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
+        self._tell(companion_heartbeat())
 
     def flush(self) -> None:
         """Send to ArduPilot what the app has sent, in few datagrams; it must have sent something before."""

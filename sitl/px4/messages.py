@@ -5,7 +5,6 @@ Formats and checksum seeds are those of pymavlink's definitions; only its slow p
 
 from __future__ import annotations
 
-import binascii
 from collections.abc import Iterator
 from dataclasses import dataclass
 from struct import Struct
@@ -15,29 +14,20 @@ from framerunner.wire.framing import (
     CHECKSUM_BYTES,
     CRC_EXTRA,
     HEADER_BYTES_V2,
+    HEADER_V2,
     MARKER_V2,
     SIGNATURE_BYTES,
     SIGNED,
+    checksum,
 )
 
-_HEADER = Struct("<BBBBBBBHB")
 _CHECKSUM = Struct("<H")
-_REVERSED = bytes(int(f"{value:08b}"[::-1], 2) for value in range(256))
 SIMULATOR_SYSTEM_ID = 1
 SIMULATOR_COMPONENT_ID = 200  # the component PX4's own simulators use
 LOCKSTEP_FLAG = 1  # of HIL_ACTUATOR_CONTROLS
 _AUTOPILOT = slice(5, 6)  # in the payload of HEARTBEAT
 _PX4 = bytes([mavlink.MAV_AUTOPILOT_PX4])
 ARMED_FLAG = int(mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
-
-
-def checksum(data: bytes, seed: int) -> int:
-    """MAVLink's checksum of a packet without its marker: CRC-16/MCRF4XX over the data and the seed.
-
-    It is the CRC that `binascii.crc_hqx` computes, with the bits of each byte and of the result reversed.
-    """
-    crc = binascii.crc_hqx(data.translate(_REVERSED) + _REVERSED[seed : seed + 1], 0xFFFF)
-    return _REVERSED[crc & 0xFF] << 8 | _REVERSED[crc >> 8]
 
 
 class Packer:
@@ -68,7 +58,7 @@ class Packer:
         payload = self._pack(*fields).rstrip(b"\0") or b"\0"
         self._sequence = (self._sequence + 1) & 0xFF
         low, high = self._message_id & 0xFFFF, self._message_id >> 16
-        head = _HEADER.pack(MARKER_V2, len(payload), 0, 0, self._sequence, *self._sender, low, high)
+        head = HEADER_V2.pack(MARKER_V2, len(payload), 0, 0, self._sequence, *self._sender, low, high)
         body = head + payload
         return body + _CHECKSUM.pack(checksum(body[1:], self._crc_extra))
 
@@ -119,7 +109,7 @@ class ControlsReader:
             position = start
             if len(buffer) - start < HEADER_BYTES_V2:
                 break
-            _, length, flags, *_, low, high = _HEADER.unpack_from(buffer, start)
+            _, length, flags, *_, low, high = HEADER_V2.unpack_from(buffer, start)
             end = start + HEADER_BYTES_V2 + length
             packet_end = end + CHECKSUM_BYTES + (SIGNATURE_BYTES if flags & SIGNED else 0)
             if len(buffer) < packet_end:

@@ -25,7 +25,7 @@ from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flying.plan import FlightPlan
 from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box
-from offboard.link.dialect import Px4Dialect
+from offboard.link.px4 import Px4Dialect
 from offboard.link.telemetry import TelemetryFeed
 from offboard.link.ticks import Requester, TickSource
 from offboard.link.watchdog import LIMITS
@@ -171,7 +171,7 @@ class LinkedVehicle:
         fields = {"time_boot_ms": state.time_us // 1000}
         fields |= zip("xyz", state.position_ned_m, strict=True)
         fields |= zip(("vx", "vy", "vz"), state.velocity_ned_m_s, strict=True)
-        position = SimpleNamespace(fields_json=json.dumps(fields))
+        position = SimpleNamespace(system_id=1, component_id=1, fields_json=json.dumps(fields))
 
         def arrive():
             self.direct.call("LOCAL_POSITION_NED", position)

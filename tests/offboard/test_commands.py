@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from offboard.link.commands import PendingRequests
+from offboard.link.ticks import PendingRequests
 
 
 async def test_a_request_continues_when_the_wait_for_it_is_cancelled():

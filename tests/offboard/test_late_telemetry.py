@@ -42,7 +42,8 @@ class Plugin:
 
     def position(self, ms, x):
         told = {"time_boot_ms": ms, "x": x, "y": 0.0, "z": None, "vx": 0.0, "vy": 0.0, "vz": 0.0}
-        self.called["LOCAL_POSITION_NED"](SimpleNamespace(fields_json=json.dumps(told)), None)
+        message = SimpleNamespace(system_id=1, component_id=1, fields_json=json.dumps(told))
+        self.called["LOCAL_POSITION_NED"](message, None)
 
 
 async def test_ticks_and_positions_never_go_back():

@@ -47,8 +47,8 @@ class Vehicle:
         fields |= {"child_frame_id": 12 if self.body_frame else 1, "reset_counter": self.resets}
         fields |= {"x": self.x, "y": self.y, "z": -1.5, "q": [cos(self.yaw / 2), 0.0, 0.0, sin(self.yaw / 2)]}
         fields |= {"vx": vx, "vy": vy, "vz": 0.0, "rollspeed": 0.0, "pitchspeed": 0.0, "yawspeed": self.turn}
-        message = SimpleNamespace(component_id=component, fields_json=json.dumps(fields | changed))
-        self.callback(message, None)
+        told = json.dumps(fields | changed)
+        self.callback(SimpleNamespace(system_id=1, component_id=component, fields_json=told), None)
         return self
 
 

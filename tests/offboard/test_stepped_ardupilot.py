@@ -2,7 +2,7 @@
 
 from framerunner.wire.dialect import mavlink
 from offboard.drone import VelocityCommand
-from offboard.link.stepped_ardupilot import SteppedArduPilotDialect
+from offboard.link.ardupilot import SteppedArduPilotDialect
 from offboard.link.telemetry import TelemetryFeed
 from tests.offboard.test_stepped_px4 import FakePlugin
 

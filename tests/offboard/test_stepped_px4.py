@@ -8,9 +8,9 @@ import pytest
 
 from framerunner.wire.dialect import mavlink
 from offboard.drone import DroneError, VelocityCommand
-from offboard.link import stepped, stepped_px4
+from offboard.link import px4, stepped
 from offboard.link.direct import CommandRefusedError
-from offboard.link.stepped_px4 import SteppedPx4Dialect
+from offboard.link.px4 import SteppedPx4Dialect
 
 FORWARD = VelocityCommand(forward_m_s=1.0, left_m_s=0.5, up_m_s=0.25, yaw_rate_rad_s=0.1)
 
@@ -38,7 +38,9 @@ class FakePlugin:
             self.receive("COMMAND_ACK", {"command": fields["command"], "result": self.result})
 
     def receive(self, name, fields):
-        self.callbacks[name](SimpleNamespace(fields_json=json.dumps(fields)), None)
+        self.callbacks[name](
+            SimpleNamespace(system_id=1, component_id=1, fields_json=json.dumps(fields)), None
+        )
 
     def names(self):
         names = [name for name, _ in self.sent]
@@ -113,7 +115,7 @@ async def test_px4_that_never_answers_is_an_error(plugin, dialect, monkeypatch):
 async def test_after_a_request_for_a_stream_no_echo_is_awaited_before_time_goes_on(
     plugin, dialect, monkeypatch
 ):
-    monkeypatch.setattr(stepped_px4, "_TAKEN_S", 0.0)
+    monkeypatch.setattr(px4, "_TAKEN_S", 0.0)
     await dialect.request_streams()
     plugin.names()
     await dialect.before_tick()

@@ -8,9 +8,8 @@ from mavsdk.asyncio import MavsdkError
 
 from offboard.drone import VelocityCommand
 from offboard.link import ticks
-from offboard.link.commands import PendingRequests
 from offboard.link.telemetry import MAX_JITTER_S, TelemetryFeed
-from offboard.link.ticks import TickSource, request_rates
+from offboard.link.ticks import PendingRequests, TickSource, request_rates
 
 COMMAND = VelocityCommand(forward_m_s=0.5)
 

@@ -187,7 +187,7 @@ def station(sim, instance):
     station = Station(14550 + instance, instance + 1)
     station.wait("HEARTBEAT", 20.0)
     # pymavlink has changed to MAVLink 2; it lacks COMPONENT_METADATA.
-    mavutil.mavlink.mavlink_map.update(extra_messages.mavlink_map)
+    extra_messages.add_to(mavutil.mavlink)
     yield station
     station.link.close()
 

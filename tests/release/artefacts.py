@@ -20,7 +20,6 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("framerunner", "sitl", "firmware_py", "offboard", "vision", "scenarios")
-NOT_IN_THE_WHEEL = frozenset({"framerunner/wire/extra_messages.xml"})  # a source, see `make messages`
 IN_THE_SDIST = frozenset({"CHANGELOG.md", "LICENSE", "PKG-INFO", "README.md", "pyproject.toml", "setup.cfg"})
 MAX_WHEEL_MB = 3.0
 MAX_SDIST_MB = 3.0
@@ -72,7 +71,7 @@ def wheel_defects(wheel: Path) -> list[str]:
     with zipfile.ZipFile(wheel) as file:
         contents = {name: file.read(name) for name in file.namelist() if not name.endswith("/")}
     shipped = {name: text for name, text in contents.items() if ".dist-info/" not in name}
-    wanted = set(tracked_files(*PACKAGES)) - NOT_IN_THE_WHEEL
+    wanted = set(tracked_files(*PACKAGES))
     packages = {name.partition("/")[0] for name in shipped}
     defects = [] if packages == set(PACKAGES) else [f"top-level packages: {', '.join(sorted(packages))}"]
     defects += [f"not in the wheel: {name}" for name in sorted(wanted - set(shipped))]
@@ -90,7 +89,7 @@ def sdist_defects(sdist: Path) -> list[str]:
     with tarfile.open(sdist) as file:
         names = {each.name.partition("/")[2] for each in file.getmembers() if each.isfile()}
     found = {name for name in names if ".egg-info/" not in name}
-    wanted = {*tracked_files(*PACKAGES, "examples"), *IN_THE_SDIST} - NOT_IN_THE_WHEEL
+    wanted = {*tracked_files(*PACKAGES, "examples"), *IN_THE_SDIST}
     defects = [f"not in the sdist: {name}" for name in sorted(wanted - found)]
     defects += [f"in the sdist without need: {name}" for name in sorted(found - wanted - {"MANIFEST.in"})]
     return [*defects, *_too_large(sdist, MAX_SDIST_MB)]

@@ -18,13 +18,13 @@ from typing import Literal
 from firmware_py.commander_table import ARMING_DENIED, TABLE, Event
 from firmware_py.estimation.report import PROBLEMS
 from firmware_py.status import NAVIGATION_STATES, CommandResult, FlightMode
+from framerunner.wire.dialect import event_id
 
 COMPONENT = 1  # the upper eight bits of every id: the autopilot
 NAMESPACE = "framerunner"
 ARGUMENT_BYTES = 40
 PROTOCOL_LEVEL = 8  # a log level beyond MAV_SEVERITY: for programs, not shown to people
 
-_FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
 _FORMATS = {
     "uint8_t": "B",
     "uint16_t": "H",
@@ -51,16 +51,13 @@ class EventKind:
 
     @property
     def sub_id(self) -> int:
-        """The lower 24 bits of the id: those of the name's 32 bit FNV-1a hash, as in PX4."""
-        value = _FNV_OFFSET
-        for byte in self.name.encode():
-            value = (value ^ byte) * _FNV_PRIME & 0xFFFFFFFF
-        return value & 0xFFFFFF
+        """The lower 24 bits of the id."""
+        return self.id & 0xFFFFFF
 
     @property
     def id(self) -> int:
         """EVENT's id."""
-        return COMPONENT << 24 | self.sub_id
+        return event_id(self.name)
 
     def packed(self, *values: float) -> bytes:
         """EVENT's arguments: the values, padded to 40 bytes."""

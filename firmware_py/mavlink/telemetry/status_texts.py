@@ -14,8 +14,8 @@ from firmware_py.mavlink.service import Service
 from firmware_py.types import StatusText
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.exchange import Exchange
+from framerunner.wire.status_text import PIECE_BYTES, statustexts
 
-_PIECE = 50
 _KEPT = 8
 _STALE_US = 5_000_000
 
@@ -67,12 +67,6 @@ class StatusTextService(Service):
     def _pieces(self, text: StatusText) -> list[Message]:
         data = text.text.encode("ascii", "replace")
         severity = min(max(text.severity, 0), mavlink.MAV_SEVERITY_DEBUG)
-        if len(data) <= _PIECE:
-            return [mavlink.MAVLink_statustext_message(severity, data, 0, 0)]
-        self._last_id = self._last_id % 0xFFFF + 1
-        # A text that fills its last piece needs an empty one after it, or the receiver waits for more.
-        starts = range(0, len(data) + 1, _PIECE)
-        return [
-            mavlink.MAVLink_statustext_message(severity, data[start : start + _PIECE], self._last_id, place)
-            for place, start in enumerate(starts)
-        ]
+        if len(data) > PIECE_BYTES:
+            self._last_id = self._last_id % 0xFFFF + 1
+        return statustexts(severity, data, self._last_id)

@@ -7,14 +7,14 @@ from collections.abc import Collection
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from urllib.parse import SplitResult, urlsplit
 
-from framerunner.monitor.vehicle.link_quality import RepeatedRequest
 from framerunner.wire.dialect import Message, mavlink, request_message
+from framerunner.wire.session.session import Request
 from framerunner.wire.simulator_api import VIDEO_PATH
 from framerunner.wire.status_text import plain
 from framerunner.wire.transports.urls import LinkError, in_url, parse_url
 
 CAMERAS = range(mavlink.MAV_COMP_ID_CAMERA, mavlink.MAV_COMP_ID_CAMERA6 + 1)
-_MAX_REQUESTS = 8
+_MAX_REQUESTS, _REPEAT_S = 8, 2.0
 _PATH = re.compile(r"(?:/[\w-][\w.-]{0,60}){0,5}/?", re.ASCII)
 _WEB_PORTS = (80, 443)
 _FIRST_FREE_PORT = 1024  # lower ones belong to other services
@@ -38,8 +38,7 @@ class CameraWatch:
         self._id = drone_id
         self._link_host = link_host
         self._confirmed = confirmed
-        self._request: RepeatedRequest | None = None
-        self._answered = False
+        self._request: Request[None] | None = None
         self.url: str | None = None
         self.problem = ""
 
@@ -47,15 +46,17 @@ class CameraWatch:
         """Take a component's heartbeat; the first camera counts."""
         if component in CAMERAS and self._request is None:
             number = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
-            self._request = RepeatedRequest(request_message(self._id, number, component), _MAX_REQUESTS)
+            message = request_message(self._id, number, component)
+            self._request = Request(message, lambda _: None, tries=_MAX_REQUESTS, every_s=_REPEAT_S)
 
     def request(self, now_s: float) -> Message | None:
         """The request to send now; None: none."""
-        return None if self._request is None or self._answered else self._request.due(now_s)
+        return None if self._request is None else self._request.due(now_s)
 
     def take(self, message: Message, host: str) -> None:
         """Take VIDEO_STREAM_INFORMATION from a host; the first stream that can be shown counts."""
-        self._answered = True
+        if self._request is not None:
+            self._request.end()
         url = plain(bytes(message._uri_raw), 200)
         if self.url is not None or not url.startswith(("http:", "https:")):
             return

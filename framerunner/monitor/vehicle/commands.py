@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 import asyncio
-from collections import defaultdict
 from collections.abc import Callable
-from contextlib import nullcontext
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass
 from math import isfinite, nan
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from framerunner.monitor.vehicle.texts import Texts
 from framerunner.wire import px4_modes
-from framerunner.wire.dialect import Message, command_long, mavlink
+from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.px4_modes import Px4Mode
+from framerunner.wire.session.session import Request, Session
 from framerunner.wire.vehicle_telemetry import VehicleTelemetry
 
 OWN_SYSTEM = 250
 STICKS_HZ = 25.0
-_ANSWER_S = 0.5
-_TRIES = 3
-_PROGRESS_S = 5.0  # wait for the answer after "in progress"
 _SHOWN_S = 3.0  # wait for telemetry to show what was accepted
 _POLL_S = 0.05
 _REASON_S = 0.3  # wait after a refusal for a text with its reason
 _FORCE = 21196.0
 
 Send = Callable[[Message], None]
+T = TypeVar("T")
 
 _RESULTS = {
     mavlink.MAV_RESULT_TEMPORARILY_REJECTED: "refused for now",
@@ -99,72 +97,6 @@ def _manual_control(system_id: int, sticks: Sticks) -> Message:
     )
 
 
-@dataclass(slots=True)
-class _Pending:
-    """A command that was sent and not yet answered."""
-
-    answer: asyncio.Future[int] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
-    in_progress: bool = False
-
-
-class CommandSender:
-    """Sends commands to one vehicle's autopilot and waits for COMMAND_ACK.
-
-    An acknowledgement names only the command's number, so commands of one number are sent one after another.
-    """
-
-    def __init__(self, system_id: int, send: Send) -> None:
-        self._system = system_id
-        self._send = send
-        self._pending: dict[int, _Pending] = {}
-        self._locks: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
-
-    async def request(self, number: int, *parameters: float, urgent: bool = False) -> int | None:
-        """Send a command and wait for its acknowledgement.
-
-        Args:
-            number: MAV_CMD.
-            *parameters: the first ones of seven; the others are 0.
-            urgent: is sent at once; a command of the same number that is not answered yet gets no answer.
-
-        Returns:
-            MAV_RESULT; None: no answer.
-        """
-        earlier = self._pending.get(number)
-        if urgent and earlier is not None and not earlier.answer.done():
-            earlier.answer.cancel()
-        async with nullcontext() if urgent else self._locks[number]:
-            pending = self._pending[number] = _Pending()
-            try:
-                return await self._send_until_answered(pending, number, parameters)
-            finally:
-                if self._pending.get(number) is pending:
-                    del self._pending[number]
-
-    def take(self, message: Message) -> None:
-        """Take a COMMAND_ACK of the autopilot."""
-        pending = self._pending.get(message.command)
-        if pending is None or message.target_system not in (0, OWN_SYSTEM) or pending.answer.done():
-            return
-        if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
-            pending.in_progress = True
-        else:
-            pending.answer.set_result(message.result)
-
-    async def _send_until_answered(
-        self, pending: _Pending, number: int, parameters: tuple[float, ...]
-    ) -> int | None:
-        for confirmation in range(_TRIES):
-            self._send(command_long(self._system, number, *parameters, confirmation=confirmation))
-            await asyncio.wait([pending.answer], timeout=_ANSWER_S)
-            while pending.in_progress and not pending.answer.done():
-                pending.in_progress = False
-                await asyncio.wait([pending.answer], timeout=_PROGRESS_S)
-            if pending.answer.done():
-                return None if pending.answer.cancelled() else pending.answer.result()
-        return None
-
-
 @dataclass(frozen=True, slots=True)
 class _Step:
     """A command, and whether telemetry shows its effect."""
@@ -209,8 +141,26 @@ ORDERS: dict[str, tuple[tuple[_Step, ...], str]] = {
 }
 
 
-async def carry_out(what: str, sender: CommandSender, telemetry: VehicleTelemetry, texts: Texts) -> Answer:
+async def answered(request: Request[T], session: Session, send: Send) -> T | None:
+    """Send what a session has to send until a request is over; its answer."""
+    loop = asyncio.get_running_loop()
+    over = asyncio.Event()
+    request.on_over = over.set
+    try:
+        while not request.over:
+            for message in session.due(loop.time()):
+                send(message)
+            with suppress(TimeoutError):
+                async with asyncio.timeout_at(max(request.due_s, loop.time() + _POLL_S)):
+                    await over.wait()
+    finally:
+        request.end()  # if this was cancelled
+    return request.answer
+
+
+async def carry_out(what: str, session: Session, send: Send, texts: Texts) -> Answer:
     """Carry out one of `ORDERS` and check that the telemetry, which is updated meanwhile, shows it."""
+    telemetry = session.telemetry
     if what not in ORDERS:
         return Answer(False, f"{what!r} is no order; there are {', '.join(sorted(ORDERS))}")
     steps, done = ORDERS[what]
@@ -220,19 +170,20 @@ async def carry_out(what: str, sender: CommandSender, telemetry: VehicleTelemetr
         text = "this drone does not have PX4's modes; only arming and stopping can be ordered here"
         return Answer(False, text)
     for step in steps:
-        problem = await _follow(step, sender, telemetry, texts)
+        problem = await _follow(step, session, send, texts)
         if problem:
             return Answer(False, f"{what.replace('_', ' ')}: {problem}")
     return Answer(True, done)
 
 
-async def _follow(step: _Step, sender: CommandSender, telemetry: VehicleTelemetry, texts: Texts) -> str:
+async def _follow(step: _Step, session: Session, send: Send, texts: Texts) -> str:
     """Take a step. Returns "" or what went wrong."""
     count = texts.warnings
-    result = await sender.request(step.number, *step.parameters, urgent=step.urgent)
+    command = session.command(step.number, *step.parameters, urgent=step.urgent)
+    result = await answered(command, session, send)
     accepted = result == mavlink.MAV_RESULT_ACCEPTED
     if (accepted or (step.urgent and result is None)) and await _wait(
-        lambda: step.is_done(telemetry), _SHOWN_S
+        lambda: step.is_done(session.telemetry), _SHOWN_S
     ):
         return ""
     if result is None:

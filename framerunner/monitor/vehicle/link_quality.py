@@ -1,23 +1,17 @@
-"""How well a vehicle is received, and requests for messages that it does not send often enough."""
+"""How well a vehicle is received."""
 
 from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
 
-from framerunner.wire.dialect import Message, mavlink, request_rate
-from framerunner.wire.framing import missing_before
+from framerunner.wire.framing import SequenceCounter
 
 _SPAN_S = 10
 _MAX_MISSING = 200  # a sequence number that is farther ahead belongs to a packet that was overtaken
 
 STALE_S = 1.0
 LOST_S = 3.0
-_REPEAT_S = 2.0
-_MAX_RATE_REQUESTS = 5
-_RATE_SPAN_S = 3.0  # over which rates are measured
-_ENOUGH_HZ = 15.0
-_REQUESTED_HZ = 25.0
 
 
 @dataclass(slots=True)
@@ -36,7 +30,7 @@ class LinkQuality:
 
     def __init__(self, now_s: float) -> None:
         self.heard_s = now_s
-        self._sequence: int | None = None
+        self._packets = SequenceCounter(_MAX_MISSING)
         self._seconds: deque[_Second] = deque([_Second(now_s)], maxlen=_SPAN_S)
 
     def count(self, sequence: int, now_s: float) -> None:
@@ -47,16 +41,11 @@ class LinkQuality:
             second = _Second(now_s)
             self._seconds.append(second)
         second.heard += 1
-        if self._sequence is not None:
-            missing = missing_before(sequence, self._sequence, _MAX_MISSING)
-            second.lost += missing  # -1: counted as missing before, and received now
-            if missing < 0:
-                return
-        self._sequence = sequence
+        second.lost += self._packets.take(sequence)  # -1: counted as missing before, and received now
 
     def forget_sequence(self) -> None:
         """Accept any next sequence number: the vehicle has restarted."""
-        self._sequence = None
+        self._packets = SequenceCounter(_MAX_MISSING)
 
     def age_s(self, now_s: float) -> float:
         """Time since the last packet."""
@@ -79,47 +68,3 @@ class LinkQuality:
             "loss_percent": round(100 * lost / (heard + lost), 1) if heard else 0.0,
             "rate_hz": round(heard / span_s, 1),
         }
-
-
-class RepeatedRequest:
-    """A request that is sent every two seconds while it is not answered, `count` times at most."""
-
-    def __init__(self, message: Message, count: int) -> None:
-        self._message = message
-        self._left = count
-        self._sent_s = -1e9
-
-    def due(self, now_s: float) -> Message | None:
-        """The message, if it is to be sent now."""
-        if not self._left or now_s - self._sent_s < _REPEAT_S:
-            return None
-        self._sent_s = now_s
-        self._left -= 1
-        return self._message
-
-
-class RateWatch:
-    """Requests more attitudes and positions where they are too slow for a smooth display."""
-
-    def __init__(self, system_id: int, now_s: float) -> None:
-        self._id = system_id
-        self._since_s = now_s
-        self._counts = (0, 0)
-        self._requests = 0
-
-    def requests(self, counts: tuple[int, int], now_s: float) -> list[Message]:
-        """The messages to send now, by the numbers of attitudes and positions so far."""
-        span_s = now_s - self._since_s
-        if span_s < _RATE_SPAN_S:
-            return []
-        rates_hz = [(now - then) / span_s for now, then in zip(counts, self._counts, strict=True)]
-        self._since_s, self._counts = now_s, counts
-        if not any(counts) or min(rates_hz) >= _ENOUGH_HZ or self._requests >= _MAX_RATE_REQUESTS:
-            return []
-        self._requests += 1
-        numbers = (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
-        return [
-            request_rate(self._id, number, _REQUESTED_HZ)
-            for number, rate_hz in zip(numbers, rates_hz, strict=True)
-            if rate_hz < _ENOUGH_HZ
-        ]

@@ -12,8 +12,8 @@ from typing import Any
 
 from framerunner.monitor.ports import Equipment
 from framerunner.monitor.vehicle.camera import CAMERAS, CameraWatch
-from framerunner.monitor.vehicle.commands import Answer, CommandSender, StickStream, carry_out
-from framerunner.monitor.vehicle.link_quality import LinkQuality, RateWatch, RepeatedRequest
+from framerunner.monitor.vehicle.commands import OWN_SYSTEM, Answer, StickStream, carry_out
+from framerunner.monitor.vehicle.link_quality import LinkQuality
 from framerunner.monitor.vehicle.mission import MissionView
 from framerunner.monitor.vehicle.referees import RefereeChannel, scenario_of
 from framerunner.monitor.vehicle.texts import Texts
@@ -21,13 +21,16 @@ from framerunner.monitor.vehicle.track import History, Placement
 from framerunner.monitor.vehicle.tries import Judging, TryEvent
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink, request_message
 from framerunner.wire.mission_tunnel import COMPONENT_ID as APP
+from framerunner.wire.session.session import Request, Session, pose_rates
 from framerunner.wire.simulator_api import SimulatorApi
-from framerunner.wire.vehicle_telemetry import VehicleTelemetry
 from scenarios.models import Scenario
 from scenarios.result import Standing
 
 _FRESH_S = 1.0
-_MAX_BOOT_TIME_REQUESTS = 5
+_MAX_BOOT_TIME_REQUESTS, _REPEAT_S = 5, 2.0
+_WANTED_HZ, _ENOUGH = 25.0, 0.6
+_RATE_SPAN_S = 3.0  # over which rates are measured
+_MAX_RATE_REQUESTS = 5
 _OTHER_BOOT_US = 10_000_000  # a referee whose clock is so far ahead reports the boot before
 
 JsonMessage = dict[str, Any]
@@ -75,11 +78,11 @@ class Vehicle:
         self._equipment = equipment
         self._callbacks = callbacks
         self._was_lost_s: float | None = None
-        self._telemetry = VehicleTelemetry()
+        self._session = Session(OWN_SYSTEM, drone_id)
+        self._telemetry = self._session.telemetry
         self._channel: RefereeChannel | None = None
         self._channel_task: asyncio.Task[None] | None = None
         self._texts = Texts(drone_id, callbacks.publish)
-        self._commands = CommandSender(drone_id, callbacks.send)
         scenario, start_pose = equipment.scenario, equipment.start_pose
         self._start_pose = start_pose(scenario) if scenario is not None and start_pose is not None else None
         self._drawn: tuple[Scenario, JsonMessage] | None = None
@@ -93,8 +96,10 @@ class Vehicle:
         self._mission = MissionView(self.id)
         self._judging = Judging(self.id, self._equipment, self._callbacks.publish_try, now_s)
         boot_time = request_message(self.id, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
-        self._boot_time = RepeatedRequest(boot_time, _MAX_BOOT_TIME_REQUESTS)
-        self._rates = RateWatch(self.id, now_s)
+        self._boot_time: Request[None] = Request(
+            boot_time, lambda _: None, tries=_MAX_BOOT_TIME_REQUESTS, every_s=_REPEAT_S
+        )
+        self._rates = pose_rates(_WANTED_HZ, _ENOUGH, _RATE_SPAN_S, now_s, _MAX_RATE_REQUESTS)
         self._restarts = self._telemetry.restarts
         self._has_flown = False
         self._result_crc: int | None = None
@@ -132,7 +137,7 @@ class Vehicle:
 
     async def do(self, what: str) -> Answer:
         """Carry out an order; see `Fleet.do`."""
-        return await carry_out(what, self._commands, self._telemetry, self._texts)
+        return await carry_out(what, self._session, self._callbacks.send, self._texts)
 
     def close(self) -> None:
         """Stop its sticks and the requests to its referee."""
@@ -205,10 +210,7 @@ class Vehicle:
         return [*self._mission.standing(), self._history_message()]
 
     def _take_autopilot(self, message: Message, number: int, now_s: float) -> None:
-        if number == mavlink.MAVLINK_MSG_ID_COMMAND_ACK:
-            self._commands.take(message)
-            return
-        is_newest = self._telemetry.take(message, now_s)
+        is_newest = self._session.take(message, now_s)
         if self._telemetry.restarts != self._restarts:
             self._judging.close()
             self.link.forget_sequence()
@@ -288,11 +290,11 @@ class Vehicle:
             self._callbacks.notice("warning", f"drone {self.id}, mission: {mission.problem}")
 
     def _send_requests(self, now_s: float) -> None:
-        telemetry = self._telemetry
+        counts = self._session.stream_counts
         requests = [
-            self._boot_time.due(now_s) if telemetry.boot_unix_us is None else None,
+            self._boot_time.due(now_s) if self._telemetry.boot_unix_us is None else None,
             self.camera.request(now_s),
-            *self._rates.requests((telemetry.attitudes, telemetry.positions), now_s),
+            *(self._rates.requests(self.id, counts, now_s) if any(counts.values()) else ()),
         ]
         for request in requests:
             if request is not None:

@@ -179,8 +179,9 @@ def test_a_live_drone_is_only_watched() -> None:
     half = 0.3  # heading 0.6 rad east of north
     attitude = mavlink.MAVLink_attitude_quaternion_message(1000, 0.955336, 0.0, 0.0, 0.295520, 0.0, 0.0, 0.0)
     position = mavlink.MAVLink_local_position_ned_message(1010, 1.0, 2.0, -3.0, 0.1, 0.2, -0.3)
-    watched.take_messages([received(each) for each in (heartbeat, attitude, position)], 5.0)
-    assert watched.vehicle == 7
+    for each in (heartbeat, attitude, position):
+        watched.take(received(each), 5.0)
+    assert watched.system_id == 7
     last = watched.reports[-1]
     assert (last.time_us, last.position_time_us) == (1_000_000, 1_010_000)
     assert last.position_m == pytest.approx((1.0, -2.0, 3.0))
@@ -188,6 +189,6 @@ def test_a_live_drone_is_only_watched() -> None:
     assert last.attitude == pytest.approx(quaternion_from_euler(0.0, 0.0, -2 * half), abs=1e-5)
     early = mavlink.MAVLink_attitude_quaternion_message(50_000, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     late = mavlink.MAVLink_attitude_quaternion_message(10, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    messages = [received(early), received(late)]
+    watched.take(received(early), 60.0)
     with pytest.raises(DroneError, match="restarted"):
-        watched.take_messages(messages, 60.0)
+        watched.take(received(late), 60.0)

@@ -4,9 +4,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega
 
 from framerunner.doctor.checks import can_fly, examine
-from framerunner.doctor.findings import Level
 from framerunner.doctor.listen import ARDUPILOT_PARAMETERS, PARAMETERS, open_requests
 from framerunner.wire.dialect import mavlink
+from offboard.safety.check import Outcome
 from tests.framerunner.doctor.test_checks import healthy, heartbeat, put, sys_status
 
 GOOD = {
@@ -39,12 +39,12 @@ def copter(**parameters):
 
 
 def subjects(record, level):
-    return {finding.subject for finding in examine(record) if finding.level is level}
+    return {finding.name for finding in examine(record) if finding.outcome is level}
 
 
 def test_a_copter_with_external_navigation_can_fly():
     assert can_fly(examine(copter()))
-    assert subjects(copter(), Level.NOTE) == set()
+    assert subjects(copter(), Outcome.NOTE) == set()
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_a_copter_with_external_navigation_can_fly():
     ],
 )
 def test_what_a_parameter_shows_to_be_missing(name, value, subject):
-    assert subjects(copter(**{name: value}), Level.MISSING) == {subject}
+    assert subjects(copter(**{name: value}), Outcome.FAIL) == {subject}
 
 
 @pytest.mark.parametrize(
@@ -71,13 +71,13 @@ def test_what_a_parameter_shows_to_be_missing(name, value, subject):
 )
 def test_what_a_parameter_shows_to_be_in_doubt(name, value, subject):
     record = copter(**{name: value})
-    assert subjects(record, Level.NOTE) == {subject}
+    assert subjects(record, Outcome.NOTE) == {subject}
     assert can_fly(examine(record))
 
 
 def test_an_exact_gps_is_enough_and_a_usual_one_is_not():
     record = copter(EK3_SRC1_POSXY=3.0)
-    for accuracy_mm, level in ((50, Level.GOOD), (900, Level.MISSING)):
+    for accuracy_mm, level in ((50, Outcome.PASS), (900, Outcome.FAIL)):
         put(record, mavlink.MAVLink_gps_raw_int_message(0, 3, 0, 0, 0, 0, 0, 0, 0, 10, 0, accuracy_mm))
         assert "position" in subjects(record, level)
 
@@ -85,21 +85,21 @@ def test_an_exact_gps_is_enough_and_a_usual_one_is_not():
 def test_an_estimator_that_rejects_measurements_is_found():
     record = copter()
     record.latest["EKF_STATUS_REPORT"] = ekf(variance=0.9)
-    assert subjects(record, Level.MISSING) == {"estimator"}
+    assert subjects(record, Outcome.FAIL) == {"estimator"}
 
 
 def test_its_texts_are_the_reasons_of_failed_checks():
     record = copter()
     put(record, sys_status(health=0x2F))
     record.texts.append((3, "PreArm: Gyros inconsistent"))
-    (finding,) = [one for one in examine(record) if one.subject == "pre-arm checks"]
-    assert (finding.level, finding.text) == (Level.MISSING, "not passed: Gyros inconsistent")
+    (finding,) = [one for one in examine(record) if one.name == "pre-arm checks"]
+    assert (finding.outcome, finding.value) == (Outcome.FAIL, "not passed: Gyros inconsistent")
 
 
 def test_a_plane_is_refused():
     record = copter()
     put(record, heartbeat(autopilot=3, kind=1))
-    assert "autopilot" in subjects(record, Level.MISSING)
+    assert "autopilot" in subjects(record, Outcome.FAIL)
 
 
 def test_it_is_asked_for_its_own_parameters_and_for_streams():

@@ -2,9 +2,8 @@
 
 from datetime import date, timedelta
 
-from framerunner.doctor.camera import examine_camera
-from framerunner.doctor.camera_times import CameraTimes
-from framerunner.doctor.findings import Level
+from framerunner.doctor.camera_times import CameraTimes, examine_camera
+from offboard.safety.check import Outcome
 from vision.calibration.model import Calibration, Mounting
 
 TIMES = CameraTimes(tuple(0.1 * number for number in range(30)), (None,) * 30, (320, 240))
@@ -12,7 +11,7 @@ TODAY = date.today()
 
 
 def levels(*arguments):
-    return {each.subject: each.level for each in examine_camera(*arguments)}
+    return {each.name: each.outcome for each in examine_camera(*arguments)}
 
 
 def calibration(**values):
@@ -22,37 +21,37 @@ def calibration(**values):
 def test_all_is_known():
     mounting = Mounting(angles_frd_rad=(0.0, 0.0, 0.0), measured_on=(TODAY - timedelta(days=2)).isoformat())
     known = calibration(mounting=mounting, delay_s=0.08)
-    findings = {each.subject: each for each in examine_camera(TIMES, known, None)}
-    assert {each.level for each in findings.values()} == {Level.GOOD}
-    assert findings["camera"].text.startswith("10.0 images a second of 320 × 240")
-    assert findings["camera delay"].text.startswith("0.080 s by the calibration")
-    assert findings["camera mounting"].text.endswith("measured 2 days ago")
+    findings = {each.name: each for each in examine_camera(TIMES, known, None)}
+    assert {each.outcome for each in findings.values()} == {Outcome.PASS}
+    assert findings["camera"].value.startswith("10.0 images a second of 320 × 240")
+    assert findings["camera delay"].value.startswith("0.080 s by the calibration")
+    assert findings["camera mounting"].value.endswith("measured 2 days ago")
 
 
 def test_what_was_never_measured_is_noted():
     expected = {
-        "camera": Level.GOOD,
-        "camera delay": Level.NOTE,
-        "camera calibration": Level.GOOD,
-        "camera mounting": Level.NOTE,
+        "camera": Outcome.PASS,
+        "camera delay": Outcome.NOTE,
+        "camera calibration": Outcome.PASS,
+        "camera mounting": Outcome.NOTE,
     }
     assert levels(TIMES, calibration(), None) == expected
-    assert levels(None, None, None) == {"camera calibration": Level.NOTE}
+    assert levels(None, None, None) == {"camera calibration": Outcome.NOTE}
 
 
 def test_a_camera_that_gives_nothing_or_another_size_is_missing():
-    assert levels(CameraTimes(problem="gone"), None, None)["camera"] is Level.MISSING
-    assert levels(TIMES, calibration(width_px=640), None)["camera calibration"] is Level.MISSING
+    assert levels(CameraTimes(problem="gone"), None, None)["camera"] is Outcome.FAIL
+    assert levels(TIMES, calibration(width_px=640), None)["camera calibration"] is Outcome.FAIL
 
 
 def test_a_camera_that_gives_one_image_is_missing():
-    assert levels(CameraTimes((1.0,), (None,), (320, 240)), None, None)["camera"] is Level.MISSING
+    assert levels(CameraTimes((1.0,), (None,), (320, 240)), None, None)["camera"] is Outcome.FAIL
 
 
 def test_images_with_vehicle_times_have_an_age_by_the_vehicles_clock_alone():
     received_s = TIMES.received_s
     stamped = CameraTimes(received_s, tuple(round(1e6 * at_s) + 50_000 for at_s in received_s), (320, 240))
-    for clock_ms, level, words in ((None, Level.NOTE, "not known"), ((250, 0.1), Level.GOOD, "0.10 s")):
-        findings = {each.subject: each for each in examine_camera(stamped, None, clock_ms)}
-        assert findings["camera delay"].level is level
-        assert findings["camera delay"].text.startswith(words)
+    for clock_ms, level, words in ((None, Outcome.NOTE, "not known"), ((250, 0.1), Outcome.PASS, "0.10 s")):
+        findings = {each.name: each for each in examine_camera(stamped, None, clock_ms)}
+        assert findings["camera delay"].outcome is level
+        assert findings["camera delay"].value.startswith(words)

@@ -5,9 +5,9 @@ import struct
 import pytest
 
 from framerunner.doctor.checks import can_fly, examine
-from framerunner.doctor.findings import Level
-from framerunner.doctor.listen import SUMMARY, Record, event_id
-from framerunner.wire.dialect import mavlink
+from framerunner.wire.dialect import event_id, mavlink
+from framerunner.wire.session.record import SUMMARY, Record
+from offboard.safety.check import Outcome
 
 GOOD_PARAMETERS = {
     "BAT_CRIT_THR": 0.07,
@@ -61,6 +61,8 @@ def put(record, message):
     """Put a message into a record, without its counts."""
     record.latest[message.get_type()] = message
     record.telemetry.take(message)
+    if message.get_type() == "HEARTBEAT":
+        record.autopilot = message.autopilot
 
 
 def healthy(**parameters):
@@ -83,17 +85,17 @@ def healthy(**parameters):
 
 
 def missing(record):
-    return {finding.subject for finding in examine(record) if finding.level is Level.MISSING}
+    return {finding.name for finding in examine(record) if finding.outcome is Outcome.FAIL}
 
 
 def notes(record):
-    return {finding.subject for finding in examine(record) if finding.level is Level.NOTE}
+    return {finding.name for finding in examine(record) if finding.outcome is Outcome.NOTE}
 
 
 def test_a_healthy_drone_can_fly():
     findings = examine(healthy())
     assert can_fly(findings)
-    assert {finding.level for finding in findings} == {Level.GOOD}
+    assert {finding.outcome for finding in findings} == {Outcome.PASS}
 
 
 @pytest.mark.parametrize(
@@ -207,22 +209,22 @@ def test_the_verdict_on_what_px4_reports_of_its_estimate(reported, parameters, l
 
 
 def finding_of(record, subject):
-    (finding,) = (finding for finding in examine(record) if finding.subject == subject)
+    (finding,) = (finding for finding in examine(record) if finding.name == subject)
     return finding
 
 
 def test_the_source_of_height_is_the_one_in_use_not_the_one_requested():
     record = healthy()
-    assert finding_of(record, "height").text == "by vision, estimated accuracy 0.00 m"
+    assert finding_of(record, "height").value == "by vision, estimated accuracy 0.00 m"
     put(record, estimator_status(*VISION_REQUESTED[0]))
     height = finding_of(record, "height")
-    assert height.text.startswith(
+    assert height.value.startswith(
         "by barometer, though EKF2_HGT_REF asks for vision, estimated accuracy 0.33 m"
     )
     assert "not MOCAP" in finding_of(record, "position").advice
     assert height.advice == "as for the position"
     put(record, estimator_status(*GPS[0]))
-    assert "the drone will stray" in finding_of(record, "position").text
+    assert "the drone will stray" in finding_of(record, "position").value
 
 
 def test_an_ideal_drone_with_a_position_from_gps_can_fly():
@@ -245,9 +247,9 @@ def test_what_keeps_it_from_arming_in_offboard_is_named():
     ):
         record.arming.take(message)
     checks = finding_of(record, "pre-arm checks")
-    assert (checks.level, checks.text) == (Level.MISSING, "not passed in hold: no ground station is heard")
+    assert (checks.outcome, checks.value) == (Outcome.FAIL, "not passed in hold: no ground station is heard")
     record.arming.take(summary(VISION[2]))
-    assert finding_of(record, "pre-arm checks").text == "passed for offboard, where fly arms it; not in hold"
+    assert finding_of(record, "pre-arm checks").value == "passed for offboard, where fly arms it; not in hold"
 
 
 def test_the_summary_has_px4_s_number():
@@ -264,9 +266,9 @@ def test_a_fence_of_px4_without_a_global_position_is_noted():
 @pytest.mark.parametrize("action", [0.0, 3.0])
 def test_a_return_under_a_roof_is_warned_of(action):
     record = healthy(COM_OBL_RC_ACT=action)
-    (finding,) = (finding for finding in examine(record) if finding.subject == "setpoints lost")
-    assert finding.level is Level.NOTE
-    assert "climbs to 30 m first" in finding.text
+    (finding,) = (finding for finding in examine(record) if finding.name == "setpoints lost")
+    assert finding.outcome is Outcome.NOTE
+    assert "climbs to 30 m first" in finding.value
 
 
 def test_a_drone_that_sends_little_is_judged_by_that():
@@ -297,14 +299,14 @@ def test_which_sensors_the_estimator_relies_on():
     record, everything = healthy(), GYRO_ACCEL_BARO | GPS_BIT | VISION_BIT
     put(record, sensors(everything, everything & ~GPS_BIT, everything))
     finding = finding_of(record, "sensors")
-    assert finding.level is Level.GOOD
-    assert finding.text == (
+    assert finding.outcome is Outcome.PASS
+    assert finding.value == (
         "the estimator relies on gyroscope, accelerometer, barometer, vision position; not on GPS"
     )
     put(record, sensors(everything, everything, everything & ~0x8))
     finding = finding_of(record, "sensors")
-    assert finding.level is Level.NOTE
-    assert finding.text.endswith("; barometer fails")
+    assert finding.outcome is Outcome.NOTE
+    assert finding.value.endswith("; barometer fails")
 
 
 def test_a_drone_that_relies_on_external_poses_has_its_position_by_vision():
@@ -313,16 +315,16 @@ def test_a_drone_that_relies_on_external_poses_has_its_position_by_vision():
         record,
         sensors(GYRO_ACCEL_BARO | VISION_BIT, GYRO_ACCEL_BARO | VISION_BIT, GYRO_ACCEL_BARO | VISION_BIT),
     )
-    assert finding_of(record, "position").text.startswith("by vision")
+    assert finding_of(record, "position").value.startswith("by vision")
 
 
 @pytest.mark.parametrize(
     ("ratios", "level", "words"),
     [
-        ((0.1, 0.2, 0.3, 0.0, 0.0), Level.GOOD, "largest ratio 0.30"),
-        ((0.1, 0.7, 0.3, 0.0, 0.0), Level.NOTE, "position 0.70"),
-        ((0.1, 0.7, 0.3, 1.4, 0.0), Level.MISSING, "position 0.70, heading 1.40"),
-        ((float("nan"), 0.2, 0.0, 0.0, 0.0), Level.GOOD, "largest ratio 0.20"),
+        ((0.1, 0.2, 0.3, 0.0, 0.0), Outcome.PASS, "largest ratio 0.30"),
+        ((0.1, 0.7, 0.3, 0.0, 0.0), Outcome.NOTE, "position 0.70"),
+        ((0.1, 0.7, 0.3, 1.4, 0.0), Outcome.FAIL, "position 0.70, heading 1.40"),
+        ((float("nan"), 0.2, 0.0, 0.0, 0.0), Outcome.PASS, "largest ratio 0.20"),
     ],
 )
 def test_how_well_measurements_agree(ratios, level, words):
@@ -334,8 +336,8 @@ def test_how_well_measurements_agree(ratios, level, words):
             0, 431, velocity, position, height, heading, above_ground, 0, 0.01, 0.01
         ),
     )
-    assert finding_of(record, "innovations").level is level
-    assert words in finding_of(record, "innovations").text
+    assert finding_of(record, "innovations").outcome is level
+    assert words in finding_of(record, "innovations").value
 
 
 def test_an_estimator_that_is_not_aligned_is_named():

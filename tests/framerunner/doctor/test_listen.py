@@ -11,8 +11,12 @@ from hypothesis import strategies as st
 
 from framerunner.cli import run
 from framerunner.doctor import listen
-from framerunner.doctor.listen import PARAMETERS, SUMMARY, Record, StreamCounter, parameter_value
+from framerunner.doctor.listen import PARAMETERS
 from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import SequenceCounter
+from framerunner.wire.session.client import VehicleClient
+from framerunner.wire.session.record import SUMMARY, Record
+from framerunner.wire.session.session import ParameterValue, VehicleError
 
 HARMLESS = {"HEARTBEAT", "COMMAND_LONG", "PARAM_REQUEST_READ"}
 
@@ -49,18 +53,18 @@ def heard(*messages, system=1, component=1):
 def test_lost_packets_are_counted_by_their_numbers(first, count, share, seed):
     chance = random.Random(seed)
     kept = [0, *(k for k in range(1, count - 1) if chance.random() >= share), max(count - 1, 0)]
-    counter = StreamCounter()
+    counter = SequenceCounter()
     for number in sorted(set(kept)):
         counter.take((first + number) % 256)
-    assert counter.passed == count
+    assert counter.sent == count
     assert counter.lost_share == pytest.approx(1 - len(set(kept)) / count)
 
 
 def test_swapped_and_doubled_packets_are_no_loss():
-    counter = StreamCounter()
+    counter = SequenceCounter()
     for number in (254, 0, 255, 1, 1, 2):
         counter.take(number)
-    assert counter.passed == 5
+    assert counter.sent == 5
     assert counter.lost_share == 0.0
 
 
@@ -105,7 +109,7 @@ def test_integer_parameters_are_sent_by_their_bytes(value):
     packet = bytearray(message.pack(Wire().codec))
     packet[10:14] = struct.pack("<i", value)
     message._msgbuf = packet  # as received
-    assert parameter_value(message) == value
+    assert ParameterValue.of(message, bytewise=True).value == value
 
 
 def test_parameters_are_kept_by_name():
@@ -179,21 +183,20 @@ class StillVehicle:
 class Clock:
     now_s = 100.0
 
-    def monotonic(self):
+    def __call__(self):
         return self.now_s
 
 
 @pytest.fixture
-def clock(monkeypatch):
-    clock = Clock()
-    monkeypatch.setattr(listen, "time", clock)
-    return clock
+def clock():
+    return Clock()
 
 
 def listened(vehicle, seconds=5.0):
-    record, shares = Record(), []
-    assert listen.find(vehicle, record, lambda _, share: shares.append(share))
-    listen.listen(vehicle, record, seconds, lambda _, share: shares.append(share))
+    record, shares = Record(heartbeat="ground station"), []
+    client = VehicleClient(vehicle, record, vehicle.clock, lambda _, share: shares.append(share))
+    client.find()
+    listen.listen(client, seconds)
     assert all(0.0 <= share <= 1.0 for share in shares)
     return record
 
@@ -239,6 +242,8 @@ def test_to_an_armed_vehicle_it_is_no_ground_station_and_requests_no_checks(cloc
 
 def test_no_vehicle_is_found_on_a_silent_line(clock):
     class Silence:
+        url = "a wire"
+
         def send(self, _message):
             pass
 
@@ -246,7 +251,8 @@ def test_no_vehicle_is_found_on_a_silent_line(clock):
             clock.now_s += timeout_s
             return []
 
-    assert not listen.find(Silence(), Record(), lambda *_: None)
+    with pytest.raises(VehicleError, match=r"no vehicle was heard on a wire within 10 s"):
+        VehicleClient(Silence(), Record(), clock).find()
     assert clock.now_s == pytest.approx(110.0, abs=0.1)
 
 
@@ -264,7 +270,7 @@ class Open(StillVehicle):
 
 
 def test_the_page_names_what_is_missing_and_the_exit_code_is_one(monkeypatch, capsys):
-    monkeypatch.setattr(listen, "time", next(Open.clocks))
+    monkeypatch.setattr("framerunner.commands.doctor.time.monotonic", next(Open.clocks))
     monkeypatch.setattr("framerunner.wire.transports.vehicle_link.VehicleLink", Open)
     monkeypatch.setenv("COLUMNS", "160")
     assert run(["doctor", "--drone", "udpin://0.0.0.0:14540"]) == 1

@@ -5,7 +5,6 @@ from math import cos, nan, pi, sin
 
 import pytest
 
-from framerunner.doctor.findings import Level
 from framerunner.geometry.rotations import multiply
 from framerunner.mocap.facts import Origin, SendSettings, Unused
 from framerunner.mocap.judgement import is_fused, judge, line
@@ -15,6 +14,7 @@ from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession
 from framerunner.mocap.sources import SitlSource, TimedPose
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.framing import PacketReader
+from offboard.safety.check import Outcome
 from tests.framerunner.mocap.arducopter import TICK_US, FakeArduCopter
 
 AHEAD_S = 7.0  # of vehicle time, by this program's clock
@@ -76,8 +76,8 @@ class Trial:
     def facts(self):
         return self.session.facts(self.now_s)
 
-    def found(self, level=Level.MISSING):
-        return {each.subject: each for each in judge(self.facts()) if each.level is level}
+    def found(self, level=Outcome.FAIL):
+        return {each.name: each for each in judge(self.facts()) if each.outcome is level}
 
 
 def test_poses_without_velocity_are_sent_as_arducopter_takes_them_and_nothing_is_set():
@@ -111,7 +111,7 @@ def test_an_origin_is_set_once_and_again_after_a_restart():
     assert trial.vehicle.origins == 1
     assert trial.vehicle.origin == (404_168_000, -37_038_000, 650_000)
     assert trial.found() == {}
-    assert "40.4168, -3.7038, 650 m" in trial.found(Level.GOOD)["origin"].text
+    assert "40.4168, -3.7038, 650 m" in trial.found(Outcome.PASS)["origin"].value
     trial.vehicle.restart()
     trial.run(8.0)
     assert trial.vehicle.origins == 1
@@ -133,7 +133,7 @@ def test_a_turned_vehicle_shows_axes_and_delay():
     trial.run(25.0)
     assert trial.facts().comparison.delay_s == pytest.approx(0.03, abs=0.01)
     assert trial.found() == {}
-    assert {"axes", "delay"} <= set(trial.found(Level.GOOD))
+    assert {"axes", "delay"} <= set(trial.found(Outcome.PASS))
 
 
 def test_a_delay_that_is_wrong_by_a_tenth_of_a_second_is_missing():
@@ -148,7 +148,7 @@ def test_a_delay_given_to_this_program_does_not_hide_a_wrong_parameter():
     trial.vehicle.turning = True
     trial.run(25.0)
     assert "delay" in trial.found()
-    assert "VISO_DELAY_MS" in trial.found(Level.NOTE)["--delay"].advice
+    assert "VISO_DELAY_MS" in trial.found(Outcome.NOTE)["--delay"].advice
 
 
 def test_a_body_that_is_turned_by_90_degrees_is_told_by_the_gyroscope():
@@ -198,28 +198,28 @@ def test_visual_odometry_that_is_off():
 @pytest.mark.parametrize(
     ("parameters", "level", "subject", "words"),
     [
-        ({"AHRS_EKF_TYPE": 10}, Level.MISSING, "AHRS_EKF_TYPE", "EKF3"),
-        ({"EK3_SRC1_POSXY": 3}, Level.MISSING, "EK3_SRC1_POSXY", "position"),
-        ({"EK3_SRC1_POSZ": 1}, Level.NOTE, "EK3_SRC1_POSZ", "height"),
-        ({"EK3_SRC1_YAW": 1}, Level.NOTE, "EK3_SRC1_YAW", "heading"),
-        ({"EK3_SRC1_VELXY": 3}, Level.MISSING, "EK3_SRC1_VELXY", "another sensor"),
-        ({"EK3_SRC1_VELZ": 6}, Level.MISSING, "EK3_SRC1_VELZ", "does not send"),
-        ({"VISO_QUAL_MIN": 10}, Level.MISSING, "VISO_QUAL_MIN", "quality"),
-        ({"VISO_SCALE": 1.1}, Level.MISSING, "VISO_SCALE", "multiplies"),
-        ({"VISO_POS_M_NSE": 0.2}, Level.NOTE, "VISO_POS_M_NSE", "slowly"),
-        ({"VISO_YAW_M_NSE": 0.2}, Level.NOTE, "VISO_YAW_M_NSE", "slowly"),
+        ({"AHRS_EKF_TYPE": 10}, Outcome.FAIL, "AHRS_EKF_TYPE", "EKF3"),
+        ({"EK3_SRC1_POSXY": 3}, Outcome.FAIL, "EK3_SRC1_POSXY", "position"),
+        ({"EK3_SRC1_POSZ": 1}, Outcome.NOTE, "EK3_SRC1_POSZ", "height"),
+        ({"EK3_SRC1_YAW": 1}, Outcome.NOTE, "EK3_SRC1_YAW", "heading"),
+        ({"EK3_SRC1_VELXY": 3}, Outcome.FAIL, "EK3_SRC1_VELXY", "another sensor"),
+        ({"EK3_SRC1_VELZ": 6}, Outcome.FAIL, "EK3_SRC1_VELZ", "does not send"),
+        ({"VISO_QUAL_MIN": 10}, Outcome.FAIL, "VISO_QUAL_MIN", "quality"),
+        ({"VISO_SCALE": 1.1}, Outcome.FAIL, "VISO_SCALE", "multiplies"),
+        ({"VISO_POS_M_NSE": 0.2}, Outcome.NOTE, "VISO_POS_M_NSE", "slowly"),
+        ({"VISO_YAW_M_NSE": 0.2}, Outcome.NOTE, "VISO_YAW_M_NSE", "slowly"),
     ],
 )
 def test_a_parameter_that_is_wrong_is_named(parameters, level, subject, words):
     trial = Trial(parameters, origin=HALL).run(6.0)
-    assert words in trial.found(level)[subject].text
+    assert words in trial.found(level)[subject].value
 
 
 def test_a_firmware_without_visual_odometry_is_told():
     trial = Trial(origin=HALL)
     del trial.vehicle.parameters["VISO_TYPE"]
     trial.run(6.0)
-    assert "no such parameter" in trial.found()["VISO_TYPE"].text
+    assert "no such parameter" in trial.found()["VISO_TYPE"].value
 
 
 def test_arducopters_own_truth_is_requested_and_sent_back():

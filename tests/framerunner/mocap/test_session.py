@@ -10,8 +10,6 @@ from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
-from framerunner.doctor.findings import Level
-from framerunner.doctor.listen import Record
 from framerunner.mocap.facts import Facts, Origin, SendSettings, Unused
 from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison
@@ -21,6 +19,8 @@ from framerunner.mocap.sources import SitlSource, TimedPose
 from framerunner.mocap.vehicle import Vehicle
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.framing import PacketReader
+from framerunner.wire.session.record import Record
+from offboard.safety.check import Outcome
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 
@@ -95,7 +95,7 @@ class Trial:
         return self.session.facts(self.now_s)
 
     def missing(self):
-        return [finding.subject for finding in judge(self.facts()) if finding.level is Level.MISSING]
+        return [finding.name for finding in judge(self.facts()) if finding.outcome is Outcome.FAIL]
 
     def sent_of(self, kind):
         return [message for message in self.sent if message.get_type() == kind]
@@ -134,14 +134,14 @@ def test_what_a_vehicle_has_told_before_it_died_does_not_count():
     facts = trial.session.facts(trial.now_s + 20.0)
     assert line(facts).startswith("the vehicle is not heard for 20 s; is it running?")
     assert is_fused(facts) is None
-    (gone,) = (finding for finding in judge(facts) if finding.level is Level.MISSING)
-    assert (gone.subject, gone.text) == ("vehicle", "not heard for 20 s")
+    (gone,) = (finding for finding in judge(facts) if finding.outcome is Outcome.FAIL)
+    assert (gone.name, gone.value) == ("vehicle", "not heard for 20 s")
     assert "· fused" in line(trial.run(3.0).facts())  # it was only silent
 
 
 def test_an_estimator_that_tells_nothing_more_is_not_known_to_use_the_poses():
     trial = Trial().run(8.0)
-    trial.session.vehicle.record.heard_s = trial.now_s + 6.0  # by its heartbeats
+    trial.session.vehicle.heard_s = trial.now_s + 6.0  # by its heartbeats
     assert is_fused(trial.session.facts(trial.now_s + 6.0)) is None
 
 
@@ -173,8 +173,8 @@ def test_a_flight_by_poses_that_are_late_shows_axes_and_delay():
     assert facts.comparison.axes == ""
     assert facts.comparison.delay_s == pytest.approx(0.03, abs=0.012)
     assert facts.comparison.correlation > 0.8
-    delay = next(finding for finding in judge(facts) if finding.subject == "delay")
-    assert delay.level is Level.NOTE
+    delay = next(finding for finding in judge(facts) if finding.name == "delay")
+    assert delay.outcome is Outcome.NOTE
     assert "EKF2_EV_DELAY is 0 ms: set it to" in delay.advice
 
 
@@ -262,14 +262,14 @@ def test_what_is_missing_and_what_to_do(changes, subject, advice):
     parameters = changes.pop("parameters", {"EKF2_EV_CTRL": 15})
     record = recorded(changes.pop("flags", RELATIVE), parameters=parameters)
     given = {"comparison": RIGHT, "sent": 100, "rate_hz": 50.0} | changes
-    found = {each.subject: each for each in judge(Facts(record, **given)) if each.level is Level.MISSING}
+    found = {each.name: each for each in judge(Facts(record, **given)) if each.outcome is Outcome.FAIL}
     assert advice in found[subject].advice
 
 
 def test_a_right_setup_has_no_missing_finding():
     record = recorded(RELATIVE, parameters={"EKF2_EV_CTRL": 15, "EKF2_HGT_REF": 3})
     facts = Facts(record, RIGHT, 100, 50.0, 0.03, converts_stamps=True)
-    assert {finding.level for finding in judge(facts)} == {Level.GOOD}
+    assert {finding.outcome for finding in judge(facts)} == {Outcome.PASS}
 
 
 @pytest.mark.parametrize("origin", [None, Origin(47.4, 8.5, 400.0)])
@@ -278,11 +278,11 @@ def test_an_origin_is_set_in_a_px4_only_if_one_is_given(origin):
     heartbeat = mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3)
     for message in reader.feed(heartbeat.pack(mavlink.MAVLink(None, 1, 1))):
         vehicle.take(message, 0.0)
-    kinds = {message.get_type() for tick in range(30) for message in vehicle.requests(tick / 10)}
+    kinds = {message.get_type() for tick in range(30) for message in vehicle.due(tick / 10)}
     assert ("SET_GPS_GLOBAL_ORIGIN" in kinds) == (origin is not None)
 
 
 def test_no_origin_is_set_in_a_drone_that_has_one():
     trial = Trial(origin=Origin(47.4, 8.5, 400.0)).run(6.0)
     assert trial.sent_of("SET_GPS_GLOBAL_ORIGIN") == []
-    assert "origin" in {finding.subject for finding in judge(trial.facts())}
+    assert "origin" in {finding.name for finding in judge(trial.facts())}

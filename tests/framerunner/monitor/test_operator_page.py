@@ -14,7 +14,7 @@ from framerunner.errors import SettingError
 from framerunner.monitor.operator_channel import REFUSED
 from framerunner.monitor.run import serve
 from framerunner.monitor.settings import MonitorError, MonitorSettings
-from framerunner.preflight.card import FlightCard, Section
+from framerunner.preflight.card import FlightCard, table
 from framerunner.preflight.operator_link import OperatorLink
 from offboard.safety.operator import Operator
 from tests.chromium import Complaints
@@ -32,8 +32,8 @@ SILENCE = """() => {
 CARD = FlightCard(
     "Flight card: test-case-1",
     (
-        Section("Flight", (("drone", "PX4, quadrotor, system 1"), ("on abort", "lands where it is"))),
-        Section(
+        table("Flight", (("drone", "PX4, quadrotor, system 1"), ("on abort", "lands where it is"))),
+        table(
             "Checks: name, result, value, allowed, what to do",
             (
                 ("autopilot", "pass", "PX4, quadrotor", "", ""),

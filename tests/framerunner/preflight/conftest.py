@@ -2,9 +2,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from framerunner.doctor import listen
 from framerunner.flying.plan import FlightPlan
-from framerunner.preflight import prepare, run, session
+from framerunner.preflight import link as preflight_link
 from offboard.mission import load_mission
 from offboard.safety.caps import Caps
 from scenarios.loader import load_scenario
@@ -25,12 +24,7 @@ def plan(scenario):
 def link(scenario, monkeypatch):
     """The link that the checks open; their clock is the simulation's."""
     bench = BenchLink(scenario)
-    clock = SimpleNamespace(
-        monotonic=lambda: bench.simulation.time_us / 1e6,
-        monotonic_ns=lambda: bench.simulation.time_us * 1000,
-    )
-    monkeypatch.setattr(session, "time", clock)
-    monkeypatch.setattr(listen, "time", clock)
-    monkeypatch.setattr(run, "open_link", lambda url: bench)
-    monkeypatch.setattr(prepare, "open_link", lambda url: bench)
+    clock = SimpleNamespace(monotonic=lambda: bench.simulation.time_us / 1e6)
+    monkeypatch.setattr(preflight_link, "time", clock)
+    monkeypatch.setattr(preflight_link, "open_link", lambda url: bench)
     return bench

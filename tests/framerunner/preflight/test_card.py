@@ -3,8 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from framerunner.preflight.card import make_card
-from framerunner.preflight.card_files import HTML_NAME, PDF_NAME, write_card
+from framerunner.preflight.card import HTML_NAME, PDF_NAME, make_card, write_card
 from framerunner.preflight.run import ParameterChange, PreflightReport, PreflightSettings
 from offboard.safety.check import Check, Outcome
 from offboard.safety.fence import flight_fence

@@ -3,18 +3,17 @@
 import pytest
 
 from firmware_py.missions.items import PlanType
+from framerunner.doctor.listen import listen
 from framerunner.errors import SettingError
-from framerunner.preflight import parameters
 from framerunner.preflight.check_names import CHECK_NAMES
-from framerunner.preflight.fence_upload import FenceItem, download_fence, is_same_fence, upload_fence
 from framerunner.preflight.kept import KeptState, check_vehicle, load_kept, restore
-from framerunner.preflight.parameters import read_parameters, set_parameter
+from framerunner.preflight.link import open_client
 from framerunner.preflight.prepare import own_simulator_id
 from framerunner.preflight.run import NotArmedError, PreflightSettings, run_preflight
-from framerunner.preflight.session import VehicleSession
 from framerunner.vehicle.geodesy import GeodeticPoint
 from framerunner.wire.dialect import mavlink
-from offboard.drone import DroneError
+from framerunner.wire.session.fence import FenceItem, download_fence, is_same_fence, upload_fence
+from framerunner.wire.session.session import ParameterValue, VehicleError
 from offboard.safety.check import Outcome
 
 FAILING = ["COM_OBL_RC_ACT", "NAV_RCL_ACT", "COM_LOW_BAT_ACT", "GF_MAX_VER_DIST", "GF_MAX_HOR_DIST"]
@@ -29,7 +28,8 @@ def outcomes(report):
 
 
 def uid_of(link):
-    return VehicleSession(link).uid
+    with open_client(link.url) as client:
+        return client.identity()[0]
 
 
 def names_sent(link, kind):
@@ -79,7 +79,8 @@ async def test_parameters_are_set_and_returned(link, plan, tmp_path):
     assert link.simulation.autopilot.parameters.value("NAV_RCL_ACT") == 3
     kept = load_kept(report.kept)
     assert {each.name: each.value for each in kept.parameters} == before
-    restore(VehicleSession(link), kept, lambda line: None)
+    with open_client(link.url) as client:
+        restore(client, kept, lambda line: None)
     assert {name: link.simulation.autopilot.parameters.value(name) for name in FAILING} == before
 
 
@@ -96,7 +97,7 @@ async def test_old_values_that_are_kept_are_not_overwritten(link, plan, tmp_path
 
 async def test_where_the_old_values_are_is_told_even_if_setting_fails(link, plan, tmp_path, capsys):
     link.lost = lambda message: message.get_type() == "PARAM_SET"
-    with pytest.raises(DroneError, match="did not answer"):
+    with pytest.raises(VehicleError, match="did not answer"):
         await run_preflight(plan, settings(tmp_path, set_parameters=True))
     kept = tmp_path / "parameters-before.params"
     assert f"--restore-parameters {kept}" in capsys.readouterr().err
@@ -169,15 +170,16 @@ async def test_nothing_that_is_sent_arms(link, plan, tmp_path):
 
 
 def test_integers_survive_the_wire(link):
-    session = VehicleSession(link)
-    for value in (0, 1, 3):
-        kept = parameters.ParameterValue("NAV_DLL_ACT", value, mavlink.MAV_PARAM_TYPE_INT32)
-        set_parameter(session, kept)
-        assert read_parameters(session, ["NAV_DLL_ACT"])["NAV_DLL_ACT"] == kept
+    with open_client(link.url) as client:
+        for value in (0, 1, 3):
+            kept = ParameterValue("NAV_DLL_ACT", value, mavlink.MAV_PARAM_TYPE_INT32)
+            client.set_parameter(kept)
+            assert client.read_parameters(["NAV_DLL_ACT"]) == {"NAV_DLL_ACT": kept}
 
 
 def test_a_parameter_that_is_not_there_is_left_out(link):
-    assert read_parameters(VehicleSession(link), ["NO_SUCH"]) == {}
+    with open_client(link.url) as client:
+        assert client.read_parameters(["NO_SUCH"]) == {}
 
 
 @pytest.mark.parametrize(
@@ -212,7 +214,7 @@ def test_a_file_of_qgroundcontrol_is_read(tmp_path):
     path = tmp_path / "old.params"
     path.write_text("# Vehicle-Id Component-Id Name Value Type\n1\t1\tGF_ACTION\t2\t6\n", encoding="utf-8")
     kept = load_kept(path)
-    assert kept == KeptState("", (parameters.ParameterValue("GF_ACTION", 2.0, 6),))
+    assert kept == KeptState("", (ParameterValue("GF_ACTION", 2.0, 6),))
     with pytest.raises(SettingError, match=r"does not say of which vehicle .* add --any-vehicle"):
         check_vehicle(kept, path, "0a0b")
 
@@ -226,10 +228,15 @@ OLD_FENCE = (
 )
 
 
-async def test_the_old_fence_is_kept_and_returned(link, plan, tmp_path):
-    session = VehicleSession(link)
-    session.listen(3.0)
-    upload_fence(session, OLD_FENCE)
+@pytest.fixture
+def client(link):
+    with open_client(link.url) as client:
+        listen(client, 3.0)
+        yield client
+
+
+async def test_the_old_fence_is_kept_and_returned(link, client, plan, tmp_path):
+    upload_fence(client, OLD_FENCE)
     report = await run_preflight(plan, settings(tmp_path))
     assert outcomes(report)["fence"] is Outcome.PASS
     again = await run_preflight(plan, settings(tmp_path))
@@ -237,22 +244,20 @@ async def test_the_old_fence_is_kept_and_returned(link, plan, tmp_path):
     kept = load_kept(report.kept)
     assert is_same_fence(kept.fence, OLD_FENCE)
     told = []
-    restore(session, kept, told.append)
+    restore(client, kept, told.append)
     assert told == ["the fence has 4 items, as before"]
-    assert is_same_fence(download_fence(session), OLD_FENCE)
-    restore(session, KeptState("", (), ()), told.append)
-    assert (download_fence(session), told[-1]) == ((), "there is no fence, as before")
+    assert is_same_fence(download_fence(client), OLD_FENCE)
+    restore(client, KeptState("", (), ()), told.append)
+    assert (download_fence(client), told[-1]) == ((), "there is no fence, as before")
 
 
-async def test_a_fence_that_cannot_be_kept_is_not_replaced(link, plan, tmp_path):
-    session = VehicleSession(link)
-    session.listen(3.0)
-    upload_fence(session, OLD_FENCE)
+async def test_a_fence_that_cannot_be_kept_is_not_replaced(link, client, plan, tmp_path):
+    upload_fence(client, OLD_FENCE)
     link.lost = lambda message: message.get_type() == "MISSION_REQUEST_INT"
     report = await run_preflight(plan, settings(tmp_path))
     assert outcomes(report)["fence"] is Outcome.FAIL
     link.lost = lambda message: False
-    assert is_same_fence(download_fence(session), OLD_FENCE)
+    assert is_same_fence(download_fence(client), OLD_FENCE)
 
 
 async def test_values_of_another_vehicle_are_not_returned(link, plan, tmp_path):

@@ -24,6 +24,7 @@ class Link:
     """A vehicle at rest on a wire, two hundredths of a second between its reports."""
 
     url = "a wire"
+    host = ""
 
     def __init__(self, *, armed=False):
         self.armed, self.mute, self.broken, self.closed = armed, False, False, False

@@ -16,7 +16,8 @@ from framerunner.vehicle.measurements import (
     Readings,
     Sensors,
 )
-from sitl.px4.messages import ControlsReader, Packer, checksum
+from framerunner.wire.framing import checksum
+from sitl.px4.messages import ControlsReader, Packer
 from sitl.px4.sensor_messages import SensorMessages
 
 ORIGIN = GeodeticPoint(47.4, 8.5, 485.0)  # 3 m below the true position

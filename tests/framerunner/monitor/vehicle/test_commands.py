@@ -5,8 +5,9 @@ import asyncio
 import pytest
 
 from firmware_py.status import FlightMode
-from framerunner.monitor.vehicle.commands import CommandSender, Sticks
+from framerunner.monitor.vehicle.commands import Sticks, answered
 from framerunner.wire.dialect import mavlink
+from framerunner.wire.session.session import Session
 from scenarios.loader import load_scenario
 from tests.framerunner.monitor.simulated_link import SimulatedLink, equipment
 from tests.framerunner.monitor.watching import watching
@@ -111,33 +112,58 @@ async def test_an_unknown_order_is_refused(flown):
     assert not ok and "'dance' is no order" in text
 
 
-def ack(number, result, target=250):
-    return mavlink.MAVLink_command_ack_message(number, result, 0, 0, target, 190)
+def ack(number, result, target=250, component=1):
+    message = mavlink.MAVLink_command_ack_message(number, result, 0, 0, target, 190)
+    message.get_header().srcSystem, message.get_header().srcComponent = 1, component
+    return message
 
 
-async def test_in_progress_extends_the_wait_and_answers_to_others_are_ignored():
-    sent = []
-    sender = CommandSender(1, sent.append)
-    asked = asyncio.create_task(sender.request(22))
+@pytest.fixture
+async def ordered():
+    """Sends a command, and what was sent; `take` gives the session an answer."""
+    session, sent = Session(250, 1), []
+
+    def order(*command, urgent=False):
+        return asyncio.create_task(answered(session.command(*command, urgent=urgent), session, sent.append))
+
+    return order, sent, lambda message: session.take(message, asyncio.get_running_loop().time())
+
+
+async def test_in_progress_extends_the_wait_and_answers_to_others_are_ignored(ordered):
+    order, sent, take = ordered
+    asked = order(22)
     await asyncio.sleep(0)
-    sender.take(ack(22, 0, target=255))  # of another ground station
-    sender.take(ack(400, 0))
-    sender.take(ack(22, 5))  # in progress
+    take(ack(22, 0, target=255))  # of another ground station
+    take(ack(22, 0, component=100))  # of the camera
+    take(ack(400, 0))
+    take(ack(22, 5))  # in progress
     await asyncio.sleep(0.8)
     assert not asked.done()
     assert len(sent) == 1
-    sender.take(ack(22, 2))
+    take(ack(22, 2))
     assert await asked == 2
 
 
-async def test_an_urgent_command_does_not_wait():
-    sent = []
-    sender = CommandSender(1, sent.append)
-    arming = asyncio.create_task(sender.request(400, 1.0))
+async def test_an_urgent_command_does_not_wait(ordered):
+    order, sent, take = ordered
+    arming = order(400, 1.0)
     await asyncio.sleep(0)
-    stopping = asyncio.create_task(sender.request(400, 0.0, 21196.0, urgent=True))
+    stopping = order(400, 0.0, 21196.0, urgent=True)
     await asyncio.sleep(0)
     assert [(m.param1, m.param2) for m in sent] == [(1.0, 0.0), (0.0, 21196.0)]
-    sender.take(ack(400, 0))
+    take(ack(400, 0))
     assert await stopping == 0
     assert await arming is None
+
+
+async def test_an_order_that_is_cancelled_does_not_hinder_the_next(ordered):
+    order, sent, take = ordered
+    cancelled = order(400, 1.0)
+    await asyncio.sleep(0)
+    cancelled.cancel()
+    await asyncio.sleep(0)
+    again = order(400, 1.0)
+    await asyncio.sleep(0)
+    assert len(sent) == 2
+    take(ack(400, 0))
+    assert await again == 0

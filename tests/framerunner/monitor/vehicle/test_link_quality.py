@@ -3,9 +3,9 @@
 import pytest
 
 from framerunner.monitor.ports import Equipment
-from framerunner.monitor.vehicle.link_quality import LinkQuality, RateWatch, RepeatedRequest
+from framerunner.monitor.vehicle.link_quality import LinkQuality
 from framerunner.monitor.vehicle.vehicle import Vehicle, VehicleCallbacks
-from framerunner.wire.dialect import mavlink, request_message
+from framerunner.wire.dialect import mavlink
 
 
 def heard(sequences, rate_hz=50.0):
@@ -50,36 +50,6 @@ def test_a_long_silence_leaves_no_rate():
 
 def wanted(messages):
     return [(each.target_system, each.command, each.param1, each.param2) for each in messages]
-
-
-@pytest.mark.parametrize("rate_hz", [15.0, 25.0, 50.0, 100.0])
-def test_sufficient_rates_are_not_changed(rate_hz):
-    watch = RateWatch(1, 0.0)
-    for second in range(1, 30):
-        assert watch.requests((round(second * rate_hz), round(second * rate_hz)), float(second)) == []
-
-
-def test_only_slow_messages_are_requested_and_five_times_at_most():
-    watch = RateWatch(3, 0.0)
-    assert watch.requests((10, 1), 1.0) == []
-    assert wanted(watch.requests((60, 4), 3.0)) == [(3, 511, 32, 40_000)]
-    assert watch.requests((80, 5), 4.0) == []
-    asked = [watch.requests((60 + 20 * second, second), 3.0 + 3 * second) for second in range(1, 30)]
-    assert [len(each) for each in asked] == [2] * 4 + [0] * 25
-
-
-def test_nothing_is_requested_before_the_first_message():
-    watch = RateWatch(1, 0.0)
-    assert watch.requests((0, 0), 10.0) == []
-
-
-def test_a_request_is_repeated_every_two_seconds_a_few_times():
-    message = request_message(1, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
-    request = RepeatedRequest(message, 5)
-    assert request.due(0.0) is message
-    assert request.due(1.0) is None
-    assert request.due(2.0) is message
-    assert sum(request.due(3.0 * count) is not None for count in range(2, 40)) == 3
 
 
 def boot_time_requests(unix_us):

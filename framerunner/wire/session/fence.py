@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from framerunner.preflight.session import VehicleSession
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
-from offboard.drone import DroneError
+from framerunner.wire.session.client import VehicleClient
+from framerunner.wire.session.session import VehicleError, Wait
 
 FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 _INCLUSION = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
@@ -50,68 +50,69 @@ def polygon_fence(vertices: Sequence[Vertex]) -> tuple[FenceItem, ...]:
     return tuple(FenceItem(_INCLUSION, mavlink.MAV_FRAME_GLOBAL, params, x, y) for x, y in vertices)
 
 
-def upload_fence(session: VehicleSession, items: Sequence[FenceItem]) -> None:
+def upload_fence(client: VehicleClient, items: Sequence[FenceItem]) -> None:
     """Replace the vehicle's fence; without items it has none afterwards.
 
     Raises:
-        DroneError: the vehicle refuses it or does not answer.
+        VehicleError: the vehicle refuses it or does not answer.
     """
-    count = mavlink.MAVLink_mission_count_message(
-        session.system_id, AUTOPILOT_COMPONENT_ID, len(items), FENCE
-    )
+    session, is_heard = client.session, False
 
-    def step(message: Message) -> int | None:
+    def answer(message: Message) -> int | Wait | None:
         """Answer a request for an item; the result once the vehicle acknowledges."""
-        if getattr(message, "mission_type", None) != FENCE:
+        nonlocal is_heard
+        kind = message.get_type()
+        if kind not in (*_REQUESTS, "MISSION_ACK") or message.mission_type != FENCE:
             return None
-        if message.get_type() in _REQUESTS and message.seq < len(items):
-            session.send(_message(session.system_id, message.seq, items[message.seq]))
-        return int(message.type) if message.get_type() == "MISSION_ACK" else None
+        is_heard = True
+        if kind == "MISSION_ACK":
+            return int(message.type)
+        if message.seq < len(items):
+            session.send(_message(session.vehicle, message.seq, items[message.seq]))
+        return Wait(_UPLOAD_S, is_last=True)
 
-    def first(message: Message) -> bool | None:
-        answered = message.get_type() in (*_REQUESTS, "MISSION_ACK")
-        if not answered or getattr(message, "mission_type", None) != FENCE:
-            return None
-        results.append(step(message))
-        return True
-
-    results: list[int | None] = []
-    if session.request(count, first) is None:
-        raise DroneError("the vehicle does not answer the upload of a fence; check that it takes fences")
-    result = results[-1]
+    count = mavlink.MAVLink_mission_count_message(session.vehicle, AUTOPILOT_COMPONENT_ID, len(items), FENCE)
+    result = client.answer(session.request(count, answer))
+    if result is None and not is_heard:
+        raise VehicleError("the vehicle does not answer the upload of a fence; check that it takes fences")
     if result is None:
-        result = session.wait(step, _UPLOAD_S)
-    if result is None:
-        raise DroneError(f"the upload of the fence did not end within {_UPLOAD_S:g} s; check the link")
+        raise VehicleError(f"the upload of the fence did not end within {_UPLOAD_S:g} s; check the link")
     if result != mavlink.MAV_MISSION_ACCEPTED:
         entry = mavlink.enums["MAV_MISSION_RESULT"].get(result)
         words = f"result {result}" if entry is None else entry.name.removeprefix("MAV_MISSION_").lower()
-        raise DroneError(f"the vehicle refuses the fence: {words.replace('_', ' ')}")
+        raise VehicleError(f"the vehicle refuses the fence: {words.replace('_', ' ')}")
 
 
-def download_fence(session: VehicleSession) -> tuple[FenceItem, ...]:
+def download_fence(client: VehicleClient) -> tuple[FenceItem, ...]:
     """The fence that the vehicle has; empty if it has none.
 
     Raises:
-        DroneError: the vehicle does not answer.
+        VehicleError: the vehicle does not answer.
     """
-    system_id = session.system_id
-    count = session.request(
-        mavlink.MAVLink_mission_request_list_message(system_id, AUTOPILOT_COMPONENT_ID, FENCE),
-        lambda each: each.count if _is(each, "MISSION_COUNT") else None,
-    )
+    session, system_id = client.session, client.session.vehicle
+
+    def count_of(message: Message) -> int | None:
+        is_count = message.get_type() == "MISSION_COUNT" and message.mission_type == FENCE
+        return int(message.count) if is_count else None
+
+    request = mavlink.MAVLink_mission_request_list_message(system_id, AUTOPILOT_COMPONENT_ID, FENCE)
+    count = client.answer(session.request(request, count_of))
     if count is None or count > MAX_ITEMS:
-        raise DroneError("the vehicle does not tell its fence; check that it takes fences")
+        raise VehicleError("the vehicle does not tell its fence; check that it takes fences")
     items = []
     for seq in range(count):
         request = mavlink.MAVLink_mission_request_int_message(system_id, AUTOPILOT_COMPONENT_ID, seq, FENCE)
-        item = session.request(request, partial(_numbered, seq))
+        item = client.answer(session.request(request, partial(_numbered, seq)))
         if item is None:
-            raise DroneError(f"the vehicle does not tell item {seq + 1} of its fence; check the link")
+            raise VehicleError(f"the vehicle does not tell item {seq + 1} of its fence; check the link")
         params = (item.param1, item.param2, item.param3, item.param4)
         items.append(FenceItem(item.command, item.frame, params, item.x, item.y, item.z))
-    done = mavlink.MAV_MISSION_ACCEPTED
-    session.send(mavlink.MAVLink_mission_ack_message(system_id, AUTOPILOT_COMPONENT_ID, done, FENCE))
+    session.send(
+        mavlink.MAVLink_mission_ack_message(
+            system_id, AUTOPILOT_COMPONENT_ID, mavlink.MAV_MISSION_ACCEPTED, FENCE
+        )
+    )
+    client.turn()
     return tuple(items)
 
 
@@ -123,29 +124,22 @@ def is_same_fence(one: Sequence[FenceItem], other: Sequence[FenceItem]) -> bool:
 
 
 def _message(system_id: int, seq: int, item: FenceItem) -> Message:
-    param1, param2, param3, param4 = item.params
     return mavlink.MAVLink_mission_item_int_message(
         system_id,
         AUTOPILOT_COMPONENT_ID,
         seq,
         item.frame,
         item.command,
-        current=0,
-        autocontinue=1,
-        param1=param1,
-        param2=param2,
-        param3=param3,
-        param4=param4,
-        x=item.x,
-        y=item.y,
-        z=item.z,
-        mission_type=FENCE,
+        0,
+        1,
+        *item.params,
+        item.x,
+        item.y,
+        item.z,
+        FENCE,
     )
 
 
-def _is(message: Message, kind: str) -> bool:
-    return bool(message.get_type() == kind and message.mission_type == FENCE)
-
-
 def _numbered(seq: int, message: Message) -> Message | None:
-    return message if _is(message, "MISSION_ITEM_INT") and message.seq == seq else None
+    is_item = message.get_type() == "MISSION_ITEM_INT" and message.mission_type == FENCE
+    return message if is_item and message.seq == seq else None

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite, nan
-from typing import Any
+from math import isfinite
 
 from framerunner.geometry.rotations import multiply, normalized, quaternion_from_yaw
 from framerunner.geometry.vectors import Quaternion
+from framerunner.wire.dialect import Message
 
 _YAW_LOCK, _YAW_IN_VEHICLE_FRAME, _YAW_IN_EARTH_FRAME = 16, 32, 64  # GIMBAL_DEVICE_FLAGS
 _MIN_LENGTH = 0.5  # of a quaternion that is one
@@ -27,38 +25,12 @@ class GimbalAttitude:
         return self.attitude if self.to_north else multiply(quaternion_from_yaw(yaw_ned_rad), self.attitude)
 
 
-def gimbal_attitude(q: Sequence[float], flags: int) -> GimbalAttitude | None:
-    """The attitude that a GIMBAL_DEVICE_ATTITUDE_STATUS says; None if it says none.
-
-    Args:
-        q: its quaternion (w, x, y, z).
-        flags: GIMBAL_DEVICE_FLAGS.
-    """
+def gimbal_attitude(message: Message) -> GimbalAttitude | None:
+    """The attitude that a GIMBAL_DEVICE_ATTITUDE_STATUS says; None if it says none."""
+    q, flags = message.q, message.flags
     if len(q) != 4 or not all(map(isfinite, q)) or sum(each * each for each in q) < _MIN_LENGTH:
         return None
     locked = bool(flags & _YAW_LOCK)  # older gimbals say the frame by this alone
     to_north = bool(flags & _YAW_IN_EARTH_FRAME) or (locked and not flags & _YAW_IN_VEHICLE_FRAME)
     w, x, y, z = q
     return GimbalAttitude(normalized((w, x, y, z)), to_north)
-
-
-class GimbalFeed:
-    """Keeps the newest attitude; it is written on MAVSDK's thread.
-
-    Attributes:
-        newest: None before the first, and without a gimbal.
-    """
-
-    def __init__(self) -> None:
-        self.newest: GimbalAttitude | None = None
-
-    def subscribe(self, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
-        """Subscribe to MAVSDK's synchronous plugin `mavlink_direct`."""
-        direct.subscribe_message("GIMBAL_DEVICE_ATTITUDE_STATUS", self._on_attitude)
-
-    def _on_attitude(self, message: Any, _user: object) -> None:  # noqa: ANN401
-        fields = json.loads(message.fields_json)
-        values = [float(value) if isinstance(value, int | float) else nan for value in fields["q"]]
-        attitude = gimbal_attitude(values, int(fields["flags"]))
-        if attitude is not None:
-            self.newest = attitude
