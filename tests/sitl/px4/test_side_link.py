@@ -40,7 +40,7 @@ class Flight:
         for _ in range(round(seconds * 250)):
             time_us = simulation.time_us
             simulation.sense()
-            simulation.move(ActuatorControls(time_us, (0.5,) * 16, armed=True, lockstep=True))
+            simulation.move(ActuatorControls(time_us, (0.5,) * 16, armed=True))
             if time_us % PERIOD_US == 0:
                 self.link.step(simulation)
 
