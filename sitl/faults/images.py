@@ -11,12 +11,9 @@ from framerunner.geometry.solids import Solid
 from scenarios.faults.declaration import Fault, FaultKind, FaultPart
 from scenarios.models import Scenario, TrueState
 from sitl.camera import CameraFeed, Exposure
-from sitl.faults.effects import Lossy
+from sitl.faults.effects import Channel, Effect, new_effect
 from sitl.faults.faults import Faults
 from sitl.optics.painter import Image
-from sitl.sensors.noise import Delay
-
-Change = Callable[[int, Exposure | None], Exposure | None]
 
 
 def new_feed(
@@ -47,7 +44,7 @@ class FaultyFeed:
 
     def __init__(self, feed: CameraFeed, active: Callable[[], tuple[Fault, ...]], seed: int) -> None:
         self._feed, self._active, self._seed = feed, active, seed
-        self._changes: dict[Fault, Change] = {}
+        self._changes: dict[Fault, Effect[Exposure]] = {}
 
     @property
     def next_us(self) -> int:
@@ -71,19 +68,9 @@ class FaultyFeed:
         return exposure
 
 
-def _new_change(fault: Fault, seed: int) -> Change:
+def _new_change(fault: Fault, seed: int) -> Effect[Exposure]:
     """What a fault does from now on; late images that have not arrived at its end are lost."""
-    if fault.kind is FaultKind.OFF:
-        return lambda _now_us, _exposure: None
-    if fault.kind is FaultKind.STUCK:
-        return _Frozen()
-    if fault.kind is FaultKind.BLACK:
-        return _blacken
-    if fault.kind is FaultKind.DELAYED:
-        return _Late(fault.amount)
-    if fault.kind is FaultKind.LOSSY:
-        return Lossy(fault.amount, seed, f"faults.{fault.part}.{fault.kind}")
-    raise ValueError(f"{fault.kind} is no fault of a camera")
+    return _blacken if fault.kind is FaultKind.BLACK else new_effect(fault, _EXPOSURES, seed)
 
 
 class _Changed(Exposure):
@@ -105,24 +92,12 @@ def _blacken(_now_us: int, exposure: Exposure | None) -> Exposure | None:
     return _Changed(exposure.time_us, lambda: np.zeros_like(exposure.image))
 
 
-class _Frozen:
-    """The first image again and again, with new times: the sensor hangs, its driver does not."""
-
-    def __init__(self) -> None:
-        self._first: Exposure | None = None
-
-    def __call__(self, _now_us: int, exposure: Exposure | None) -> Exposure | None:
-        if exposure is None:
-            return None
-        first = self._first = self._first or exposure
-        return _Changed(exposure.time_us, lambda: first.image)
+def _frozen(first: Exposure, now: Exposure) -> Exposure:
+    """The first image with a new time: the sensor hangs, its driver does not."""
+    return _Changed(now.time_us, lambda: first.image)
 
 
-class _Late:
-    def __init__(self, delay_s: float) -> None:
-        self._delay: Delay[Exposure] = Delay(delay_s)
-
-    def __call__(self, now_us: int, exposure: Exposure | None) -> Exposure | None:
-        if exposure is not None:
-            self._delay.send(now_us, exposure)
-        return self._delay.newest(now_us)
+_EXPOSURES: Channel[Exposure] = Channel(
+    0, add=lambda exposure, _by: exposure, scale=lambda exposure, _factor: exposure, freeze=_frozen
+)
+"""Images are no numbers: nothing is added, and no fault scales them."""
