@@ -66,8 +66,6 @@ class Turbulence:
 class _FirstOrder:
     """The filter of the component along: x+ = a x + sqrt(1 - a^2) w, of unit variance."""
 
-    __slots__ = ("_decay", "_deviation_m_s", "_noise", "_share", "_steps_m", "_x")
-
     def __init__(self, deviation_m_s: float, length_m: float, period_s: float, stream: Generator) -> None:
         self._deviation_m_s = deviation_m_s
         self._steps_m = period_s / length_m
@@ -94,8 +92,6 @@ class _SecondOrder:
     sqrt(3) x + (1 - sqrt(3)) y, of variance 2. A step has the transition matrix e [[1, 0], [h, 1]] with
     h = period / T and e = exp(-h). [[a, 0], [b, c]] is the Cholesky factor of the noise's covariance.
     """
-
-    __slots__ = ("_a", "_b", "_c", "_decay", "_gain_x", "_gain_y", "_h", "_noise", "_steps_m", "_x", "_y")
 
     def __init__(self, deviation_m_s: float, length_m: float, period_s: float, stream: Generator) -> None:
         scale_m_s = deviation_m_s / sqrt(2.0)
