@@ -1,8 +1,8 @@
 """The velocity of the air at the drone: mean wind, turbulence and gusts, in steps of time.
 
-Turbulence is the Dryden model of MIL-F-8785C, section 3.7.1.2, discretised exactly. White noise passes through
-one filter for each component of the air's velocity. With its length scale L and standard deviation s, the
-airspeed V and T = L / V:
+Turbulence is the Dryden model of MIL-F-8785C, section 3.7.1.2, discretised exactly. White noise passes
+through one filter for each component of the air's velocity. With its length scale L and standard
+deviation s, the airspeed V and T = L / V:
 
     along:         s sqrt(2 T / pi) / (1 + T p)
     across, down:  s sqrt(T / pi) (1 + sqrt(3) T p) / (1 + T p)^2

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from firmware_py.mavlink.camera.model import PictureSpace
 from firmware_py.storage import Path
-from sitl.storage import MEBIBYTE, FolderStorage, MemoryStorage
+from sitl.storage import MEBIBYTE, FolderStorage
 
 if TYPE_CHECKING:
     from sitl.optics.painter import Image
@@ -41,7 +41,7 @@ class CameraAlbum:
         can_record: whether PyAV is installed.
     """
 
-    def __init__(self, storage: MemoryStorage | FolderStorage, boot_unix_us: int, rate_hz: float) -> None:
+    def __init__(self, storage: FolderStorage, boot_unix_us: int, rate_hz: float) -> None:
         self._storage = storage
         name = datetime.fromtimestamp(boot_unix_us / 1e6, UTC).strftime("%Y%m%d_%H%M%S")
         self._folder: Path = (_FOLDER, name)
