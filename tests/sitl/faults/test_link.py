@@ -20,7 +20,7 @@ PACKETS = 2000
 
 def sent(text):
     """Which of many numbered packets arrive, and with what delay, when one is sent at each tick."""
-    way = LinkFault(parse_fault(text), seed=3).new_way()
+    way = LinkFault(parse_fault(text), seed=3).up
     arrived = []
     for number in range(PACKETS):
         now_us = number * 4000
