@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import AsyncExitStack
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from vision.calibration.board import MIN_COVERAGE, SAME_VIEW, Board, View, coverage_of
 from vision.calibration.model import CalibrationError
-from vision.sources import IMAGE_SUFFIXES, open_source
+from vision.sources import IMAGE_SUFFIXES, FolderSource, open_source
 from vision.types import CameraError, Image
 
 MAX_VIEWS = 60
@@ -69,37 +69,34 @@ async def collect(
 async def _collect_from(
     source: str, collection: Collection, board: Board, wanted: int, say: Callable[[str], None]
 ) -> None:
-    live = _is_live(source)
-    async for name, image in _images(source):
-        new = collection.add(board, image, name)
-        views = len(collection.views)
-        if new and live:
-            seen = 100 * coverage_of(collection.views)
-            say(f"view {views} of {wanted}, {seen:.0f} % of the image covered; move and tilt the board")
-        enough = views >= wanted and coverage_of(collection.views) >= MIN_COVERAGE
-        if (live and enough) or views >= MAX_VIEWS:
-            break
-
-
-def _is_live(source: str) -> bool:
-    """Whether a source has more images than are needed: a camera or a video."""
-    return not (Path(source).is_dir() or _is_image(source))
-
-
-def _is_image(source: str) -> bool:
-    return source.lower().endswith(tuple(IMAGE_SUFFIXES)) and "://" not in source
-
-
-async def _images(source: str) -> AsyncIterator[tuple[str, Image]]:
-    if _is_image(source):
-        image = cv2.imread(source, cv2.IMREAD_COLOR)
-        if image is None:
-            raise CalibrationError(f"{source}: not an image that can be read; give PNG or JPEG files")
-        yield Path(source).name, image
+    image = image_in(source)
+    if image is not None:
+        collection.add(board, image, Path(source).name)
         return
-    async with AsyncExitStack() as stack:
-        camera = await stack.enter_async_context(open_source(source))
-        number = 0
+    number, camera = 0, open_source(source)
+    live = not isinstance(camera, FolderSource)  # a camera or a video: it has more images than are needed
+    async with camera:
         async for frame in camera.frames():
-            yield f"image {number}", frame.image
+            new = collection.add(board, frame.image, f"image {number}")
             number += 1
+            views = len(collection.views)
+            if new and live:
+                seen = 100 * coverage_of(collection.views)
+                say(f"view {views} of {wanted}, {seen:.0f} % of the image covered; move and tilt the board")
+            enough = views >= wanted and coverage_of(collection.views) >= MIN_COVERAGE
+            if (live and enough) or views >= MAX_VIEWS:
+                break
+
+
+def image_in(source: str) -> Image | None:
+    """The image in a file; None: the source is no image file.
+
+    Raises:
+        CalibrationError: it cannot be read.
+    """
+    if not source.lower().endswith(IMAGE_SUFFIXES) or "://" in source:
+        return None
+    image = cv2.imread(source, cv2.IMREAD_COLOR)
+    if image is None:
+        raise CalibrationError(f"{source}: not an image that can be read; give PNG or JPEG files")
+    return np.asarray(image, np.uint8)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation, Slerp
 
 from framerunner.geometry.rotations import mounting_flu, rotation, rotation_rows
 from framerunner.geometry.vectors import Quaternion, Vec3
@@ -54,21 +56,23 @@ class Motion:
         self.start_us = min((report.position_time_us for report in reports), default=0)
         times_s = self.seconds([report.position_time_us for report in reports])
         self._position_s, first = np.unique(times_s, return_index=True)
-        self._positions = np.array([report.position_m for report in reports]).reshape(-1, 3)[first]
-        self._velocities = np.array([report.velocity_m_s for report in reports]).reshape(-1, 3)[first]
+        positions = np.array([report.position_m for report in reports]).reshape(-1, 3)[first]
+        velocities = np.array([report.velocity_m_s for report in reports]).reshape(-1, 3)[first]
         times_s = self.seconds([report.time_us for report in reports])
         self._attitude_s, first = np.unique(times_s, return_index=True)
         quaternions = np.array([report.attitude for report in reports]).reshape(-1, 4)[first]
-        flips = np.sign(np.einsum("ij,ij->i", quaternions[1:], quaternions[:-1]))
-        signs = np.concatenate([np.ones(min(1, len(quaternions))), np.where(flips < 0.0, -1.0, 1.0)])
-        self._quaternions = quaternions * np.cumprod(signs)[:, None]
         tracks = (self._position_s, self._attitude_s)
-        enough = min(map(len, tracks)) >= 2
-        self.span_s = (
-            (max(float(track[0]) for track in tracks), min(float(track[-1]) for track in tracks) - END_S)
-            if enough
-            else (0.0, -1.0)
-        )
+        self._place: CubicHermiteSpline[np.float64] | None = None
+        self._attitude: Slerp | None = None
+        self.span_s = (0.0, -1.0)
+        if min(map(len, tracks)) >= 2:
+            self._place = CubicHermiteSpline(self._position_s, positions, velocities)
+            self._attitude = Slerp(self._attitude_s, Rotation.from_quat(quaternions[:, [1, 2, 3, 0]]))
+            start_s, end_s = (
+                max(float(track[0]) for track in tracks),
+                min(float(track[-1]) for track in tracks),
+            )
+            self.span_s = (start_s, end_s - END_S)
 
     def seconds(self, times_us: Sequence[int]) -> Floats:
         """Vehicle times as seconds since the start."""
@@ -86,35 +90,17 @@ class Motion:
 
     def positions(self, times_s: Floats) -> Floats:
         """Where the drone's centre is, shape (n, 3)."""
-        track = self._position_s
-        after = np.clip(np.searchsorted(track, times_s), 1, len(track) - 1)
-        gap_s = (track[after] - track[after - 1])[:, None]
-        t = np.clip((times_s - track[after - 1])[:, None] / gap_s, 0.0, 1.0)
-        rise = t * t * (3.0 - 2.0 * t)
-        start, end = gap_s * t * (1.0 - t) ** 2, gap_s * t * t * (t - 1.0)
-        before_m, after_m = self._positions[after - 1], self._positions[after]
-        bent = start * self._velocities[after - 1] + end * self._velocities[after]
-        at: Floats = before_m + rise * (after_m - before_m) + bent
+        if self._place is None:
+            return np.empty((0, 3))
+        at: Floats = self._place(np.clip(times_s, self._position_s[0], self._position_s[-1]))
         return at
 
     def rotations(self, times_s: Floats) -> Floats:
         """Matrices from body to world, shape (n, 3, 3)."""
-        track = self._attitude_s
-        after = np.clip(np.searchsorted(track, times_s), 1, len(track) - 1)
-        share = np.clip((times_s - track[after - 1]) / (track[after] - track[after - 1]), 0.0, 1.0)[:, None]
-        mixed = (1.0 - share) * self._quaternions[after - 1] + share * self._quaternions[after]
-        return matrices(mixed / np.sqrt((mixed**2).sum(axis=1))[:, None])
-
-
-def matrices(quaternions: Floats) -> Floats:
-    """Rotation matrices of unit quaternions (w, x, y, z), shape (n, 4) to (n, 3, 3)."""
-    w, x, y, z = quaternions.T
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
+        if self._attitude is None:
+            return np.empty((0, 3, 3))
+        turned = self._attitude(np.clip(times_s, self._attitude_s[0], self._attitude_s[-1]))
+        return np.asarray(turned.as_matrix(), np.float64)
 
 
 def mounting_matrix(angles_frd_rad: Vec3) -> Floats:
