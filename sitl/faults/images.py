@@ -9,7 +9,7 @@ import numpy as np
 
 from framerunner.geometry.solids import Solid
 from scenarios.faults.declaration import Fault, FaultKind, FaultPart
-from scenarios.models import Scenario, TrueState
+from scenarios.models import Scenario
 from sitl.camera import CameraFeed, Exposure
 from sitl.faults.effects import Channel, Effect, new_effect
 from sitl.faults.faults import Faults
@@ -18,7 +18,7 @@ from sitl.optics.painter import Image
 
 def new_feed(
     scenario: Scenario, faults: Faults, seed: int, drones: Callable[[], Sequence[Solid]] = tuple
-) -> CameraFeed | FaultyFeed:
+) -> CameraFeed:
     """The camera's feed; one with faults only if the scenario declares some of the camera.
 
     Args:
@@ -27,44 +27,24 @@ def new_feed(
         seed: of the flight.
         drones: see `CameraFeed`.
     """
-    feed = CameraFeed(scenario, drones, seed)
-    if not any(fault.part is FaultPart.CAMERA for fault in scenario.faults):
-        return feed
-    return FaultyFeed(feed, lambda: faults.camera, seed)
+    has_faults = any(fault.part is FaultPart.CAMERA for fault in scenario.faults)
+    return CameraFeed(scenario, drones, seed, _ImageFaults(faults, seed) if has_faults else None)
 
 
-class FaultyFeed:
-    """A camera feed with the faults that are active; it has the interface of `CameraFeed`.
+class _ImageFaults:
+    """The camera's active faults."""
 
-    Args:
-        feed: without faults.
-        active: called at each image for the faults of the camera.
-        seed: of the flight.
-    """
-
-    def __init__(self, feed: CameraFeed, active: Callable[[], tuple[Fault, ...]], seed: int) -> None:
-        self._feed, self._active, self._seed = feed, active, seed
+    def __init__(self, faults: Faults, seed: int) -> None:
+        self._faults, self._seed = faults, seed
         self._changes: dict[Fault, Effect[Exposure]] = {}
 
-    @property
-    def next_us(self) -> int:
-        """Before this time there is nothing to do."""
-        return 0 if self._active() or self._changes else self._feed.next_us
-
-    def step(self, truth: TrueState) -> tuple[int, Image] | None:
-        """See `CameraFeed.step`."""
-        arrived = self.arrival(truth)
-        return None if arrived is None else (arrived.time_us, arrived.image)
-
-    def arrival(self, truth: TrueState) -> Exposure | None:
-        """See `CameraFeed.arrival`."""
-        active = self._active()
+    def __call__(self, now_us: int, exposure: Exposure | None) -> Exposure | None:
+        active = self._faults.camera
         if active != tuple(self._changes):
             kept = self._changes
             self._changes = {fault: kept.get(fault) or _new_change(fault, self._seed) for fault in active}
-        exposure = self._feed.arrival(truth)
         for change in self._changes.values():
-            exposure = change(truth.time_us, exposure)
+            exposure = change(now_us, exposure)
         return exposure
 
 

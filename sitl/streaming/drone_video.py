@@ -18,7 +18,6 @@ from sitl.vehicle import SimulatedVehicle
 
 if TYPE_CHECKING:
     from sitl.camera import CameraFeed
-    from sitl.faults.images import FaultyFeed
     from sitl.pacing.time_grants import TimeGrants
     from sitl.streaming.rtp import RtpSender
     from sitl.video import Image, VideoServer
@@ -45,7 +44,7 @@ class DroneVideo:
         self.image_us = -1
         self.sends_rtp = True
         self._simulation, self._settings, self._grants = simulation, settings, grants
-        self._camera: CameraFeed | FaultyFeed | None = None
+        self._camera: CameraFeed | None = None
         self._video: VideoServer | None = None
         self._rtp: RtpSender | None = None
         self._others: Callable[[], Sequence[Solid]] = tuple
