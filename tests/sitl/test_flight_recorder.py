@@ -1,6 +1,6 @@
 from datetime import UTC, datetime
 
-from sitl.drone_files import flight_recorder
+from sitl.drone import flight_recorder
 from sitl.storage import TemporaryStorage
 
 
