@@ -22,8 +22,8 @@ from sitl.payload.album import CameraAlbum
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.storage import open_storage
-from sitl.streaming.drone_video import DroneVideo
 from sitl.streaming.streams import video_streams
+from sitl.video import DroneVideo
 from sitl.world import CONTROL_PERIOD_US
 
 _REQUESTED_US = MappingProxyType({mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20_000})

@@ -14,8 +14,8 @@ from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.pacing.pacer import BURST_TICKS, Pacer
 from sitl.pacing.time_grants import FREE_US, TimeGrants
 from sitl.server_settings import ServerSettings
-from sitl.streaming.drone_video import DroneVideo
 from sitl.vehicle import SimulatedVehicle
+from sitl.video import DroneVideo
 from sitl.world import CONTROL_PERIOD_US
 
 FALL_US = 3_000_000
