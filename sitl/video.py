@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from framerunner.errors import UserError
 from framerunner.geometry.rotations import rotation, yaw_of
 from framerunner.wire.finite_json import finite
 from framerunner.wire.mjpeg import STREAM_HEADERS, STREAM_START, write_part
@@ -29,6 +28,7 @@ from framerunner.wire.simulator_api import REFEREE_PATH, SCENARIO_PATH, VIDEO_PA
 from framerunner.wire.transports.urls import in_url
 from scenarios.result import LocalFrame, Standing, StandingPlace
 from scenarios.task import Task
+from sitl.streaming.streams import VideoError
 
 if TYPE_CHECKING:
     from aiohttp import web
@@ -56,10 +56,6 @@ object-fit:contain;image-rendering:pixelated}</style>
 <img src="/video" alt="what the drone's camera sees">
 </html>
 """
-
-
-class VideoError(UserError):
-    """Video cannot be served; the message is one line for people."""
 
 
 @dataclass(slots=True)

@@ -124,9 +124,12 @@ def _camera_heartbeat(custom_mode: int) -> Message:
 
 def _origin(simulation: Px4Simulation, system_id: int) -> Message:
     origin = simulation.scenario.origin
-    place = (degrees_e7(origin.latitude_deg), degrees_e7(origin.longitude_deg))
-    # Altitude 0: another one would not fit the barometer's offset.
-    return mavlink.MAVLink_set_gps_global_origin_message(system_id, *place, 0)
+    return mavlink.MAVLink_set_gps_global_origin_message(
+        target_system=system_id,
+        latitude=degrees_e7(origin.latitude_deg),
+        longitude=degrees_e7(origin.longitude_deg),
+        altitude=0,  # another one would not fit the barometer's offset
+    )
 
 
 def _battery_status(battery: BatteryState) -> Message:

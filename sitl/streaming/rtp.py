@@ -16,8 +16,9 @@ from av.video.stream import VideoStream
 from framerunner.wire.h264_rtp import describe_h264_rtp
 from framerunner.wire.transports.sockets import Address, resolved_ipv4
 from scenarios.models import Camera
+from sitl.optics.painter import Image
 from sitl.streaming.h264 import CLOCK_HZ, add_h264_stream, h264_frame
-from sitl.video import Image, VideoError
+from sitl.streaming.streams import VideoError
 
 _PACKET_BYTES = 1200
 _BITS_PER_PIXEL = 0.8  # of each image: thin coloured bars stay recognisable
