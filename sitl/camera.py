@@ -29,9 +29,8 @@ from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.models import Scenario, TrueState
 from sitl.camera_projection import Pinhole
-from sitl.optics.lens import SCALE, LensMap
 from sitl.optics.painter import MARGIN_PX, Image, Painter
-from sitl.optics.sensor import SensorChain
+from sitl.optics.sensor import SCALE, LensMap, SensorChain
 
 FIRST_EXPOSURE_US = 36_000
 _INSIDE = (slice(MARGIN_PX, -MARGIN_PX), slice(MARGIN_PX, -MARGIN_PX))

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from sitl.camera import CameraFeed
     from sitl.pacing.time_grants import TimeGrants
     from sitl.server_settings import ServerSettings
-    from sitl.streaming.rtp import RtpSender
+    from sitl.streaming.h264 import RtpSender
     from sitl.vehicle import SimulatedVehicle
 
 Image = npt.NDArray[np.uint8]
@@ -281,8 +281,8 @@ class DroneVideo:
         task = Task.of(scenario, show_layout=self._settings.show_layout)
         video.add_json(SCENARIO_PATH, lambda _query: task.model_dump(mode="json"))
         if self._settings.video_rtp is not None:
-            await asyncio.to_thread(import_module, "sitl.streaming.rtp")
-            from sitl.streaming.rtp import RtpSender
+            await asyncio.to_thread(import_module, "sitl.streaming.h264")
+            from sitl.streaming.h264 import RtpSender
 
             self._rtp = RtpSender(self._settings.video_rtp, scenario.camera, self._settings.speed)
             video.add_text("/video.sdp", "application/sdp", self._rtp.description())

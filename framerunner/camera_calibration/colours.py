@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from framerunner.camera_calibration.calibrate import image_in
 from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
-from framerunner.camera_calibration.collect import image_in
 from framerunner.errors import SettingError
 from vision.calibration.colours import learn_colours, share_seen, swatch_of
 from vision.calibration.model import CalibrationError

@@ -258,8 +258,7 @@ def extrinsics(
     """
     check_range("--seconds", seconds, 20, 1800)
 
-    from framerunner.camera_calibration.mounting_report import finish
-    from framerunner.camera_calibration.recorded_mounting import measure_recorded, place_of
+    from framerunner.camera_calibration.mounting_report import finish, measure_recorded, place_of
     from framerunner.commands.options.named_numbers import place_of_lens
 
     place_m = None if position is None else place_of_lens(position)

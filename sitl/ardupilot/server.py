@@ -8,13 +8,12 @@ from collections.abc import Callable
 
 from framerunner.wire.transports.sockets import Address, UdpSocket, bind_udp
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
-from sitl.ardupilot.mavlink_sender import mavlink_sender
 from sitl.ardupilot.poses import POSE_PORT, PoseLink
 from sitl.ardupilot.relay import HEARTBEAT_S, RELAY_PORT, AppRelay
 from sitl.ardupilot.simulation import ArduPilotSimulation
+from sitl.ardupilot.sole_sender import SoleSender, mavlink_sender
 from sitl.autopilots.process import AutopilotEndedError
 from sitl.autopilots.server import AutopilotServer
-from sitl.autopilots.sole_sender import SoleSender
 from sitl.pacing.pacer import Pacer
 from sitl.pacing.time_grants import FREE_US
 

@@ -14,7 +14,7 @@ from sitl.storage import MEBIBYTE, FolderStorage
 
 if TYPE_CHECKING:
     from sitl.optics.painter import Image
-    from sitl.payload.video_file import VideoEncoder
+    from sitl.streaming.h264 import VideoEncoder
 
 _FOLDER = "DCIM"  # of cameras, by the Design rule for Camera File system
 _MIN_FREE_BYTES = MEBIBYTE  # a recording needs room to begin
@@ -95,7 +95,7 @@ class CameraAlbum:
             self._create(path)
         except OSError:
             return False
-        from sitl.payload.video_file import VideoEncoder
+        from sitl.streaming.h264 import VideoEncoder
 
         height, width = self._newest.shape[:2]
         self._recording = _Recording(VideoEncoder(width, height, self._rate_hz), path)

@@ -3,7 +3,7 @@
 import cv2
 import pytest
 
-from framerunner.camera_calibration import collect
+from framerunner.camera_calibration import calibrate
 from framerunner.camera_calibration.calibration_file import load_calibration
 from framerunner.cli import run
 from tests.vision.calibration.board_images import TRUE, board_images
@@ -56,7 +56,7 @@ def test_the_views_of_a_camera_that_fails_are_used(photos, tmp_path, capsys, mon
         return FailingSource(photos)
 
     url = ""
-    monkeypatch.setattr(collect, "open_source", failing)
+    monkeypatch.setattr(calibrate, "open_source", failing)
     out = tmp_path / "camera.yaml"
     assert run(["camera", "calibrate", "rtsp://gone", "--out", str(out)]) == 2
     assert run(["camera", "calibrate", "rtsp://ends", "--out", str(out)]) == 0

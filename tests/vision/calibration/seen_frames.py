@@ -7,8 +7,14 @@ from math import cos, radians, sin
 import numpy as np
 
 from framerunner.geometry.rotations import quaternion_from_euler, rotation, rotation_rows
-from vision.calibration.motion import Motion, MotionReport, mounting_matrix
-from vision.calibration.sightings import Sightings, Values, sightings_of
+from vision.calibration.sightings import (
+    Motion,
+    MotionReport,
+    Sightings,
+    Values,
+    mounting_matrix,
+    sightings_of,
+)
 from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M
 from vision.types import Detections, FrameCorner, FramePose, FrameSighting
 
