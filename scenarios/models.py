@@ -19,8 +19,7 @@ from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.air import Wind
 from scenarios.faults.declaration import Fault
 from scenarios.goals import Goal
-from scenarios.imaging.clutter import Hall, Patch
-from scenarios.imaging.effects import CameraEffects
+from scenarios.imaging.effects import CameraEffects, Hall, Patch
 from scenarios.part import Component, Metres, OnDrone, Part, Turn
 
 

@@ -9,8 +9,18 @@ from pydantic import Field, model_validator
 
 from scenarios.air import MAX_TURBULENCE_M_S, MAX_WIND_M_S, Wind, check_gusts
 from scenarios.faults.declaration import MAX_TIME_S, Fault, FaultPart
-from scenarios.imaging.clutter import PATCH_COLOURS, SURFACES, Hall, Patch, PatchColour, Surface
-from scenarios.imaging.effects import MAX_K, MAX_P, CameraEffects, Lens
+from scenarios.imaging.effects import (
+    MAX_K,
+    MAX_P,
+    PATCH_COLOURS,
+    SURFACES,
+    CameraEffects,
+    Hall,
+    Lens,
+    Patch,
+    PatchColour,
+    Surface,
+)
 from scenarios.models import Arena, Camera, Light
 from scenarios.part import Part
 from scenarios.random_numbers import Range, random_stream, within

@@ -6,7 +6,7 @@ import time
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from scenarios.faults.parse import parse_fault
+from scenarios.faults.declaration import parse_fault
 from scenarios.loader import load_scenario
 from sitl.px4.messages import ActuatorControls
 from sitl.px4.side_link import CAMERA_PORT, PERIOD_US, SideLink

@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from framerunner.errors import SettingError
-from scenarios.faults.parse import FaultError, parse_fault
+from scenarios.faults.declaration import FaultError, parse_fault
 from scenarios.loader import load_scenario
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.px4.messages import ActuatorControls
