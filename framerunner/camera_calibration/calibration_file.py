@@ -1,7 +1,7 @@
 """Calibrations as YAML files; those of ROS (camera_info) and OpenCV (FileStorage) are read, too.
 
-Those of OpenCV are YAML, XML or JSON. They all have OpenCV's conventions: whole numbers are pixel centres, and
-the distortion is k1, k2, p1, p2, k3.
+Those of OpenCV are YAML, XML or JSON. They all have its conventions: whole numbers are pixel centres, and the
+distortion is k1, k2, p1, p2, k3.
 """
 
 from __future__ import annotations
