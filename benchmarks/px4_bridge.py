@@ -8,9 +8,10 @@ from __future__ import annotations
 import time
 
 from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader, packed
 from scenarios.loader import load_scenario
 from sitl.autopilots.sensors import with_estimable_sensors
-from sitl.px4.messages import ActuatorControls, ControlsReader, Packer
+from sitl.px4.messages import ActuatorControls
 from sitl.px4.simulation import Px4Simulation
 
 STEPS = 20_000
@@ -20,8 +21,7 @@ HOVER = 0.26
 def main() -> None:
     """Print the mean times, microseconds a step."""
     simulation = Px4Simulation(with_estimable_sensors(load_scenario("test-case-1")))
-    packer = Packer(mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS)
-    reader = ControlsReader()
+    px4, reader = mavlink.MAVLink(None, 1, 1), PacketReader()
     packed_s = read_s = 0.0
     messages = simulation.messages
     pack = messages.pack
@@ -38,11 +38,12 @@ def main() -> None:
     for _ in range(STEPS):
         time_us = simulation.time_us
         simulation.sense()
-        answer = packer.pack(time_us, 1, *(HOVER,) * 4, *(0.0,) * 12, 129)
+        outputs = [HOVER] * 4 + [0.0] * 12
+        answer = packed(mavlink.MAVLink_hil_actuator_controls_message(time_us, outputs, 129, 1), px4)
         read_began_s = time.perf_counter()
-        (controls,) = reader.feed(answer)
+        (message,) = reader.feed(answer)
+        controls = ActuatorControls.of(message)
         read_s += time.perf_counter() - read_began_s
-        assert isinstance(controls, ActuatorControls)
         simulation.move(controls)
     all_s = time.perf_counter() - began_s
     for name, seconds in (("packing", packed_s), ("reading", read_s), ("all of a step", all_s)):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from math import atan2, cos, hypot, sin, sqrt, tan
-from typing import Annotated, Any, Literal, Self
+from math import atan2, cos, hypot, pi, sin, sqrt, tan
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 
 from framerunner.errors import UserError
 from framerunner.files.yaml_file import refusal
@@ -18,11 +18,27 @@ from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.air import Wind
 from scenarios.faults.declaration import Fault
-from scenarios.gimbal import Gimbal
 from scenarios.goals import Goal
-from scenarios.imaging.clutter import Hall, Patch
-from scenarios.imaging.effects import CameraEffects
+from scenarios.imaging.effects import CameraEffects, Hall, Patch
 from scenarios.part import Component, Metres, OnDrone, Part, Turn
+
+
+class Gimbal(Part):
+    """A gimbal with two axes that carries the camera and keeps it level: pitch and yaw are commanded."""
+
+    pitch_min_rad: float = Field(
+        -pi / 2, ge=-pi / 2, le=0, description="lowest, to the horizon; down is below 0"
+    )
+    pitch_max_rad: float = Field(0.52, ge=0, le=pi / 2, description="highest, to the horizon")
+    yaw_max_rad: float = Field(2.79, ge=0, le=pi, description="to either side, from the drone's heading")
+    rate_max_rad_s: float = Field(1.57, ge=0.01, le=20, description="at which it turns to a new angle")
+
+    @model_validator(mode="after")
+    def _turns(self) -> Self:
+        if self.pitch_min_rad == self.pitch_max_rad == self.yaw_max_rad == 0.0:
+            raise refusal(self.yaw_max_rad, "lets it turn about no axis; leave the gimbal out", "yaw_max_rad")
+        return self
+
 
 Colour = Literal["red", "green", "blue"]
 COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
@@ -31,18 +47,6 @@ MissionClass = Literal["contest", "open"]
 DecoyColour = Literal["cyan", "magenta"]
 DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
-_OFTEN_UNUSED = (
-    "decoys",
-    "poles",
-    "walls",
-    "sensors",
-    "wind",
-    "faults",
-    "hall",
-    "patches",
-    "gripper",
-    "goals",
-)
 _SHORTEST_DIRECTION = 1e-6
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
@@ -224,6 +228,8 @@ def _standing(name: str, place_m: tuple[float, float], yaw_rad: float, size_m: V
 class Camera(Part):
     """A pinhole camera that looks along the drone's x axis unless it is mounted otherwise, or on a gimbal."""
 
+    often_unused: ClassVar = ("effects", "gimbal", "mounting_frd_rad")
+
     width_px: int = Field(320, ge=16, le=4096, description="columns of the image")
     height_px: int = Field(240, ge=16, le=4096, description="rows of the image")
     horizontal_fov_rad: float = Field(1.57, gt=0.1, lt=3.0, description="angle of view over the width")
@@ -263,13 +269,11 @@ class Camera(Part):
             raise refusal(lens.k1, message, "effects", "lens", "k1")
         return self
 
-    @model_serializer(mode="wrap")
-    def _without_unused_effects(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return _without_defaults(self, write(self), ("effects", "gimbal", "mounting_frd_rad"))
-
 
 class Light(Part):
     """One sun and ambient light."""
+
+    often_unused: ClassVar = ("turn_rad_s",)
 
     sun_direction_arena: tuple[Component, Component, Component] = Field(
         (-0.5, 0.1, -0.9), description="direction of its light; any length"
@@ -292,17 +296,6 @@ class Light(Part):
             raise refusal(str(list(self.sun_direction_arena)), message, "sun_direction_arena")
         return self
 
-    @model_serializer(mode="wrap")
-    def _without_turn(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return _without_defaults(self, write(self), ("turn_rad_s",))
-
-
-def _without_defaults(part: Part, written: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
-    """What is written of a part, less those of the named fields that have their defaults."""
-    fields = type(part).model_fields
-    unused = [name for name in names if getattr(part, name) == fields[name].default]
-    return {field: value for field, value in written.items() if field not in unused}
-
 
 class Origin(Part):
     """Where on Earth the arena's centre is; by default PX4's simulated home."""
@@ -314,6 +307,19 @@ class Origin(Part):
 
 class Scenario(Part):
     """All that is given before a flight."""
+
+    often_unused: ClassVar = (
+        "decoys",
+        "poles",
+        "walls",
+        "sensors",
+        "wind",
+        "faults",
+        "hall",
+        "patches",
+        "gripper",
+        "goals",
+    )
 
     name: ScenarioName
     description: str = Field("", description="what this scenario is and where its numbers come from")
@@ -401,11 +407,6 @@ class Scenario(Part):
                     message = f"is over the {where}; keep the {solid.name} {clear_m:.3g} m from its centre"
                     raise refusal(part.x_m, message, *at, "x_m")
         return self
-
-    @model_serializer(mode="wrap")
-    def _without_unused_parts(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what most scenarios do not use: evaluations compare scenarios by what is written."""
-        return _without_defaults(self, write(self), _OFTEN_UNUSED)
 
     @property
     def contents(self) -> str:

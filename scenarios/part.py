@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
 from framerunner.geometry.rotations import MAX_MOUNTING_RAD
 
@@ -18,6 +18,18 @@ Component = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class Part(BaseModel):
-    """Base of all scenario parts: frozen, finite numbers, and an unknown field is an error."""
+    """Base of all scenario parts: frozen, finite numbers, and an unknown field is an error.
+
+    Attributes:
+        often_unused: fields that are not written with their defaults: most scenarios do not use them, and
+            evaluations compare scenarios by what is written.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    often_unused: ClassVar[tuple[str, ...]] = ()
+
+    @model_serializer(mode="wrap")
+    def _without_unused(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        fields, written = type(self).model_fields, write(self)
+        unused = [name for name in self.often_unused if getattr(self, name) == fields[name].default]
+        return {name: value for name, value in written.items() if name not in unused}

@@ -7,12 +7,13 @@ is added, left out or drawn from more often changes no other.
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Self
+from math import tau
+from typing import TYPE_CHECKING, Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from framerunner.files.yaml_file import refusal
-from scenarios.models import ScenarioError
+from scenarios.models import Arena, ScenarioError, UprightFrame
 from scenarios.part import Part
 
 if TYPE_CHECKING:
@@ -56,8 +57,8 @@ class Range(Part):
         """Draw a number of at most three decimals."""
         return self.draw(stream) / STEPS_PER_UNIT
 
-    def within(self, lowest: float, highest: float, *at: str) -> None:
-        """Refuse a range that goes beyond limits.
+    def check(self, lowest: float, highest: float, *at: str) -> None:
+        """Refuse a range that goes beyond limits, between which all can be flown.
 
         Args:
             lowest: what may be drawn.
@@ -68,6 +69,25 @@ class Range(Part):
             if not lowest <= value <= highest:
                 message = f"cannot be flown; keep within {lowest:.4g} and {highest:.4g}"
                 raise refusal(value, message, *at, end)
+
+
+def within(lowest: float, highest: float) -> AfterValidator:
+    """Limits of a field that is a `Range`."""
+
+    def checked(drawn: Range) -> Range:
+        drawn.check(lowest, highest)
+        return drawn
+
+    return AfterValidator(checked)
+
+
+_ARENA = Arena()
+PlaceX = Annotated[Range, within(-_ARENA.length_x_m / 2, _ARENA.length_x_m / 2)]
+PlaceY = Annotated[Range, within(-_ARENA.width_y_m / 2, _ARENA.width_y_m / 2)]
+FrameHeight = Annotated[
+    Range, within(UprightFrame.model_fields["outer_height_m"].default / 2, _ARENA.height_m)
+]
+Heading = Annotated[Range, within(-tau, tau)]
 
 
 def random_stream(seed: int, name: str) -> Generator:

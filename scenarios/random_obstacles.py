@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, dist, hypot, sin, sqrt, tau
-from typing import TYPE_CHECKING, Self
+from math import cos, dist, hypot, sin, sqrt
+from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -21,7 +21,17 @@ from scenarios.models import (
     Wall,
 )
 from scenarios.part import Part
-from scenarios.random_numbers import MAX_DRAWS, LevelError, Range, random_stream
+from scenarios.random_numbers import (
+    MAX_DRAWS,
+    FrameHeight,
+    Heading,
+    LevelError,
+    PlaceX,
+    PlaceY,
+    Range,
+    random_stream,
+    within,
+)
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -33,30 +43,36 @@ class RandomDecoys(Part):
     """Frames of other colours."""
 
     count: int = Field(ge=1, le=20, description="how many, cyan and magenta by turns")
-    z_m: Range = Field(description="centres of the openings above the floor")
-    yaw_rad: Range = Field(description="headings of their normals")
+    z_m: FrameHeight = Field(description="centres of the openings above the floor")
+    yaw_rad: Heading = Field(description="headings of their normals")
 
 
 class RandomPoles(Part):
     """Poles from the floor to the ceiling."""
 
     count: int = Field(ge=1, le=20, description="how many")
-    edge_m: Range = Field(description="edges of their squares")
+    edge_m: Annotated[Range, within(0.02, 2.0)] = Field(description="edges of their squares")
 
 
 class RandomWall(Part):
     """A wall from the floor to the ceiling, anywhere that both its ends are inside the arena."""
 
     length_m: Range = Field(description="from end to end, doorway included")
-    yaw_rad: Range = Field(description="heading from where it begins to where it ends")
+    yaw_rad: Heading = Field(description="heading from where it begins to where it ends")
     doorway_m: float = Field(1.2, ge=1.0, le=10, description="width of its doorway, which is anywhere in it")
+
+    @model_validator(mode="after")
+    def _doorway_fits(self) -> Self:
+        arena, shortest_m = Arena(), self.doorway_m + 2 * _BESIDE_DOORWAY_M
+        self.length_m.check(shortest_m, hypot(arena.length_x_m, arena.width_y_m), "length_m")
+        return self
 
 
 class Obstacles(Part):
     """What else is in the arena, beside base and frames."""
 
-    x_m: Range = Field(description="centres of the obstacles")
-    y_m: Range = Field(description="centres of the obstacles")
+    x_m: PlaceX = Field(description="centres of the obstacles")
+    y_m: PlaceY = Field(description="centres of the obstacles")
     free_m: float = Field(
         ge=0.01,
         le=10,
@@ -66,25 +82,6 @@ class Obstacles(Part):
     decoys: RandomDecoys | None = Field(None, description="frames of other colours")
     poles: RandomPoles | None = Field(None, description="poles")
     wall: RandomWall | None = Field(None, description="a wall with a doorway")
-
-    @model_validator(mode="after")
-    def _every_draw_is_a_valid_scenario(self) -> Self:
-        arena = Arena()
-        self.x_m.within(-arena.length_x_m / 2, arena.length_x_m / 2, "x_m")
-        self.y_m.within(-arena.width_y_m / 2, arena.width_y_m / 2, "y_m")
-        if self.decoys is not None:
-            half_frame_m: float = Decoy.model_fields["outer_height_m"].default / 2
-            self.decoys.z_m.within(half_frame_m, arena.height_m, "decoys", "z_m")
-            self.decoys.yaw_rad.within(-tau, tau, "decoys", "yaw_rad")
-        if self.poles is not None:
-            self.poles.edge_m.within(0.02, 2.0, "poles", "edge_m")
-        if self.wall is not None:
-            shortest_m = self.wall.doorway_m + 2 * _BESIDE_DOORWAY_M
-            self.wall.length_m.within(
-                shortest_m, hypot(arena.length_x_m, arena.width_y_m), "wall", "length_m"
-            )
-            self.wall.yaw_rad.within(-tau, tau, "wall", "yaw_rad")
-        return self
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,8 +28,6 @@ class Battery:
         sag: share of the voltage that is lost by a fault, 0..1.
     """
 
-    __slots__ = ("_airframe", "_parameters", "_values", "_version", "charge", "current_a", "sag", "voltage_v")
-
     def __init__(self, airframe: Airframe, parameters: Parameters) -> None:
         self._airframe = airframe
         self._parameters = parameters

@@ -29,9 +29,8 @@ from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.models import Scenario, TrueState
 from sitl.camera_projection import Pinhole
-from sitl.optics.lens import SCALE, LensMap
 from sitl.optics.painter import MARGIN_PX, Image, Painter
-from sitl.optics.sensor import SensorChain
+from sitl.optics.sensor import SCALE, LensMap, SensorChain
 
 FIRST_EXPOSURE_US = 36_000
 _INSIDE = (slice(MARGIN_PX, -MARGIN_PX), slice(MARGIN_PX, -MARGIN_PX))
@@ -89,6 +88,8 @@ class Camera:
         attitude_arena: Quaternion,
         drones: Sequence[Solid] = (),
         motion: Motion = STILL,
+        *,
+        gimbal_arena: Quaternion | None = None,
     ) -> Image:
         """What the camera sees.
 
@@ -99,6 +100,8 @@ class Camera:
                 where the tree has its centre. That is correct unless it flies closer to a thing than about
                 its own size.
             motion: of the drone, for blur and rolling shutter; its time is that of light and noise.
+            gimbal_arena: attitude of a camera on a gimbal, forward-left-up to arena; its centre is the
+                camera's place on the drone. None: the camera is fixed to the drone.
 
         Returns:
             A new image, BGR, shape (height, width, 3), uint8; its rows need not follow each other in memory.
@@ -106,26 +109,18 @@ class Camera:
         Raises:
             ValueError: a number is not finite, or the quaternion is zero.
         """
+        if gimbal_arena is not None:
+            place = self._eye(position_arena_m, _rows(attitude_arena))
+            x, y, z = self._settings.position_flu_m
+            turned = zip(place, _rows(gimbal_arena), strict=True)
+            cx, cy, cz = (e - r[0] * x - r[1] * y - r[2] * z for e, r in turned)
+            position_arena_m, attitude_arena = (cx, cy, cz), gimbal_arena
         if self._effects is None:
             attitude = _unit(attitude_arena)
             eye, rotation = self._seen_from(position_arena_m, attitude)
             return self._painter.paint(eye, rotation, drones, time_us=motion.time_us)[_INSIDE]
         light = self._exposed(position_arena_m, attitude_arena, drones, motion)
         return self._sensor.develop(light, motion.time_us)
-
-    def place_on(self, position_arena_m: Vec3, attitude_arena: Quaternion) -> Vec3:
-        """Where the camera is on a drone with this pose, arena axes: the centre of a gimbal's axes."""
-        return self._eye(position_arena_m, _rows(attitude_arena))
-
-    def render_from(
-        self, eye_arena_m: Vec3, attitude_arena: Quaternion, drones: Sequence[Solid], motion: Motion
-    ) -> Image:
-        """As `render`, from a place and an attitude of the camera itself, such as one on a gimbal."""
-        x, y, z = self._settings.position_flu_m
-        rows = _rows(attitude_arena)
-        centre = (e - r[0] * x - r[1] * y - r[2] * z for e, r in zip(eye_arena_m, rows, strict=True))
-        cx, cy, cz = centre
-        return self.render((cx, cy, cz), attitude_arena, drones, motion)
 
     def _exposed(
         self, position: Vec3, attitude: Quaternion, drones: Sequence[Solid], motion: Motion
@@ -221,13 +216,18 @@ class Exposure:
     @cached_property
     def image(self) -> Image:
         """BGR, shape (height, width, 3), uint8."""
-        truth, camera = self._truth, self._truth.camera
-        if camera is None:
-            motion = Motion(truth.time_us, truth.velocity_arena_m_s, truth.rate_frd_rad_s)
-            return self._camera.render(truth.position_arena_m, truth.attitude_arena, self._drones, motion)
-        motion = Motion(truth.time_us, truth.velocity_arena_m_s, camera.rate_frd_rad_s)
-        eye = self._camera.place_on(truth.position_arena_m, truth.attitude_arena)
-        return self._camera.render_from(eye, camera.attitude_arena, self._drones, motion)
+        truth, gimbal = self._truth, self._truth.camera
+        rate = truth.rate_frd_rad_s if gimbal is None else gimbal.rate_frd_rad_s
+        return self._camera.render(
+            truth.position_arena_m,
+            truth.attitude_arena,
+            self._drones,
+            Motion(truth.time_us, truth.velocity_arena_m_s, rate),
+            gimbal_arena=None if gimbal is None else gimbal.attitude_arena,
+        )
+
+
+Change = Callable[[int, Exposure | None], Exposure | None]
 
 
 class CameraFeed:
@@ -242,15 +242,21 @@ class CameraFeed:
         scenario: camera settings and what is to be seen.
         drones: called at each exposure for the boxes of other drones.
         seed: of noise.
+        change: from the time and the image that would arrive, or None, to what arrives; None: no fault.
 
     Attributes:
         next_us: before this time there is nothing to do.
     """
 
     def __init__(
-        self, scenario: Scenario, drones: Callable[[], Sequence[Solid]] = tuple, seed: int = 0
+        self,
+        scenario: Scenario,
+        drones: Callable[[], Sequence[Solid]] = tuple,
+        seed: int = 0,
+        change: Change | None = None,
     ) -> None:
         self._camera = Camera(scenario, seed)
+        self._change = change
         self._drones = drones
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._latency_us = round(scenario.camera.latency_s * 1e6)
@@ -284,4 +290,7 @@ class CameraFeed:
         self.next_us = int(FIRST_EXPOSURE_US + self._taken * self._period_us)
         if self._waiting:
             self.next_us = min(self.next_us, self._waiting[0].time_us + self._latency_us)
+        if self._change is not None:
+            self.next_us = 0  # an image may be late
+            return self._change(truth.time_us, arrived)
         return arrived

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from types import MappingProxyType
 
 from firmware_py.mavlink.camera.model import CameraModel
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
+from firmware_py.storage import Path, Storage
+from firmware_py.ulog import UlogRecorder
 from framerunner.geometry.solids import Solid
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.transports.urls import in_url
-from sitl.drone_files import flight_recorder
 from sitl.link_hub import LinkHub
 from sitl.pacing.time_grants import TimeGrants, Velocity
 from sitl.parameter_file import ParameterKeeper, open_parameters
@@ -20,8 +22,8 @@ from sitl.payload.album import CameraAlbum
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.storage import open_storage
-from sitl.streaming.drone_video import DroneVideo
 from sitl.streaming.streams import video_streams
+from sitl.video import DroneVideo
 from sitl.world import CONTROL_PERIOD_US
 
 _REQUESTED_US = MappingProxyType({mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20_000})
@@ -187,3 +189,22 @@ class ServedDrone:
         page = f"http://{in_url(settings.bind, settings.http_port)}/"
         rtp = "" if settings.video_rtp is None else f" and as RTP to UDP {settings.video_rtp[1]}"
         return f"{scenario.airframe} in {scenario.name}: MAVLink to UDP {ports}, video on {page}{rtp}"
+
+
+def _utc(unix_us: int, form: str) -> str:
+    return datetime.fromtimestamp(unix_us / 1e6, UTC).strftime(form)
+
+
+def flight_recorder(storage: Storage, boot_unix_us: int) -> UlogRecorder:
+    """A recorder that names logs as PX4 does, `log/2026-11-20/14_05_59.ulg` (UTC).
+
+    Args:
+        storage: where the logs are written.
+        boot_unix_us: time of boot in microseconds since 1970.
+    """
+
+    def name_log(time_us: int) -> Path:
+        began_us = boot_unix_us + time_us
+        return ("log", _utc(began_us, "%Y-%m-%d"), _utc(began_us, "%H_%M_%S.ulg"))
+
+    return UlogRecorder(storage, name_log, boot_unix_us=boot_unix_us)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from framerunner.wire.link import LinkProfile
-from framerunner.wire.transports.sockets import Stream, open_serial
-from framerunner.wire.transports.urls import LinkUrl, is_loopback
-from sitl.faults.link import LinkFault, Way
+from framerunner.wire.transports.sockets import Address, Stream, bind_udp, open_serial, resolved_ipv4
+from framerunner.wire.transports.urls import LinkError, LinkUrl, is_loopback
+from sitl.faults.link import LinkFault
 from sitl.links import (
     Joined,
     Receive,
@@ -25,7 +27,6 @@ from sitl.links import (
     connect_tcp_async,
     open_udp,
 )
-from sitl.payload.link import PayloadLink, open_payload
 from sitl.server_settings import RequestedLink
 
 _INPUT_SHARE = 0.25  # of a core
@@ -51,9 +52,11 @@ class LinkHub:
     ) -> None:
         self._node = node
         self._input = LinkInput(node, notice)
-        self._faulty = _FaultyLink(fault)
-        self._carriers: dict[str, UdpLink | PayloadLink | StreamLink] = {}
-        self._opened: list[UdpLink | PayloadLink | StreamLinks] = []
+        self._fault = fault
+        self._faulty: LinkFault | None = None  # as of the last update
+        self._now_us = 0
+        self._carriers: dict[str, list[UdpLink] | list[StreamLink]] = {}
+        self._opened: list[UdpLink | StreamLinks] = []
         self._joined = 0
 
     async def open_udp(self, profile: LinkProfile, addresses: UdpAddresses) -> None:
@@ -62,20 +65,42 @@ class LinkHub:
         Raises:
             LinkError: the local port is in use or an address is wrong.
         """
-        self._add(profile, await open_udp(addresses, self._receiver(profile.name)))
+        self._add(profile, [await open_udp(addresses, self._receiver(profile.name))])
 
     async def open_payload(self, profile: LinkProfile, addresses: UdpAddresses) -> None:
         """Open the payload link and send on it from now on.
 
+        PX4 sends from 14280 to 14030, where a camera's program listens; MAVSDK's camera client sends to
+        14030. Here the camera is in the simulator. So this link has two sockets: it sends from 14280 to
+        14030, and listens on 14030 as well unless another program does. One that binds it later, as MAVSDK
+        does, receives instead.
+
+        Args:
+            profile: of the link.
+            addresses: PX4's; the remote's port is listened on too if the remote is this machine.
+
         Raises:
             LinkError: the local port is in use or an address is wrong.
         """
-        self._add(profile, await open_payload(addresses, self._receiver(profile.name)))
+        receive, (host, port) = self._receiver(profile.name), addresses.bind
+        links = [await open_udp(addresses, receive)]
+        assert addresses.remote is not None
+        remote = await asyncio.to_thread(resolved_ipv4, addresses.remote)
 
-    def _add(self, profile: LinkProfile, link: UdpLink | PayloadLink) -> None:
-        self._opened.append(link)
+        def accepts(peer: Address) -> bool:
+            return peer[1] != port and (not is_loopback(host) or is_loopback(peer[0]))
+
+        if is_loopback(remote[0]):
+            # Everywhere, where MAVSDK binds: a more specific address would receive before it.
+            with suppress(LinkError):
+                listener = bind_udp(("0.0.0.0", remote[1]), "", gives_way=True)
+                links.append(UdpLink(listener, None, receive, accepts=accepts))
+        self._add(profile, links)
+
+    def _add(self, profile: LinkProfile, links: list[UdpLink]) -> None:
+        self._opened += links
         self._node.add_link(profile)
-        self._carriers[profile.name] = link
+        self._carriers[profile.name] = links
 
     async def open(self, link: RequestedLink) -> None:
         """Open a link that the user requested.
@@ -99,12 +124,12 @@ class LinkHub:
 
     def update(self, time_us: int) -> None:
         """Process waiting input, then send what is due at a vehicle time."""
-        faulty = self._faulty
-        if faulty.update(time_us):
-            for data in faulty.arrived_up():
+        self._now_us, self._faulty = time_us, self._fault()
+        if self._faulty is not None:
+            for data in self._faulty.up.all(time_us):
                 self._input.take(ONBOARD.name, data)
-            for data in faulty.arrived_down():
-                self._carriers[ONBOARD.name].send(data)
+            for data in self._faulty.down.all(time_us):
+                self._send(ONBOARD.name, data)
         self._input.work()
         self._node.update(time_us)
         self._flush()
@@ -115,12 +140,15 @@ class LinkHub:
         self._flush()
 
     def _flush(self) -> None:
-        faulty = self._faulty
         for name, data in self._node.take_output():
-            if faulty.active and name == ONBOARD.name:
-                faulty.send_down(data)
+            if self._faulty is not None and name == ONBOARD.name:
+                self._faulty.down.send(self._now_us, data)
             else:
-                self._carriers[name].send(data)
+                self._send(name, data)
+
+    def _send(self, name: str, data: bytes) -> None:
+        for carrier in self._carriers[name]:
+            carrier.send(data)
 
     def close(self) -> None:
         """Close all links."""
@@ -140,8 +168,8 @@ class LinkHub:
 
     def _receiver(self, name: str) -> Receive:
         def receive(data: bytes) -> None:
-            if self._faulty.active and name == ONBOARD.name:
-                self._faulty.send_up(data)
+            if self._faulty is not None and name == ONBOARD.name:
+                self._faulty.up.send(self._now_us, data)
                 return
             self._input.take(name, data)
             self._flush()  # answers do not wait for the next tick
@@ -153,64 +181,16 @@ class LinkHub:
             self._joined += 1
             name = f"{profile.name}#{self._joined}"
             self._node.add_link(replace(profile, name=name))
-            self._carriers[name] = carrier
+            self._carriers[name] = [carrier]
             return self._receiver(name)
 
         return join
 
     def _leave(self, carrier: StreamLink) -> None:
         for name, known in list(self._carriers.items()):
-            if known is carrier:
+            if carrier in known:
                 self._node.remove_link(name)
                 del self._carriers[name]
-
-
-class _FaultyLink:
-    """Datagrams to and from the app while that link has a fault.
-
-    Args:
-        fault: called for the active one.
-    """
-
-    def __init__(self, fault: Callable[[], LinkFault | None]) -> None:
-        self._fault = fault
-        self._now_us = 0
-        self._known: LinkFault | None = None
-        self._up: Way[bytes] | None = None
-        self._down: Way[bytes] | None = None
-
-    @property
-    def active(self) -> bool:
-        """Whether the link has a fault, as of the last update."""
-        return self._known is not None
-
-    def update(self, now_us: int) -> bool:
-        """Look for the fault at a vehicle time; return whether there is one."""
-        self._now_us = now_us
-        fault = self._fault()
-        if fault is not self._known:
-            self._known = fault
-            self._up = None if fault is None else fault.new_way()
-            self._down = None if fault is None else fault.new_way()
-        return fault is not None
-
-    def send_up(self, data: bytes) -> None:
-        """Take a datagram from the app."""
-        if self._up is not None:
-            self._up.send(self._now_us, data)
-
-    def send_down(self, data: bytes) -> None:
-        """Take a datagram to the app."""
-        if self._down is not None:
-            self._down.send(self._now_us, data)
-
-    def arrived_up(self) -> Iterable[bytes]:
-        """Datagrams that have reached the vehicle now."""
-        return () if self._up is None else self._up.all(self._now_us)
-
-    def arrived_down(self) -> Iterable[bytes]:
-        """Datagrams that reach the app now."""
-        return () if self._down is None else self._down.all(self._now_us)
 
 
 class LinkInput:

@@ -94,7 +94,7 @@ class ServerSettings:
     speed: float = 1.0  # simulated seconds a second
     links: tuple[RequestedLink, ...] = ()  # further ones
     signing_key: SigningKey | None = None  # of MAVLink; None: unsigned
-    storage: Path | None = None  # folder for the drones' files and logs; None: they are kept in memory
+    storage: Path | None = None  # folder for the drones' files and logs; None: a temporary one
     shell: bool = False  # over MAVLink
     camera: bool = True  # a MAVLink camera component
     show_layout: bool = False  # tell everybody who asks where the frames and obstacles are

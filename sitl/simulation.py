@@ -72,16 +72,13 @@ class Simulation(SimulatedVehicle):
     @property
     def local_origin_arena_m(self) -> Vec3 | None:
         """Where the autopilot's local frame has its origin, arena axes; None before it is known."""
-        origin, place = self.autopilot.estimator.origin, self.scenario.origin
-        if origin is None:
-            return None
-        arena = GeodeticPoint(place.latitude_deg, place.longitude_deg, place.altitude_m)
-        return flip_vector(LocalProjection(arena).to_local(origin))
+        origin = self.autopilot.estimator.origin
+        return None if origin is None else flip_vector(LocalProjection(self._place).to_local(origin))
 
     def tick(self) -> None:
         """Advance by one control period: sense, control, move, judge."""
         sensors = self._begin_tick()
-        if self._sensing is None:
+        if self._models is None:
             faulty = self.faults.sensors
             motors = self.autopilot.step(sensors if faulty is None else faulty.change_ideal(sensors))
         else:

@@ -1,6 +1,6 @@
-"""A vehicle's files: in memory, gone with the program, or in a folder on disk.
+"""A vehicle's files: in a folder on disk, or in a temporary one, gone with the program.
 
-Both have limits, so that a link cannot fill the machine. The folder cannot be left: every name of a
+There are limits, so that a link cannot fill the machine. The folder cannot be left: every name of a
 path is opened by itself, from the folder down, and none may be a symbolic link.
 """
 
@@ -9,14 +9,15 @@ from __future__ import annotations
 import errno
 import os
 import stat
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path as DiskPath
+from tempfile import gettempdir
 
 from firmware_py.storage import Entry, Path, refuse, sound_name
 from framerunner.errors import UserError
+from sitl.temporary_folder import TemporaryFolder
 
 MEBIBYTE = 1 << 20
 
@@ -59,137 +60,13 @@ class _Usage:
             raise refuse(errno.ENOSPC, path)
 
 
-def open_storage(folder: DiskPath | None, instance: int) -> MemoryStorage | FolderStorage:
-    """The storage of an instance: a folder with its number, as PX4's simulations have; without one, memory.
+def open_storage(folder: DiskPath | None, instance: int) -> FolderStorage:
+    """The storage of an instance: a folder with its number, as PX4's simulations have, or a temporary one.
 
     Raises:
         StorageFolderError: the folder cannot be used.
     """
-    return MemoryStorage() if folder is None else FolderStorage(folder / str(instance))
-
-
-@dataclass(slots=True)
-class _Stored:
-    data: bytearray | None  # None: a folder
-    modified_unix_s: int
-
-
-class MemoryStorage:
-    """Files in memory, gone with the process. The methods are those of `firmware_py.storage.Storage`.
-
-    Args:
-        limits: how much is kept.
-        now: seconds since 1970.
-    """
-
-    def __init__(self, limits: StorageLimits | None = None, now: Callable[[], float] = time.time) -> None:
-        self._usage = _Usage(limits or StorageLimits(total_bytes=128 * MEBIBYTE))
-        self._now = now
-        self._nodes: dict[Path, _Stored] = {(): _Stored(None, 0)}
-
-    def space(self) -> tuple[int, int]:
-        """Bytes kept, and bytes that can be kept."""
-        return self._usage.space
-
-    def entry(self, path: Path) -> Entry:
-        """The file or folder at a path."""
-        node = self._node(path)
-        return Entry(path[-1] if path else "", len(node.data or b""), node.data is None, node.modified_unix_s)
-
-    def entries(self, path: Path) -> list[Entry]:
-        """What a folder holds, by name."""
-        self._check_folder(path)
-        inside = (each for each in self._nodes if len(each) == len(path) + 1 and each[:-1] == path)
-        return [self.entry(each) for each in sorted(inside)]
-
-    def read(self, path: Path, offset: int, count: int) -> bytes:
-        """At most `count` bytes of a file."""
-        return bytes(self._file(path)[offset : offset + count])
-
-    def write(self, path: Path, offset: int, data: bytes) -> None:
-        """Write into an existing file."""
-        file = self._file(path)
-        if data:
-            self.truncate(path, max(len(file), offset + len(data)))
-            file[offset : offset + len(data)] = data
-
-    def create(self, path: Path) -> None:
-        """Make an empty file, or empty an existing one."""
-        if path in self._nodes:
-            self.truncate(path, 0)
-        else:
-            self._add(path, bytearray())
-
-    def truncate(self, path: Path, size: int) -> None:
-        """Set the size of a file."""
-        file = self._file(path)
-        before = len(file)
-        self._usage.check_size(path, before, size)
-        self._usage.bytes += size - before
-        self._nodes[path].modified_unix_s = int(self._now())
-        del file[size:]
-        file += bytes(max(0, size - before))
-
-    def remove(self, path: Path) -> None:
-        """Remove a file."""
-        self._usage.bytes -= len(self._file(path))
-        self._usage.files -= 1
-        del self._nodes[path]
-
-    def make_folder(self, path: Path) -> None:
-        """Make a folder."""
-        if path in self._nodes:
-            raise refuse(errno.EEXIST, path)
-        self._add(path, None)
-
-    def remove_folder(self, path: Path) -> None:
-        """Remove an empty folder."""
-        self._check_folder(path)
-        if not path:
-            raise refuse(errno.EACCES, path)
-        if self.entries(path):
-            raise refuse(errno.ENOTEMPTY, path)
-        self._usage.files -= 1
-        del self._nodes[path]
-
-    def rename(self, old: Path, new: Path) -> None:
-        """Give a file or folder another path."""
-        self._check_folder(new[:-1])
-        replaced = self._nodes.get(new)
-        if self._node(old).data is not None and (replaced is None or replaced.data is not None):
-            if replaced is not None and new != old:
-                self.remove(new)
-        else:
-            self._check_folder(old)
-            if not old or new[: len(old)] == old:
-                raise refuse(errno.EINVAL, new)
-            if replaced is not None:
-                raise refuse(errno.EEXIST, new)
-        depth = len(old)
-        self._nodes = {
-            new + path[depth:] if path[:depth] == old else path: node for path, node in self._nodes.items()
-        }
-
-    def _node(self, path: Path) -> _Stored:
-        if path not in self._nodes:
-            raise refuse(errno.ENOENT, path)
-        return self._nodes[path]
-
-    def _file(self, path: Path) -> bytearray:
-        data = self._node(path).data
-        if data is None:
-            raise refuse(errno.EISDIR, path)
-        return data
-
-    def _check_folder(self, path: Path) -> None:
-        if self._node(path).data is not None:
-            raise refuse(errno.ENOTDIR, path)
-
-    def _add(self, path: Path, data: bytearray | None) -> None:
-        self._check_folder(path[:-1])
-        self._usage.check_count(path)
-        self._usage.files += 1
-        self._nodes[path] = _Stored(data, int(self._now()))
+    return TemporaryStorage() if folder is None else FolderStorage(folder / str(instance))
 
 
 class FolderStorage:
@@ -357,6 +234,26 @@ class FolderStorage:
             yield file
         finally:
             os.close(file)
+
+
+class TemporaryStorage(FolderStorage):
+    """Files in a folder that is removed when the program ends, at the latest by the next program.
+
+    Args:
+        limits: how much is kept.
+
+    Raises:
+        StorageFolderError: the folder cannot be made.
+    """
+
+    def __init__(self, limits: StorageLimits | None = None) -> None:
+        try:
+            self._temporary = TemporaryFolder("framerunner-storage-")
+        except OSError as error:
+            raise StorageFolderError(
+                f"{gettempdir()}: cannot be used for the drone's files ({error.strerror}); name a folder"
+            ) from error
+        super().__init__(self._temporary.path, limits or StorageLimits(total_bytes=128 * MEBIBYTE))
 
 
 def _entry(name: str, found: os.stat_result) -> Entry:

@@ -7,12 +7,12 @@ simulator sends a line once it is up; then it answers each line with the true st
 from __future__ import annotations
 
 import asyncio
-import socket
 from collections.abc import Callable
 
 from pydantic import TypeAdapter
 
 from scenarios.models import TrueState
+from sitl.pacing.time_grants import ProgramChannel
 
 _STATES = TypeAdapter(TrueState)
 
@@ -22,35 +22,15 @@ def parse_truth(line: bytes) -> TrueState:
     return _STATES.validate_json(line)
 
 
-class TruthChannel:
-    """The simulator's end of the channel.
-
-    Args:
-        channel: connected to the program that started the simulator.
-    """
-
-    def __init__(self, channel: socket.socket) -> None:
-        self._channel = channel
-        self._writer: asyncio.StreamWriter | None = None
-        self._task: asyncio.Task[None] | None = None
+class TruthChannel(ProgramChannel):
+    """The simulator's end of the channel."""
 
     async def open(self, truth: Callable[[], TrueState]) -> None:
         """Report that the simulator is up, and answer from now on with what `truth` returns."""
-        reader, self._writer = await asyncio.open_connection(sock=self._channel)
-        self._writer.write(b"up\n")
-        self._task = asyncio.create_task(self._answer(reader, self._writer, truth), name="truth")
 
-    async def close(self) -> None:
-        """Stop answering."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
-        if self._writer is not None:
-            self._writer.close()
+        async def answer(reader: asyncio.StreamReader) -> None:
+            while await reader.readline():
+                assert self._writer is not None, "it is open"
+                self._writer.write(_STATES.dump_json(truth()) + b"\n")
 
-    @staticmethod
-    async def _answer(
-        reader: asyncio.StreamReader, writer: asyncio.StreamWriter, truth: Callable[[], TrueState]
-    ) -> None:
-        while await reader.readline():
-            writer.write(_STATES.dump_json(truth()) + b"\n")
+        await self._open(answer)

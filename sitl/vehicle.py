@@ -19,44 +19,11 @@ from sitl.battery import Battery
 from sitl.faults.faults import Faults
 from sitl.payload.gimbal import SimulatedGimbal
 from sitl.sensors.assumptions import parameter_defaults
-from sitl.sensors.specs import SuiteSpec
 from sitl.sensors.suite import SensorSuite, load_suite
 from sitl.sensors.truth import MotionTracker
 from sitl.world import CONTROL_PERIOD_US, World
 
 _BATTERY_PERIOD_US = 100_000
-
-
-class Sensing:
-    """The sensors of a suite, in a world.
-
-    Args:
-        suite: not an ideal one.
-        world: whose motion they measure.
-        origin: where on Earth the scenario is.
-        seed: of everything random.
-    """
-
-    def __init__(self, suite: SuiteSpec, world: World, origin: GeodeticPoint, seed: int) -> None:
-        airframe = world.airframe
-        self._world = world
-        self._suite = SensorSuite(suite, airframe, origin, seed)
-        self._tracker = MotionTracker(CONTROL_PERIOD_US, airframe.motor.max_speed_rad_s)
-
-    def read(self, true: Sensors) -> tuple[Readings, ExternalPose | None]:
-        """What the sensors deliver in the tick of a true state."""
-        world = self._world
-        x_m, y_m, _ = world.position_arena_m
-        motion = self._tracker.update(
-            true.time_us,
-            true.position_ned_m,
-            true.velocity_ned_m_s,
-            true.attitude,
-            motor_speeds_rad_s=world.dynamics.motor_speeds_rad_s(),
-            ground_z_m=ground_height(world.scenario, x_m, y_m),
-        )
-        readings = self._suite.read(motion, true.battery_voltage_v, true.battery_current_a)
-        return readings, self._suite.external_pose()
 
 
 class SimulatedVehicle(ABC):
@@ -93,7 +60,8 @@ class SimulatedVehicle(ABC):
         origin = scenario.origin
         self._place = place = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
         self._suite = suite = load_suite(scenario.sensors)
-        self._sensing = None if suite.ideal else Sensing(suite, self.world, place, seed)
+        self._models = None if suite.ideal else SensorSuite(suite, airframe, place, seed)
+        self._tracker = MotionTracker(CONTROL_PERIOD_US)
         self.parameters = Parameters(defaults={**airframe.parameters, **parameter_defaults(suite)})
         self.referee = Referee(scenario, airframe.envelope_m)
         self.battery = Battery(airframe, self.parameters)
@@ -163,8 +131,17 @@ class SimulatedVehicle(ABC):
 
     def _read_sensors(self, true: Sensors) -> tuple[Readings, ExternalPose | None]:
         """What the sensors deliver in the tick of a true state, with faults; the suite is not ideal."""
-        assert self._sensing is not None, "ideal sensors read nothing"
-        readings, pose = self._sensing.read(true)
+        assert self._models is not None, "ideal sensors read nothing"
+        x_m, y_m, _ = self.world.position_arena_m
+        motion = self._tracker.update(
+            true.time_us,
+            true.position_ned_m,
+            true.velocity_ned_m_s,
+            true.attitude,
+            motor_speeds_rad_s=self.world.dynamics.motor_speeds_rad_s(),
+            ground_z_m=ground_height(self.scenario, x_m, y_m),
+        )
+        readings, pose = self._models.read(motion, true.battery_voltage_v, true.battery_current_a)
         if (faulty := self.faults.sensors) is not None:
             return faulty.change(readings, pose)
         return readings, pose

@@ -3,6 +3,8 @@
 `/video` is a stream of JPEG images, each with the vehicle time of its exposure in the header `X-Time-Us`;
 `/image.jpg` is the latest one, `/` a page that shows the stream. An image is compressed when the first
 client requests it, and once for all of them. There is no backlog: a slow client misses images.
+
+`DroneVideo` serves one simulated drone's camera, referee and scenario, and sends its video as RTP.
 """
 
 from __future__ import annotations
@@ -10,26 +12,37 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from socket import SO_SNDBUF, SOL_SOCKET
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
-from framerunner.errors import UserError
+from framerunner.geometry.rotations import rotation, yaw_of
 from framerunner.wire.finite_json import finite
 from framerunner.wire.mjpeg import STREAM_HEADERS, STREAM_START, write_part
-from framerunner.wire.simulator_api import VIDEO_PATH
+from framerunner.wire.simulator_api import REFEREE_PATH, SCENARIO_PATH, VIDEO_PATH
 from framerunner.wire.transports.urls import in_url
+from scenarios.result import LocalFrame, Standing, StandingPlace
+from scenarios.task import Task
+from sitl.streaming.streams import VideoError
 
 if TYPE_CHECKING:
     from aiohttp import web
 
+    from framerunner.geometry.solids import Solid
+    from scenarios.models import TrueState
+    from sitl.camera import CameraFeed
+    from sitl.pacing.time_grants import TimeGrants
+    from sitl.server_settings import ServerSettings
+    from sitl.streaming.h264 import RtpSender
+    from sitl.vehicle import SimulatedVehicle
+
 Image = npt.NDArray[np.uint8]
+_UPRIGHT = 0.98  # cosine of the tilt of a drone that stands
 JsonProvider = Callable[[Mapping[str, str]], object]
 
 JPEG_QUALITY = 98  # of 3138 boxes none differs from the raw image's; at 95, 39 do, by a pixel
@@ -43,10 +56,6 @@ object-fit:contain;image-rendering:pixelated}</style>
 <img src="/video" alt="what the drone's camera sees">
 </html>
 """
-
-
-class VideoError(UserError):
-    """Video cannot be served; the message is one line for people."""
 
 
 @dataclass(slots=True)
@@ -66,6 +75,8 @@ class _VideoImage:
 
 def encode_jpeg(image: Image, quality: int = JPEG_QUALITY) -> bytes:
     """Compress a BGR image; thin coloured bars keep their colour by full chroma resolution and quality 98."""
+    import cv2  # late: telemetry must not wait for it
+
     chroma = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
     settings = [cv2.IMWRITE_JPEG_QUALITY, quality, *chroma]
     done, data = cv2.imencode(".jpg", image, settings)
@@ -225,3 +236,112 @@ class VideoServer:
             return web.Response(status=500, text=f"{request.path}: {type(error).__name__}: {error!s:.200}\n")
         headers = {"Cache-Control": "no-store"}
         return web.Response(text=text, content_type="application/json", headers=headers)
+
+
+class DroneVideo:
+    """Serves a drone's images and its referee once it is open.
+
+    Args:
+        simulation: of the drone.
+        settings: of this drone.
+        grants: the program that grants time gets the images without compression; None: there is none.
+
+    Attributes:
+        image_us: time of exposure of the image that was sent last; negative before the first.
+        sends_rtp: images are sent as RTP, if that was set up.
+    """
+
+    def __init__(
+        self, simulation: SimulatedVehicle, settings: ServerSettings, grants: TimeGrants | None = None
+    ) -> None:
+        self.image_us = -1
+        self.sends_rtp = True
+        self._simulation, self._settings, self._grants = simulation, settings, grants
+        self._camera: CameraFeed | None = None
+        self._video: VideoServer | None = None
+        self._rtp: RtpSender | None = None
+        self._others: Callable[[], Sequence[Solid]] = tuple
+
+    async def open(self, others: Callable[[], Sequence[Solid]] = tuple) -> None:
+        """Import large libraries in a thread, as telemetry must not wait, then serve the camera's images.
+
+        Args:
+            others: called at each exposure for the boxes of other drones.
+
+        Raises:
+            VideoError: a port is in use or an address is wrong.
+        """
+        for module in ("cv2", "sitl.camera", "aiohttp.web"):
+            await asyncio.to_thread(import_module, module)
+        scenario = self._simulation.scenario
+        video = VideoServer(
+            self._settings.bind, self._settings.http_port, options="--instance (sim also: --video-port)"
+        )
+        video.add_json(REFEREE_PATH, self._referee_answer)
+        task = Task.of(scenario, show_layout=self._settings.show_layout)
+        video.add_json(SCENARIO_PATH, lambda _query: task.model_dump(mode="json"))
+        if self._settings.video_rtp is not None:
+            await asyncio.to_thread(import_module, "sitl.streaming.h264")
+            from sitl.streaming.h264 import RtpSender
+
+            self._rtp = RtpSender(self._settings.video_rtp, scenario.camera, self._settings.speed)
+            video.add_text("/video.sdp", "application/sdp", self._rtp.description())
+        self._video = video
+        await video.start()
+        self._others = others
+        self.show(self._simulation)
+
+    def show(self, simulation: SimulatedVehicle) -> None:
+        """Serve this simulation of the same scenario from now on."""
+        from sitl.faults.images import new_feed
+
+        self._simulation = simulation
+        self.image_us = -1
+        self._camera = new_feed(simulation.scenario, simulation.faults, simulation.seed, self._others)
+
+    def step(self) -> Image | None:
+        """Take the true state now; returns the image that was sent, if one has arrived."""
+        if self._camera is None or self._video is None:
+            return None
+        arrived = self._camera.step(self._simulation.truth)
+        if arrived is None:
+            return None
+        time_us, image = arrived
+        self.image_us = time_us
+        self._video.publish(image, time_us)
+        if self._grants is not None:
+            self._grants.send_image(image, time_us)
+        if self._rtp is not None and self.sends_rtp:
+            self._rtp.send(image, time_us)
+        return image
+
+    async def close(self) -> None:
+        """Stop serving."""
+        if self._video is not None:
+            await self._video.close()
+        if self._rtp is not None:
+            await asyncio.to_thread(self._rtp.close)
+
+    def _referee_answer(self, query: Mapping[str, str]) -> object:
+        """`/referee.json?state=…&ended=…`: how the try stands, and the report if it ended now."""
+        simulation = self._simulation
+        referee = simulation.referee
+        origin_arena_m = simulation.local_origin_arena_m
+        standing = Standing(
+            scenario=simulation.scenario.name,
+            source="truth",
+            time_us=simulation.time_us,
+            local_frame=None if origin_arena_m is None else LocalFrame(origin_arena_m=origin_arena_m),
+            stands_at=standing_place(simulation.truth),
+            snapshot=referee.snapshot(),
+            report=referee.report(query.get("state", ""), query.get("ended")),
+            faults=simulation.fault_facts(),
+        )
+        return standing.model_dump(mode="json")
+
+
+def standing_place(truth: TrueState) -> StandingPlace | None:
+    """Where a drone stands; None if it flies, or lies on its side."""
+    if truth.motors_on or rotation(truth.attitude_arena)[8] < _UPRIGHT:
+        return None
+    return StandingPlace(position_arena_m=truth.position_arena_m, yaw_rad=yaw_of(truth.attitude_arena))

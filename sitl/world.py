@@ -314,8 +314,6 @@ class World:
 class _Group:
     """Solids that are close to each other, and the sphere around them (`centre_arena_m`)."""
 
-    __slots__ = ("_centre_arena_m", "_radius_m", "solids")
-
     def __init__(self, centre_arena_m: Vec3, solids: tuple[Solid, ...]) -> None:
         self.solids = solids
         self._centre_arena_m = centre_arena_m

@@ -6,15 +6,13 @@ import asyncio
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import cv2
-import numpy as np
-
+from framerunner.camera_calibration.calibrate import image_in
 from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.errors import SettingError
 from vision.calibration.colours import learn_colours, share_seen, swatch_of
 from vision.calibration.model import CalibrationError
 from vision.colour_regions import PRIMARIES
-from vision.sources import IMAGE_SUFFIXES, open_source
+from vision.sources import open_source
 from vision.types import Image
 
 _IMAGES = 20
@@ -55,13 +53,11 @@ def _pair(text: str) -> tuple[str, str]:
 
 
 def _image(colour: str, source: str, ask: Callable[[str], None]) -> Image:
-    if source.lower().endswith(IMAGE_SUFFIXES) and "://" not in source:
-        image = cv2.imread(source, cv2.IMREAD_COLOR)
-        if image is None:
-            raise CalibrationError(f"{source}: not an image that can be read; give PNG or JPEG files")
-        return np.asarray(image, np.uint8)
-    ask(f"fill the middle of the image with {colour}")
-    return asyncio.run(_settled(source))
+    image = image_in(source)
+    if image is None:
+        ask(f"fill the middle of the image with {colour}")
+        image = asyncio.run(_settled(source))
+    return image
 
 
 async def _settled(source: str) -> Image:

@@ -7,11 +7,9 @@ import random
 import shutil
 import sys
 import time
-from collections.abc import Callable, Coroutine
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Protocol, Self
 
 from framerunner.errors import SettingError, write_advice
 from vision.calibration.latency import (
@@ -28,74 +26,60 @@ _HIDE, _SHOW = "\x1b[?25l\x1b[2J", "\x1b[0m\x1b[?25h\x1b[2J\x1b[H"
 _LIT, _DARK = "\x1b[107m", "\x1b[40m"
 
 
-class Light(AbstractContextManager["Light"], Protocol):
-    """Something that a program can switch on and off."""
-
-    def switch(self, lit: bool) -> None:
-        """Switch it."""
+Switch = Callable[[bool], None]
+"""Switches a light on and off."""
 
 
-class TerminalLight:
-    """The whole terminal, white or black."""
+@contextmanager
+def terminal_light() -> Iterator[Switch]:
+    """The whole terminal, white or black. Raises `SettingError` if the output is no terminal."""
+    if not sys.stdout.isatty():
+        raise SettingError("the output is no terminal that can blink; run it in one, or give --led")
+    sys.stdout.write(_HIDE)
 
-    def __enter__(self) -> Self:
-        """Raises `SettingError` if the output is no terminal."""
-        if not sys.stdout.isatty():
-            raise SettingError("the output is no terminal that can blink; run it in one, or give --led")
-        sys.stdout.write(_HIDE)
-        return self
-
-    def switch(self, lit: bool) -> None:
-        """Fill the terminal."""
+    def switch(lit: bool) -> None:
         columns, rows = shutil.get_terminal_size()
         line = " " * columns
         sys.stdout.write((_LIT if lit else _DARK) + "\x1b[H" + "\r\n".join([line] * rows))
         sys.stdout.flush()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Give the terminal back."""
+    try:
+        yield switch
+    finally:
         sys.stdout.write(_SHOW)
         sys.stdout.flush()
 
 
-class LedLight:
+@contextmanager
+def led_light(path: Path) -> Iterator[Switch]:
     """An LED that a file switches: 1 is lit, 0 dark, as `/sys/class/leds/NAME/brightness` of Linux.
 
-    Args:
-        path: of the file.
+    Raises:
+        SettingError: the file cannot be written.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> Self:
-        """Raises `SettingError` if the file cannot be written."""
-        self.switch(False)
-        return self
-
-    def switch(self, lit: bool) -> None:
-        """Switch the LED. Raises `SettingError` if the file cannot be written."""
+    def switch(lit: bool) -> None:
         try:
-            self._path.write_text("1" if lit else "0", encoding="ascii")
+            path.write_text("1" if lit else "0", encoding="ascii")
         except OSError as error:
             raise SettingError(
-                f"--led {self._path}: cannot be written to ({error.strerror}); {write_advice(error)}"
+                f"--led {path}: cannot be written to ({error.strerror}); {write_advice(error)}"
             ) from error
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Leave it dark."""
-        self.switch(False)
+    switch(False)
+    try:
+        yield switch
+    finally:
+        switch(False)
 
 
-async def film(light: Light, source: str, duration_s: float, say: Callable[[str], None]) -> Latency:
+async def film(
+    light: AbstractContextManager[Switch], source: str, duration_s: float, say: Callable[[str], None]
+) -> Latency:
     """Let a light blink while the camera films it, and find the delay.
 
     Args:
-        light: is switched; used as a context manager once the camera has sent an image.
+        light: is entered once the camera has sent an image.
         source: as for `open_source`.
         duration_s: how long to film.
         say: called with lines for people.
@@ -121,10 +105,10 @@ async def film(light: Light, source: str, duration_s: float, say: Callable[[str]
     try:
         await _first_of(watching, first.wait())
         say(f"the light blinks for {duration_s:.0f} s; a third of the camera's image must be the light")
-        with light:
+        with light as switch:
             lit = False
             for interval_s in blink_intervals(duration_s, random.randrange(1 << 30)):
-                light.switch(lit)
+                switch(lit)
                 switches.append((time.monotonic(), lit))
                 await _first_of(watching, asyncio.sleep(interval_s))
                 lit = not lit

@@ -23,7 +23,7 @@ from framerunner.wire.session.session import pose_rates
 from framerunner.wire.simulator_api import SimulatorApi
 from offboard.drone import DroneError
 from offboard.link.telemetry import least_lag
-from vision.calibration.motion import MotionReport
+from vision.calibration.sightings import MotionReport
 from vision.detectors import new_detector
 from vision.sources import open_source
 from vision.types import CameraFrame, Detections

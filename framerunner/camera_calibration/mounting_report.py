@@ -1,4 +1,4 @@
-"""The mounting that was found: told to people, refused if not known, written into the calibration file."""
+"""The mounting of a camera: found in a recorded flight, told to people, written into the calibration file."""
 
 from __future__ import annotations
 
@@ -7,23 +7,38 @@ from dataclasses import dataclass
 from datetime import date
 from math import degrees, hypot
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from framerunner.camera_calibration.calibration_file import save_calibration
+from rich.console import Console
+
+from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.camera_calibration.camera_delay import CAMERA_DELAY_S
+from framerunner.errors import SettingError
+from framerunner.flying.detector import true_calibration
 from framerunner.geometry.rotations import MAX_MOUNTING_RAD
 from framerunner.geometry.vectors import Vec3
+from framerunner.recording.events import RecordedImage
+from framerunner.recording.open_recording import recorded_flight
+from framerunner.recording.tlog_reader import TlogRecording
+from offboard.app import Moment
+from scenarios.loader import load_scenario
 from vision.calibration.model import Calibration, CalibrationError, Mounting
-from vision.calibration.motion import Motion, MotionReport
-from vision.calibration.mounting import MountingFit, fit_mounting
-from vision.calibration.movement import (
+from vision.calibration.mounting import (
     MAX_DELAY_STD_S,
     MAX_POSITION_STD_M,
+    MountingFit,
     Movement,
+    fit_mounting,
     missing_for,
     movement_of,
 )
-from vision.calibration.sightings import Values, sightings_of
+from vision.calibration.sightings import Motion, MotionReport, Values, sightings_of
+from vision.detectors import new_detector
 from vision.types import Detections
+
+if TYPE_CHECKING:
+    from offboard.drone import DroneState
+    from scenarios.models import Scenario
 
 _ANGLES = (
     ("roll", "to the right", "to the left"),
@@ -172,3 +187,75 @@ def finish(
 
 def _counted(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def measure_recorded(
+    flight: Path, calibration: Path, position_flu_m: Vec3 | None
+) -> tuple[MountingSearch, Calibration, bool]:
+    """Find the mounting from a recorded flight.
+
+    Args:
+        flight: a run folder, or the MCAP file in it.
+        calibration: file of the camera; for a flight of the simulated drone it need not exist.
+        position_flu_m: of the camera from the drone's centre; None: what the file or the scenario says.
+
+    Returns:
+        What was found, the calibration as it is, and whether the images have time stamps.
+
+    Raises:
+        RecordingError: there is no recorded flight, or it is damaged.
+        CalibrationError: the calibration is not valid, or of another size of images.
+        SettingError: the recording's images have no times.
+    """
+    folder = flight if flight.is_dir() else flight.parent
+    with recorded_flight(flight) as recorded:
+        if isinstance(recorded, TlogRecording):
+            raise SettingError(
+                f"{flight}: has a log and a video, whose images have no times; fly again with --record"
+            )
+        result = recorded.result
+        simulated = result is not None and result.judged_by == "truth"
+        scenario_file = folder / "scenario.yaml"
+        scenario = load_scenario(scenario_file) if scenario_file.is_file() else None
+        known = _calibration(calibration, scenario if simulated else None)
+        smooth = scenario is not None and scenario.camera.effects is not None
+        detect = new_detector("frames", calibration=known, rendered=simulated, smooth=smooth)
+        images: list[Detections] = []
+        reports: list[MotionReport] = []
+        with Console(stderr=True).status("looking for frames in the recorded images"):
+            for event in recorded.events():
+                if isinstance(event, RecordedImage):
+                    images.append(detect(event.image, event.time_us))
+                elif isinstance(event, Moment):
+                    reports += [_report_of(state) for state in (*event.state.missed, event.state)]
+    place_m = place_of(known, position_flu_m, scenario)
+    with Console(stderr=True).status("fitting"):
+        search = search_mounting(images, reports, known, place_m, stamped=simulated)
+    return search, known, simulated
+
+
+def place_of(calibration: Calibration, given_m: Vec3 | None, scenario: Scenario | None) -> Vec3:
+    """The camera's place on the drone as it is known: given, of an earlier measurement, or the scenario's."""
+    if given_m is not None:
+        return given_m
+    mounting = calibration.mounting
+    if mounting is not None and mounting.position_flu_m is not None:
+        return mounting.position_flu_m
+    if scenario is not None:
+        return scenario.camera.position_flu_m
+    from scenarios.models import Camera
+
+    return Camera().position_flu_m
+
+
+def _report_of(state: DroneState) -> MotionReport:
+    """A tick's state."""
+    position_us = state.time_us - round(state.position_age_s * 1e6)
+    place_m = (state.x, state.y, state.z)
+    return MotionReport(state.time_us, position_us, place_m, state.velocity_arena_m_s, state.attitude_arena)
+
+
+def _calibration(path: Path, simulated: Scenario | None) -> Calibration:
+    if simulated is not None and not path.exists():
+        return true_calibration(simulated.camera)
+    return load_calibration(path, to_write=True)

@@ -83,7 +83,7 @@ Faults = Annotated[
         help="what fails, such as `gps off at 12 s for 5 s`, in seconds after arming; may be repeated",
     ),
 ]
-"""Faults in one line each; see `scenarios.faults.parse`."""
+"""Faults in one line each; see `scenarios.faults.declaration`."""
 
 
 def with_faults(scenario: Scenario, fault: tuple[str, ...]) -> Scenario:
@@ -92,7 +92,7 @@ def with_faults(scenario: Scenario, fault: tuple[str, ...]) -> Scenario:
     Raises:
         FaultError: one cannot be understood, or there are too many.
     """
-    from scenarios.faults.parse import FaultError, parse_fault
+    from scenarios.faults.declaration import FaultError, parse_fault
 
     faults = (*scenario.faults, *map(parse_fault, fault))
     if len(faults) > MAX_FAULTS:

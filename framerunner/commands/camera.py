@@ -170,9 +170,9 @@ def latency(
     check_range("--seconds", seconds, 8, 300)
     check_range("--display-delay", display_delay, 0.0, 0.2)
 
-    from framerunner.camera_calibration.latency import LedLight, TerminalLight, film
+    from framerunner.camera_calibration.latency import film, led_light, terminal_light
 
-    light = TerminalLight() if led is None else LedLight(led)
+    light = terminal_light() if led is None else led_light(led)
     found = asyncio.run(film(light, source, float(seconds), say))
     if led is None:
         print(
@@ -258,8 +258,7 @@ def extrinsics(
     """
     check_range("--seconds", seconds, 20, 1800)
 
-    from framerunner.camera_calibration.mounting_report import finish
-    from framerunner.camera_calibration.recorded_mounting import measure_recorded, place_of
+    from framerunner.camera_calibration.mounting_report import finish, measure_recorded, place_of
     from framerunner.commands.options.named_numbers import place_of_lens
 
     place_m = None if position is None else place_of_lens(position)

@@ -51,7 +51,7 @@ class Onboard:
 
     storage: Annotated[
         Path | None,
-        Parameter(help="folder for its files and flight logs, DIR/0 for instance 0; else kept in memory"),
+        Parameter(help="folder for its files and flight logs, DIR/0 for instance 0; else a temporary one"),
     ] = None
     parameters: Annotated[
         Path | None,

@@ -19,7 +19,7 @@ from framerunner.flying.simulator_process import GenuineAutopilot
 from framerunner.instances import claimed_instance
 from framerunner.runs.recorder import RunRecords
 from framerunner.runs.run_folder import RunFolder
-from sitl.autopilots.temporary_folder import TemporaryFolder
+from sitl.temporary_folder import TemporaryFolder
 
 T = TypeVar("T")
 

@@ -20,9 +20,6 @@ class FaultyLink:
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._fault: LinkFault | None = None
-        self._up: Way[SentVelocity] | None = None
-        self._down: Way[DroneState] | None = None
 
     @property
     def active(self) -> bool:
@@ -36,25 +33,21 @@ class FaultyLink:
 
     def send(self, velocity: SentVelocity) -> None:
         """Send a velocity to the vehicle."""
-        up, _ = self._ways()
-        up.send(self._simulation.time_us, velocity)
+        self._fault.up.send(self._simulation.time_us, velocity)
 
     def arrived(self) -> SentVelocity | None:
         """The newest velocity that has reached the vehicle since the last call."""
-        up, _ = self._ways()
+        up: Way[SentVelocity] = self._fault.up
         return up.newest(self._simulation.time_us)
 
     def receive(self, state: DroneState) -> DroneState | None:
         """What arrives at the app of a state that is sent now; None: nothing."""
-        _, down = self._ways()
+        down: Way[DroneState] = self._fault.down
         down.send(self._simulation.time_us, state)
         return down.newest(self._simulation.time_us)
 
-    def _ways(self) -> tuple[Way[SentVelocity], Way[DroneState]]:
-        """Both directions of the active fault."""
+    @property
+    def _fault(self) -> LinkFault:
         fault = self._simulation.faults.link
-        if fault is None:
-            raise RuntimeError("the link has no fault")
-        if self._up is None or self._down is None or fault is not self._fault:
-            self._fault, self._up, self._down = fault, fault.new_way(), fault.new_way()
-        return self._up, self._down
+        assert fault is not None, "it is active"
+        return fault

@@ -22,7 +22,7 @@ from offboard.app import MissionEnd, Moment, Observer, TickHook, fly_mission
 from offboard.drone import Drone
 from offboard.perception import Perception
 from offboard.safety.rules import SIMULATED, SafetyRules
-from scenarios.faults.outcome import fault_fields
+from scenarios.faults.table import fault_fields
 from scenarios.models import Scenario
 from scenarios.result import FlightResult, RefereeReport
 

@@ -29,7 +29,7 @@ from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.models import Scenario, TrueState
 from scenarios.result import FaultFacts, RefereeReport, RefereeSnapshot
 from sitl.camera import CameraFeed, Exposure
-from sitl.faults.images import FaultyFeed, new_feed
+from sitl.faults.images import new_feed
 from sitl.simulation import Simulation
 from vision.detectors import Detector, new_detector
 from vision.types import Detections, Image
@@ -162,7 +162,7 @@ class LockstepPerception:
         scenario: Scenario,
         on_image: ImageObserver | None = None,
         detector: Detector | None = None,
-        feed: CameraFeed | FaultyFeed | None = None,
+        feed: CameraFeed | None = None,
         *,
         remembers: bool = False,
     ) -> None:

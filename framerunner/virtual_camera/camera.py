@@ -178,12 +178,14 @@ class VirtualCamera:
         self._next = index + 1
         motion = Motion(exposure_us, where.velocity_arena_m_s)
         gimbal, alignment = self._gimbal, self.placement.alignment
+        turned = None
+        attitude = where.attitude_arena
         if self.has_gimbal and gimbal is not None and pose is not None and alignment is not None:
-            attitude = alignment.attitude(gimbal.ned(yaw_of(pose.attitude_ned)))
-            eye = self._camera.place_on(where.position_arena_m, where.attitude_arena)
-            return exposure_us, self._camera.render_from(eye, attitude, (), motion)
-        attitude = quaternion_from_yaw(yaw_of(where.attitude_arena)) if self._level else where.attitude_arena
-        return exposure_us, self._camera.render(where.position_arena_m, attitude, motion=motion)
+            turned = alignment.attitude(gimbal.ned(yaw_of(pose.attitude_ned)))
+        elif self._level:
+            attitude = quaternion_from_yaw(yaw_of(attitude))
+        image = self._camera.render(where.position_arena_m, attitude, motion=motion, gimbal_arena=turned)
+        return exposure_us, image
 
     def standing(self, state: str = "", ended: str | None = None) -> Standing:
         """How the try stands, for `/referee.json`; `ended` is why the flight was aborted, if it was."""

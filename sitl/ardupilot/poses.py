@@ -15,7 +15,7 @@ from framerunner.vehicle.measurements import ExternalPose
 from framerunner.wire.dialect import Message, degrees_e7, mavlink, millimetres
 from framerunner.wire.framing import packed
 from framerunner.wire.transports.sockets import bind_udp
-from sitl.ardupilot.mavlink_sender import mavlink_sender
+from sitl.ardupilot.sole_sender import mavlink_sender
 
 POSE_PORT = 9006
 """UDP port of instance 0, between those of the JSON interface."""

@@ -15,7 +15,7 @@ from collections import deque
 from framerunner.wire.dialect import Message, companion_heartbeat, mavlink
 from framerunner.wire.framing import HEADER_BYTES_V2, MARKERS, PacketReader, message_id_of, packed
 from framerunner.wire.transports.sockets import Address, UdpSocket, connect_udp
-from sitl.autopilots.sole_sender import SoleSender
+from sitl.ardupilot.sole_sender import SoleSender
 
 HEARTBEAT_S = 1.0
 RELAY_PORT = 9007

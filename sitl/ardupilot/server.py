@@ -8,16 +8,14 @@ from collections.abc import Callable
 
 from framerunner.wire.transports.sockets import Address, UdpSocket, bind_udp
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
-from sitl.ardupilot.mavlink_sender import mavlink_sender
 from sitl.ardupilot.poses import POSE_PORT, PoseLink
 from sitl.ardupilot.relay import HEARTBEAT_S, RELAY_PORT, AppRelay
 from sitl.ardupilot.simulation import ArduPilotSimulation
-from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
+from sitl.ardupilot.sole_sender import SoleSender, mavlink_sender
+from sitl.autopilots.process import AutopilotEndedError
 from sitl.autopilots.server import AutopilotServer
-from sitl.autopilots.sole_sender import SoleSender
 from sitl.pacing.pacer import Pacer
-from sitl.pacing.time_grants import FREE_US, TimeGrants
-from sitl.server_settings import ServerSettings
+from sitl.pacing.time_grants import FREE_US
 
 _SILENCE_S = 2.0  # wall time without a frame that is reported
 _LOST_S = 0.5  # wall time after which an answer to a frame that is repeated was lost
@@ -79,59 +77,40 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
 
     ArduPilot sets the pace: it sends a frame when the time for a step has come, and waits for the answer.
 
-    Args:
-        new_simulation: makes the simulation anew.
-        settings: ports and speed; MAVLink is ArduPilot's own.
-        ardupilot: how it is started.
-        notice: called with lines for people.
-        grants: how far simulated time may advance; None: without a limit.
-
     Attributes:
-        exchange: with the present ArduPilot.
+        exchange: with the present ArduPilot, from `run` on.
     """
 
-    def __init__(
-        self,
-        new_simulation: Callable[[], ArduPilotSimulation],
-        settings: ServerSettings,
-        ardupilot: AutopilotStart,
-        notice: Callable[[str], None] = lambda line: None,
-        grants: TimeGrants | None = None,
-    ) -> None:
-        super().__init__(new_simulation, settings, ardupilot, notice, grants)
-        self.exchange = FrameExchange(self._simulation)
-        self._link: UdpSocket | None = None
-        self._poses: PoseLink | None = None
-        self._relay: AppRelay | None = None  # with a program that grants time
-        self._pacer: Pacer | None = None  # until that has granted time
-        self._sender = SoleSender[ServoFrame]("ArduPilot", self._port, notice, _GONE_S)
-        self._waiting: tuple[ServoFrame, Address] | None = None  # the last frame and its sender
-        self._frame_s = 0.0  # wall time of the last frame
-        self._connected = asyncio.Event()
-        self._is_falling = False  # ArduPilot has ended: its last frames are not answered
-        self._holding: asyncio.Task[None] | None = None  # until time is granted
-        self._failed: asyncio.Future[None] | None = None
+    exchange: FrameExchange
+    _link: UdpSocket | None = None
+    _poses: PoseLink | None = None
+    _relay: AppRelay | None = None  # with a program that grants time
+    _pacer: Pacer | None = None  # until that has granted time
+    _sender: SoleSender[ServoFrame]
+    _waiting: tuple[ServoFrame, Address] | None = None  # the last frame and its sender
+    _frame_s = 0.0  # wall time of the last frame
+    _connected: asyncio.Event
+    _is_falling = False  # ArduPilot has ended: its last frames are not answered
+    _holding: asyncio.Task[None] | None = None  # until time is granted
+    _failed: asyncio.Future[None] | None = None
 
     def _open(self) -> None:
+        self.exchange, self._connected = FrameExchange(self._simulation), asyncio.Event()
+        self._sender = SoleSender[ServoFrame]("ArduPilot", self._port, self._notice, _GONE_S)
         bind, instance = self._settings.bind, self._settings.instance
         self._link = bind_udp((bind, self._port), "choose another --instance")
+        self._opened.callback(self._link.close)
         if self._simulation.sends_poses:
             port, place = POSE_PORT + PORTS_AN_INSTANCE * instance, self._simulation.place
             self._poses = PoseLink(bind, port, instance + 1, place, self._notice)
+            self._opened.callback(self._poses.close)
         app = self._settings.onboard.remote
         if self._grants is not None and app is not None:
             port = RELAY_PORT + PORTS_AN_INSTANCE * instance
             listening = bind_udp((bind, port), "choose another --instance")
             sender = mavlink_sender(port, instance + 1, self._notice)
             self._relay = AppRelay(listening, app, sender, instance + 1)
-
-    def _close(self) -> None:
-        if self._poses is not None:
-            self._poses.close()
-        if self._relay is not None:
-            self._relay.close()
-        if self._link is not None:
-            self._link.close()
+            self._opened.callback(self._relay.close)
 
     async def _serve(self) -> None:
         loop, link = asyncio.get_running_loop(), self._link

@@ -102,7 +102,7 @@ class ArduPilotSimulation(SimulatedVehicle):
         world.end_step()
         self._judge()
         self._true = self._begin_tick()
-        if self._sensing is not None:
+        if self._models is not None:
             self._take_readings()
         return self._line(self._true)
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from framerunner.errors import SettingError, UserError
-from sitl.autopilots.temporary_folder import TemporaryFolder
+from sitl.temporary_folder import TemporaryFolder
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 _LAST_BYTES = 2000

@@ -6,6 +6,7 @@ import asyncio
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Generic, TypeVar
 
 from framerunner.wire.transports.urls import in_url
@@ -13,8 +14,8 @@ from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
 from sitl.pacing.pacer import BURST_TICKS, Pacer
 from sitl.pacing.time_grants import FREE_US, TimeGrants
 from sitl.server_settings import ServerSettings
-from sitl.streaming.drone_video import DroneVideo
 from sitl.vehicle import SimulatedVehicle
+from sitl.video import DroneVideo
 from sitl.world import CONTROL_PERIOD_US
 
 FALL_US = 3_000_000
@@ -45,12 +46,13 @@ class AutopilotServer(ABC, Generic[V]):
         new_simulation: Callable[[], V],
         settings: ServerSettings,
         start: AutopilotStart,
-        notice: Callable[[str], None],
-        grants: TimeGrants | None,
+        notice: Callable[[str], None] = lambda line: None,
+        grants: TimeGrants | None = None,
     ) -> None:
         self._new_simulation = new_simulation
         self._settings, self._autopilot, self._notice, self._grants = settings, start, notice, grants
         self._simulation = self._new()
+        self._opened = ExitStack()  # the autopilot's ports, and what else is closed in the end
         self._video = DroneVideo(self._simulation, settings, grants)
         self._video_is_open = asyncio.Event()  # from then on time passes
 
@@ -72,7 +74,7 @@ class AutopilotServer(ABC, Generic[V]):
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            self._close()
+            self._opened.close()
             if self._autopilot.process is not None:
                 await self._autopilot.process.stop()
             if self._grants is not None:
@@ -87,11 +89,7 @@ class AutopilotServer(ABC, Generic[V]):
 
     @abstractmethod
     def _open(self) -> None:
-        """Open the autopilot's ports; `_close` closes those that were opened before one that cannot be."""
-
-    @abstractmethod
-    def _close(self) -> None:
-        """Close it."""
+        """Open the autopilot's ports, each to be closed by `_opened`."""
 
     @abstractmethod
     async def _serve(self) -> None:

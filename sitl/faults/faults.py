@@ -3,28 +3,66 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from scenarios.faults.declaration import Fault, FaultKind, FaultPart
-from scenarios.faults.parse import FaultError
+from scenarios.faults.declaration import SIZES, Fault, FaultError, FaultKind, FaultPart
 from sitl.battery import Battery
-from sitl.faults.injection import fault_of, part_of
 from sitl.faults.link import LinkFault
 from sitl.faults.sensors import IDEAL_PARTS, SensorFaults
 from sitl.sensors.specs import SuiteSpec
 from sitl.world import World
 
-_NEVER_US = 1 << 62
-_SENSORS = {
-    FaultPart.MAGNETOMETER: "magnetometer",
-    FaultPart.BAROMETER: "barometer",
-    FaultPart.GPS: "gps",
-    FaultPart.RANGE_FINDER: "range_finder",
-    FaultPart.OPTICAL_FLOW: "optical_flow",
-    FaultPart.EXTERNAL_POSE: "external_pose",
+_GARBAGE = 10.0  # times the default noise: MAVLink calls it complete garbage
+_MOTOR, _BATTERY, _SLOW, _GARBAGE_TYPE = 101, 100, 5, 3
+
+_UNITS: dict[int, FaultPart] = {
+    0: FaultPart.GYROSCOPE,
+    1: FaultPart.ACCELEROMETER,
+    2: FaultPart.MAGNETOMETER,
+    3: FaultPart.BAROMETER,
+    4: FaultPart.GPS,
+    5: FaultPart.OPTICAL_FLOW,
+    6: FaultPart.EXTERNAL_POSE,
+    7: FaultPart.RANGE_FINDER,
+    _BATTERY: FaultPart.BATTERY_MONITOR,
+    _MOTOR: FaultPart.MOTOR,
 }
-"""Sensors that a suite may lack, by their fields."""
+_TYPES: dict[int, FaultKind] = {
+    1: FaultKind.OFF,
+    2: FaultKind.STUCK,
+    _GARBAGE_TYPE: FaultKind.NOISY,
+    4: FaultKind.WRONG,
+    6: FaultKind.DELAYED,
+    7: FaultKind.LOSSY,  # intermittent
+}
+
+
+def part_of(unit: int) -> FaultPart | None:
+    """The part of a FAILURE_UNIT; None: there is none that can fail here."""
+    return _UNITS.get(unit)
+
+
+def fault_of(unit: int, kind: int, number: int | None) -> Fault | None:
+    """The fault of a FAILURE_UNIT and FAILURE_TYPE with its default size; None: there is none.
+
+    A motor is slow if it is weak. The sensors' rates cannot be changed, so no sensor is slow.
+    """
+    part, fault_kind = _UNITS.get(unit), _TYPES.get(kind)
+    if part is FaultPart.MOTOR and kind == _SLOW:
+        fault_kind = FaultKind.WEAK
+    if part is None or fault_kind is None or fault_kind not in SIZES[part]:
+        return None
+    meant = SIZES[part][fault_kind]
+    size = None
+    if meant is not None and kind == _GARBAGE_TYPE:
+        size = min(_GARBAGE * meant.default, meant.high)
+    return Fault(part=part, kind=fault_kind, size=size, number=number)
+
+
+_NEVER_US = 1 << 62
 _OTHERS = frozenset({FaultPart.BATTERY, FaultPart.MOTOR, FaultPart.CAMERA, FaultPart.LINK, FaultPart.RC})
+_ALWAYS = frozenset({FaultPart.GYROSCOPE, FaultPart.ACCELEROMETER, FaultPart.BATTERY_MONITOR})
+"""In each suite; the other sensors are named as their fields of a suite, which may lack them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,8 +222,7 @@ class Faults:
         pose = self._suite.external_pose
         if part is FaultPart.EXTERNAL_POSE and pose is not None and pose.source != "simulated":
             return False  # its poses come over MAVLink
-        field = _SENSORS.get(part)
-        return field is None or getattr(self._suite, field) is not None
+        return part in _ALWAYS or getattr(self._suite, part) is not None
 
     def _check(self, fault: Fault) -> None:
         """Refuse a fault of a part that the drone does not have."""
@@ -209,30 +246,24 @@ class Faults:
         self._active.append(fault)
         self.notice(f"fault begins: {fault}")
         self.begun.append(BegunFault(fault, now_us))
-        if fault.part is FaultPart.MOTOR:
-            self._apply_motors()
-        elif fault.part not in _OTHERS:
+        if fault.part not in _OTHERS:
             self._all_sensors.begin(fault)
-        self._apply_others()
+        self._apply()
 
     def _end(self, fault: Fault, now_us: int) -> None:
         if fault not in self._active:
             return
         self._active.remove(fault)
         self.notice(f"fault ends: {fault}")
-        self.begun = [
-            BegunFault(each.fault, each.time_us, now_us)
-            if each.fault == fault and each.ended_us is None
-            else each
-            for each in self.begun
-        ]
-        if fault.part is FaultPart.MOTOR:
-            self._apply_motors()
-        elif fault.part not in _OTHERS:
+        for number, each in enumerate(self.begun):
+            if each.fault == fault and each.ended_us is None:
+                self.begun[number] = replace(each, ended_us=now_us)
+        if fault.part not in _OTHERS:
             self._all_sensors.end(fault)
-        self._apply_others()
+        self._apply()
 
-    def _apply_others(self) -> None:
+    def _apply(self) -> None:
+        """Let what is active act; of several faults of one motor or link the last counts."""
         self.sensors = self._all_sensors if self._all_sensors.active else None
         self.camera = tuple(fault for fault in self._active if fault.part is FaultPart.CAMERA)
         self.rc = next((fault for fault in reversed(self._active) if fault.part is FaultPart.RC), None)
@@ -243,9 +274,6 @@ class Faults:
             self.link = LinkFault(links[-1], self._seed)
         sags = [fault.amount for fault in self._active if fault.part is FaultPart.BATTERY]
         self._battery.sag = max(sags, default=0.0)
-
-    def _apply_motors(self) -> None:
-        """Of several faults of one motor the last counts."""
         dynamics = self._world.dynamics
         states = {fault.number or 1: fault for fault in self._active if fault.part is FaultPart.MOTOR}
         for number in range(1, self._rotors + 1):

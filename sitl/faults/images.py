@@ -9,19 +9,16 @@ import numpy as np
 
 from framerunner.geometry.solids import Solid
 from scenarios.faults.declaration import Fault, FaultKind, FaultPart
-from scenarios.models import Scenario, TrueState
+from scenarios.models import Scenario
 from sitl.camera import CameraFeed, Exposure
-from sitl.faults.effects import Lossy
+from sitl.faults.effects import Channel, Effect, new_effect
 from sitl.faults.faults import Faults
 from sitl.optics.painter import Image
-from sitl.sensors.noise import Delay
-
-Change = Callable[[int, Exposure | None], Exposure | None]
 
 
 def new_feed(
     scenario: Scenario, faults: Faults, seed: int, drones: Callable[[], Sequence[Solid]] = tuple
-) -> CameraFeed | FaultyFeed:
+) -> CameraFeed:
     """The camera's feed; one with faults only if the scenario declares some of the camera.
 
     Args:
@@ -30,60 +27,30 @@ def new_feed(
         seed: of the flight.
         drones: see `CameraFeed`.
     """
-    feed = CameraFeed(scenario, drones, seed)
-    if not any(fault.part is FaultPart.CAMERA for fault in scenario.faults):
-        return feed
-    return FaultyFeed(feed, lambda: faults.camera, seed)
+    has_faults = any(fault.part is FaultPart.CAMERA for fault in scenario.faults)
+    return CameraFeed(scenario, drones, seed, _ImageFaults(faults, seed) if has_faults else None)
 
 
-class FaultyFeed:
-    """A camera feed with the faults that are active; it has the interface of `CameraFeed`.
+class _ImageFaults:
+    """The camera's active faults."""
 
-    Args:
-        feed: without faults.
-        active: called at each image for the faults of the camera.
-        seed: of the flight.
-    """
+    def __init__(self, faults: Faults, seed: int) -> None:
+        self._faults, self._seed = faults, seed
+        self._changes: dict[Fault, Effect[Exposure]] = {}
 
-    def __init__(self, feed: CameraFeed, active: Callable[[], tuple[Fault, ...]], seed: int) -> None:
-        self._feed, self._active, self._seed = feed, active, seed
-        self._changes: dict[Fault, Change] = {}
-
-    @property
-    def next_us(self) -> int:
-        """Before this time there is nothing to do."""
-        return 0 if self._active() or self._changes else self._feed.next_us
-
-    def step(self, truth: TrueState) -> tuple[int, Image] | None:
-        """See `CameraFeed.step`."""
-        arrived = self.arrival(truth)
-        return None if arrived is None else (arrived.time_us, arrived.image)
-
-    def arrival(self, truth: TrueState) -> Exposure | None:
-        """See `CameraFeed.arrival`."""
-        active = self._active()
+    def __call__(self, now_us: int, exposure: Exposure | None) -> Exposure | None:
+        active = self._faults.camera
         if active != tuple(self._changes):
             kept = self._changes
             self._changes = {fault: kept.get(fault) or _new_change(fault, self._seed) for fault in active}
-        exposure = self._feed.arrival(truth)
         for change in self._changes.values():
-            exposure = change(truth.time_us, exposure)
+            exposure = change(now_us, exposure)
         return exposure
 
 
-def _new_change(fault: Fault, seed: int) -> Change:
+def _new_change(fault: Fault, seed: int) -> Effect[Exposure]:
     """What a fault does from now on; late images that have not arrived at its end are lost."""
-    if fault.kind is FaultKind.OFF:
-        return lambda _now_us, _exposure: None
-    if fault.kind is FaultKind.STUCK:
-        return _Frozen()
-    if fault.kind is FaultKind.BLACK:
-        return _blacken
-    if fault.kind is FaultKind.DELAYED:
-        return _Late(fault.amount)
-    if fault.kind is FaultKind.LOSSY:
-        return Lossy(fault.amount, seed, f"faults.{fault.part}.{fault.kind}")
-    raise ValueError(f"{fault.kind} is no fault of a camera")
+    return _blacken if fault.kind is FaultKind.BLACK else new_effect(fault, _EXPOSURES, seed)
 
 
 class _Changed(Exposure):
@@ -105,24 +72,12 @@ def _blacken(_now_us: int, exposure: Exposure | None) -> Exposure | None:
     return _Changed(exposure.time_us, lambda: np.zeros_like(exposure.image))
 
 
-class _Frozen:
-    """The first image again and again, with new times: the sensor hangs, its driver does not."""
-
-    def __init__(self) -> None:
-        self._first: Exposure | None = None
-
-    def __call__(self, _now_us: int, exposure: Exposure | None) -> Exposure | None:
-        if exposure is None:
-            return None
-        first = self._first = self._first or exposure
-        return _Changed(exposure.time_us, lambda: first.image)
+def _frozen(first: Exposure, now: Exposure) -> Exposure:
+    """The first image with a new time: the sensor hangs, its driver does not."""
+    return _Changed(now.time_us, lambda: first.image)
 
 
-class _Late:
-    def __init__(self, delay_s: float) -> None:
-        self._delay: Delay[Exposure] = Delay(delay_s)
-
-    def __call__(self, now_us: int, exposure: Exposure | None) -> Exposure | None:
-        if exposure is not None:
-            self._delay.send(now_us, exposure)
-        return self._delay.newest(now_us)
+_EXPOSURES: Channel[Exposure] = Channel(
+    0, add=lambda exposure, _by: exposure, scale=lambda exposure, _factor: exposure, freeze=_frozen
+)
+"""Images are no numbers: nothing is added, and no fault scales them."""

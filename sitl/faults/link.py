@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from scenarios.faults.declaration import Fault, FaultKind
 from sitl.faults.effects import Lossy
@@ -18,12 +18,18 @@ class LinkFault:
     Args:
         fault: of the link.
         seed: of the flight.
+
+    Attributes:
+        up: from the app.
+        down: to the app.
     """
 
     def __init__(self, fault: Fault, seed: int) -> None:
         self.fault = fault
         self._off = fault.kind is FaultKind.OFF
-        self._delay_s = fault.amount if fault.kind is FaultKind.DELAYED else 0.0
+        delay_s = fault.amount if fault.kind is FaultKind.DELAYED else 0.0
+        self.up: Way[Any] = Way(self.loses, delay_s)
+        self.down: Way[Any] = Way(self.loses, delay_s)
         self._lossy: Lossy | None = None
         if fault.kind is FaultKind.LOSSY:
             self._lossy = Lossy(fault.amount, seed, "faults.link.lossy")
@@ -31,10 +37,6 @@ class LinkFault:
     def loses(self) -> bool:
         """Whether the next packet is lost."""
         return self._off or (self._lossy is not None and self._lossy(0, True) is None)
-
-    def new_way(self) -> Way[T]:
-        """One direction."""
-        return Way(self.loses, self._delay_s)
 
 
 class Way(Generic[T]):

@@ -9,16 +9,15 @@ from typing import Any, TypeVar
 from framerunner.geometry.vectors import NAN3, Vec3
 from framerunner.vehicle.measurements import ExternalPose, ImuSample, Readings, Sensors
 from scenarios.faults.declaration import Fault, FaultPart
-from sitl.faults.channels import CHANNELS, IDEAL_POSITION
-from sitl.faults.effects import Effect, new_effect
+from sitl.faults.effects import CHANNELS, IDEAL_POSITION, Effect, new_effect
 
 T = TypeVar("T")
-_SAMPLES = (  # with the field of `Readings`
-    (FaultPart.MAGNETOMETER, "magnetometer"),
-    (FaultPart.BAROMETER, "barometer"),
-    (FaultPart.GPS, "gps"),
-    (FaultPart.RANGE_FINDER, "range_finder"),
-    (FaultPart.OPTICAL_FLOW, "optical_flow"),
+_SAMPLES = (  # named as their fields of `Readings`
+    FaultPart.MAGNETOMETER,
+    FaultPart.BAROMETER,
+    FaultPart.GPS,
+    FaultPart.RANGE_FINDER,
+    FaultPart.OPTICAL_FLOW,
 )
 _POSITION = (FaultPart.GPS, FaultPart.EXTERNAL_POSE)
 IDEAL_PARTS = frozenset({FaultPart.GYROSCOPE, FaultPart.ACCELEROMETER, FaultPart.BATTERY_MONITOR, *_POSITION})
@@ -60,9 +59,9 @@ class SensorFaults:
         now_us, effects = readings.time_us, self._effects
         if FaultPart.GYROSCOPE in effects or FaultPart.ACCELEROMETER in effects:
             readings.imu = self._imu(now_us, readings.imu)
-        for part, field in _SAMPLES:
+        for part in _SAMPLES:
             if part in effects:
-                setattr(readings, field, self._pass(part, now_us, getattr(readings, field)))
+                setattr(readings, part, self._pass(part, now_us, getattr(readings, part)))
         if FaultPart.EXTERNAL_POSE in effects:
             pose = self._pass(FaultPart.EXTERNAL_POSE, now_us, pose)
         if FaultPart.BATTERY_MONITOR in effects:

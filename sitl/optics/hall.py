@@ -10,7 +10,7 @@ from math import cos, sin
 import numpy as np
 
 from framerunner.geometry.vectors import Vec3
-from scenarios.imaging.clutter import Hall, Patch, PatchColour, Surface
+from scenarios.imaging.effects import Hall, Patch, PatchColour, Surface
 from scenarios.models import Arena, Light, Scenario
 from sitl.camera_scene import Bgr, Face, Floats, lit
 

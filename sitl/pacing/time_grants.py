@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -32,39 +32,39 @@ Velocity = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Grant:
-    """How far simulated time may advance."""
-
-    until_us: int  # time of the last control tick that may run
-    setpoint: Velocity | None = None  # that the autopilot must have received before; None: none is awaited
+class _Sent:
+    """What is sent as one line."""
 
     def line(self) -> bytes:
         """As sent."""
         return json.dumps(asdict(self)).encode() + b"\n"
 
+
+@dataclass(frozen=True, slots=True)
+class Grant(_Sent):
+    """How far simulated time may advance."""
+
+    until_us: int  # time of the last control tick that may run
+    setpoint: Velocity | None = None  # that the autopilot must have received before; None: none is awaited
+
     @staticmethod
     def parse(line: bytes) -> Grant:
         """The inverse of `line`."""
         fields = json.loads(line)
-        setpoint = fields["setpoint"]
-        return Grant(fields["until_us"], None if setpoint is None else tuple(setpoint))
+        return Grant(**fields | {"setpoint": fields["setpoint"] and tuple(fields["setpoint"])})
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class Held(_Sent):
     """The simulator has used up the time that was granted."""
 
     time_us: int  # of the last control tick that ran
     image_us: int  # time of exposure of the last image that was sent; negative before the first
     setpoint_missed: bool = False  # the setpoint of the last grant was not received in time
 
-    def line(self) -> bytes:
-        """As sent."""
-        return json.dumps(asdict(self)).encode() + b"\n"
-
 
 @dataclass(frozen=True, slots=True)
-class SentImage:
+class SentImage(_Sent):
     """An image of the camera; its pixels follow this line, `size_bytes` of them."""
 
     time_us: int  # of its exposure
@@ -76,10 +76,6 @@ class SentImage:
         """Of the pixels: BGR, row by row."""
         return self.height_px * self.width_px * 3
 
-    def line(self) -> bytes:
-        """As sent."""
-        return json.dumps({"image": asdict(self)}).encode() + b"\n"
-
     def image(self, pixels: bytes) -> Image:
         """The image, shape (height, width, 3), uint8; it cannot be changed."""
         return np.frombuffer(pixels, np.uint8).reshape(self.height_px, self.width_px, 3)
@@ -88,10 +84,37 @@ class SentImage:
 def parse_answer(line: bytes) -> Held | SentImage:
     """What the simulator has sent."""
     fields = json.loads(line)
-    return SentImage(**fields["image"]) if "image" in fields else Held(**fields)
+    return SentImage(**fields) if "width_px" in fields else Held(**fields)
 
 
-class TimeGrants:
+class ProgramChannel:
+    """The simulator's end of a channel to the program that started it, which it inherits; both send lines.
+
+    Args:
+        channel: connected to that program.
+    """
+
+    def __init__(self, channel: socket.socket) -> None:
+        self._channel = channel
+        self._writer: asyncio.StreamWriter | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    async def _open(self, listen: Callable[[asyncio.StreamReader], Coroutine[None, None, None]]) -> None:
+        """Report that the simulator is up, and listen from now on."""
+        reader, self._writer = await asyncio.open_connection(sock=self._channel)
+        self._writer.write(b"up\n")
+        self._task = asyncio.create_task(listen(reader), name=type(self).__name__)
+
+    async def close(self) -> None:
+        """Stop listening."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+        if self._writer is not None:
+            self._writer.close()
+
+
+class TimeGrants(ProgramChannel):
     """The simulator's end of the channel.
 
     Args:
@@ -100,36 +123,20 @@ class TimeGrants:
     Attributes:
         until_us: time of the last control tick that may run; `FREE_US` without a limit.
         used: time has been granted, or never will be.
+        setpoint: of the last grant, which was sent before it; None: there was none.
     """
 
     def __init__(self, channel: socket.socket) -> None:
+        super().__init__(channel)
         self.until_us = FREE_US
         self.used = False
-        self._channel = channel
-        self._setpoint: Velocity | None = None
+        self.setpoint: Velocity | None = None
         self._granted = asyncio.Event()
-        self._writer: asyncio.StreamWriter | None = None
-        self._task: asyncio.Task[None] | None = None
         self._missed = False
-
-    @property
-    def setpoint(self) -> Velocity | None:
-        """The setpoint of the last grant, which was sent before it; None: there was none."""
-        return self._setpoint
 
     async def open(self) -> None:
         """Report that the simulator is up, and receive grants from now on."""
-        reader, self._writer = await asyncio.open_connection(sock=self._channel)
-        self._writer.write(b"up\n")
-        self._task = asyncio.create_task(self._listen(reader), name="time grants")
-
-    async def close(self) -> None:
-        """Stop receiving grants."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
-        if self._writer is not None:
-            self._writer.close()
+        await self._open(self._listen)
 
     async def first(self, timeout_s: float) -> bool:
         """Wait for the first grant; False if there was none within a wall time."""
@@ -160,13 +167,13 @@ class TimeGrants:
         `received` returns the velocity setpoint that the autopilot has now, in a link's single precision.
         """
         self._granted.clear()
-        wanted = self._setpoint
+        wanted = self.setpoint
         # An older one that MAVSDK's thread has sent again may have come after it.
         missed = self._missed or not (wanted is None or wanted == received())
         if self._writer is not None:
             self._writer.write(Held(time_us, image_us, missed).line())
         await self._granted.wait()
-        wanted, polls = self._setpoint, 0
+        wanted, polls = self.setpoint, 0
         while not (arrived := wanted is None or wanted == received()) and polls < _POLLS:
             polls += 1
             await asyncio.sleep(_POLL_S)
@@ -176,8 +183,8 @@ class TimeGrants:
         try:
             async for line in reader:
                 grant = Grant.parse(line)
-                self.until_us, self._setpoint, self.used = grant.until_us, grant.setpoint, True
+                self.until_us, self.setpoint, self.used = grant.until_us, grant.setpoint, True
                 self._granted.set()
         finally:  # the channel has closed
-            self.until_us, self._setpoint, self.used = FREE_US, None, True
+            self.until_us, self.setpoint, self.used = FREE_US, None, True
             self._granted.set()

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 from firmware_py.mavlink.camera.model import PictureSpace
 from firmware_py.storage import Path
-from sitl.storage import MEBIBYTE, FolderStorage, MemoryStorage
+from sitl.storage import MEBIBYTE, FolderStorage
 
 if TYPE_CHECKING:
     from sitl.optics.painter import Image
-    from sitl.payload.video_file import VideoEncoder
+    from sitl.streaming.h264 import VideoEncoder
 
 _FOLDER = "DCIM"  # of cameras, by the Design rule for Camera File system
 _MIN_FREE_BYTES = MEBIBYTE  # a recording needs room to begin
@@ -41,7 +41,7 @@ class CameraAlbum:
         can_record: whether PyAV is installed.
     """
 
-    def __init__(self, storage: MemoryStorage | FolderStorage, boot_unix_us: int, rate_hz: float) -> None:
+    def __init__(self, storage: FolderStorage, boot_unix_us: int, rate_hz: float) -> None:
         self._storage = storage
         name = datetime.fromtimestamp(boot_unix_us / 1e6, UTC).strftime("%Y%m%d_%H%M%S")
         self._folder: Path = (_FOLDER, name)
@@ -95,7 +95,7 @@ class CameraAlbum:
             self._create(path)
         except OSError:
             return False
-        from sitl.payload.video_file import VideoEncoder
+        from sitl.streaming.h264 import VideoEncoder
 
         height, width = self._newest.shape[:2]
         self._recording = _Recording(VideoEncoder(width, height, self._rate_hz), path)

@@ -7,8 +7,7 @@ from math import copysign, isfinite, remainder, tau
 from firmware_py.mavlink.gimbal.model import GimbalLimits, GimbalTarget
 from framerunner.geometry.rotations import yaw_of
 from framerunner.geometry.vectors import Quaternion
-from scenarios.gimbal import Gimbal
-from scenarios.models import CameraMotion
+from scenarios.models import CameraMotion, Gimbal
 
 
 class SimulatedGimbal:

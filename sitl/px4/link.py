@@ -14,10 +14,12 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
+from framerunner.wire.dialect import mavlink
+from framerunner.wire.framing import PacketReader
 from framerunner.wire.transports.sockets import Address, Stream, listen_tcp
 from framerunner.wire.transports.urls import in_url
 from sitl.autopilots import WARNING
-from sitl.px4.messages import ActuatorControls, ControlsReader
+from sitl.px4.messages import ActuatorControls
 
 FIRST_PORT = 4560  # of PX4's instance 0
 _SOON_S = 0.004  # for which the event loop waits for an answer; it usually comes in a fraction of this
@@ -38,15 +40,17 @@ class _Candidate:
     def __init__(self, connection: socket.socket, peer: Address) -> None:
         self.stream = Stream.of(connection, peer)
         self.place = in_url(*peer[:2])
-        self.reader = ControlsReader()
+        self.reader = PacketReader()
         self.since_s = time.monotonic()
+        self.is_of_px4 = False
         self.is_reported = False
 
     def read(self) -> bool:
         """Read what has arrived; whether the connection is still open."""
         try:
-            for _ in self.reader.feed(self.stream.read() or b""):
-                pass  # there was no HIL_SENSOR that it could answer
+            for message in self.reader.feed(self.stream.read() or b""):
+                is_heartbeat = message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
+                self.is_of_px4 |= is_heartbeat and message.autopilot == mavlink.MAV_AUTOPILOT_PX4
         except OSError:
             return False
         return True
@@ -76,7 +80,7 @@ class Px4Link:
         self._notice = notice
         self._stream: Stream | None = None
         self._candidates: list[_Candidate] = []  # the oldest first
-        self._reader = ControlsReader()
+        self._reader = PacketReader()
         self._poll = select.poll()
         self._in_a_row = 0
         self.in_lockstep = False
@@ -99,7 +103,7 @@ class Px4Link:
         self._accept()
         for candidate in list(self._candidates):
             is_open = candidate.read()
-            if candidate.reader.is_of_px4:
+            if candidate.is_of_px4:
                 self._candidates.remove(candidate)
                 self._close_candidates(0)
                 self._take(candidate)
@@ -209,7 +213,10 @@ class Px4Link:
         except OSError:
             raise Px4GoneError from None
         found = None
-        for controls in self._reader.feed(data) if data else ():
+        for message in self._reader.feed(data) if data else ():
+            controls = ActuatorControls.of(message)
+            if controls is None:
+                continue
             if controls.time_us == time_us and found is None:
                 found = controls
             elif self.in_lockstep:

@@ -5,17 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import Callable
 
 from sitl.autopilots.idle import IdleCheck
-from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
+from sitl.autopilots.process import AutopilotEndedError
 from sitl.autopilots.server import AutopilotServer
 from sitl.pacing.pacer import BURST_TICKS, LagNotices, Pacer
-from sitl.pacing.time_grants import TimeGrants
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
 from sitl.px4.side_link import PERIOD_US, SideLink
 from sitl.px4.simulation import Px4Simulation
-from sitl.server_settings import ServerSettings
 from sitl.world import CONTROL_PERIOD_US
 
 _OWN_TIME = ("commander", "mavlink_if1")
@@ -29,44 +26,28 @@ _ENDING_S = 1.0  # wall time in which a PX4 that has closed the connection ends
 class Px4Server(AutopilotServer[Px4Simulation]):
     """Runs a drone that PX4 flies, until cancelled; see `AutopilotServer`.
 
-    Args:
-        new_simulation: makes the simulation anew.
-        settings: ports and speed; MAVLink is PX4's own.
-        px4: how it is started.
-        notice: called with lines for people.
-        grants: how far simulated time may advance; None: without a limit.
-
     Attributes:
         link: to PX4; None before `run`.
     """
 
-    def __init__(
-        self,
-        new_simulation: Callable[[], Px4Simulation],
-        settings: ServerSettings,
-        px4: AutopilotStart,
-        notice: Callable[[str], None] = lambda line: None,
-        grants: TimeGrants | None = None,
-    ) -> None:
-        super().__init__(new_simulation, settings, px4, notice, grants)
-        self.link: Px4Link | None = None
-        self._idle: IdleCheck | None = None  # of the PX4 that was started here
-        self._side_link: SideLink | None = None
-        self._ended: asyncio.Task[str] | None = None  # how the PX4 that was started here ends
+    link: Px4Link | None = None
+    _idle: IdleCheck | None = None  # of the PX4 that was started here
+    _side_link: SideLink | None = None
+    _ended: asyncio.Task[str] | None = None  # how the PX4 that was started here ends
 
     def _open(self) -> None:
         settings, process = self._settings, self._autopilot.process
         self.link = Px4Link((settings.bind, FIRST_PORT + settings.instance), self._notice)
+        self._opened.callback(self.link.close)
         output = None if process is None else process.log
         self._side_link = SideLink(settings, self._simulation.scenario.camera, output)
+        self._opened.callback(self._side_link.close)
+        self._opened.callback(self._forget_process)
 
-    def _close(self) -> None:
+    def _forget_process(self) -> None:
+        """No longer watch the PX4 that was started here."""
         if self._ended is not None:
             self._ended.cancel()
-        if self.link is not None:
-            self.link.close()
-        if self._side_link is not None:
-            self._side_link.close()
         if self._idle is not None:
             self._idle.close()
 
@@ -74,8 +55,6 @@ class Px4Server(AutopilotServer[Px4Simulation]):
         link = self.link
         assert link is not None, "it was opened"
         while True:
-            if self._ended is not None:
-                self._ended.cancel()
             await self._start(link)
             self._notice("PX4 is connected")
             await self._video_is_open.wait()
@@ -93,10 +72,9 @@ class Px4Server(AutopilotServer[Px4Simulation]):
                 self._notice(f"waiting for PX4 on TCP {port}; start it: {self._autopilot.command}")
                 await link.connected()
             return
+        self._forget_process()
         await process.stop()
         await process.start()
-        if self._idle is not None:
-            self._idle.close()
         self._idle = None if process.process_id is None else IdleCheck(process.process_id, _OWN_TIME)
         self._ended = ended = asyncio.create_task(process.ended())
         connected = asyncio.create_task(link.connected())

@@ -8,37 +8,27 @@ forwards what it and ground stations send to each other.
 
 from __future__ import annotations
 
-import contextlib
-import socket
-from collections.abc import Iterator
 from pathlib import Path
-from struct import Struct
 from typing import BinaryIO
 
+from firmware_py.mavlink.camera.messages import stream_information
 from framerunner.vehicle.measurements import BatteryState
-from framerunner.wire.dialect import degrees_e7, mavlink, whole
-from framerunner.wire.framing import HEADER_BYTES_V2, MARKER_V2
+from framerunner.wire.dialect import Message, degrees_e7, mavlink, whole
+from framerunner.wire.framing import PacketReader, packed
 from framerunner.wire.px4_modes import px4_name
+from framerunner.wire.transports.sockets import connect_udp
 from scenarios.models import Camera
-from sitl.px4.camera_component import CameraComponent
-from sitl.px4.messages import Packer
+from sitl.px4.messages import SIMULATOR_COMPONENT_ID, SIMULATOR_SYSTEM_ID
 from sitl.px4.simulation import Px4Simulation
 from sitl.server_settings import ServerSettings
 from sitl.streaming.streams import video_streams
 
 PERIOD_US = 100_000
 CAMERA_PORT = 14280  # of PX4's instance 0
-_HEARTBEAT = Struct("<IBBBBB")  # custom mode, type, autopilot, base mode, system status, version
 _UNKNOWN_CELL = 0xFFFF
 _UNKNOWN_TEMPERATURE = 0x7FFF
 _MAX_CELLS = 10
-_BATTERY = int(mavlink.MAV_COMP_ID_BATTERY)
 _SECOND = 10  # periods
-_COMMAND_ID = int(mavlink.MAVLINK_MSG_ID_COMMAND_LONG)
-_HEARTBEAT_ID = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
-_ORIGIN_ID = int(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
-_CRITICAL = int(mavlink.MAV_STATE_CRITICAL)
-_PACKETS_AT_ONCE = 200
 
 
 class SideLink:
@@ -51,42 +41,33 @@ class SideLink:
     """
 
     def __init__(self, settings: ServerSettings, camera: Camera, output: Path | None) -> None:
-        instance = settings.instance
-        self._system_id = instance + 1
-        self._camera = CameraComponent(self._system_id, video_streams(settings, camera))
+        self._system_id = system_id = settings.instance + 1
+        self._streams = video_streams(settings, camera)
         self._mode = 0
-        self._packer = Packer(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, self._system_id, _BATTERY)
-        self._origin_packer = Packer(mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN)
+        self._battery = mavlink.MAVLink(None, system_id, mavlink.MAV_COMP_ID_BATTERY)
+        self._camera = mavlink.MAVLink(None, system_id, mavlink.MAV_COMP_ID_CAMERA)
+        self._simulator = mavlink.MAVLink(None, SIMULATOR_SYSTEM_ID, SIMULATOR_COMPONENT_ID)
         self._placed: Px4Simulation | None = None  # the one whose PX4 knows the place of its local frame
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        self._socket.connect(("127.0.0.1", CAMERA_PORT + instance))  # nobody else is heard
+        self._socket = connect_udp(("127.0.0.1", CAMERA_PORT + settings.instance))  # nobody else is heard
+        self._reader = PacketReader()
         self._output = None if output is None else _Output(output)
 
     def step(self, simulation: Px4Simulation) -> None:
         """Send the battery's state, and take what PX4 has said; to be called each `PERIOD_US`."""
         battery = simulation.measured_battery()
         if battery is not None:
-            self._send(self._pack(battery))
-        time_us, words = simulation.time_us, simulation.words
+            self._send(_battery_status(battery), self._battery)
+        time_us = simulation.time_us
         if time_us // PERIOD_US % _SECOND == 0:
-            self._send(self._camera.heartbeat(self._mode))
+            self._send(_camera_heartbeat(self._mode), self._camera)
             if self._lacks_origin(simulation):
-                self._send_origin(simulation)
+                self._send(_origin(simulation, self._system_id), self._simulator)
         if self._output is not None:
             for line in self._output.new_lines():
-                words.printed(time_us, line)
-        for message_id, sender, payload in self._received():
-            if message_id == _COMMAND_ID:
-                for packet in self._camera.answers(payload, sender):
-                    self._send(packet)
-            elif sender != (self._system_id, 1):
-                continue
-            elif message_id == _ORIGIN_ID:
-                self._placed = simulation
-            elif message_id == _HEARTBEAT_ID and len(payload) >= _HEARTBEAT.size:
-                self._mode, *_, status, _ = _HEARTBEAT.unpack_from(payload)
-                words.heartbeat(time_us, px4_name(self._mode), critical=status >= _CRITICAL)
+                simulation.words.printed(time_us, line)
+        for packet, _ in self._socket.read_all():
+            for message in self._reader.feed(packet):
+                self._take(message, simulation)
 
     def close(self) -> None:
         """Close the socket and the file."""
@@ -94,57 +75,78 @@ class SideLink:
         if self._output is not None:
             self._output.close()
 
+    def _take(self, message: Message, simulation: Px4Simulation) -> None:
+        kind, sender = message.get_msgId(), (message.get_srcSystem(), message.get_srcComponent())
+        if kind == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
+            if (message.target_system, message.target_component) == (
+                self._system_id,
+                mavlink.MAV_COMP_ID_CAMERA,
+            ):
+                self._answer(message, sender)
+        elif sender != (self._system_id, 1):
+            return
+        elif kind == mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN:
+            self._placed = simulation
+        elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            self._mode = message.custom_mode
+            critical = message.system_status >= mavlink.MAV_STATE_CRITICAL
+            simulation.words.heartbeat(simulation.time_us, px4_name(self._mode), critical=critical)
+
+    def _answer(self, command: Message, sender: tuple[int, int]) -> None:
+        """As a camera: it answers requests for its video streams, and nothing else."""
+        asked = command.command == mavlink.MAV_CMD_REQUEST_MESSAGE
+        asked &= command.param1 == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
+        result = mavlink.MAV_RESULT_ACCEPTED if asked else mavlink.MAV_RESULT_UNSUPPORTED
+        self._send(mavlink.MAVLink_command_ack_message(command.command, result, 0, 0, *sender), self._camera)
+        for number, stream in enumerate(self._streams if asked else (), 1):
+            information = stream_information(stream, number, len(self._streams), running=True)
+            self._send(information, self._camera)
+
     def _lacks_origin(self, simulation: Px4Simulation) -> bool:
         """Whether PX4 must be told where on Earth it is, and has not said that it was told."""
         return simulation.needs_place_on_earth and not simulation.armed and self._placed is not simulation
 
-    def _send_origin(self, simulation: Px4Simulation) -> None:
-        origin = simulation.scenario.origin
-        self._send(
-            self._origin_packer.pack(
-                degrees_e7(origin.latitude_deg),
-                degrees_e7(origin.longitude_deg),
-                0,  # altitude: another one would not fit the barometer's offset
-                self._system_id,
-                0,  # time
-            )
-        )
+    def _send(self, message: Message, sender: mavlink.MAVLink) -> None:
+        self._socket.write(packed(message, sender))
 
-    def _send(self, packet: bytes) -> None:
-        with contextlib.suppress(OSError):  # PX4 has not started
-            self._socket.send(packet)
 
-    def _pack(self, battery: BatteryState) -> bytes:
-        cells = min(max(battery.cells, 1), _MAX_CELLS)
-        cell_mv = whole(battery.voltage_v * 1e3 / cells, 16, signed=False)
-        return self._packer.pack(
-            round(battery.used_mah),
-            -1,  # no energy consumed is measured
-            _UNKNOWN_TEMPERATURE,
-            *[cell_mv] * cells,
-            *[_UNKNOWN_CELL] * (_MAX_CELLS - cells),
-            whole(battery.current_a * 100, 16),
-            0,  # battery's id
-            mavlink.MAV_BATTERY_FUNCTION_ALL,
-            mavlink.MAV_BATTERY_TYPE_LIPO,
-            round(battery.remaining * 100),
-            0,  # no time remaining is known
-            battery.warning,
-            *[0] * 4,  # voltages of cells 11 to 14
-            0,  # mode
-            0,  # faults
-        )
+def _camera_heartbeat(custom_mode: int) -> Message:
+    """HEARTBEAT with the vehicle's mode, as some programs take any component's for the vehicle's."""
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_CAMERA,
+        mavlink.MAV_AUTOPILOT_INVALID,
+        mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+        custom_mode,
+        mavlink.MAV_STATE_ACTIVE,
+        3,
+    )
 
-    def _received(self) -> Iterator[tuple[int, tuple[int, int], bytes]]:
-        """Number, system and component id of the sender, and payload of what has arrived."""
-        for _ in range(_PACKETS_AT_ONCE):
-            try:
-                packet = self._socket.recv(2048)
-            except OSError:
-                return
-            if len(packet) >= HEADER_BYTES_V2 and packet[0] == MARKER_V2:
-                number, end = int.from_bytes(packet[7:10], "little"), HEADER_BYTES_V2 + packet[1]
-                yield number, (packet[5], packet[6]), packet[HEADER_BYTES_V2:end]
+
+def _origin(simulation: Px4Simulation, system_id: int) -> Message:
+    origin = simulation.scenario.origin
+    return mavlink.MAVLink_set_gps_global_origin_message(
+        target_system=system_id,
+        latitude=degrees_e7(origin.latitude_deg),
+        longitude=degrees_e7(origin.longitude_deg),
+        altitude=0,  # another one would not fit the barometer's offset
+    )
+
+
+def _battery_status(battery: BatteryState) -> Message:
+    cells = min(max(battery.cells, 1), _MAX_CELLS)
+    cell_mv = whole(battery.voltage_v * 1e3 / cells, 16, signed=False)
+    return mavlink.MAVLink_battery_status_message(
+        0,  # battery's id
+        mavlink.MAV_BATTERY_FUNCTION_ALL,
+        mavlink.MAV_BATTERY_TYPE_LIPO,
+        _UNKNOWN_TEMPERATURE,
+        [cell_mv] * cells + [_UNKNOWN_CELL] * (_MAX_CELLS - cells),
+        whole(battery.current_a * 100, 16),
+        round(battery.used_mah),
+        -1,  # no energy consumed is measured
+        round(battery.remaining * 100),
+        charge_state=battery.warning,
+    )
 
 
 class _Output:

@@ -11,8 +11,7 @@ from framerunner.vehicle.airframe import Airframe
 from framerunner.vehicle.measurements import BatteryState
 from scenarios.faults.declaration import FaultKind, FaultPart
 from scenarios.models import Scenario
-from sitl.px4.messages import ActuatorControls
-from sitl.px4.sensor_messages import RC_PERIOD_US, SensorMessages, has_whole_imu
+from sitl.px4.messages import RC_PERIOD_US, ActuatorControls, SensorMessages, has_whole_imu
 from sitl.px4.transmitter import CENTRED, Channels, Sticks, centred
 from sitl.px4.words import FailsafeWords
 from sitl.vehicle import SimulatedVehicle

@@ -14,8 +14,6 @@ class BatteryMonitor:
         seed: of all random numbers.
     """
 
-    __slots__ = ("_current_scale", "_noise_a", "_noise_v", "_numbers", "_voltage_scale")
-
     def __init__(self, spec: BatteryMonitorSpec, seed: int) -> None:
         self._noise_v, self._noise_a = spec.voltage_noise_v, spec.current_noise_a
         self._numbers = normal_numbers(seed, "sensors.battery.noise", 2)

@@ -29,8 +29,6 @@ class Magnetometer:
         seed: of all random numbers.
     """
 
-    __slots__ = ("_field_ned_gauss", "_hard_iron_gauss", "_noise_gauss", "_numbers", "_scale", "_times")
-
     def __init__(self, spec: MagnetometerSpec, origin: GeodeticPoint, seed: int) -> None:
         self._field_ned_gauss = earth_field_ned_gauss(
             origin.latitude_deg, origin.longitude_deg, origin.altitude_m
@@ -66,17 +64,6 @@ class Barometer:
         seed: of all random numbers.
     """
 
-    __slots__ = (
-        "_bias_pa",
-        "_drift_pa",
-        "_floor_m",
-        "_noise_k",
-        "_noise_pa",
-        "_numbers",
-        "_period_s",
-        "_times",
-    )
-
     def __init__(self, spec: BarometerSpec, origin: GeodeticPoint, seed: int) -> None:
         self._floor_m = origin.altitude_m
         self._times = SamplingTimes(spec.rate_hz)
@@ -110,19 +97,6 @@ class Gps:
         origin: where on Earth the scenario is.
         seed: of all random numbers.
     """
-
-    __slots__ = (
-        "_delay",
-        "_drift",
-        "_first_fix_us",
-        "_horizontal_accuracy_m",
-        "_numbers",
-        "_period_s",
-        "_projection",
-        "_spec",
-        "_times",
-        "_vertical_accuracy_m",
-    )
 
     def __init__(self, spec: GpsSpec, origin: GeodeticPoint, seed: int) -> None:
         self._spec = spec

@@ -33,8 +33,6 @@ class RangeFinder:
         seed: of all random numbers.
     """
 
-    __slots__ = ("_numbers", "_offset_m", "_spec", "_times")
-
     def __init__(self, spec: RangeFinderSpec, seed: int) -> None:
         self._spec = spec
         self._times = SamplingTimes(spec.rate_hz)
@@ -68,18 +66,6 @@ class OpticalFlow:
         spec: figures of the errors.
         seed: of all random numbers.
     """
-
-    __slots__ = (
-        "_bias_rad_s",
-        "_flow_rad",
-        "_gyro_rad",
-        "_integration_us",
-        "_numbers",
-        "_scale",
-        "_spec",
-        "_times",
-        "_usable",
-    )
 
     def __init__(self, spec: OpticalFlowSpec, seed: int) -> None:
         self._spec = spec

@@ -23,8 +23,6 @@ class Imu:
         seed: of all random numbers.
     """
 
-    __slots__ = ("_accelerometer", "_gyroscope", "_hover_squares")
-
     def __init__(self, spec: ImuSpec, airframe: Airframe, seed: int) -> None:
         self._hover_squares = len(airframe.rotors) * airframe.hover_speed_rad_s**2
         gyro, accel = spec.gyroscope, spec.accelerometer
@@ -84,20 +82,6 @@ class InertialTriad:
         vibration_at_hover: 1 sigma of a sample of each axis.
         full_scale: largest value.
     """
-
-    __slots__ = (
-        "_bias",
-        "_constant_bias",
-        "_drift",
-        "_full_scale",
-        "_noise_density",
-        "_noise_variance",
-        "_numbers",
-        "_period_us",
-        "_scale",
-        "_ticks",
-        "_vibration",
-    )
 
     def __init__(
         self,

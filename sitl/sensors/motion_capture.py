@@ -21,17 +21,6 @@ class MotionCapture:
         seed: of all random numbers.
     """
 
-    __slots__ = (
-        "_attitude_variance_rad2",
-        "_delay",
-        "_misalignment",
-        "_numbers",
-        "_offset_frd_m",
-        "_position_variance_m2",
-        "_spec",
-        "_times",
-    )
-
     def __init__(self, spec: ExternalPoseSpec, seed: int) -> None:
         self._spec = spec
         self._times = SamplingTimes(spec.rate_hz)

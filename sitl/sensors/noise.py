@@ -50,8 +50,6 @@ class GaussMarkov:
         values: the components now, shape (n,).
     """
 
-    __slots__ = ("_decay", "_numbers", "_sigma", "_step_s", "_step_sigma", "_time_constant_s", "values")
-
     def __init__(self, seed: int, name: str, width: int, sigma: float, time_constant_s: float) -> None:
         self._numbers = normal_numbers(seed, name, width)
         self._sigma, self._time_constant_s = sigma, time_constant_s
@@ -79,8 +77,6 @@ class SamplingTimes:
         rate_hz: samples a second.
     """
 
-    __slots__ = ("_due_us", "_rate_hz", "_samples")
-
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
         self._samples = 0
@@ -101,8 +97,6 @@ class Delay(Generic[Sample]):
     Args:
         delay_s: from when a sample is true to its arrival.
     """
-
-    __slots__ = ("_delay_us", "_waiting")
 
     def __init__(self, delay_s: float) -> None:
         self._delay_us = round(delay_s * 1e6)

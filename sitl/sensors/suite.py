@@ -9,7 +9,6 @@ from framerunner.files.yaml_file import FileKind
 from framerunner.vehicle.airframe import Airframe
 from framerunner.vehicle.geodesy import GeodeticPoint
 from framerunner.vehicle.measurements import ExternalPose, Readings
-from scenarios.models import Origin
 from sitl.sensors.battery_monitor import BatteryMonitor
 from sitl.sensors.environment import Barometer, Gps, Magnetometer
 from sitl.sensors.ground import OpticalFlow, RangeFinder
@@ -57,35 +56,21 @@ class SensorSuite:
         seed: of all random numbers, 0 to `scenarios.random_numbers.MAX_SEED`.
     """
 
-    __slots__ = (
-        "_barometer",
-        "_battery",
-        "_external_pose",
-        "_gps",
-        "_imu",
-        "_magnetometer",
-        "_motion_capture",
-        "_optical_flow",
-        "_range_finder",
-    )
-
-    def __init__(
-        self, spec: SuiteSpec, airframe: Airframe, origin: GeodeticPoint | Origin, seed: int
-    ) -> None:
-        place = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
+    def __init__(self, spec: SuiteSpec, airframe: Airframe, origin: GeodeticPoint, seed: int) -> None:
         self._imu = Imu(spec.imu, airframe, seed) if spec.imu else None
-        self._magnetometer = Magnetometer(spec.magnetometer, place, seed) if spec.magnetometer else None
-        self._barometer = Barometer(spec.barometer, place, seed) if spec.barometer else None
-        self._gps = Gps(spec.gps, place, seed) if spec.gps else None
+        self._magnetometer = Magnetometer(spec.magnetometer, origin, seed) if spec.magnetometer else None
+        self._barometer = Barometer(spec.barometer, origin, seed) if spec.barometer else None
+        self._gps = Gps(spec.gps, origin, seed) if spec.gps else None
         self._range_finder = RangeFinder(spec.range_finder, seed) if spec.range_finder else None
         self._optical_flow = OpticalFlow(spec.optical_flow, seed) if spec.optical_flow else None
         pose = spec.external_pose
         simulated = pose is not None and pose.source == "simulated"
         self._motion_capture = MotionCapture(pose, seed) if pose is not None and simulated else None
         self._battery = BatteryMonitor(spec.battery, seed) if spec.battery else None
-        self._external_pose: ExternalPose | None = None
 
-    def read(self, motion: TrueMotion, battery_voltage_v: float, battery_current_a: float) -> Readings:
+    def read(
+        self, motion: TrueMotion, battery_voltage_v: float, battery_current_a: float
+    ) -> tuple[Readings, ExternalPose | None]:
         """Measure once in each control tick.
 
         Args:
@@ -94,12 +79,11 @@ class SensorSuite:
             battery_current_a: the true one.
 
         Returns:
-            What has arrived in this tick, without the pose of motion capture: see `external_pose`.
+            What has arrived in this tick, and the pose of motion capture if one has.
         """
         if self._battery is not None:
             battery_voltage_v, battery_current_a = self._battery.measure(battery_voltage_v, battery_current_a)
-        self._external_pose = self._motion_capture.sample(motion) if self._motion_capture else None
-        return Readings(
+        readings = Readings(
             motion.time_us,
             self._imu.sample(motion) if self._imu else None,
             self._magnetometer.sample(motion) if self._magnetometer else None,
@@ -110,7 +94,4 @@ class SensorSuite:
             battery_voltage_v,
             battery_current_a,
         )
-
-    def external_pose(self) -> ExternalPose | None:
-        """The newest pose of motion capture that has arrived in the tick of the last `read`, or None."""
-        return self._external_pose
+        return readings, self._motion_capture.sample(motion) if self._motion_capture else None

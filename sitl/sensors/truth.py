@@ -30,7 +30,6 @@ class TrueMotion:
         specific_force_frd_m_s2: mean over the interval: the change of velocity divided by the period, without
             gravity, in the body axes at the interval's middle, shape (3,); at rest (0, 0, -g).
         motor_speeds_rad_s: of the rotors, in the airframe's order.
-        max_motor_speed_rad_s: of each rotor.
         ground_z_m: height above the floor of the surface below.
     """
 
@@ -42,7 +41,6 @@ class TrueMotion:
     angular_rate_frd_rad_s: Vec3
     specific_force_frd_m_s2: Vec3
     motor_speeds_rad_s: tuple[float, ...]
-    max_motor_speed_rad_s: float
     ground_z_m: float
 
 
@@ -54,15 +52,11 @@ class MotionTracker:
 
     Args:
         period_us: length of a control period.
-        max_motor_speed_rad_s: of each rotor.
     """
 
-    __slots__ = ("_attitude", "_max_motor_speed_rad_s", "_period_us", "_rate_hz", "_velocity_ned_m_s")
-
-    def __init__(self, period_us: int, max_motor_speed_rad_s: float) -> None:
+    def __init__(self, period_us: int) -> None:
         self._period_us = period_us
         self._rate_hz = 1e6 / period_us
-        self._max_motor_speed_rad_s = max_motor_speed_rad_s
         self._attitude: Quaternion | None = None
         self._velocity_ned_m_s = ZERO3
 
@@ -110,7 +104,6 @@ class MotionTracker:
             (turn[0] * rate_hz, turn[1] * rate_hz, turn[2] * rate_hz),
             specific_force,
             motor_speeds_rad_s,
-            self._max_motor_speed_rad_s,
             ground_z_m,
         )
 

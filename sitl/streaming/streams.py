@@ -7,10 +7,15 @@ from dataclasses import replace
 from math import degrees
 
 from firmware_py.mavlink.camera.model import VideoEncoding, VideoStream
+from framerunner.errors import UserError
 from framerunner.wire.simulator_api import VIDEO_PATH
 from framerunner.wire.transports.urls import in_url, is_loopback
 from scenarios.models import Camera
 from sitl.server_settings import ServerSettings
+
+
+class VideoError(UserError):
+    """Video cannot be served; the message is one line for people."""
 
 
 def video_streams(settings: ServerSettings, camera: Camera) -> tuple[VideoStream, ...]:

@@ -81,7 +81,7 @@ def test_a_level_loads_by_path(tmp_path):
             "f.yaml:13: layout.frame_z_m.high 4.5 cannot be flown; keep within 0.11 and 4",
         ),
         (
-            CALM.replace("high: 3.141", "high: 180.0"),
+            CALM.replace("high: 3.141", "high: 180.0", 1),
             "f.yaml:16: layout.frame_yaw_rad.high 180.0 cannot be flown; keep within -6.283 and 6.283",
         ),
     ],

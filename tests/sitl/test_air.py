@@ -9,8 +9,7 @@ from scipy.signal import welch
 from framerunner.vehicle.airframe import AirEffects, load_airframe
 from scenarios.air import Wind
 from scenarios.models import Base, Scenario, Start
-from sitl.air.turbulence import MIN_AIRSPEED_M_S
-from sitl.air.wind import SimulatedWind
+from sitl.air.wind import MIN_AIRSPEED_M_S, SimulatedWind
 from sitl.dynamics import Dynamics
 from sitl.world import World
 from tests.flight import ORIGIN

@@ -153,7 +153,7 @@ async def test_a_choked_tcp_client_costs_nothing_but_its_packets():
             drone.pass_time()
             if drone.time_us % 10_000_000 == 0:
                 await asyncio.sleep(0)
-        (carrier,) = drone.hub._carriers.values()
+        ((carrier,),) = drone.hub._carriers.values()
         assert len(carrier._stream._unsent) <= MAX_UNSENT_BYTES
         writer.close()
 

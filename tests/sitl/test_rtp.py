@@ -9,7 +9,7 @@ import pytest
 
 from framerunner.wire.transports.urls import LinkError
 from scenarios.models import Camera
-from sitl.streaming.rtp import RtpSender
+from sitl.streaming.h264 import RtpSender
 from tests.free_ports import free_port
 
 CAMERA = Camera(width_px=320, height_px=240, rate_hz=10.0)

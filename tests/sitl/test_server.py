@@ -18,8 +18,7 @@ from sitl.pacing.pacer import LagNotices
 from sitl.server import SimulatorServer
 from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
-from sitl.streaming.drone_video import standing_place
-from sitl.video import VideoError
+from sitl.video import VideoError, standing_place
 from sitl.world import CONTROL_PERIOD_US
 from tests.processes import bound, free_instance
 from tests.waiting import until

@@ -5,7 +5,7 @@ from contextlib import closing
 
 import pytest
 
-from sitl.autopilots.sole_sender import Sign, SoleSender
+from sitl.ardupilot.sole_sender import Sign, SoleSender
 
 
 def sender(address="127.0.0.1"):

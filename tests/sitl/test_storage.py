@@ -1,4 +1,4 @@
-"""Both storages behave alike and keep their limits, and the folder cannot be left."""
+"""A storage keeps its limits, and its folder cannot be left."""
 
 import errno
 import os
@@ -10,16 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_py.storage import Entry, parse_path
-from sitl.storage import FolderStorage, MemoryStorage, StorageFolderError, StorageLimits, open_storage
+from sitl.storage import FolderStorage, StorageFolderError, StorageLimits, TemporaryStorage, open_storage
 from tests.disk import disk_that_takes
 
 LIMITS = StorageLimits(files=6, file_bytes=1000, total_bytes=1500)
 
 
-@pytest.fixture(params=["memory", "folder"])
+@pytest.fixture(params=["temporary", "folder"])
 def storage(request, tmp_path):
-    if request.param == "memory":
-        yield MemoryStorage(LIMITS)
+    if request.param == "temporary":
+        yield TemporaryStorage(LIMITS)
         return
     folder = FolderStorage(tmp_path / "files", LIMITS)
     yield folder
@@ -211,4 +211,4 @@ def test_a_folder_that_cannot_be_used_is_named(tmp_path):
 def test_each_instance_has_its_own_folder(tmp_path):
     open_storage(tmp_path, 3).create(("a",))
     assert (tmp_path / "3" / "a").exists()
-    assert isinstance(open_storage(None, 0), MemoryStorage)
+    assert isinstance(open_storage(None, 0), TemporaryStorage)

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from sitl.autopilots.temporary_folder import TemporaryFolder
+from sitl.temporary_folder import TemporaryFolder
 
 PREFIX = "framerunner-test-"
 MAKE = f"""
 import time
-from sitl.autopilots.temporary_folder import TemporaryFolder
+from sitl.temporary_folder import TemporaryFolder
 folder = TemporaryFolder({PREFIX!r})
 print(folder.path, flush=True)
 (folder.path / "file").touch()

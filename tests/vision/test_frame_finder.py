@@ -8,8 +8,7 @@ import pytest
 
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.vectors import Quaternion, Vec3
-from scenarios.imaging.clutter import Hall, Patch
-from scenarios.imaging.effects import CameraEffects, Lens
+from scenarios.imaging.effects import CameraEffects, Hall, Lens, Patch
 from scenarios.models import Base, Frame, Pole, Scenario
 from scenarios.models import Camera as ScenarioCamera
 from sitl.camera import Camera

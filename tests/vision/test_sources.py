@@ -17,7 +17,7 @@ import pytest
 from aiohttp import web
 
 from scenarios.models import Camera
-from sitl.streaming.rtp import RtpSender
+from sitl.streaming.h264 import RtpSender
 from tests.free_ports import free_port
 from vision.sources import CaptureSource, FolderSource, open_source
 from vision.streams.http_source import HttpSource, Latest

@@ -20,8 +20,6 @@ class _Trial:
         arrived_s: of the first image.
     """
 
-    __slots__ = ("_limit_s", "_period_s", "offsets", "usual_s")
-
     def __init__(self, usual_s: float, arrived_s: float) -> None:
         opened = usual_s == -inf
         self.usual_s = usual_s
@@ -55,8 +53,6 @@ class StreamClock:
     their stamps. The time is not known until they come at the pace of their stamps, from when on the zero
     is found anew, or until they are as early as those before the gap.
     """
-
-    __slots__ = ("_last_arrived_s", "_last_stamp_s", "_offsets", "_trial")
 
     def __init__(self) -> None:
         self._offsets: deque[tuple[float, float]] = deque()  # arrival, and arrival less stamp

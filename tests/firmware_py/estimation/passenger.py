@@ -37,7 +37,7 @@ class Passenger:
         )
         body = simulation.world.airframe
         self._sensors = SensorSuite(spec, body, place, seed)
-        self._tracker = MotionTracker(TICK_US, body.motor.max_speed_rad_s)
+        self._tracker = MotionTracker(TICK_US)
         self.estimator = new_estimator(spec, place)
         self.dropped: set[str] = set()
         self.moving = False
@@ -96,8 +96,7 @@ class Passenger:
             motor_speeds_rad_s=simulation.world.dynamics.motor_speeds_rad_s(),
             ground_z_m=0.0,
         )
-        readings = self._sensors.read(motion, 16.0, 1.0)
-        pose = self._sensors.external_pose()
+        readings, pose = self._sensors.read(motion, 16.0, 1.0)
         if pose is not None and "external_pose" not in self.dropped:
             self.estimator.take_external_pose(pose)
         for name in self.dropped - {"external_pose"}:

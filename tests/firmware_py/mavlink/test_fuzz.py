@@ -18,8 +18,8 @@ from firmware_py.types import MotorOutput
 from framerunner.vehicle.geodesy import GeodeticPoint
 from framerunner.vehicle.measurements import Sensors
 from framerunner.wire.dialect import mavlink
-from scenarios.gimbal import Gimbal
 from scenarios.loader import load_scenario
+from scenarios.models import Gimbal
 from sitl.payload.gimbal import SimulatedGimbal
 from sitl.simulation import Simulation
 from tests.node_input import deliver

@@ -18,7 +18,7 @@ from framerunner.vehicle.geodesy import GeodeticPoint
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 from sitl.simulation import Simulation
-from sitl.storage import MemoryStorage, StorageLimits
+from sitl.storage import StorageLimits, TemporaryStorage
 from sitl.world import World
 
 ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)
@@ -43,7 +43,7 @@ class Flight:
         self.world = World(Scenario(name="field"), airframe)
         parameters = Parameters({"MPC_LAND_SPEED": 0.5}, defaults=airframe.parameters)
         self.autopilot = Autopilot(airframe, ORIGIN, parameters)
-        self.storage = storage or MemoryStorage(now=lambda: 0)
+        self.storage = storage or TemporaryStorage()
         self.recorder = UlogRecorder(self.storage, lambda time_us: PATH, boot_unix_us=BOOT_US)
         self.truth = []
 
@@ -240,7 +240,7 @@ def test_an_erased_log_is_begun_again():
 
 
 def test_the_oldest_log_is_removed_and_a_full_storage_ends_logging_with_a_text():
-    storage = MemoryStorage(StorageLimits(total_bytes=60_000))
+    storage = TemporaryStorage(StorageLimits(total_bytes=60_000))
     for folder in (("log",), ("log", "2026-01-01")):
         storage.make_folder(folder)
     old = ("log", "2026-01-01", "00_00_00.ulg")
@@ -260,7 +260,7 @@ def test_the_oldest_log_is_removed_and_a_full_storage_ends_logging_with_a_text()
 
 
 def test_a_log_that_is_there_is_not_replaced():
-    storage = MemoryStorage()
+    storage = TemporaryStorage()
     for depth in (1, 2):
         storage.make_folder(PATH[:depth])
     storage.create(PATH)
@@ -285,7 +285,7 @@ def test_nothing_is_written_on_the_ground():
 def test_with_sensors_the_samples_and_the_estimators_condition_are_logged():
     scenario = load_scenario("open-field").model_copy(update={"sensors": "outdoor"})
     simulation = Simulation(scenario, seed=4)
-    storage = MemoryStorage(now=lambda: 0)
+    storage = TemporaryStorage()
     recorder = UlogRecorder(storage, lambda time_us: PATH, boot_unix_us=BOOT_US)
     while simulation.time_us < 13_000_000:
         simulation.tick()

@@ -3,11 +3,12 @@
 import cv2
 import pytest
 
-from framerunner.camera_calibration import collect
+from framerunner.camera_calibration import calibrate
 from framerunner.camera_calibration.calibration_file import load_calibration
 from framerunner.cli import run
 from tests.vision.calibration.board_images import TRUE, board_images
 from vision.calibration.model import CalibrationError
+from vision.sources import FolderSource
 from vision.types import CameraError
 
 
@@ -42,15 +43,20 @@ def test_too_few_photos_are_refused_in_one_line(photos, tmp_path, capsys):
 
 
 def test_the_views_of_a_camera_that_fails_are_used(photos, tmp_path, capsys, monkeypatch):
-    folder = collect._images
+    class FailingSource(FolderSource):
+        async def frames(self):
+            if url == "rtsp://ends":
+                async for each in super().frames():
+                    yield each
+            raise CameraError("camera rtsp://ends: the stream ended")
 
-    async def failing(source):
-        if source == "rtsp://ends":
-            async for each in folder(str(photos)):
-                yield each
-        raise CameraError("camera rtsp://ends: the stream ended")
+    def failing(source):
+        nonlocal url
+        url = source
+        return FailingSource(photos)
 
-    monkeypatch.setattr(collect, "_images", failing)
+    url = ""
+    monkeypatch.setattr(calibrate, "open_source", failing)
     out = tmp_path / "camera.yaml"
     assert run(["camera", "calibrate", "rtsp://gone", "--out", str(out)]) == 2
     assert run(["camera", "calibrate", "rtsp://ends", "--out", str(out)]) == 0

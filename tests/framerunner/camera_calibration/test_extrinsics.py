@@ -24,8 +24,7 @@ from scenarios.models import Scenario
 from sitl.camera import Camera
 from tests.vision.calibration.seen_frames import FOCAL_PX
 from vision.calibration.model import Calibration, CalibrationError
-from vision.calibration.mounting import MountingFit
-from vision.calibration.movement import Movement
+from vision.calibration.mounting import MountingFit, Movement
 from vision.calibration.sightings import Sightings, Values
 from vision.detectors import new_detector
 

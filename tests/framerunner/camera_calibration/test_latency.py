@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from aiohttp import web
 
-from framerunner.camera_calibration.latency import LedLight, TerminalLight, film
+from framerunner.camera_calibration.latency import film, led_light, terminal_light
 from framerunner.errors import SettingError
 from vision.calibration.latency import LatencyError
 from vision.types import CameraError
@@ -59,7 +59,7 @@ async def camera(led: Path, images: int = 10**6) -> AsyncIterator[str]:
 async def test_an_led_and_a_camera_give_the_delay(tmp_path: Path) -> None:
     led = tmp_path / "brightness"
     async with camera(led) as url:
-        found = await film(LedLight(led), url, 8.0, lambda line: None)
+        found = await film(led_light(led), url, 8.0, lambda line: None)
     # An image is sent up to a period after its delay, when the next one is taken.
     assert DELAY_S - 0.005 < found.delay_s < DELAY_S + PERIOD_S + 0.02
     assert found.correlation > 0.9
@@ -69,23 +69,23 @@ async def test_an_led_and_a_camera_give_the_delay(tmp_path: Path) -> None:
 async def test_a_camera_that_sees_no_light_is_said(tmp_path: Path) -> None:
     async with camera(tmp_path / "other") as url:
         with pytest.raises(LatencyError, match="not seen"):
-            await film(LedLight(tmp_path / "brightness"), url, 3.0, lambda line: None)
+            await film(led_light(tmp_path / "brightness"), url, 3.0, lambda line: None)
 
 
 async def test_a_video_that_ends_is_said(tmp_path: Path) -> None:
     async with camera(tmp_path / "led", images=30) as url:
         with pytest.raises((CameraError, SettingError)):
-            await film(LedLight(tmp_path / "led"), url, 8.0, lambda line: None)
+            await film(led_light(tmp_path / "led"), url, 8.0, lambda line: None)
 
 
 def test_an_led_that_cannot_be_switched_is_one_line(tmp_path: Path) -> None:
     with (
         pytest.raises(SettingError, match=r"--led .*: cannot be written"),
-        LedLight(tmp_path / "none" / "led"),
+        led_light(tmp_path / "none" / "led"),
     ):
         pass
 
 
 def test_what_is_no_terminal_does_not_blink() -> None:
-    with pytest.raises(SettingError, match="--led"), TerminalLight():
+    with pytest.raises(SettingError, match="--led"), terminal_light():
         pass

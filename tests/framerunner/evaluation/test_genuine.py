@@ -21,7 +21,7 @@ from framerunner.evaluation.plan import plan_files
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.instances import claimed_instance
 from offboard.mission import load_mission
-from scenarios.faults.parse import parse_fault
+from scenarios.faults.declaration import parse_fault
 from scenarios.loader import dump_yaml, load_scenario
 from tests.framerunner.evaluation.flights import short_scenario, write_scenarios
 

@@ -22,7 +22,7 @@ from offboard.safety.fence import flight_fence
 from offboard.safety.operator import Operator
 from offboard.safety.operator_pages import OperatorPages
 from offboard.safety.rules import SafetyRules
-from scenarios.faults.parse import parse_fault
+from scenarios.faults.declaration import parse_fault
 from scenarios.loader import load_scenario
 from tests.framerunner.simulated_link import Direction, Impairment, fly_over
 from tests.offboard.fakes import runaway

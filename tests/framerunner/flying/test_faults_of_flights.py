@@ -6,8 +6,7 @@ from framerunner.flying.display import result_lines
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
-from scenarios.faults.declaration import FaultPart
-from scenarios.faults.parse import parse_fault
+from scenarios.faults.declaration import FaultPart, parse_fault
 from scenarios.faults.table import TABLE, FaultEnd
 from scenarios.loader import load_scenario
 

@@ -16,9 +16,8 @@ from offboard.navigation.goals import CONTEST
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
 from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.world_model import WorldModel
-from scenarios.gimbal import Gimbal
 from scenarios.imaging.effects import CameraEffects
-from scenarios.models import Arena, Base, Camera
+from scenarios.models import Arena, Base, Camera, Gimbal
 from tests.offboard.navigation.sightings import corners_px, frame_at, sighting
 from vision.types import Detections, FrameCorner, FrameSighting
 

@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.faults.declaration import SIZES, Fault
-from scenarios.faults.parse import FaultError, parse_fault
+from scenarios.faults.declaration import SIZES, Fault, FaultError, parse_fault
 from scenarios.loader import dump_yaml, load_scenario, parse_scenario
 from scenarios.models import ScenarioError
 

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.faults.outcome import fault_fields
+from scenarios.faults.declaration import parse_fault
 from scenarios.faults.page import kinds_table, rows_table, sensor_kinds
-from scenarios.faults.parse import parse_fault
-from scenarios.faults.table import TABLE, FaultEnd, row_of
+from scenarios.faults.table import TABLE, FaultEnd, fault_fields, row_of
 from scenarios.result import BegunFault, FailsafeText, FaultFacts, FlightResult
 
 PAGE = (Path(__file__).parents[3] / "docs" / "faults.md").read_text(encoding="utf-8").splitlines()

@@ -1,7 +1,7 @@
 """Only the vehicle's own MAVLink takes ArduPilot's place."""
 
 from framerunner.wire.dialect import mavlink
-from sitl.ardupilot.mavlink_sender import mavlink_sender
+from sitl.ardupilot.sole_sender import mavlink_sender
 
 HEARTBEAT = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3)
 STATION = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)

@@ -9,7 +9,7 @@ from framerunner.wire.dialect import mavlink
 from framerunner.wire.framing import PacketReader
 from framerunner.wire.transports.sockets import bind_udp
 from sitl.ardupilot.relay import AppRelay
-from sitl.autopilots.sole_sender import SoleSender
+from sitl.ardupilot.sole_sender import SoleSender
 
 APP = mavlink.MAVLink(None, srcSystem=245, srcComponent=190)
 HEARTBEAT = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from scenarios.faults.parse import FaultError, parse_fault
+from scenarios.faults.declaration import FaultError, parse_fault
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 

@@ -10,7 +10,7 @@ from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from framerunner.vehicle.airframe import load_airframe
 from framerunner.vehicle.geodesy import GeodeticPoint
-from scenarios.faults.parse import parse_fault
+from scenarios.faults.declaration import parse_fault
 from sitl.faults.link import LinkFault
 from sitl.link_hub import LinkHub
 from sitl.links import UdpAddresses
@@ -20,7 +20,7 @@ PACKETS = 2000
 
 def sent(text):
     """Which of many numbered packets arrive, and with what delay, when one is sent at each tick."""
-    way = LinkFault(parse_fault(text), seed=3).new_way()
+    way = LinkFault(parse_fault(text), seed=3).up
     arrived = []
     for number in range(PACKETS):
         now_us = number * 4000

@@ -9,7 +9,7 @@ import sitl.sensors
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import ManualInput
 from scenarios.air import Wind
-from scenarios.faults.parse import parse_fault
+from scenarios.faults.declaration import parse_fault
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 from tests.sitl.faults.hovering import hover

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from framerunner.geometry.rotations import quaternion_from_euler
-from scenarios.imaging.clutter import Hall, Patch
-from scenarios.imaging.effects import CameraEffects, Lens
+from scenarios.imaging.effects import CameraEffects, Hall, Lens, Patch
 from scenarios.models import Camera, Light, Pole, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
 from sitl.camera import Camera as PaintedCamera

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from sitl.payload.album import CameraAlbum
-from sitl.storage import FolderStorage, MemoryStorage, StorageLimits
+from sitl.storage import FolderStorage, StorageLimits, TemporaryStorage
 
 BOOT_US = 1_795_000_000_000_000  # 2026-11-18 11:06:40 UTC
 FOLDER = ("DCIM", "20261118_110640")
 IMAGE = np.full((24, 32, 3), (10, 20, 200), np.uint8)
 
 
-@pytest.fixture(params=["memory", "folder"])
+@pytest.fixture(params=["temporary", "folder"])
 def storage(request, tmp_path):
-    return MemoryStorage() if request.param == "memory" else FolderStorage(tmp_path)
+    return TemporaryStorage() if request.param == "temporary" else FolderStorage(tmp_path)
 
 
 def test_there_is_no_picture_before_the_first_image(storage):
@@ -48,7 +48,7 @@ def test_space_is_the_storages(storage):
 
 
 def test_a_full_storage_keeps_no_picture_and_no_part_of_one():
-    storage = MemoryStorage(StorageLimits(total_bytes=100))
+    storage = TemporaryStorage(StorageLimits(total_bytes=100))
     album = CameraAlbum(storage, BOOT_US, 10.0)
     album.show(IMAGE, 0)
     assert album.capture(0, 0) == ""
@@ -88,7 +88,7 @@ def test_a_recording_has_the_images_with_their_vehicle_times(storage):
 
 
 def test_a_recording_ends_when_the_storage_is_full():
-    storage = MemoryStorage(StorageLimits(total_bytes=1_100_000))
+    storage = TemporaryStorage(StorageLimits(total_bytes=1_100_000))
     album = CameraAlbum(storage, BOOT_US, 10.0)
     noise = np.random.default_rng(1).integers(0, 256, (5, 240, 320, 3), np.uint8)
     album.show(noise[0], 0)

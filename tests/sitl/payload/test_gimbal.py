@@ -5,9 +5,8 @@ import pytest
 
 from firmware_py.mavlink.gimbal.model import GimbalTarget
 from framerunner.geometry.rotations import quaternion_from_euler, yaw_of
-from scenarios.gimbal import Gimbal
 from scenarios.loader import load_scenario
-from scenarios.models import Scenario
+from scenarios.models import Gimbal, Scenario
 from sitl.camera import CameraFeed
 from sitl.payload.gimbal import SimulatedGimbal
 from sitl.simulation import Simulation

@@ -174,7 +174,7 @@ async def test_a_px4_that_stands_still_changes_nothing():
 def test_an_output_that_is_no_number_stops_its_motor():
     simulation = new_simulation()
     for _ in range(50):
-        controls = ActuatorControls(simulation.time_us, (nan, *(0.3,) * 15), armed=True, lockstep=True)
+        controls = ActuatorControls(simulation.time_us, (nan, *(0.3,) * 15), armed=True)
         simulation.sense()
         simulation.move(controls)
     speeds_rad_s = simulation.world.dynamics.motor_speeds_rad_s()

@@ -6,7 +6,7 @@ import time
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from scenarios.faults.parse import parse_fault
+from scenarios.faults.declaration import parse_fault
 from scenarios.loader import load_scenario
 from sitl.px4.messages import ActuatorControls
 from sitl.px4.side_link import CAMERA_PORT, PERIOD_US, SideLink
@@ -40,7 +40,7 @@ class Flight:
         for _ in range(round(seconds * 250)):
             time_us = simulation.time_us
             simulation.sense()
-            simulation.move(ActuatorControls(time_us, (0.5,) * 16, armed=True, lockstep=True))
+            simulation.move(ActuatorControls(time_us, (0.5,) * 16, armed=True))
             if time_us % PERIOD_US == 0:
                 self.link.step(simulation)
 

@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from framerunner.errors import SettingError
-from scenarios.faults.parse import FaultError, parse_fault
+from scenarios.faults.declaration import FaultError, parse_fault
 from scenarios.loader import load_scenario
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.px4.messages import ActuatorControls
@@ -33,7 +33,7 @@ def flown(faults=(), sticks=None, seconds=1.0):
                 assert message.chancount == RC_PARAMETERS["RC_CHAN_CNT"]
                 values = [getattr(message, f"chan{number}_raw") for number in range(1, 19)]
                 got.append((time_us, tuple(values[: message.chancount])))
-        simulation.move(ActuatorControls(time_us, (0.0,) * 16, armed=True, lockstep=True))
+        simulation.move(ActuatorControls(time_us, (0.0,) * 16, armed=True))
     return got
 
 
@@ -114,7 +114,7 @@ def test_a_gyroscope_that_is_off_is_not_flagged_and_its_tick_is_not_answered():
             if message.get_type() == "HIL_SENSOR":
                 flags[simulation.is_answered] = message.fields_updated & 0b111_111
                 assert message.xgyro == message.xgyro  # a number
-        answer = ActuatorControls(time_us, (0.5,) * 16, armed=True, lockstep=True)
+        answer = ActuatorControls(time_us, (0.5,) * 16, armed=True)
         simulation.move(answer if simulation.is_answered else None)
         speeds.append(simulation.world.dynamics.motor_speeds_rad_s()[0])
     assert flags == {True: 0b111_111, False: 0b111}

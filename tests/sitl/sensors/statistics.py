@@ -24,7 +24,6 @@ def motion(time_us=0, **parts):
         "angular_rate_frd_rad_s": ZERO3,
         "specific_force_frd_m_s2": (0.0, 0.0, -GRAVITY_M_S2),
         "motor_speeds_rad_s": (0.0,) * 4,
-        "max_motor_speed_rad_s": AIRFRAME.motor.max_speed_rad_s,
         "ground_z_m": 0.0,
     }
     return TrueMotion(time_us=time_us, **values | parts)

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from framerunner.vehicle.measurements import Readings
-from scenarios.models import Origin
 from sitl.sensors.suite import SUITE_FILES, SensorSuite, SuiteError, load_suite
 from tests.sitl.sensors.statistics import AIRFRAME, ORIGIN, TICK_US, motion
 
@@ -26,10 +25,10 @@ def recorded(spec, seed, ticks=400):
     suite = SensorSuite(spec, AIRFRAME, ORIGIN, seed)
     found = {field.name: [] for field in fields(Readings)} | {"external_pose": []}
     for tick in range(ticks):
-        readings = suite.read(motion(tick * TICK_US, motor_speeds_rad_s=SPEEDS), 16.0, 5.0)
+        readings, pose = suite.read(motion(tick * TICK_US, motor_speeds_rad_s=SPEEDS), 16.0, 5.0)
         for field in fields(Readings):
             found[field.name].append(repr(getattr(readings, field.name)))
-        found["external_pose"].append(repr(suite.external_pose()))
+        found["external_pose"].append(repr(pose))
     return found
 
 
@@ -84,18 +83,15 @@ def test_each_sensor_has_its_rate():
 
 
 def test_an_external_pose_is_given_in_one_tick_only():
-    suite = SensorSuite(load_suite("mocap"), AIRFRAME, Origin(), 1)
-    found = []
-    for tick in range(20):
-        suite.read(motion(tick * TICK_US), 16.0, 5.0)
-        found.append(suite.external_pose())
-    assert [index for index, pose in enumerate(found) if pose] == [8, 13, 18]
+    suite = SensorSuite(load_suite("mocap"), AIRFRAME, ORIGIN, 1)
+    poses = [suite.read(motion(tick * TICK_US), 16.0, 5.0)[1] for tick in range(20)]
+    assert [index for index, pose in enumerate(poses) if pose] == [8, 13, 18]
 
 
 def test_without_a_monitor_the_batterys_values_are_exact_and_with_one_near():
-    ideal = SensorSuite(load_suite("ideal"), AIRFRAME, ORIGIN, 1).read(motion(), 16.0, 5.0)
+    ideal, _ = SensorSuite(load_suite("ideal"), AIRFRAME, ORIGIN, 1).read(motion(), 16.0, 5.0)
     assert ideal == Readings(0, battery_voltage_v=16.0, battery_current_a=5.0)
-    measured = SensorSuite(ALL, AIRFRAME, ORIGIN, 1).read(motion(), 16.0, 0.0)
+    measured, _ = SensorSuite(ALL, AIRFRAME, ORIGIN, 1).read(motion(), 16.0, 0.0)
     assert measured.battery_voltage_v != 16.0
     assert measured.battery_voltage_v == pytest.approx(16.0, abs=0.7)
     assert measured.battery_current_a >= 0.0

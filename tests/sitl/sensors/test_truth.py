@@ -30,7 +30,7 @@ def motions_of_flight(seconds):
     )
     world = World(scenario, AIRFRAME)
     stabiliser = Stabiliser(AIRFRAME, STEP_S)
-    tracker = MotionTracker(CONTROL_PERIOD_US, AIRFRAME.motor.max_speed_rad_s)
+    tracker = MotionTracker(CONTROL_PERIOD_US)
     motions = []
     touched = False
     for tick in range(round(seconds / STEP_S)):
@@ -82,7 +82,7 @@ def test_strapdown_integration_of_a_minutes_flight_gives_its_attitude_and_veloci
 
 
 def test_at_rest_the_specific_force_is_minus_gravity():
-    motion = MotionTracker(4000, 1000.0).update(
+    motion = MotionTracker(4000).update(
         0, (0.0, 0.0, -1.0), ZERO3, LEVEL, motor_speeds_rad_s=(0.0,) * 4, ground_z_m=0.0
     )
     assert motion.specific_force_frd_m_s2 == pytest.approx((0.0, 0.0, -GRAVITY_M_S2))
@@ -92,7 +92,7 @@ def test_at_rest_the_specific_force_is_minus_gravity():
 @pytest.mark.parametrize("angle_rad", [1e-12, 1e-9, 1e-6, 1e-3, 0.5, 3.0])
 def test_rates_are_exact_for_small_and_large_turns_and_either_sign_of_the_quaternion(angle_rad):
     for sign in (1.0, -1.0):
-        tracker = MotionTracker(4000, 1000.0)
+        tracker = MotionTracker(4000)
         after = tuple(sign * part for part in quaternion_from_euler(0.0, 0.0, angle_rad))
         for attitude in (LEVEL, after):
             motion = tracker.update(0, ZERO3, ZERO3, attitude, motor_speeds_rad_s=(0.0,) * 4, ground_z_m=0.0)
@@ -100,7 +100,7 @@ def test_rates_are_exact_for_small_and_large_turns_and_either_sign_of_the_quater
 
 
 def test_an_acceleration_forwards_is_felt_forwards_with_the_headings_axes():
-    tracker = MotionTracker(4000, 1000.0)
+    tracker = MotionTracker(4000)
     east = quaternion_from_euler(0.0, 0.0, pi / 2)
     for velocity in (ZERO3, (0.0, 0.004, 0.0)):
         motion = tracker.update(0, ZERO3, velocity, east, motor_speeds_rad_s=(0.0,) * 4, ground_z_m=0.0)

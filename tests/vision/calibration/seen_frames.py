@@ -6,9 +6,15 @@ from math import cos, radians, sin
 
 import numpy as np
 
-from framerunner.geometry.rotations import quaternion_from_euler
-from vision.calibration.motion import Motion, MotionReport, matrices, mounting_matrix
-from vision.calibration.sightings import Sightings, Values, sightings_of
+from framerunner.geometry.rotations import quaternion_from_euler, rotation, rotation_rows
+from vision.calibration.sightings import (
+    Motion,
+    MotionReport,
+    Sightings,
+    Values,
+    mounting_matrix,
+    sightings_of,
+)
 from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M
 from vision.types import Detections, FrameCorner, FramePose, FrameSighting
 
@@ -60,7 +66,7 @@ def fly(
     images = []
     for time_s in np.arange(0.3, seconds, 1.0 / rate_hz):
         x, y, z, *angles = path(time_s)
-        body = matrices(np.array([quaternion_from_euler(*angles)]))[0]
+        body = np.array(rotation_rows(rotation(quaternion_from_euler(*angles))))
         camera = body @ mounting_matrix(true.angles_frd_rad)
         eye = np.array((x, y, z)) + body @ np.array(true.position_flu_m)
         found = (sighting(each, eye, camera, stream, noise_px) for each in rectangles)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.vision.calibration.seen_frames import FOCAL_PX, FRAMES, TRUE, fly, sightings, survey
-from vision.calibration.mounting import MountingFit, fit_mounting
-from vision.calibration.movement import missing_for, movement_of
+from vision.calibration.mounting import MountingFit, fit_mounting, missing_for, movement_of
 from vision.calibration.sightings import Values
 
 RULER = Values((0.0, 0.0, 0.0), (0.08, 0.0, 0.0), 0.0)

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from framerunner.wire.dialect import mavlink
-from sitl.storage import MemoryStorage, StorageLimits
+from sitl.storage import StorageLimits, TemporaryStorage
 from tests.firmware_py.mavlink.ground_station import ftp_client as ftp
 from tests.firmware_py.mavlink.ground_station.ftp_client import FtpClient, RefusedError, Reply, request
 from tests.firmware_py.mavlink.lossy import LossyPeer
@@ -20,7 +20,7 @@ PERFECT = {"loss": 0.0, "duplicate": 0.0, "reorder": 0.0}
 
 @pytest.fixture
 def storage():
-    return MemoryStorage(StorageLimits(files=300, file_bytes=1 << 20, total_bytes=2 << 20), now=lambda: 0)
+    return TemporaryStorage(StorageLimits(files=300, file_bytes=1 << 20, total_bytes=2 << 20))
 
 
 @pytest.fixture
@@ -211,7 +211,7 @@ def test_a_burst_leaves_a_slow_link_air(autopilot, make_peer, storage):
 
 
 def test_the_checksum_of_a_large_file_is_worked_out_piece_by_piece(autopilot, make_peer):
-    storage = MemoryStorage()
+    storage = TemporaryStorage()
     storage.create(("a",))
     data = content(3, 5 << 20)
     storage.write(("a",), 0, data)
@@ -295,7 +295,7 @@ PATHS = st.one_of(
 )
 def test_awkward_requests_break_nothing_and_keep_limits(autopilot, make_peer, requests):
     limits = StorageLimits(files=20, file_bytes=2000, total_bytes=5000)
-    storage = MemoryStorage(limits)
+    storage = TemporaryStorage(limits)
     peer = make_peer(autopilot, node_options={"storage": storage, "firmware_files": FIRMWARE})
     for sequence, (opcode, data, offset, session, size) in enumerate(requests):
         peer.send(request(sequence, opcode, data, session=session, offset=offset, size=size))

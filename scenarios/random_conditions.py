@@ -1,17 +1,29 @@
-"""What makes the images of random scenarios hard: the camera's effects, light and clutter."""
+"""What makes random scenarios hard beside their layout: wind, faults, camera, light and clutter."""
 
 from __future__ import annotations
 
 from math import cos, sin
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.imaging.clutter import PATCH_COLOURS, SURFACES, Hall, Patch, PatchColour, Surface
-from scenarios.imaging.effects import MAX_K, MAX_P, CameraEffects, Lens
+from scenarios.air import MAX_TURBULENCE_M_S, MAX_WIND_M_S, Wind, check_gusts
+from scenarios.faults.declaration import MAX_TIME_S, Fault, FaultPart
+from scenarios.imaging.effects import (
+    MAX_K,
+    MAX_P,
+    PATCH_COLOURS,
+    SURFACES,
+    CameraEffects,
+    Hall,
+    Lens,
+    Patch,
+    PatchColour,
+    Surface,
+)
 from scenarios.models import Arena, Camera, Light
 from scenarios.part import Part
-from scenarios.random_numbers import Range, random_stream
+from scenarios.random_numbers import Range, random_stream, within
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -20,46 +32,94 @@ _NONE = Range(low=0.0, high=0.0)
 _ALL = Range(low=1.0, high=1.0)
 _ALL_ROUND_RAD = Range(low=-3.141, high=3.141)
 _QUARTER_RAD = 1.57
+_QUAD = 4
 _BORDERS = 3  # every third patch is nothing but a border, in the proportions of a frame
 _FRAME_SHAPE = 0.22 / 0.42
 _SLANT_RAD = Range(low=-0.3, high=0.3)
+
+_WindSpeed = Annotated[Range, within(0.0, MAX_WIND_M_S)]
+_Radial = Annotated[Range, within(-MAX_K, MAX_K)]
+_Tangential = Annotated[Range, within(-MAX_P, MAX_P)]
+_ExposureTime = Annotated[Range, within(0.0, 0.05)]
+_Noise = Annotated[Range, within(0.0, 20.0)]
+_Share = Annotated[Range, within(0.0, 1.0)]
+
+
+class RandomWind(Part):
+    """Ranges of the wind's numbers; each is drawn from a stream of its own, the direction from all round."""
+
+    speed_m_s: _WindSpeed = Field(_NONE, description="mean speed of the air")
+    turbulence_m_s: Annotated[Range, within(0.0, MAX_TURBULENCE_M_S)] = Field(
+        _NONE, description="standard deviation of each horizontal component"
+    )
+    gust_m_s: _WindSpeed = Field(_NONE, description="highest speed of each gust")
+    length_m: float = Field(Wind().length_m, ge=0.1, le=1000, description="length scale of turbulence")
+    gust_period_s: float = Field(
+        Wind().gust_period_s, ge=0.1, le=3600, description="mean time from one gust to the next"
+    )
+    gust_s: float = Field(Wind().gust_s, ge=0.05, le=60, description="length of a gust")
+
+    @model_validator(mode="after")
+    def _gusts_fit_their_period(self) -> Self:
+        check_gusts(self.gust_s, self.gust_period_s)
+        return self
+
+    def draw(self, seed: int) -> Wind:
+        """Draw the wind of a scenario, in whole thousandths."""
+        return Wind(
+            speed_m_s=self.speed_m_s.draw_value(random_stream(seed, "wind.speed")),
+            direction_rad=_ALL_ROUND_RAD.draw_value(random_stream(seed, "wind.direction")),
+            turbulence_m_s=self.turbulence_m_s.draw_value(random_stream(seed, "wind.turbulence")),
+            length_m=self.length_m,
+            gust_m_s=self.gust_m_s.draw_value(random_stream(seed, "wind.gust")),
+            gust_period_s=self.gust_period_s,
+            gust_s=self.gust_s,
+        )
+
+
+class RandomFault(Part):
+    """One fault, each of a list equally likely, at a random time; motors without a number are drawn, too."""
+
+    at_s: Annotated[Range, within(0.0, MAX_TIME_S)] = Field(
+        description="when it begins: seconds after arming"
+    )
+    any_of: tuple[Fault, ...] = Field(min_length=1, description="faults, without their times")
+
+    def draw(self, seed: int) -> Fault:
+        """Draw the fault of a scenario."""
+        at = int(random_stream(seed, "faults.kind").random() * len(self.any_of))
+        fault = self.any_of[at]
+        changes: dict[str, float] = {"at_s": self.at_s.draw_value(random_stream(seed, "faults.time"))}
+        if fault.part is FaultPart.MOTOR and fault.number is None:
+            changes["number"] = 1 + int(random_stream(seed, "faults.motor").random() * _QUAD)
+        return fault.model_copy(update=changes)
 
 
 class RandomEffects(Part):
     """Ranges of the numbers of `CameraEffects`; each is drawn from a stream of its own."""
 
-    k1: Range = Field(_NONE, description="radial distortion")
-    k2: Range = Field(_NONE, description="radial distortion")
-    p1: Range = Field(_NONE, description="tangential distortion")
-    p2: Range = Field(_NONE, description="tangential distortion")
-    exposure_s: Range = Field(_NONE, description="time of exposure")
-    readout_s: Range = Field(_NONE, description="read-out of the rolling shutter")
-    vignetting: Range = Field(_NONE, description="share of the light lost in the corners")
-    illumination: Range = Field(_ALL, description="light that reaches the sensor")
-    warmth: Range = Field(_NONE, description="by which share that light is redder than white, and less blue")
-    read_noise: Range = Field(_NONE, description="standard deviation of noise in the dark, of 255")
-    shot_noise: Range = Field(_NONE, description="standard deviation of noise at white, of 255")
+    k1: _Radial = Field(_NONE, description="radial distortion")
+    k2: _Radial = Field(_NONE, description="radial distortion")
+    p1: _Tangential = Field(_NONE, description="tangential distortion")
+    p2: _Tangential = Field(_NONE, description="tangential distortion")
+    exposure_s: _ExposureTime = Field(_NONE, description="time of exposure")
+    readout_s: _ExposureTime = Field(_NONE, description="read-out of the rolling shutter")
+    vignetting: Annotated[Range, within(0.0, 0.9)] = Field(
+        _NONE, description="share of the light lost in the corners"
+    )
+    illumination: Annotated[Range, within(0.02, 1.0)] = Field(
+        _ALL, description="light that reaches the sensor"
+    )
+    warmth: Annotated[Range, within(-0.5, 0.5)] = Field(
+        _NONE, description="by which share that light is redder than white, and less blue"
+    )
+    read_noise: _Noise = Field(_NONE, description="standard deviation of noise in the dark, of 255")
+    shot_noise: _Noise = Field(_NONE, description="standard deviation of noise at white, of 255")
     gain: Literal["auto", "fixed"] = Field("fixed", description="whether brightness is regulated")
     white_balance: Literal["auto", "fixed"] = Field("fixed", description="whether colour is regulated")
 
     @model_validator(mode="after")
-    def _every_draw_is_valid(self) -> Self:
-        limits = {
-            "k1": (-MAX_K, MAX_K),
-            "k2": (-MAX_K, MAX_K),
-            "p1": (-MAX_P, MAX_P),
-            "p2": (-MAX_P, MAX_P),
-            "exposure_s": (0.0, 0.05),
-            "readout_s": (0.0, 0.05),
-            "vignetting": (0.0, 0.9),
-            "illumination": (0.02, 1.0),
-            "warmth": (-0.5, 0.5),
-            "read_noise": (0.0, 20.0),
-            "shot_noise": (0.0, 20.0),
-        }
-        for field, (lowest, highest) in limits.items():
-            drawn: Range = getattr(self, field)
-            drawn.within(lowest, highest, field)
+    def _no_lens_folds_the_image(self) -> Self:
         for k1 in (self.k1.low, self.k1.high):
             for k2 in (self.k2.low, self.k2.high):
                 Camera(effects=CameraEffects(lens=Lens(k1=k1, k2=k2)))
@@ -90,16 +150,11 @@ class RandomEffects(Part):
 class RandomLight(Part):
     """Ranges of the light's numbers; it may come from all round."""
 
-    elevation_rad: Range = Field(description="of the light's origin above the horizon")
-    ambient: Range = Field(description="brightness of surfaces in shadow")
-    turn_rad_s: Range = Field(_NONE, description="how fast its direction turns")
-
-    @model_validator(mode="after")
-    def _every_draw_is_a_valid_light(self) -> Self:
-        self.elevation_rad.within(0.05, _QUARTER_RAD, "elevation_rad")
-        self.ambient.within(0.0, 1.0, "ambient")
-        self.turn_rad_s.within(-1.0, 1.0, "turn_rad_s")
-        return self
+    elevation_rad: Annotated[Range, within(0.05, _QUARTER_RAD)] = Field(
+        description="of the light's origin above the horizon"
+    )
+    ambient: _Share = Field(description="brightness of surfaces in shadow")
+    turn_rad_s: Annotated[Range, within(-1.0, 1.0)] = Field(_NONE, description="how fast its direction turns")
 
     def draw(self, seed: int) -> Light:
         """Draw the light of a scenario."""
@@ -121,19 +176,19 @@ class RandomClutter(Part):
 
     posters: int = Field(0, ge=0, le=100, description="how many things on the walls")
     marks: int = Field(0, ge=0, le=100, description="how many things on the floor")
-    size_m: Range = Field(description="width and height of each; a border has the proportions of a frame")
+    size_m: Annotated[Range, within(0.05, 10.0)] = Field(
+        description="width and height of each; a border has the proportions of a frame"
+    )
     up_m: Range = Field(description="centres of the posters above the floor")
-    border_m: Range = Field(description="width of borders")
+    border_m: Annotated[Range, within(0.005, 1.0)] = Field(description="width of borders")
     beyond_m: float = Field(
         Hall().beyond_m, ge=0.01, le=100, description="from the arena to the hall's walls"
     )
     height_m: float = Field(Hall().height_m, ge=0.1, le=100, description="of the hall")
 
     @model_validator(mode="after")
-    def _every_draw_is_valid(self) -> Self:
-        self.size_m.within(0.05, 10.0, "size_m")
-        self.up_m.within(0.0, self.height_m, "up_m")
-        self.border_m.within(0.005, 1.0, "border_m")
+    def _posters_are_on_the_walls(self) -> Self:
+        self.up_m.check(0.0, self.height_m, "up_m")
         return self
 
     @property
