@@ -14,7 +14,7 @@ from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowCheck
 from firmware_py.commander_table import Event, Row, State
 from firmware_py.commands import ControlCommand
 from firmware_py.estimation.ideal_estimator import IdealEstimator
-from firmware_py.estimation.interface import StateEstimator
+from firmware_py.estimation.report import StateEstimator
 from firmware_py.estimation.wind import WindEstimator
 from firmware_py.ground_contact import LandDetector, LiftOff
 from firmware_py.guidance.modes import Guidance

@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.camera.component import CameraComponent
+from firmware_py.mavlink.camera.component import CameraComponent, Streaming
 from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink, VideoStream
-from firmware_py.mavlink.camera.streaming import Streaming
 from firmware_py.mavlink.commands.flight import FlightCommands
 from firmware_py.mavlink.commands.gripper import GripperService
 from firmware_py.mavlink.commands.maintenance import FailureSink, MaintenanceCommands

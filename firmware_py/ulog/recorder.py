@@ -15,8 +15,7 @@ from firmware_py.mavlink.telemetry.connection import FOLLOWED_PX4_VERSION, OWN_V
 from firmware_py.storage import LOG_SUFFIX, Path, Storage
 from firmware_py.types import WARNING, StatusText
 from firmware_py.ulog import messages
-from firmware_py.ulog.measured import Sample
-from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged
+from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged, Sample
 
 _FLUSH_US = 1_000_000
 _LOG_FOLDER: Path = ("log",)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from firmware_py.estimation.ideal_report import ideal_report
+from firmware_py.estimation.ideal_estimator import ideal_report
 from firmware_py.estimation.report import EstimatorReport
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
