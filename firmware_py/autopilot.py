@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isinf, isnan, nan
 
-from firmware_py.commander_table import BY_HAND, MODE_EVENT, Event, State
+from firmware_py.commander_table import BY_HAND, Event, State
 from firmware_py.flight_loop import FlightLoop
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import IssuedCommand
@@ -32,12 +32,12 @@ class Autopilot(FlightLoop):
 
     def terminate(self) -> CommandResult:
         """Stop the motors until disarmed, also in the air; always ACCEPTED."""
-        return self._handle(Event.TERMINATE)
+        return self._handle(FlightMode.TERMINATION)
 
     def set_mode(self, mode: FlightMode) -> CommandResult:
         """Change the mode; while armed only to one that can be flown, else a status text reports why not."""
         return self._handle(
-            MODE_EVENT[mode],
+            mode,
             takeoff_altitude_m=nan if mode is FlightMode.TAKEOFF else None,
             orbit=self.orbit_here() if mode is FlightMode.ORBIT else None,
         )
@@ -55,11 +55,11 @@ class Autopilot(FlightLoop):
         if isinf(altitude_amsl_m):
             self.say(WARNING, "Takeoff denied: altitude is infinite")
             return CommandResult.DENIED
-        return self._handle(Event.SET_TAKEOFF, takeoff_altitude_m=altitude_amsl_m)
+        return self._handle(FlightMode.TAKEOFF, takeoff_altitude_m=altitude_amsl_m)
 
     def land(self) -> CommandResult:
         """Land here; always ACCEPTED."""
-        return self._handle(Event.SET_LAND)
+        return self._handle(FlightMode.LAND)
 
     def reposition(self, target_ned_m: Vec3, yaw_rad: float = nan, speed_m_s: float = nan) -> CommandResult:
         """Fly to a place and hold there.
@@ -76,7 +76,7 @@ class Autopilot(FlightLoop):
         if breach is not None:
             self.say(WARNING, f"Reposition denied: {breach}")
             return CommandResult.DENIED
-        result = self._handle(Event.SET_HOLD)
+        result = self._handle(FlightMode.HOLD)
         stays_on_ground = self._land_detector.landed and all(map(isnan, target_ned_m))
         if result is CommandResult.ACCEPTED and self.status.armed and not stays_on_ground:
             self._guidance.fly_to(self.state, target_ned_m, yaw_rad, speed_m_s)
@@ -84,7 +84,7 @@ class Autopilot(FlightLoop):
 
     def orbit(self, orbit: Orbit) -> CommandResult:
         """Fly an orbit, if that is possible now."""
-        return self._handle(Event.SET_ORBIT, orbit=orbit)
+        return self._handle(FlightMode.ORBIT, orbit=orbit)
 
     def orbit_here(self) -> Orbit:
         """The default orbit, PX4's: a radius of 1 m around the present position."""

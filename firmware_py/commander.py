@@ -18,13 +18,13 @@ from firmware_py.commander_guards import (
 )
 from firmware_py.commander_table import (
     ARMING_DENIED,
-    CAUSE_EVENT,
     FLOWN_MODE,
     RULES,
     TICK_RULES,
     Event,
     Row,
     State,
+    Trigger,
     first_match,
 )
 from firmware_py.guidance.orbit import Orbit
@@ -221,13 +221,13 @@ class Commander:
 
     def _react(self, cause: Cause) -> Row | None:
         self.situation.handled.add(cause)
-        return first_match(RULES[self.state, CAUSE_EVENT[cause]], self.situation)
+        return first_match(RULES[self.state, cause], self.situation)
 
-    def handle(self, event: Event) -> Row:
+    def handle(self, event: Trigger) -> Row:
         """Take a command, between ticks; the row that matched has the answer."""
         row = first_match(RULES[self.state, event], self.situation)
         if row is None:  # the table has an answer to every command; a test sweeps it
-            raise LookupError(f"commander: no rule for {event.value} in {self.state.value}")
+            raise LookupError(f"commander: no rule for {event} in {self.state.value}")
         self._follow(row)
         return replace(row, text=self._in_words(row)) if row.guard is estimator_fails else row
 

@@ -266,32 +266,17 @@ def hold_over_on_ground(now: Situation) -> bool:
 
 def hold_over_then(reaction: Reaction) -> Guard:
     """A guard: a failsafe has held for its time, and this reaction follows."""
-
-    def guard(now: Situation) -> bool:
-        return now.follow_up is reaction and hold_over(now)
-
-    guard.__name__ = f"hold_over_then_{reaction.value}"
-    return guard
+    return lambda now: now.follow_up is reaction and hold_over(now)
 
 
 def reacts(cause: Cause, reaction: Reaction) -> Guard:
     """A guard: the parameters choose this reaction to a cause."""
-
-    def guard(now: Situation) -> bool:
-        return now.choices.reaction(cause) is reaction
-
-    guard.__name__ = f"chosen_{reaction.value}"
-    return guard
+    return lambda now: now.choices.reaction(cause) is reaction
 
 
 def reacts_with_sticks(cause: Cause, reaction: Reaction) -> Guard:
     """The same for a reaction that needs manual control input, which is received."""
-
-    def guard(now: Situation) -> bool:
-        return now.choices.reactions.get(cause, Reaction.NOTHING) is reaction and not manual_lost(now)
-
-    guard.__name__ = f"chosen_{reaction.value}_with_sticks"
-    return guard
+    return lambda now: now.choices.reactions.get(cause, Reaction.NOTHING) is reaction and not manual_lost(now)
 
 
 def target_reached(now: Situation) -> bool:
@@ -316,12 +301,7 @@ def no_mission(now: Situation) -> bool:
 
 def intends(mode: FlightMode) -> Guard:
     """A guard: this mode is intended."""
-
-    def guard(now: Situation) -> bool:
-        return now.intended is mode
-
-    guard.__name__ = f"intends_{mode.name.lower()}"
-    return guard
+    return lambda now: now.intended is mode
 
 
 def intends_unarmable(now: Situation) -> bool:
@@ -388,10 +368,7 @@ def next_cause(now: Situation) -> Cause | None:
 
 
 def _battery_at(level: int) -> Guard:
-    def guard(now: Situation) -> bool:
-        return now.battery_warning >= level > now.battery_at_arming
-
-    return guard
+    return lambda now: now.battery_warning >= level > now.battery_at_arming
 
 
 def _ground_station_gone(now: Situation) -> bool:
@@ -413,15 +390,11 @@ def _flight_time_over(now: Situation) -> bool:
     return limit_us is not None and now.flown and now.now_us - now.armed_us > limit_us
 
 
-def _fence_breached(now: Situation) -> bool:
-    return now.fence_breached
-
-
 _CAUSES: tuple[tuple[Cause, Guard], ...] = (
     (Cause.POSITION, position_lost),
     (Cause.BATTERY_EMERGENCY, _battery_at(_BATTERY_EMERGENCY)),
     (Cause.BATTERY_CRITICAL, _battery_at(_BATTERY_CRITICAL)),
-    (Cause.FENCE, _fence_breached),
+    (Cause.FENCE, lambda now: now.fence_breached),
     (Cause.MANUAL, _manual_gone),
     (Cause.GROUND_STATION, _ground_station_gone),
     (Cause.FLIGHT_TIME, _flight_time_over),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from firmware_py.battery import BatteryMonitor
 from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowChecks
-from firmware_py.commander_table import Event, Row, State
+from firmware_py.commander_table import Event, Row, State, Trigger
 from firmware_py.commands import ControlCommand
 from firmware_py.estimation.ideal_estimator import IdealEstimator
 from firmware_py.estimation.report import StateEstimator
@@ -171,7 +171,7 @@ class FlightLoop:
         return self.output.speeds_rad_s
 
     def _handle(
-        self, event: Event, *, takeoff_altitude_m: float | None = None, orbit: Orbit | None = None
+        self, event: Trigger, *, takeoff_altitude_m: float | None = None, orbit: Orbit | None = None
     ) -> CommandResult:
         """Take a command, between ticks.
 
@@ -289,7 +289,7 @@ class FlightLoop:
         self.flight.failsafes = ()
         self.flight.number += 1
 
-    def _enter(self, target: State, before: State, event: Event) -> None:
+    def _enter(self, target: State, before: State, event: Trigger) -> None:
         """Start the mode of a state; a state without motors changes no mode."""
         if before is State.MISSION:
             self._navigator.leave_mission()
