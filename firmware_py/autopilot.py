@@ -161,6 +161,11 @@ class Autopilot(FlightLoop):
         """A place on Earth in the local frame, NED metres; None before the origin is known."""
         return self._geo.to_local(point)
 
+    def check_mission(self) -> None:
+        """Check whether the mission can be flown, if it, the fence or home has changed, and say why not."""
+        landed = self._land_detector.landed
+        self._texts.extend(self._navigator.check_mission(self.state, self._geo, landed=landed))
+
     def take_issued_commands(self) -> list[IssuedCommand]:
         """The mission's commands to others, such as the camera, since the last call."""
         return self._navigator.take_issued()

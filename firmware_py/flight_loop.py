@@ -10,7 +10,7 @@ from math import cos, isfinite, isnan, nan, radians
 from typing import TYPE_CHECKING
 
 from firmware_py.battery import BatteryMonitor
-from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowChecks
+from firmware_py.commander import Commander, Observation
 from firmware_py.commander_table import Event, Row, State, Trigger
 from firmware_py.commands import ControlCommand
 from firmware_py.estimation.ideal_estimator import IdealEstimator
@@ -119,7 +119,6 @@ class FlightLoop:
         self._texts: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
         self._period_us = round(control_period_s * 1e6)
         self._now_us = 0  # advances also while samples are unusable
-        self._checks = NOT_CHECKED
         self._checks_due_us = self._ready_due_us = 0
         self._motors_stopped = self._output_finite = True
         self._state_entered = State.DISARMED
@@ -225,7 +224,7 @@ class FlightLoop:
             if landed is not before:
                 self._change_ground_contact(landed)
         if now_us >= self._checks_due_us:
-            self._checks = self._check(sensors)
+            self._check(sensors)
         if self.setpoints.waiting is not None and self.setpoints.is_due(now_us):
             self._guidance.accept(self.setpoints.take())
         _, x, y, _ = state.attitude
@@ -236,7 +235,6 @@ class FlightLoop:
             1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
             detector.landed,
             self._guidance.mode.target_reached,
-            self._checks,
         )
 
     def _actuate(self, command: ControlCommand, landed: bool) -> MotorOutput:
@@ -354,22 +352,22 @@ class FlightLoop:
         if not self._motors_stopped:
             self.say(INFO, "Landing detected" if landed else "Takeoff detected")
 
-    def _check(self, sensors: Sensors | Readings) -> SlowChecks:
+    def _check(self, sensors: Sensors | Readings) -> None:
         """Check battery, fence and mission."""
         self._checks_due_us = self._now_us + _CHECK_PERIOD_US
         battery, navigator = self._battery, self._navigator
         navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
         battery.update(self._now_us, sensors.battery_voltage_v, sensors.battery_current_a)
         breach = navigator.breach() if self.status.armed else None
-        if breach is not None and not self._checks.fence_breached:
+        if breach is not None and not self._commander.situation.fence_breached:
             self.say(WARNING, breach)
         self._texts.extend(navigator.take_texts())
-        return SlowChecks(
-            battery.state.warning,
-            battery.can_arm,
-            self.missions.valid,
-            breach is not None,
-            "" if self.status.armed else self.estimator.report().problem,
+        self._commander.note_checks(
+            battery_warning=battery.state.warning,
+            battery_arms=battery.can_arm,
+            has_mission=self.missions.valid,
+            fence_breached=breach is not None,
+            problem="" if self.status.armed else self.estimator.report().problem,
         )
 
     def _configure(self) -> None:
