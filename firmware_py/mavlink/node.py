@@ -39,7 +39,12 @@ from firmware_py.mavlink.telemetry.motion import (
 )
 from firmware_py.mavlink.telemetry.sensing import SENSORS
 from firmware_py.mavlink.telemetry.status_texts import StatusTextService
-from firmware_py.mavlink.telemetry.streams import AutopilotSource, AutopilotTelemetry, StreamService
+from firmware_py.mavlink.telemetry.streams import (
+    AutopilotSource,
+    AutopilotTelemetry,
+    RequestService,
+    StreamService,
+)
 from firmware_py.mavlink.time_sync import Clocks
 from firmware_py.storage import Storage
 from firmware_py.types import StatusText
@@ -98,19 +103,6 @@ class _Devices:
         services = (self.camera, self.manager, self.gimbal, self.gripper)
         return tuple(service for service in services if service is not None)
 
-    def command_services(self, exchange: Exchange) -> tuple[CommandService, ...]:
-        """The commands of those that are components of their own."""
-        camera, gimbal, services = self.camera, self.gimbal, []
-        if camera is not None:
-            services.append(
-                CommandService(exchange, CAMERA_COMPONENT_ID, camera.commands, camera.takes_broadcast)
-            )
-        if gimbal is not None:
-            services.append(
-                CommandService(exchange, GIMBAL_COMPONENT_ID, gimbal.commands, lambda _command: False)
-            )
-        return tuple(services)
-
 
 def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
     """All services of the vehicle, in the order in which they are updated."""
@@ -152,19 +144,33 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         MetadataService(autopilot, exchange),
         RemoteIdService(autopilot, exchange),
     )
+    own = [service for service in services if service.component_id == AUTOPILOT_COMPONENT_ID]
     streams = StreamService(
         exchange,
-        merged(service.sources for service in services),
-        merged(service.replies for service in services),
+        merged(service.sources for service in own),
+        merged(service.replies for service in own),
     )
-    own = [service for service in (streams, *services) if service.component_id == AUTOPILOT_COMPONENT_ID]
-    commands = CommandService(
-        exchange,
-        AUTOPILOT_COMPONENT_ID,
-        merged(service.commands for service in own),
-        lambda command: camera is None or not camera.takes_broadcast(command),
+    requests = (
+        RequestService(exchange, each.component_id, each.replies, each.older_requests)
+        for each in devices.services
+        if each.component_id != AUTOPILOT_COMPONENT_ID
     )
-    return (streams, *services, commands, *devices.command_services(exchange))
+    services = (streams, *services, *requests)
+    return (*services, *_command_services(exchange, services))
+
+
+def _command_services(exchange: Exchange, services: Sequence[Service]) -> list[CommandService]:
+    """The commands of each component; those to all components are the camera's, or else the autopilot's."""
+    tables = {
+        component_id: merged(each.commands for each in services if each.component_id == component_id)
+        for component_id in {service.component_id for service in services}
+    }
+    to_camera = tables.get(CAMERA_COMPONENT_ID, {}).keys() - {mavlink.MAV_CMD_REQUEST_MESSAGE}
+
+    def owner(command: int) -> int:
+        return CAMERA_COMPONENT_ID if command in to_camera else AUTOPILOT_COMPONENT_ID
+
+    return [CommandService(exchange, component_id, table, owner) for component_id, table in tables.items()]
 
 
 class MavlinkNode:

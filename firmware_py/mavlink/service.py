@@ -100,6 +100,8 @@ class Service:
         commands: by MAV_CMD; they are acknowledged with the handler's result.
         sources: by message id; messages that can be streamed and requested.
         replies: by message id; messages that can only be requested.
+        older_requests: by MAV_CMD, of requests older than REQUEST_MESSAGE: the message, and which of the
+            command's parameters is its index; 0: none.
     """
 
     component_id: int = AUTOPILOT_COMPONENT_ID
@@ -107,6 +109,7 @@ class Service:
     commands: Mapping[int, CommandHandler] = _EMPTY
     sources: Mapping[int, Source] = _EMPTY
     replies: Mapping[int, Reply] = _EMPTY
+    older_requests: Mapping[int, tuple[int, int]] = _EMPTY
 
     def update(self) -> None:
         """Send what is due; called at every update of the node."""

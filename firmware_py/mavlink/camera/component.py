@@ -28,6 +28,7 @@ from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.exchange import Exchange
+from framerunner.wire.link import Link
 
 
 class Streaming:
@@ -54,22 +55,27 @@ class Streaming:
         """VIDEO_STOP_STREAMING: param 1 is the stream, 0: all that can be stopped; over HTTP: DENIED."""
         return self._turn(params[0], on=False)
 
-    def messages(self, message_id: int, index: int) -> list[Message]:
-        """Information or status of a stream, or of all, 0."""
-        streams = self._streams
-        requested = [(n, stream) for n, stream in enumerate(streams, start=1) if index in (0, n)]
-        information = [
-            messages.stream_information(stream, n, len(streams), running=self._is_running(stream))
-            for n, stream in requested
+    def information(self, _link: Link, index: int) -> list[Message]:
+        """VIDEO_STREAM_INFORMATION of a stream, or of all, 0."""
+        return [
+            messages.stream_information(stream, n, len(self._streams), running=self._is_running(stream))
+            for n, stream in self._chosen(index)
         ]
-        if message_id == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION:
-            return information
-        if message_id != mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS:
-            return []
-        status = [messages.stream_status(each, n, running=self._is_running(each)) for n, each in requested]
-        # MAVSDK 4.1 requests only the status, yet shows the last information that it receives: so that is
-        # sent too, the preferred stream's last.
-        return [*reversed(information), *status]
+
+    def status(self, link: Link, index: int) -> list[Message]:
+        """VIDEO_STREAM_STATUS of a stream, or of all, 0.
+
+        MAVSDK 4.1 requests only the status, yet shows the last information that it receives: so that is sent
+        too, the preferred stream's last.
+        """
+        status = [
+            messages.stream_status(stream, n, running=self._is_running(stream))
+            for n, stream in self._chosen(index)
+        ]
+        return [*reversed(self.information(link, index)), *status]
+
+    def _chosen(self, index: int) -> list[tuple[int, VideoStream]]:
+        return [(n, stream) for n, stream in enumerate(self._streams, start=1) if index in (0, n)]
 
     def _turn(self, number: float, *, on: bool) -> CommandResult:
         streams = self._streams
@@ -88,17 +94,6 @@ class Streaming:
 
 
 _HEARTBEAT_US = 1_000_000
-
-_REQUESTS: dict[int, tuple[int, int]] = {
-    # Older than REQUEST_MESSAGE: the message, and which of their parameters is its index (0: none).
-    mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: (mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, 0),
-    mavlink.MAV_CMD_REQUEST_CAMERA_SETTINGS: (mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS, 0),
-    mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: (mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION, 1),
-    mavlink.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: (mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS, 0),
-    mavlink.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE: (mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, 1),
-    mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: (mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION, 1),
-    mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: (mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS, 1),
-}
 
 
 class CameraComponent(Service):
@@ -145,9 +140,28 @@ class CameraComponent(Service):
         }
         self.commands = {
             **{number: partial(_run, work) for number, work in self._work.items()},
-            **{number: partial(self._answer, *request) for number, request in _REQUESTS.items()},
             mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_once,
-            mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+        }
+        self.older_requests = {
+            mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: (mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, 0),
+            mavlink.MAV_CMD_REQUEST_CAMERA_SETTINGS: (mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS, 0),
+            mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: (mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION, 1),
+            mavlink.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: (mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS, 0),
+            mavlink.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE: (mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, 1),
+            mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: (
+                mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION,
+                1,
+            ),
+            mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: (mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS, 1),
+        }
+        self.replies = {
+            mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION: lambda _, __: [self._information()],
+            mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS: lambda _, __: [self._settings()],
+            mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION: self._storage_information,
+            mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS: lambda _, __: [self._capture_status()],
+            mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED: self._image_captured,
+            mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION: streaming.information,
+            mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS: streaming.status,
         }
 
     def update(self) -> None:
@@ -165,10 +179,6 @@ class CameraComponent(Service):
         work = self._work.get(command)
         return CommandResult.UNSUPPORTED if work is None else work(params)
 
-    def takes_broadcast(self, command: int) -> bool:
-        """Whether a command to all components is the camera's, and not the autopilot's."""
-        return command in self.commands and command != mavlink.MAV_CMD_REQUEST_MESSAGE
-
     def _start_once(self, command: Command) -> CommandResult:
         """IMAGE_START_CAPTURE; a repeated command for one picture, by its number, takes no other."""
         _, _, count, number = command.params
@@ -179,42 +189,23 @@ class CameraComponent(Service):
             self._last_single = (*command.sender, number)
         return result
 
-    def _request_message(self, command: Command) -> CommandResult:
-        message_id = command.params[0]
-        return self._send(command, int(message_id) if isfinite(message_id) else -1, command.params[1])
+    def _information(self) -> Message:
+        return messages.information(
+            self._camera,
+            streams=bool(self._streaming),
+            records=self._recordings.can_record,
+            time_us=self._exchange.time_us,
+        )
 
-    def _answer(self, message_id: int, index_param: int, command: Command) -> CommandResult:
-        """Answer a request that is older than REQUEST_MESSAGE."""
-        return self._send(command, message_id, command.all_params[index_param - 1] if index_param else 0.0)
+    def _storage_information(self, _link: Link, index: int) -> list[Message]:
+        return [messages.storage_information(self._space(), self._exchange.time_us)] if index <= 1 else []
 
-    def _send(self, command: Command, message_id: int, argument: float) -> CommandResult:
-        index = int(argument) if isfinite(argument) and 0 <= argument < 1 << 31 else 0
-        answers = self._requested(message_id, index)
-        for answer in answers:
-            self._exchange.send(command.link, answer, CAMERA_COMPONENT_ID)
-        return CommandResult.ACCEPTED if answers else CommandResult.DENIED
-
-    def _requested(self, message_id: int, index: int) -> list[Message]:
-        time_us = self._exchange.time_us
-        match message_id:
-            case mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION:
-                message = messages.information(
-                    self._camera,
-                    streams=bool(self._streaming),
-                    records=self._recordings.can_record,
-                    time_us=time_us,
-                )
-            case mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS:
-                message = messages.settings(self._mode, time_us)
-            case mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION if index <= 1:
-                message = messages.storage_information(self._space(), time_us)
-            case mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS:
-                message = self._capture_status()
-            case mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED:
-                message = self._captures.sent(index)
-            case _:
-                return self._streaming.messages(message_id, index)
+    def _image_captured(self, _link: Link, index: int) -> list[Message]:
+        message = self._captures.sent(index)
         return [] if message is None else [message]
+
+    def _settings(self) -> Message:
+        return messages.settings(self._mode, self._exchange.time_us)
 
     def _space(self) -> PictureSpace | None:
         return None if self._sink is None else self._sink.space()
@@ -256,7 +247,7 @@ class CameraComponent(Service):
         if not video and params[1] != mavlink.CAMERA_MODE_IMAGE:
             return CommandResult.DENIED
         self._mode = int(params[1])
-        self._exchange.broadcast(messages.settings(self._mode, self._exchange.time_us), CAMERA_COMPONENT_ID)
+        self._exchange.broadcast(self._settings(), CAMERA_COMPONENT_ID)
         return CommandResult.ACCEPTED
 
     def _reset(self, params: SevenParams) -> CommandResult:

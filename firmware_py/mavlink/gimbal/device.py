@@ -5,13 +5,12 @@ It reports its attitude and describes itself. It takes orders of its manager onl
 
 from __future__ import annotations
 
-from math import cos, isfinite, sin
+from math import cos, sin
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.gimbal.model import GIMBAL_COMPONENT_ID, GimbalDevice
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Service
 from firmware_py.mavlink.telemetry.connection import OWN_VERSION
-from firmware_py.status import CommandResult
 from framerunner.geometry.rotations import quaternion_from_euler, yaw_of
 from framerunner.wire.dialect import BROADCAST, Message, boot_ms, mavlink
 from framerunner.wire.exchange import Exchange
@@ -48,7 +47,10 @@ class GimbalComponent(Service):
         self._heartbeat_due_us = 0
         self._attitude_due_us = 0
         self._sent: Message | None = None  # the last attitude
-        self.commands = {mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message}
+        self.replies = {
+            mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION: lambda _, __: [self._information()],
+            mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: lambda _, __: [self._attitude()],
+        }
 
     def update(self) -> None:
         """Send what is due."""
@@ -65,18 +67,6 @@ class GimbalComponent(Service):
         """Send the last attitude again."""
         if self._sent is not None:
             self._exchange.broadcast(self._sent, GIMBAL_COMPONENT_ID)
-
-    def _request_message(self, command: Command) -> CommandResult:
-        number = command.params[0]
-        match int(number) if isfinite(number) else -1:
-            case mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION:
-                message = self._information()
-            case mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS:
-                message = self._attitude()
-            case _:
-                return CommandResult.DENIED
-        self._exchange.send(command.link, message, GIMBAL_COMPONENT_ID)
-        return CommandResult.ACCEPTED
 
     def _heartbeat(self) -> Message:
         """HEARTBEAT of a gimbal, with the vehicle's mode for MAVSDK's follow-me, as the camera's."""
