@@ -76,44 +76,32 @@ class NodeOptions:
     truth: Truth | None = None  # the true state, of a simulated vehicle whose sensors have errors
 
 
-@dataclass(frozen=True, slots=True)
-class _Devices:
-    """What the vehicle carries, those that it has."""
-
-    camera: CameraComponent | None = None
-    manager: GimbalManager | None = None
-    gimbal: GimbalComponent | None = None
-    gripper: GripperService | None = None
-
-    @classmethod
-    def of(cls, autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> _Devices:
-        """The devices of a vehicle's options."""
-        camera = manager = gimbal = None
-        if options.camera is not None:
-            streaming = Streaming(tuple(options.video), options.switch_video)
-            camera = CameraComponent(autopilot, exchange, options.camera, streaming, options.captures)
-        if options.gimbal is not None:
-            manager = GimbalManager(autopilot, exchange, options.gimbal)
-            gimbal = GimbalComponent(autopilot, exchange, options.gimbal)
-        return cls(camera, manager, gimbal, GripperService(autopilot) if options.gripper else None)
-
-    @property
-    def services(self) -> tuple[Service, ...]:
-        """Of those that there are."""
-        services = (self.camera, self.manager, self.gimbal, self.gripper)
-        return tuple(service for service in services if service is not None)
+def _devices(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> list[Service]:
+    """The services of what the vehicle carries."""
+    devices: list[Service] = []
+    if options.camera is not None:
+        streaming = Streaming(tuple(options.video), options.switch_video)
+        devices.append(CameraComponent(autopilot, exchange, options.camera, streaming, options.captures))
+    if options.gimbal is not None:
+        devices.append(GimbalManager(autopilot, exchange, options.gimbal))
+        devices.append(GimbalComponent(autopilot, exchange, options.gimbal))
+    if options.gripper:
+        devices.append(GripperService(autopilot))
+    return devices
 
 
 def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
     """All services of the vehicle, in the order in which they are updated."""
-    devices = _Devices.of(autopilot, exchange, options)
-    camera, manager = devices.camera, devices.manager
+    devices = _devices(autopilot, exchange, options)
+    gimbals = [device.look_at for device in devices if isinstance(device, GimbalManager)]
+    look_at = gimbals[0] if gimbals else lambda point_ned_m: None
     files = options.firmware_files
     if files is None:
         files = ExtraFiles(autopilot.parameters)
     events = EventService(autopilot, exchange)
     clocks = Clocks()
-    mission = MissionExecution(autopilot, exchange, camera, manager, devices.gripper)
+    device_commands = merged(device.mission_commands for device in devices)
+    mission = MissionExecution(autopilot, exchange, device_commands, look_at)
     others: dict[int, AutopilotSource] = {
         mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
         mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: lambda autopilot: hil_state_quaternion(
@@ -132,14 +120,14 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         MissionService(autopilot, exchange, mission),
         mission,
         *((ShellService(autopilot, exchange),) if options.shell else ()),
-        *devices.services,
+        *devices,
         # The others have no `update`.
         ConnectionService(autopilot, exchange, clocks),
         ExternalPoseService(autopilot, exchange, clocks),
         AutopilotTelemetry(autopilot, state_messages),
         OffboardService(autopilot, exchange),
         ManualControlService(autopilot, exchange),
-        FlightCommands(autopilot) if manager is None else FlightCommands(autopilot, manager.look_at),
+        FlightCommands(autopilot, look_at),
         MaintenanceCommands(autopilot, options.failures),
         MetadataService(autopilot, exchange),
         RemoteIdService(autopilot, exchange),
@@ -152,7 +140,7 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
     )
     requests = (
         RequestService(exchange, each.component_id, each.replies, each.older_requests)
-        for each in devices.services
+        for each in devices
         if each.component_id != AUTOPILOT_COMPONENT_ID
     )
     services = (streams, *services, *requests)

@@ -80,6 +80,9 @@ Handler = Callable[[Link, Message], None]
 CommandHandler = Callable[[Command], CommandResult | None]
 """Executes a command; None: it is not acknowledged."""
 
+MissionCommandHandler = Callable[[SevenParams], CommandResult]
+"""Executes a mission's command, with params 1 to 7."""
+
 Source = Callable[[], Message | None]
 """Makes a message as it is now; None: it has no content yet."""
 
@@ -98,6 +101,7 @@ class Service:
         component_id: of the component.
         handlers: by message id.
         commands: by MAV_CMD; they are acknowledged with the handler's result.
+        mission_commands: by MAV_CMD; those of a mission to a device.
         sources: by message id; messages that can be streamed and requested.
         replies: by message id; messages that can only be requested.
         older_requests: by MAV_CMD, of requests older than REQUEST_MESSAGE: the message, and which of the
@@ -107,6 +111,7 @@ class Service:
     component_id: int = AUTOPILOT_COMPONENT_ID
     handlers: Mapping[int, Handler] = _EMPTY
     commands: Mapping[int, CommandHandler] = _EMPTY
+    mission_commands: Mapping[int, MissionCommandHandler] = _EMPTY
     sources: Mapping[int, Source] = _EMPTY
     replies: Mapping[int, Reply] = _EMPTY
     older_requests: Mapping[int, tuple[int, int]] = _EMPTY

@@ -8,7 +8,7 @@ which it begins and ends itself: no command takes the video from the others, suc
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from math import isfinite, isnan
 
@@ -23,7 +23,7 @@ from firmware_py.mavlink.camera.model import (
     VideoEncoding,
     VideoStream,
 )
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Command, MissionCommandHandler, Service
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import Message, mavlink
@@ -122,7 +122,7 @@ class CameraComponent(Service):
         self._captures = Captures(autopilot, exchange, camera, sink)
         self._heartbeat_due_us = 0
         self._last_single: tuple[int, int, float] | None = None
-        self._work: dict[int, Callable[[SevenParams], CommandResult]] = {
+        self.mission_commands: Mapping[int, MissionCommandHandler] = {
             mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self._digicam,
             mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST: self._trigger_distance,
             mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: self._trigger_interval,
@@ -139,7 +139,7 @@ class CameraComponent(Service):
             mavlink.MAV_CMD_SET_CAMERA_FOCUS: _unsupported,
         }
         self.commands = {
-            **{number: partial(_run, work) for number, work in self._work.items()},
+            **{number: partial(_run, work) for number, work in self.mission_commands.items()},
             mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_once,
         }
         self.older_requests = {
@@ -173,11 +173,6 @@ class CameraComponent(Service):
             self._exchange.broadcast(beat, CAMERA_COMPONENT_ID)
         self._captures.update()
         self._recordings.update()
-
-    def run(self, command: int, params: SevenParams) -> CommandResult:
-        """Execute a MAV_CMD to the camera, such as a mission's; UNSUPPORTED if it is not the camera's."""
-        work = self._work.get(command)
-        return CommandResult.UNSUPPORTED if work is None else work(params)
 
     def _start_once(self, command: Command) -> CommandResult:
         """IMAGE_START_CAPTURE; a repeated command for one picture, by its number, takes no other."""
@@ -272,7 +267,7 @@ class CameraComponent(Service):
         return CommandResult.ACCEPTED
 
 
-def _run(work: Callable[[SevenParams], CommandResult], command: Command) -> CommandResult:
+def _run(work: MissionCommandHandler, command: Command) -> CommandResult:
     return work(command.all_params)
 
 

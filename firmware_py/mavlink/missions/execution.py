@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from math import isfinite
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.camera.model import CameraControl
-from firmware_py.mavlink.commands.gripper import GripperService
-from firmware_py.mavlink.gimbal.manager import GimbalManager
 from firmware_py.mavlink.missions.messages import mission_current
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Command, MissionCommandHandler, Service
 from firmware_py.missions.actions import REGIONS
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.status import CommandResult, FlightMode
+from framerunner.geometry.vectors import Vec3
 from framerunner.vehicle.geodesy import GeodeticPoint
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.exchange import Exchange
@@ -32,21 +31,24 @@ _GIMBALS = frozenset(  # every mission of MAVSDK contains them; without a gimbal
 
 
 class MissionExecution(Service):
-    """Checks missions when they change, starts them, reports their progress and passes on their commands."""
+    """Checks missions when they change, starts them, reports their progress and passes on their commands.
+
+    Args:
+        device_commands: of what the vehicle carries, by MAV_CMD.
+        look_at: points a gimbal, if there is one, at a region of interest.
+    """
 
     def __init__(
         self,
         autopilot: Autopilot,
         exchange: Exchange,
-        camera: CameraControl | None,
-        gimbal: GimbalManager | None = None,
-        gripper: GripperService | None = None,
+        device_commands: Mapping[int, MissionCommandHandler],
+        look_at: Callable[[Vec3 | None], None],
     ) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
-        self._camera = camera
-        self._gimbal = gimbal
-        self._gripper = gripper
+        self._device_commands = device_commands
+        self._look_at = look_at
         self._version = 0  # of the mission
         self._current_sent = 0
         self._reached: int | None = None
@@ -155,17 +157,14 @@ class MissionExecution(Service):
         return self._command_device(issued)
 
     def _command_device(self, issued: IssuedCommand) -> CommandResult:
-        """Pass a command on to gimbal, gripper or camera."""
-        command, gimbal = issued.command, self._gimbal
-        if command in REGIONS:
-            if gimbal is not None:
-                gimbal.look_at(issued.place_ned_m)
+        """Pass a command on to the device that has it."""
+        if issued.command in REGIONS:
+            self._look_at(issued.place_ned_m)
             return CommandResult.ACCEPTED
-        if command in _GIMBALS:
-            return CommandResult.ACCEPTED if gimbal is None else gimbal.run(command, issued.params)
-        if command == mavlink.MAV_CMD_DO_GRIPPER and self._gripper is not None:
-            return self._gripper.run(issued.params)
-        return CommandResult.UNSUPPORTED if self._camera is None else self._camera.run(command, issued.params)
+        work = self._device_commands.get(issued.command)
+        if work is None:
+            return CommandResult.ACCEPTED if issued.command in _GIMBALS else CommandResult.UNSUPPORTED
+        return work(issued.params)
 
 
 def _mission_state(autopilot: Autopilot) -> int:
