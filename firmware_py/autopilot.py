@@ -22,7 +22,6 @@ class Autopilot(FlightLoop):
 
     def arm(self, *, force: bool = False) -> CommandResult:
         """Arm, or report in a status text why not. As in PX4, a forced command skips no check."""
-        del force
         self.prepare()
         return self._handle(Event.ARM)
 

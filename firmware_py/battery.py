@@ -52,8 +52,6 @@ class BatteryMonitor:
         state: updated in place.
     """
 
-    __slots__ = ("_min_charge_to_arm", "_settings", "_started", "_time_us", "state")
-
     def __init__(self, airframe: Airframe, parameters: Parameters) -> None:
         self.state = BatteryState()
         self._started = False

@@ -107,16 +107,6 @@ class Commander:
         orbit: the circle to fly.
     """
 
-    __slots__ = (
-        "_check_us",
-        "_started",
-        "_tick_rules",
-        "orbit",
-        "situation",
-        "state",
-        "takeoff_altitude_m",
-    )
-
     def __init__(self) -> None:
         self.state = State.DISARMED
         self._tick_rules = TICK_RULES[self.state]

@@ -44,18 +44,6 @@ class LandDetector:
         turning_rad_s: maximum rate of roll and pitch (LNDMC_ROT_MAX).
     """
 
-    __slots__ = (
-        "_ground_down_m",
-        "_hover_throttle",
-        "_last_not_ground_us",
-        "_last_still_us",
-        "landed",
-        "level_m_s",
-        "trigger_us",
-        "turning_rad_s",
-        "vertical_m_s",
-    )
-
     def __init__(self, hover_throttle: float) -> None:
         """Start on the ground.
 
@@ -166,8 +154,6 @@ class _ClimbRamp:
         running: the climb commanded is not reached yet.
     """
 
-    __slots__ = ("_integral_m_s2", "_time_us", "climb_m_s", "climb_m_s2", "running")
-
     def __init__(self) -> None:
         self.running = False
         self.climb_m_s = self.climb_m_s2 = self._integral_m_s2 = 0.0
@@ -208,19 +194,6 @@ class LiftOff:
         spool_up_us: motors idle this long after arming (COM_SPOOLUP_TIME).
         ramp_us: duration of the climb ramp since a climb is commanded (MPC_TKO_RAMP_T).
     """
-
-    __slots__ = (
-        "_armed_us",
-        "_build_up_m_s2",
-        "_builds_up",
-        "_max_climb_m_s",
-        "_ramp",
-        "_ramp_start_us",
-        "_wanted",
-        "ramp_us",
-        "spool_up_us",
-        "ticks",
-    )
 
     def __init__(self) -> None:
         self.ticks = 0

@@ -29,8 +29,6 @@ class Navigator:
         parameters: MIS_, NAV_, GF_ and RTL_.
     """
 
-    __slots__ = ("_checked", "_executor", "_fence", "_issued", "_leg", "_parameters", "_store", "_view")
-
     def __init__(self, store: MissionStore, parameters: Parameters) -> None:
         self._store = store
         self._view = View()

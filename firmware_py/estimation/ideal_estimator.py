@@ -117,8 +117,6 @@ class IdealEstimator:
         stands: not used.
     """
 
-    __slots__ = ("_sensor_origin", "has_position", "origin_ned_m", "stands", "state")
-
     def __init__(self, sensor_origin: GeodeticPoint) -> None:
         self.state = VehicleState()
         self.origin_ned_m: Vec3 | None = None

@@ -17,7 +17,7 @@ from firmware_py.estimation.error_state import ATTITUDE, POSITION, VELOCITY
 from firmware_py.estimation.output import OutputPredictor
 from firmware_py.estimation.report import IMU, NO_FIX, NO_HEIGHT, NOT_ALIGNED, EstimatorReport, Sensor
 from firmware_py.estimation.settings import EstimatorSettings
-from firmware_py.estimation.watch import watch_sensors
+from firmware_py.estimation.watch import SensorWatches
 from firmware_py.types import VehicleState
 from framerunner.geometry.rotations import euler_from_quaternion, yaw_of
 from framerunner.geometry.vectors import Vec3
@@ -69,7 +69,7 @@ class InertialEstimator:
         self._arrivals = 0
         self._resets = 0
         self.latest = Readings(0)
-        self._watches = watch_sensors(settings)
+        self._watches = SensorWatches(settings)
         self._now_us = self._imu_us = 0
         self._ticks = 0
         noise = settings.noise

@@ -73,16 +73,6 @@ class TargetFollower:
         seen_us: vehicle time of the target's last report; far in the past before the first.
     """
 
-    __slots__ = (
-        "_angle_rad",
-        "_course_rad",
-        "_position_ned_m",
-        "_turned_us",
-        "seen_us",
-        "settings",
-        "velocity_ned_m_s",
-    )
-
     def __init__(self, settings: FollowSettings) -> None:
         self.settings = settings
         self.seen_us = _NEVER_US

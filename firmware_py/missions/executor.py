@@ -25,18 +25,6 @@ class Arrival:
         takeoff_m: climb of a take-off, if the item gives none.
     """
 
-    __slots__ = (
-        "_circle_m",
-        "_heading_reached",
-        "_since_us",
-        "_version",
-        "_yaw_error_rad",
-        "_yaw_ignored",
-        "height_m",
-        "radius_m",
-        "takeoff_m",
-    )
-
     def __init__(self, parameters: Parameters) -> None:
         self._version = -1
         self.configure(parameters)
@@ -137,25 +125,6 @@ class MissionExecutor:
     A step in which nothing changes makes a few comparisons and returns the same `Leg` again. One item is
     begun or ended per step.
     """
-
-    __slots__ = (
-        "_actions",
-        "_arrival",
-        "_climb_first",
-        "_gate_ned_m",
-        "_home_ned_m",
-        "_item",
-        "_jumps",
-        "_left_at",
-        "_leg",
-        "_parameters",
-        "_phase",
-        "_replay",
-        "_restart",
-        "_seen",
-        "_speed_m_s",
-        "_store",
-    )
 
     def __init__(self, store: MissionStore, parameters: Parameters) -> None:
         self._store = store
