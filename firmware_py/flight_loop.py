@@ -242,17 +242,20 @@ class FlightLoop:
         stabiliser = self._stabiliser
         if stabiliser is None:
             raise RuntimeError("the stabiliser is not designed yet; call prepare()")
+        lift_off, state, guidance = self._lift_off, self.state, self._guidance
         if not landed or command.is_for_motors:
-            return self._lift_off.fly(stabiliser, self.state, command)
-        guidance = self._guidance
-        return self._lift_off.stand(
-            stabiliser,
-            self.state,
+            return stabiliser.step(state, lift_off.in_air(command, state.time_us))
+        lifting = lift_off.on_ground(
             command,
+            state.time_us,
             guidance.command_down_m_s,
-            may_lift=self._commander.state not in _STAYS_ON_GROUND or guidance.mode.departs(self.state),
+            may_lift=self._commander.state not in _STAYS_ON_GROUND or guidance.mode.departs(state),
             builds_up_climb=guidance.mode.builds_up_climb,
         )
+        if lifting is None:
+            stabiliser.reset()
+            return stabiliser.idle()
+        return stabiliser.step(state, lifting, grounded=lift_off.is_held)
 
     def _follow(self, row: Row) -> None:
         """Apply a row that matched."""
