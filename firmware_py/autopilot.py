@@ -8,7 +8,6 @@ from firmware_py.commander_table import BY_HAND, Event, State
 from firmware_py.flight_loop import FlightLoop
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import IssuedCommand
-from firmware_py.setpoints import Setpoint
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import WARNING, ManualInput
 from framerunner.geometry.vectors import Vec3
@@ -119,17 +118,6 @@ class Autopilot(FlightLoop):
             return CommandResult.DENIED
         self._publish_places()
         return CommandResult.ACCEPTED
-
-    def accept_setpoint(self, setpoint: Setpoint) -> None:
-        """Take an offboard setpoint; it is flown in OFFBOARD, which cannot be entered without one.
-
-        An unusable one is ignored; a status text reports the first since a usable one.
-        """
-        if setpoint.is_usable:
-            self.setpoints.put(setpoint, self._now_us)
-            self._commander.note_setpoint(setpoint.time_us)
-        elif self.setpoints.refuse():
-            self.say(WARNING, "Offboard setpoint ignored: nothing in it can be flown")
 
     def manual_input(self, sticks: ManualInput) -> None:
         """Take manual control input; in automatic modes, moved sticks take over (COM_RC_OVERRIDE)."""

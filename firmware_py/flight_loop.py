@@ -24,6 +24,7 @@ from firmware_py.missions.store import MissionStore
 from firmware_py.navigator import Navigator
 from firmware_py.offboard_requests import SetpointQueue
 from firmware_py.parameters import Parameters
+from firmware_py.setpoints import Setpoint
 from firmware_py.status import CommandResult, LandedState, VehicleStatus
 from firmware_py.types import CRITICAL, INFO, WARNING, FlightRecord, MotorOutput, StatusText
 from framerunner.geometry.vectors import NAN3, Vec3
@@ -185,6 +186,17 @@ class FlightLoop:
         self._follow(row)
         self._refresh_status()
         return row.result
+
+    def accept_setpoint(self, setpoint: Setpoint) -> None:
+        """Take an offboard setpoint; it is flown in OFFBOARD, which cannot be entered without one.
+
+        An unusable one is ignored; a status text reports the first since a usable one.
+        """
+        if setpoint.is_usable:
+            self.setpoints.put(setpoint, self._now_us)
+            self._commander.note_setpoint(setpoint.time_us)
+        elif self.setpoints.refuse():
+            self.say(WARNING, "Offboard setpoint ignored: nothing in it can be flown")
 
     def say(self, severity: int, text: str) -> None:
         """Add a status text with MAV_SEVERITY; of texts that are not taken the oldest are dropped."""
