@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import hypot, inf, radians
 
 from firmware_py.commands import ControlCommand
-from firmware_py.guidance.limits import speed_limits
+from firmware_py.guidance.limits import SpeedLimits
 from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
 from framerunner.vehicle.airframe import GRAVITY_M_S2, Airframe
@@ -204,7 +204,7 @@ class LiftOff:
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Apply changed parameters."""
-        limits = speed_limits(airframe, parameters)
+        limits = SpeedLimits(airframe, parameters)
         self._max_climb_m_s, self._build_up_m_s2 = limits.up_m_s, limits.takeoff_m_s2
         self.spool_up_us = round(parameters.value("COM_SPOOLUP_TIME") * 1e6)
         self.ramp_us = round(parameters.value("MPC_TKO_RAMP_T") * 1e6)

@@ -15,7 +15,7 @@ from firmware_py.guidance.auto_modes import (
     TakeoffMode,
 )
 from firmware_py.guidance.following import FollowMode
-from firmware_py.guidance.limits import speed_limits
+from firmware_py.guidance.limits import SpeedLimits
 from firmware_py.guidance.mode import Mode, ModeContext, ModeEntry
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.guidance.sticks import AcroMode, AltitudeMode, PositionMode, StabilizedMode
@@ -61,7 +61,7 @@ class Guidance:
     """
 
     def __init__(self, airframe: Airframe, parameters: Parameters, period_s: float = 0.004) -> None:
-        self._context = context = ModeContext(speed_limits(airframe, parameters), period_s)
+        self._context = context = ModeContext(SpeedLimits(airframe, parameters), period_s)
         self._hold = hold = HoldMode(context, airframe, parameters)
         land = LandMode(context, airframe, parameters)
         self._follow = FollowMode(context, airframe, parameters)
@@ -93,7 +93,7 @@ class Guidance:
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Apply changed parameters."""
-        self._context.limits = speed_limits(airframe, parameters)
+        self._context.limits = SpeedLimits(airframe, parameters)
         for mode in dict.fromkeys(self._modes.values()):
             mode.configure(airframe, parameters)
         self._configure_shared(parameters)
