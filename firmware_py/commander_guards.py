@@ -8,6 +8,7 @@ from enum import Enum
 
 from firmware_py.estimation.report import NO_FIX
 from firmware_py.status import FlightMode
+from framerunner.wire.dialect import mavlink
 
 NEVER_US = -(10**15)
 """The time of what has never happened."""
@@ -330,13 +331,7 @@ def position_missing(now: Situation) -> bool:
 
 
 MANUAL_MODES = frozenset(
-    {
-        FlightMode.MANUAL,
-        FlightMode.ALTITUDE,
-        FlightMode.POSITION,
-        FlightMode.ACRO,
-        FlightMode.STABILIZED,
-    }
+    mode for mode in FlightMode if mode.value.flags & mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 )
 """Modes flown by the sticks."""
 
