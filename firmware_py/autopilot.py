@@ -90,12 +90,12 @@ class Autopilot(FlightLoop):
 
     def change_speed(self, speed_m_s: float) -> CommandResult:
         """Fly to the present target at another horizontal speed; NaN: MPC_XY_CRUISE."""
-        self._guidance.change_speed(speed_m_s)
+        self._guidance.context.trajectory.speed_m_s = speed_m_s
         return CommandResult.ACCEPTED
 
     def look_at(self, point_ned_m: Vec3 | None) -> CommandResult:
         """Turn to a place, shape (3,), while flying to targets and in hold; None: no longer."""
-        self._guidance.look_at(point_ned_m)
+        self._guidance.context.region_ned_m = point_ned_m
         return CommandResult.ACCEPTED
 
     def set_home(self, point: GeodeticPoint | None) -> CommandResult:
@@ -121,7 +121,7 @@ class Autopilot(FlightLoop):
 
     def manual_input(self, sticks: ManualInput) -> None:
         """Take manual control input; in automatic modes, moved sticks take over (COM_RC_OVERRIDE)."""
-        self._guidance.take_sticks(sticks)
+        self._guidance.context.sticks = sticks
         self._commander.note_manual_input()
         state = self._commander.state
         if self._motors_stopped or state in BY_HAND or self._land_detector.landed:
@@ -138,7 +138,7 @@ class Autopilot(FlightLoop):
 
     def follow_target(self, position_ned_m: Vec3, velocity_ned_m_s: Vec3) -> None:
         """Take a report of the target to follow, in the local frame."""
-        self._guidance.report_target(self._now_us, position_ned_m, velocity_ned_m_s)
+        self._guidance.follow.follower.report(self._now_us, position_ned_m, velocity_ned_m_s)
 
     def global_position(self) -> GeodeticPoint | None:
         """The estimated position on Earth; None before the first usable sample."""

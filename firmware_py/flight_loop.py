@@ -363,7 +363,7 @@ class FlightLoop:
             self.flight.landed_us = self._now_us
         else:
             self.flight.takeoff_us = self._now_us
-            self._guidance.left_ground()
+            self._guidance.context.trajectory.resume()  # the reference point has moved ahead on the ground
         if not self._motors_stopped:
             self.say(INFO, "Landing detected" if landed else "Takeoff detected")
 

@@ -8,15 +8,18 @@ from math import isfinite, nan
 from types import MappingProxyType
 from typing import Any, TypeVar
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.vehicle.geodesy import GeodeticPoint
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
+from framerunner.wire.exchange import Exchange
 from framerunner.wire.link import Link
 
 _NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT
 _RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _EMPTY: Mapping[int, Any] = MappingProxyType({})
+_HEARTBEAT_US = 1_000_000
 Entry = TypeVar("Entry")
 
 
@@ -121,6 +124,40 @@ class Service:
 
     def repeat(self) -> None:
         """Send again what is sent regularly; called ten times a second while vehicle time stands."""
+
+
+class DeviceComponent(Service):
+    """A component beside the autopilot: it sends a heartbeat once a second, with the vehicle's mode.
+
+    MAVSDK's follow-me takes any component's heartbeat for the vehicle's, and would end with one without
+    a mode.
+
+    Attributes:
+        kind: MAV_TYPE of its heartbeat.
+    """
+
+    kind: int
+
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
+        self._autopilot = autopilot
+        self._exchange = exchange
+        self._heartbeat_due_us = 0
+
+    def update(self) -> None:
+        """Send the heartbeat, if it is due."""
+        time_us = self._exchange.time_us
+        if time_us < self._heartbeat_due_us:
+            return
+        self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
+        heartbeat = mavlink.MAVLink_heartbeat_message(
+            self.kind,
+            mavlink.MAV_AUTOPILOT_INVALID,
+            mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+            self._autopilot.status.mode.custom_mode,
+            mavlink.MAV_STATE_ACTIVE,
+            3,
+        )
+        self._exchange.broadcast(heartbeat, self.component_id)
 
 
 def merged(tables: Iterable[Mapping[int, Entry]]) -> dict[int, Entry]:

@@ -23,7 +23,7 @@ from firmware_py.mavlink.camera.model import (
     VideoEncoding,
     VideoStream,
 )
-from firmware_py.mavlink.service import Command, MissionCommandHandler, Service
+from firmware_py.mavlink.service import Command, DeviceComponent, MissionCommandHandler
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import Message, mavlink
@@ -93,16 +93,14 @@ class Streaming:
         return self._sends or stream.encoding is VideoEncoding.MJPEG_HTTP
 
 
-_HEARTBEAT_US = 1_000_000
-
-
-class CameraComponent(Service):
+class CameraComponent(DeviceComponent):
     """Answers for the camera, sends its heartbeat and takes its pictures.
 
     Without a sink pictures are only counted, and nothing is recorded.
     """
 
     component_id = CAMERA_COMPONENT_ID
+    kind = mavlink.MAV_TYPE_CAMERA
 
     def __init__(
         self,
@@ -112,15 +110,13 @@ class CameraComponent(Service):
         streaming: Streaming,
         sink: CaptureSink | None = None,
     ) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._camera = camera
         self._streaming = streaming
         self._sink = sink
         self._mode = int(mavlink.CAMERA_MODE_IMAGE)
         self._recordings = recordings = Recordings(exchange, sink, self._report_capture)
         self._captures = Captures(autopilot, exchange, camera, sink)
-        self._heartbeat_due_us = 0
         self._last_single: tuple[int, int, float] | None = None
         self.mission_commands: Mapping[int, MissionCommandHandler] = {
             mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self._digicam,
@@ -166,11 +162,7 @@ class CameraComponent(Service):
 
     def update(self) -> None:
         """Send the heartbeat and take pictures that are due."""
-        time_us = self._exchange.time_us
-        if time_us >= self._heartbeat_due_us:
-            self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
-            beat = messages.heartbeat(self._autopilot.status.mode)
-            self._exchange.broadcast(beat, CAMERA_COMPONENT_ID)
+        super().update()
         self._captures.update()
         self._recordings.update()
 

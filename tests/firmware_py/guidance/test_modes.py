@@ -32,7 +32,7 @@ def at(north=0.0, east=0.0, down=0.0, yaw=0.0, velocity=(0.0, 0.0, 0.0)):
 
 def limited():
     guidance = Guidance(AIRFRAME, Parameters())
-    guidance._context.limits = LIMITS
+    guidance.context.limits = LIMITS
     return guidance
 
 
@@ -131,7 +131,7 @@ def test_hold_brakes_smoothly_and_then_keeps_the_position():
     speeds = []
     for _ in range(500):
         speeds.append(guidance.step(state).velocity_level_m_s[0])
-        state.position_ned_m = guidance._context.trajectory.reference.position_ned_m
+        state.position_ned_m = guidance.context.trajectory.reference.position_ned_m
     assert all(after < before + 1e-3 for before, after in pairwise(speeds))
     assert speeds[0] == pytest.approx(cos(0.3), rel=0.01)
     north_m, east_m, _ = guidance.mode.setpoint.position_ned_m
