@@ -78,7 +78,6 @@ class Row:
         result: the answer to a command.
         severity: MAV_SEVERITY of the text.
         text: for people; empty: none.
-        cause: of a failsafe; None: the target is entered for another reason.
         follow_up: the reaction that follows the failsafe's hold.
     """
 
@@ -90,8 +89,12 @@ class Row:
     result: CommandResult = CommandResult.ACCEPTED
     severity: int = INFO
     text: str = ""
-    cause: Cause | None = None
     follow_up: Reaction = Reaction.NOTHING
+
+    @property
+    def cause(self) -> Cause | None:
+        """Of a failsafe; None: the target is entered for another reason."""
+        return self.event if isinstance(self.event, Cause) else None
 
 
 def _at(*states: State) -> frozenset[State]:
@@ -112,6 +115,18 @@ def _tick(
 
 def _stop(states: frozenset[State], guard: Guard, text: str, *, severity: int = INFO) -> Row:
     return _tick(states, guard, State.DISARMED, text, severity=severity, intends=FlightMode.HOLD)
+
+
+def _fail(
+    states: frozenset[State],
+    event: Trigger,
+    guard: Guard | None,
+    target: State,
+    text: str,
+    *,
+    follow_up: Reaction = Reaction.NOTHING,
+) -> Row:
+    return Row(states, event, guard, target, severity=CRITICAL, text=text, follow_up=follow_up)
 
 
 def _refuse(states: frozenset[State], event: Trigger, guard: Guard | None, text: str) -> Row:
@@ -162,14 +177,7 @@ _DELAYED = (Cause.GROUND_STATION, Cause.MANUAL)
 def _hold_ends(reaction: Reaction) -> Row:
     target, _ = _STEPS[reaction]
     guard = when.hold_over_then(reaction)
-    return Row(
-        _at(State.FAILSAFE_HOLD),
-        Event.TICK,
-        guard,
-        target,
-        severity=CRITICAL,
-        text=f"Failsafe: {_DOING[reaction]}",
-    )
+    return _fail(_at(State.FAILSAFE_HOLD), Event.TICK, guard, target, f"Failsafe: {_DOING[reaction]}")
 
 
 def _reactions(cause: Cause, *, from_sticks: bool = False) -> tuple[Row, ...]:
@@ -177,18 +185,9 @@ def _reactions(cause: Cause, *, from_sticks: bool = False) -> tuple[Row, ...]:
     rows = []
     alarm = f"Failsafe activated: {cause.value}"
     if from_sticks:
-        rows += [
-            Row(
-                _FLYING - _LANDING,
-                cause,
-                when.reacts_with_sticks(cause, reaction),
-                target,
-                severity=CRITICAL,
-                text=f"{alarm}, {reaction.value}",
-                cause=cause,
-            )
-            for reaction, target in _STICKS.items()
-        ]
+        for reaction, target in _STICKS.items():
+            guard = when.reacts_with_sticks(cause, reaction)
+            rows.append(_fail(_FLYING - _LANDING, cause, guard, target, f"{alarm}, {reaction.value}"))
     for reaction, (target, states) in _STEPS.items():
         delayed = cause in _DELAYED and reaction in {Reaction.RETURN, Reaction.LAND}
         if cause is Cause.SETPOINTS and reaction is Reaction.HOLD:
@@ -196,60 +195,43 @@ def _reactions(cause: Cause, *, from_sticks: bool = False) -> tuple[Row, ...]:
         else:
             follow_up = reaction if delayed else Reaction.NOTHING
         rows.append(
-            Row(
+            _fail(
                 states - _HOMEWARD - _at(State.FAILSAFE_HOLD) if delayed else states,
                 cause,
                 when.reacts(cause, reaction),
                 State.FAILSAFE_HOLD if delayed else target,
-                severity=CRITICAL,
-                text=f"{alarm}, {'hold, then ' if delayed else ''}{reaction.value}",
-                cause=cause,
+                f"{alarm}, {'hold, then ' if delayed else ''}{reaction.value}",
                 follow_up=follow_up,
             )
         )
-    rows.append(
-        Row(
-            _FLYING,
-            cause,
-            when.reacts(cause, Reaction.WARN),
-            severity=WARNING,
-            text=f"Warning: {cause.value}",
-        )
-    )
+    warns = when.reacts(cause, Reaction.WARN)
+    rows.append(Row(_FLYING, cause, warns, severity=WARNING, text=f"Warning: {cause.value}"))
     rows.append(Row(frozenset(State), cause))
     return tuple(rows)
 
 
-_MANUAL_NOT_THERE = (
-    Row(
-        BY_HAND,
-        Cause.MANUAL,
-        when.reacts(Cause.MANUAL, Reaction.NOTHING),
-        State.FAILSAFE_HOLD,
-        severity=CRITICAL,
-        text=f"Failsafe activated: {Cause.MANUAL.value}, hold",
-        cause=Cause.MANUAL,
-    ),
+_MANUAL_NOT_THERE = _fail(
+    BY_HAND,
+    Cause.MANUAL,
+    when.reacts(Cause.MANUAL, Reaction.NOTHING),
+    State.FAILSAFE_HOLD,
+    f"Failsafe activated: {Cause.MANUAL.value}, hold",
 )
 
 _POSITION_LOST = (
-    Row(
+    _fail(
         _at(State.POSITION),
         Cause.POSITION,
         when.manual_present,
         State.ALTITUDE,
-        severity=CRITICAL,
-        text="Position lost: altitude mode",
-        cause=Cause.POSITION,
+        "Position lost: altitude mode",
     ),
-    Row(
+    _fail(
         _FLYING - _BLIND - _at(State.FAILSAFE_DESCEND),
         Cause.POSITION,
         None,
         State.FAILSAFE_DESCEND,
-        severity=CRITICAL,
-        text="Failsafe activated: position lost, descending",
-        cause=Cause.POSITION,
+        "Failsafe activated: position lost, descending",
     ),
     Row(frozenset(State), Cause.POSITION),
 )
@@ -259,7 +241,7 @@ _FAILSAFES = (
     + tuple(_hold_ends(reaction) for reaction in (Reaction.RETURN, Reaction.LAND))
     + _POSITION_LOST
     + _reactions(Cause.SETPOINTS, from_sticks=True)
-    + _MANUAL_NOT_THERE
+    + (_MANUAL_NOT_THERE,)
     + tuple(
         row for cause in Cause if cause not in {Cause.SETPOINTS, Cause.POSITION} for row in _reactions(cause)
     )
