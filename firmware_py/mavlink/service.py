@@ -12,7 +12,7 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.vehicle.geodesy import GeodeticPoint
-from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, device_heartbeat, mavlink
 from framerunner.wire.exchange import Exchange
 from framerunner.wire.link import Link
 
@@ -129,9 +129,6 @@ class Service:
 class DeviceComponent(Service):
     """A component beside the autopilot: it sends a heartbeat once a second, with the vehicle's mode.
 
-    MAVSDK's follow-me takes any component's heartbeat for the vehicle's, and would end with one without
-    a mode.
-
     Attributes:
         kind: MAV_TYPE of its heartbeat.
     """
@@ -149,14 +146,7 @@ class DeviceComponent(Service):
         if time_us < self._heartbeat_due_us:
             return
         self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
-        heartbeat = mavlink.MAVLink_heartbeat_message(
-            self.kind,
-            mavlink.MAV_AUTOPILOT_INVALID,
-            mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
-            self._autopilot.status.mode.custom_mode,
-            mavlink.MAV_STATE_ACTIVE,
-            3,
-        )
+        heartbeat = device_heartbeat(self.kind, self._autopilot.status.mode.custom_mode)
         self._exchange.broadcast(heartbeat, self.component_id)
 
 

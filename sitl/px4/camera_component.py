@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from firmware_py.mavlink.camera.messages import stream_information
 from firmware_py.mavlink.camera.model import VideoStream
-from framerunner.wire.dialect import mavlink
+from framerunner.wire.dialect import device_heartbeat, mavlink
 
 COMPONENT_ID = int(mavlink.MAV_COMP_ID_CAMERA)
 _COMMAND = mavlink.mavlink_map[mavlink.MAVLINK_MSG_ID_COMMAND_LONG].unpacker
@@ -25,15 +25,8 @@ class CameraComponent:
         self._mavlink = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=COMPONENT_ID)
 
     def heartbeat(self, custom_mode: int) -> bytes:
-        """HEARTBEAT with the vehicle's mode, as some programs take any component's for the vehicle's."""
-        message = mavlink.MAVLink_heartbeat_message(
-            mavlink.MAV_TYPE_CAMERA,
-            mavlink.MAV_AUTOPILOT_INVALID,
-            mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
-            custom_mode,
-            mavlink.MAV_STATE_ACTIVE,
-            3,
-        )
+        """HEARTBEAT with the vehicle's mode."""
+        message = device_heartbeat(mavlink.MAV_TYPE_CAMERA, custom_mode)
         return bytes(message.pack(self._mavlink))
 
     def answers(self, payload: bytes, sender: tuple[int, int]) -> list[bytes]:
