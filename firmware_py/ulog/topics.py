@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, hypot, isfinite, nan, sqrt
+from math import atan2, hypot, isfinite, nan
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.estimation.report import EstimatorReport, Sensor
-from firmware_py.mavlink.telemetry.health import solution_flags
+from firmware_py.mavlink.telemetry.condition import pulses_us
+from firmware_py.mavlink.telemetry.health import accuracy_m, solution_flags
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint
 from firmware_py.status import NAVIGATION_STATES, LandedState
 from firmware_py.ulog.messages import Topic
@@ -62,11 +63,9 @@ def control_mode_flags(report: EstimatorReport) -> int:
 
 def accuracies_and_ratios(report: EstimatorReport) -> Values:
     """Accuracies of position and height, ratios of heading, velocity, position and height."""
-    north_m2, east_m2, down_m2 = report.position_variance_m2
     ratios = report.ratios
     return (
-        sqrt(north_m2 + east_m2),
-        sqrt(down_m2),
+        *accuracy_m(report),
         ratios.heading,
         ratios.velocity,
         ratios.position_horizontal,
@@ -139,7 +138,6 @@ def sensor_combined(sample: Sample) -> Values | None:
 
 _MOTORS = 12
 _OUTPUTS = 16
-_PWM_DISARMED_US, _PWM_LOW_US, _PWM_SPAN_US = 900.0, 1000.0, 1000.0
 _FAST_US = 20_000  # 50 Hz
 _USUAL_US = 100_000
 _SLOW_US = 500_000
@@ -191,13 +189,8 @@ def _actuator_motors(sample: Sample) -> Values:
 
 def _actuator_outputs(sample: Sample) -> Values:
     """Pulses in microseconds, as SERVO_OUTPUT_RAW."""
-    autopilot = sample.autopilot
-    speeds, full_rad_s = autopilot.output.speeds_rad_s, autopilot.airframe.motor.max_speed_rad_s
-    count = min(len(speeds), _OUTPUTS)
-    if autopilot.status.armed:
-        pulses = [_PWM_LOW_US + _PWM_SPAN_US * speed / full_rad_s for speed in speeds[:count]]
-    else:
-        pulses = [_PWM_DISARMED_US] * count
+    pulses = pulses_us(sample.autopilot)
+    count = len(pulses)
     return (sample.time_us, count, *pulses, *[0.0] * (_OUTPUTS - count))
 
 
@@ -222,7 +215,7 @@ def _local_position(sample: Sample) -> Values | None:
 
 def _local_quality(report: EstimatorReport) -> Values:
     """Height above ground, accuracies and validity."""
-    horizontal_m, vertical_m = accuracies_and_ratios(report)[:2]
+    horizontal_m, vertical_m = accuracy_m(report)
     place, height, speed = report.has_position, report.has_height, report.has_velocity
     above_ground_m = report.height_above_ground_m
     return (
