@@ -189,37 +189,34 @@ class InertialEstimator:
 
     def _take_slow(self, sensors: Readings) -> None:
         """Keep and queue what the slower sensors deliver."""
-        latest, watches, now_us = self.latest, self._watches, self._now_us
-        latest.time_us = now_us
+        latest = self.latest
+        latest.time_us = self._now_us
         if (field := sensors.magnetometer) is not None:
             latest.magnetometer = field
-            if isfinite(sum(field.field_frd_gauss)) and watches.note(
-                Sensor.MAGNETOMETER, field.field_frd_gauss, now_us
-            ):
-                self._queue(field)
+            finite = isfinite(sum(field.field_frd_gauss))
+            self._take_one(Sensor.MAGNETOMETER, field, field.field_frd_gauss, finite=finite)
         if (pressure := sensors.barometer) is not None:
             latest.barometer = pressure
-            if isfinite(pressure.pressure_pa) and watches.note(
-                Sensor.BAROMETER, pressure.pressure_pa, now_us
-            ):
-                self._queue(pressure)
+            finite = isfinite(pressure.pressure_pa)
+            self._take_one(Sensor.BAROMETER, pressure, pressure.pressure_pa, finite=finite)
         if (fix := sensors.gps) is not None:
             latest.gps = fix
             value: object = (fix.latitude_deg, fix.longitude_deg, fix.altitude_m, fix.velocity_ned_m_s)
             if fix.fix_type < FixType.FIX_3D:
                 value = fix.time_us  # it has not hung
-            if watches.note(Sensor.GPS, value, now_us):
-                self._queue(fix)
+            self._take_one(Sensor.GPS, fix, value)
         if (distance := sensors.range_finder) is not None:
             latest.range_finder = distance
-            if watches.note(Sensor.RANGE_FINDER, distance.distance_m, now_us):
-                self._queue(distance)
+            self._take_one(Sensor.RANGE_FINDER, distance, distance.distance_m)
         if (flow := sensors.optical_flow) is not None:
             latest.optical_flow = flow
-            if isfinite(sum(flow.flow_rad) + sum(flow.gyro_rad)) and watches.note(
-                Sensor.OPTICAL_FLOW, flow.gyro_rad, now_us
-            ):
-                self._queue(flow)
+            finite = isfinite(sum(flow.flow_rad) + sum(flow.gyro_rad))
+            self._take_one(Sensor.OPTICAL_FLOW, flow, flow.gyro_rad, finite=finite)
+
+    def _take_one(self, sensor: Sensor, sample: Sample, value: object, *, finite: bool = True) -> None:
+        """Queue a sample that may be used; a sensor has hung if `value` stays the same."""
+        if finite and self._watches.note(sensor, value, self._now_us):
+            self._queue(sample)
 
     def _queue(self, sample: Sample) -> None:
         """Keep a measurement until the filter reaches its time."""
