@@ -50,7 +50,6 @@ class InertialEstimator:
         state: the estimate of the present, updated in place.
         aiding: the filter and its measurements.
         stands: set by the owner: the vehicle is disarmed on the ground.
-        late: measurements that came too late to be fused.
         latest: the newest sample of each sensor.
     """
 
@@ -60,7 +59,6 @@ class InertialEstimator:
         self.state = VehicleState()
         self.aiding = Aiding(settings, field_ned_gauss, origin)
         self.stands = True
-        self.late = 0
         self._settings = settings
         self._field = field_ned_gauss
         self._alignment: Alignment | None = Alignment()
@@ -219,17 +217,12 @@ class InertialEstimator:
             self._queue(sample)
 
     def _queue(self, sample: Sample) -> None:
-        """Keep a measurement until the filter reaches its time."""
-        if self._alignment is not None:
-            return
-        if (
-            sample.time_us < self.aiding.target.filter.time_us - _MAX_LATE_US
-            or len(self._waiting) >= _MAX_WAITING
-        ):
-            self.late += 1
-            return
-        self._arrivals += 1
-        heappush(self._waiting, (sample.time_us, self._arrivals, sample))
+        """Keep a measurement until the filter reaches its time; one that comes too late is dropped."""
+        earliest_us = self.aiding.target.filter.time_us - _MAX_LATE_US
+        is_late = sample.time_us < earliest_us or len(self._waiting) >= _MAX_WAITING
+        if self._alignment is None and not is_late:
+            self._arrivals += 1
+            heappush(self._waiting, (sample.time_us, self._arrivals, sample))
 
     def _align(self, imu: ImuSample) -> None:
         alignment, magnetometer = self._alignment, self.latest.magnetometer
