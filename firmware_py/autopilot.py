@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from math import isinf, isnan, nan
 
-from firmware_py.commander_table import BY_HAND, MODE_EVENT, Event, State
+from firmware_py.commander_table import BY_HAND, Event, State
 from firmware_py.flight_loop import FlightLoop
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import IssuedCommand
-from firmware_py.setpoints import Setpoint
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import WARNING, ManualInput
 from framerunner.geometry.vectors import Vec3
@@ -22,7 +21,6 @@ class Autopilot(FlightLoop):
 
     def arm(self, *, force: bool = False) -> CommandResult:
         """Arm, or report in a status text why not. As in PX4, a forced command skips no check."""
-        del force
         self.prepare()
         return self._handle(Event.ARM)
 
@@ -32,12 +30,12 @@ class Autopilot(FlightLoop):
 
     def terminate(self) -> CommandResult:
         """Stop the motors until disarmed, also in the air; always ACCEPTED."""
-        return self._handle(Event.TERMINATE)
+        return self._handle(FlightMode.TERMINATION)
 
     def set_mode(self, mode: FlightMode) -> CommandResult:
         """Change the mode; while armed only to one that can be flown, else a status text reports why not."""
         return self._handle(
-            MODE_EVENT[mode],
+            mode,
             takeoff_altitude_m=nan if mode is FlightMode.TAKEOFF else None,
             orbit=self.orbit_here() if mode is FlightMode.ORBIT else None,
         )
@@ -55,11 +53,11 @@ class Autopilot(FlightLoop):
         if isinf(altitude_amsl_m):
             self.say(WARNING, "Takeoff denied: altitude is infinite")
             return CommandResult.DENIED
-        return self._handle(Event.SET_TAKEOFF, takeoff_altitude_m=altitude_amsl_m)
+        return self._handle(FlightMode.TAKEOFF, takeoff_altitude_m=altitude_amsl_m)
 
     def land(self) -> CommandResult:
         """Land here; always ACCEPTED."""
-        return self._handle(Event.SET_LAND)
+        return self._handle(FlightMode.LAND)
 
     def reposition(self, target_ned_m: Vec3, yaw_rad: float = nan, speed_m_s: float = nan) -> CommandResult:
         """Fly to a place and hold there.
@@ -76,7 +74,7 @@ class Autopilot(FlightLoop):
         if breach is not None:
             self.say(WARNING, f"Reposition denied: {breach}")
             return CommandResult.DENIED
-        result = self._handle(Event.SET_HOLD)
+        result = self._handle(FlightMode.HOLD)
         stays_on_ground = self._land_detector.landed and all(map(isnan, target_ned_m))
         if result is CommandResult.ACCEPTED and self.status.armed and not stays_on_ground:
             self._guidance.fly_to(self.state, target_ned_m, yaw_rad, speed_m_s)
@@ -84,7 +82,7 @@ class Autopilot(FlightLoop):
 
     def orbit(self, orbit: Orbit) -> CommandResult:
         """Fly an orbit, if that is possible now."""
-        return self._handle(Event.SET_ORBIT, orbit=orbit)
+        return self._handle(FlightMode.ORBIT, orbit=orbit)
 
     def orbit_here(self) -> Orbit:
         """The default orbit, PX4's: a radius of 1 m around the present position."""
@@ -92,12 +90,12 @@ class Autopilot(FlightLoop):
 
     def change_speed(self, speed_m_s: float) -> CommandResult:
         """Fly to the present target at another horizontal speed; NaN: MPC_XY_CRUISE."""
-        self._guidance.change_speed(speed_m_s)
+        self._guidance.context.trajectory.speed_m_s = speed_m_s
         return CommandResult.ACCEPTED
 
     def look_at(self, point_ned_m: Vec3 | None) -> CommandResult:
         """Turn to a place, shape (3,), while flying to targets and in hold; None: no longer."""
-        self._guidance.look_at(point_ned_m)
+        self._guidance.context.region_ned_m = point_ned_m
         return CommandResult.ACCEPTED
 
     def set_home(self, point: GeodeticPoint | None) -> CommandResult:
@@ -121,20 +119,9 @@ class Autopilot(FlightLoop):
         self._publish_places()
         return CommandResult.ACCEPTED
 
-    def accept_setpoint(self, setpoint: Setpoint) -> None:
-        """Take an offboard setpoint; it is flown in OFFBOARD, which cannot be entered without one.
-
-        An unusable one is ignored; a status text reports the first since a usable one.
-        """
-        if setpoint.is_usable:
-            self.setpoints.put(setpoint, self._now_us)
-            self._commander.note_setpoint(setpoint.time_us)
-        elif self.setpoints.refuse():
-            self.say(WARNING, "Offboard setpoint ignored: nothing in it can be flown")
-
     def manual_input(self, sticks: ManualInput) -> None:
         """Take manual control input; in automatic modes, moved sticks take over (COM_RC_OVERRIDE)."""
-        self._guidance.take_sticks(sticks)
+        self._guidance.context.sticks = sticks
         self._commander.note_manual_input()
         state = self._commander.state
         if self._motors_stopped or state in BY_HAND or self._land_detector.landed:
@@ -151,7 +138,7 @@ class Autopilot(FlightLoop):
 
     def follow_target(self, position_ned_m: Vec3, velocity_ned_m_s: Vec3) -> None:
         """Take a report of the target to follow, in the local frame."""
-        self._guidance.report_target(self._now_us, position_ned_m, velocity_ned_m_s)
+        self._guidance.follow.follower.report(self._now_us, position_ned_m, velocity_ned_m_s)
 
     def global_position(self) -> GeodeticPoint | None:
         """The estimated position on Earth; None before the first usable sample."""
@@ -160,6 +147,11 @@ class Autopilot(FlightLoop):
     def local_position(self, point: GeodeticPoint) -> Vec3 | None:
         """A place on Earth in the local frame, NED metres; None before the origin is known."""
         return self._geo.to_local(point)
+
+    def check_mission(self) -> None:
+        """Check whether the mission can be flown, if it, the fence or home has changed, and say why not."""
+        landed = self._land_detector.landed
+        self._texts.extend(self._navigator.check_mission(self.state, self._geo, landed=landed))
 
     def take_issued_commands(self) -> list[IssuedCommand]:
         """The mission's commands to others, such as the camera, since the last call."""

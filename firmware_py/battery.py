@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import isfinite
 
 from firmware_py.parameters import Parameters
@@ -14,35 +13,23 @@ _MAH_PER_A_S = 1000.0 / 3600.0
 _SUPPLY_UNCHECKED = 894_281  # of CBRK_SUPPLY_CHK
 
 
-@dataclass(frozen=True, slots=True)
 class BatterySettings:
-    """Cells, their voltages without load, capacity, resistance, and the shares of charge that warn."""
+    """The BAT_ parameters; the airframe's values where they give none.
 
-    cells: int
-    charged_v: float
-    empty_v: float
-    capacity_mah: float
-    resistance_ohm: float
-    low: float
-    critical: float
-    emergency: float
+    Cells, their voltages without load, capacity, resistance, and the shares of charge that warn.
+    """
 
-
-def battery_settings(airframe: Airframe, parameters: Parameters) -> BatterySettings:
-    """The BAT_ parameters; the airframe's values where they give none."""
-    value, own = parameters.value, airframe.battery
-    cells = parameters.integer("BAT1_N_CELLS") or own.cells
-    capacity_mah, cell_ohm = value("BAT1_CAPACITY"), value("BAT1_R_INTERNAL")
-    return BatterySettings(
-        cells,
-        value("BAT1_V_CHARGED"),
-        value("BAT1_V_EMPTY"),
-        capacity_mah if capacity_mah > 0.0 else own.capacity_mah,
-        cell_ohm * cells if cell_ohm >= 0.0 else own.resistance_ohm,
-        value("BAT_LOW_THR"),
-        value("BAT_CRIT_THR"),
-        value("BAT_EMERGEN_THR"),
-    )
+    def __init__(self, airframe: Airframe, parameters: Parameters) -> None:
+        value, own = parameters.value, airframe.battery
+        capacity_mah, cell_ohm = value("BAT1_CAPACITY"), value("BAT1_R_INTERNAL")
+        self.cells = parameters.integer("BAT1_N_CELLS") or own.cells
+        self.charged_v = value("BAT1_V_CHARGED")
+        self.empty_v = value("BAT1_V_EMPTY")
+        self.capacity_mah = capacity_mah if capacity_mah > 0.0 else own.capacity_mah
+        self.resistance_ohm = cell_ohm * self.cells if cell_ohm >= 0.0 else own.resistance_ohm
+        self.low = value("BAT_LOW_THR")
+        self.critical = value("BAT_CRIT_THR")
+        self.emergency = value("BAT_EMERGEN_THR")
 
 
 class BatteryMonitor:
@@ -52,8 +39,6 @@ class BatteryMonitor:
         state: updated in place.
     """
 
-    __slots__ = ("_min_charge_to_arm", "_settings", "_started", "_time_us", "state")
-
     def __init__(self, airframe: Airframe, parameters: Parameters) -> None:
         self.state = BatteryState()
         self._started = False
@@ -62,7 +47,7 @@ class BatteryMonitor:
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Apply changed parameters."""
-        self._settings = battery_settings(airframe, parameters)
+        self._settings = BatterySettings(airframe, parameters)
         if parameters.integer("CBRK_SUPPLY_CHK") == _SUPPLY_UNCHECKED:
             self._min_charge_to_arm = 0.0
         else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import nan
 from typing import NamedTuple
 
@@ -18,13 +18,13 @@ from firmware_py.commander_guards import (
 )
 from firmware_py.commander_table import (
     ARMING_DENIED,
-    CAUSE_EVENT,
     FLOWN_MODE,
     RULES,
     TICK_RULES,
     Event,
     Row,
     State,
+    Trigger,
     first_match,
 )
 from firmware_py.guidance.orbit import Orbit
@@ -77,21 +77,6 @@ _MANUAL_DISABLED = 4  # COM_RC_IN_MODE
 _TERMINATION_OFF = 121_212
 
 
-@dataclass(frozen=True, slots=True)
-class SlowChecks:
-    """Conditions that are checked ten times a second (`problem` while disarmed); see `Situation`."""
-
-    battery_warning: int = 1
-    battery_arms: bool = True
-    has_mission: bool = False
-    fence_breached: bool = False
-    problem: str = ""
-
-
-NOT_CHECKED = SlowChecks()
-"""Before the first check."""
-
-
 class Observation(NamedTuple):
     """The vehicle in one control tick; immutable.
 
@@ -102,7 +87,6 @@ class Observation(NamedTuple):
         upright: the attitude is within the limits of the failure detector.
         landed: on the ground.
         target_reached: a take-off has reached its height.
-        checks: the last slow checks; the same object until the next.
     """
 
     now_us: int
@@ -111,7 +95,6 @@ class Observation(NamedTuple):
     upright: bool
     landed: bool
     target_reached: bool
-    checks: SlowChecks = NOT_CHECKED
 
 
 class Commander:
@@ -124,23 +107,11 @@ class Commander:
         orbit: the circle to fly.
     """
 
-    __slots__ = (
-        "_check_us",
-        "_checks",
-        "_started",
-        "_tick_rules",
-        "orbit",
-        "situation",
-        "state",
-        "takeoff_altitude_m",
-    )
-
     def __init__(self) -> None:
         self.state = State.DISARMED
         self._tick_rules = TICK_RULES[self.state]
         self._check_us = 0
         self._started = False
-        self._checks = NOT_CHECKED
         self.situation = Situation()
         self.takeoff_altitude_m = nan
         self.orbit = Orbit()
@@ -169,7 +140,7 @@ class Commander:
         Returns:
             The row that matched; None when nothing happens.
         """
-        now_us, usable, has_position, upright, landed, target_reached, checks = seen
+        now_us, usable, has_position, upright, landed, target_reached = seen
         now = self.situation
         if not self._started:
             self._start(now_us)
@@ -187,8 +158,6 @@ class Commander:
             now.airborne_us = now_us
             now.flown = self.state is not State.DISARMED
         now.target_reached = target_reached
-        if checks is not self._checks:
-            self._take_checks(checks)
         for guard, rule in self._tick_rules:
             if guard(now):
                 self._follow(rule)
@@ -206,13 +175,22 @@ class Commander:
         self._started, now = True, self.situation
         now.unusable_us = now.usable_us = now.position_us = now.upright_us = now_us
 
-    def _take_checks(self, checks: SlowChecks) -> None:
-        self._checks, now = checks, self.situation
-        now.battery_warning = checks.battery_warning
-        now.battery_arms = checks.battery_arms
-        now.has_mission = checks.has_mission
-        now.fence_breached = checks.fence_breached
-        now.problem = checks.problem
+    def note_checks(
+        self,
+        *,
+        battery_warning: int,
+        battery_arms: bool,
+        has_mission: bool,
+        fence_breached: bool,
+        problem: str,
+    ) -> None:
+        """Note conditions that are checked ten times a second (`problem` while disarmed); see `Situation`."""
+        now = self.situation
+        now.battery_warning = battery_warning
+        now.battery_arms = battery_arms
+        now.has_mission = has_mission
+        now.fence_breached = fence_breached
+        now.problem = problem
 
     def _check(self, now_us: int) -> Row | None:
         self._check_us = now_us + _CHECK_PERIOD_US
@@ -221,13 +199,13 @@ class Commander:
 
     def _react(self, cause: Cause) -> Row | None:
         self.situation.handled.add(cause)
-        return first_match(RULES[self.state, CAUSE_EVENT[cause]], self.situation)
+        return first_match(RULES[self.state, cause], self.situation)
 
-    def handle(self, event: Event) -> Row:
+    def handle(self, event: Trigger) -> Row:
         """Take a command, between ticks; the row that matched has the answer."""
         row = first_match(RULES[self.state, event], self.situation)
         if row is None:  # the table has an answer to every command; a test sweeps it
-            raise LookupError(f"commander: no rule for {event.value} in {self.state.value}")
+            raise LookupError(f"commander: no rule for {event} in {self.state.value}")
         self._follow(row)
         return replace(row, text=self._in_words(row)) if row.guard is estimator_fails else row
 

@@ -8,6 +8,7 @@ from enum import Enum
 
 from firmware_py.estimation.report import NO_FIX
 from firmware_py.status import FlightMode
+from framerunner.wire.dialect import mavlink
 
 NEVER_US = -(10**15)
 """The time of what has never happened."""
@@ -266,32 +267,17 @@ def hold_over_on_ground(now: Situation) -> bool:
 
 def hold_over_then(reaction: Reaction) -> Guard:
     """A guard: a failsafe has held for its time, and this reaction follows."""
-
-    def guard(now: Situation) -> bool:
-        return now.follow_up is reaction and hold_over(now)
-
-    guard.__name__ = f"hold_over_then_{reaction.value}"
-    return guard
+    return lambda now: now.follow_up is reaction and hold_over(now)
 
 
 def reacts(cause: Cause, reaction: Reaction) -> Guard:
     """A guard: the parameters choose this reaction to a cause."""
-
-    def guard(now: Situation) -> bool:
-        return now.choices.reaction(cause) is reaction
-
-    guard.__name__ = f"chosen_{reaction.value}"
-    return guard
+    return lambda now: now.choices.reaction(cause) is reaction
 
 
 def reacts_with_sticks(cause: Cause, reaction: Reaction) -> Guard:
     """The same for a reaction that needs manual control input, which is received."""
-
-    def guard(now: Situation) -> bool:
-        return now.choices.reactions.get(cause, Reaction.NOTHING) is reaction and not manual_lost(now)
-
-    guard.__name__ = f"chosen_{reaction.value}_with_sticks"
-    return guard
+    return lambda now: now.choices.reactions.get(cause, Reaction.NOTHING) is reaction and not manual_lost(now)
 
 
 def target_reached(now: Situation) -> bool:
@@ -316,12 +302,7 @@ def no_mission(now: Situation) -> bool:
 
 def intends(mode: FlightMode) -> Guard:
     """A guard: this mode is intended."""
-
-    def guard(now: Situation) -> bool:
-        return now.intended is mode
-
-    guard.__name__ = f"intends_{mode.name.lower()}"
-    return guard
+    return lambda now: now.intended is mode
 
 
 def intends_unarmable(now: Situation) -> bool:
@@ -350,13 +331,7 @@ def position_missing(now: Situation) -> bool:
 
 
 MANUAL_MODES = frozenset(
-    {
-        FlightMode.MANUAL,
-        FlightMode.ALTITUDE,
-        FlightMode.POSITION,
-        FlightMode.ACRO,
-        FlightMode.STABILIZED,
-    }
+    mode for mode in FlightMode if mode.value.flags & mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 )
 """Modes flown by the sticks."""
 
@@ -388,10 +363,7 @@ def next_cause(now: Situation) -> Cause | None:
 
 
 def _battery_at(level: int) -> Guard:
-    def guard(now: Situation) -> bool:
-        return now.battery_warning >= level > now.battery_at_arming
-
-    return guard
+    return lambda now: now.battery_warning >= level > now.battery_at_arming
 
 
 def _ground_station_gone(now: Situation) -> bool:
@@ -413,15 +385,11 @@ def _flight_time_over(now: Situation) -> bool:
     return limit_us is not None and now.flown and now.now_us - now.armed_us > limit_us
 
 
-def _fence_breached(now: Situation) -> bool:
-    return now.fence_breached
-
-
 _CAUSES: tuple[tuple[Cause, Guard], ...] = (
     (Cause.POSITION, position_lost),
     (Cause.BATTERY_EMERGENCY, _battery_at(_BATTERY_EMERGENCY)),
     (Cause.BATTERY_CRITICAL, _battery_at(_BATTERY_CRITICAL)),
-    (Cause.FENCE, _fence_breached),
+    (Cause.FENCE, lambda now: now.fence_breached),
     (Cause.MANUAL, _manual_gone),
     (Cause.GROUND_STATION, _ground_station_gone),
     (Cause.FLIGHT_TIME, _flight_time_over),

@@ -14,8 +14,6 @@ from firmware_py.commander_guards import MANUAL_MODES, Cause, Guard, Reaction, S
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import CRITICAL, INFO, WARNING
 
-_MANY = 8  # a row with more states is drawn as one in the diagram
-
 
 class State(Enum):
     """Disarmed, or the mode that is flown, and whether a failsafe chose it."""
@@ -42,54 +40,22 @@ class State(Enum):
 
 
 class Event(Enum):
-    """Commands, ends of modes and causes of failsafes; all other conditions are guards on TICK."""
+    """Commands and ends of modes; all other conditions are guards on TICK."""
 
     TICK = "tick"
     ARM = "arm"
     DISARM = "disarm"
     FORCE_DISARM = "force_disarm"
-    TERMINATE = "terminate"
-    SET_MANUAL = "set_manual"
-    SET_STABILIZED = "set_stabilized"
-    SET_ACRO = "set_acro"
-    SET_ALTITUDE = "set_altitude"
-    SET_POSITION = "set_position"
-    SET_HOLD = "set_hold"
-    SET_TAKEOFF = "set_takeoff"
-    SET_ORBIT = "set_orbit"
-    SET_FOLLOW = "set_follow"
-    SET_MISSION = "set_mission"
-    SET_RETURN = "set_return"
-    SET_LAND = "set_land"
-    SET_OFFBOARD = "set_offboard"
     PILOT_TAKES_OVER = "pilot_takes_over"
     MISSION_DONE = "mission_done"
     MISSION_RETURNS = "mission_returns"
-    SETPOINTS_LOST = "setpoints_lost"
-    GROUND_STATION_LOST = "ground_station_lost"
-    MANUAL_LOST = "manual_lost"
-    BATTERY_LOW = "battery_low"
-    BATTERY_CRITICAL = "battery_critical"
-    BATTERY_EMERGENCY = "battery_emergency"
-    FENCE_BREACHED = "fence_breached"
-    POSITION_LOST = "position_lost"
-    FLIGHT_TIME_OVER = "flight_time_over"
 
+
+Trigger = Event | FlightMode | Cause
+"""What a row applies to: an event, the request of a mode, or the cause of a failsafe."""
 
 FLOWN_MODE: dict[State, FlightMode] = {
-    State.MANUAL: FlightMode.MANUAL,
-    State.STABILIZED: FlightMode.STABILIZED,
-    State.ACRO: FlightMode.ACRO,
-    State.ALTITUDE: FlightMode.ALTITUDE,
-    State.POSITION: FlightMode.POSITION,
-    State.HOLD: FlightMode.HOLD,
-    State.TAKEOFF: FlightMode.TAKEOFF,
-    State.ORBIT: FlightMode.ORBIT,
-    State.FOLLOW: FlightMode.FOLLOW,
-    State.MISSION: FlightMode.MISSION,
-    State.RETURN: FlightMode.RETURN,
-    State.LAND: FlightMode.LAND,
-    State.OFFBOARD: FlightMode.OFFBOARD,
+    **{state: FlightMode[state.name] for state in State if state.name in FlightMode.__members__},
     State.FAILSAFE_HOLD: FlightMode.HOLD,
     State.FAILSAFE_RETURN: FlightMode.RETURN,
     State.FAILSAFE_LAND: FlightMode.LAND,
@@ -98,25 +64,6 @@ FLOWN_MODE: dict[State, FlightMode] = {
 }
 """The flight mode of each armed state."""
 
-MODE_EVENT: dict[FlightMode, Event] = {
-    mode: Event.TERMINATE if mode is FlightMode.TERMINATION else Event(f"set_{mode.name.lower()}")
-    for mode in FlightMode
-}
-"""The event that requests each mode."""
-
-CAUSE_EVENT: dict[Cause, Event] = {
-    Cause.SETPOINTS: Event.SETPOINTS_LOST,
-    Cause.GROUND_STATION: Event.GROUND_STATION_LOST,
-    Cause.MANUAL: Event.MANUAL_LOST,
-    Cause.BATTERY_LOW: Event.BATTERY_LOW,
-    Cause.BATTERY_CRITICAL: Event.BATTERY_CRITICAL,
-    Cause.BATTERY_EMERGENCY: Event.BATTERY_EMERGENCY,
-    Cause.FENCE: Event.FENCE_BREACHED,
-    Cause.POSITION: Event.POSITION_LOST,
-    Cause.FLIGHT_TIME: Event.FLIGHT_TIME_OVER,
-}
-"""The event of each cause of a failsafe."""
-
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -124,27 +71,30 @@ class Row:
 
     Attributes:
         states: in which it applies.
-        event: to which it applies.
+        event: to which it applies, see `Trigger`.
         guard: condition; None: always.
         target: the next state; None: stay, and the mode continues unchanged.
         intends: the new intended mode; None: unchanged.
         result: the answer to a command.
         severity: MAV_SEVERITY of the text.
         text: for people; empty: none.
-        cause: of a failsafe; None: the target is entered for another reason.
         follow_up: the reaction that follows the failsafe's hold.
     """
 
     states: frozenset[State]
-    event: Event
+    event: Trigger
     guard: Guard | None = None
     target: State | None = None
     intends: FlightMode | None = None
     result: CommandResult = CommandResult.ACCEPTED
     severity: int = INFO
     text: str = ""
-    cause: Cause | None = None
     follow_up: Reaction = Reaction.NOTHING
+
+    @property
+    def cause(self) -> Cause | None:
+        """Of a failsafe; None: the target is entered for another reason."""
+        return self.event if isinstance(self.event, Cause) else None
 
 
 def _at(*states: State) -> frozenset[State]:
@@ -167,7 +117,19 @@ def _stop(states: frozenset[State], guard: Guard, text: str, *, severity: int = 
     return _tick(states, guard, State.DISARMED, text, severity=severity, intends=FlightMode.HOLD)
 
 
-def _refuse(states: frozenset[State], event: Event, guard: Guard | None, text: str) -> Row:
+def _fail(
+    states: frozenset[State],
+    event: Trigger,
+    guard: Guard | None,
+    target: State,
+    text: str,
+    *,
+    follow_up: Reaction = Reaction.NOTHING,
+) -> Row:
+    return Row(states, event, guard, target, severity=CRITICAL, text=text, follow_up=follow_up)
+
+
+def _refuse(states: frozenset[State], event: Trigger, guard: Guard | None, text: str) -> Row:
     return Row(states, event, guard, result=CommandResult.TEMPORARILY_REJECTED, severity=CRITICAL, text=text)
 
 
@@ -215,33 +177,17 @@ _DELAYED = (Cause.GROUND_STATION, Cause.MANUAL)
 def _hold_ends(reaction: Reaction) -> Row:
     target, _ = _STEPS[reaction]
     guard = when.hold_over_then(reaction)
-    return Row(
-        _at(State.FAILSAFE_HOLD),
-        Event.TICK,
-        guard,
-        target,
-        severity=CRITICAL,
-        text=f"Failsafe: {_DOING[reaction]}",
-    )
+    return _fail(_at(State.FAILSAFE_HOLD), Event.TICK, guard, target, f"Failsafe: {_DOING[reaction]}")
 
 
 def _reactions(cause: Cause, *, from_sticks: bool = False) -> tuple[Row, ...]:
     """The rows of one cause: each reaction, in the states in which it is more severe."""
-    event, rows = CAUSE_EVENT[cause], []
+    rows = []
     alarm = f"Failsafe activated: {cause.value}"
     if from_sticks:
-        rows += [
-            Row(
-                _FLYING - _LANDING,
-                event,
-                when.reacts_with_sticks(cause, reaction),
-                target,
-                severity=CRITICAL,
-                text=f"{alarm}, {reaction.value}",
-                cause=cause,
-            )
-            for reaction, target in _STICKS.items()
-        ]
+        for reaction, target in _STICKS.items():
+            guard = when.reacts_with_sticks(cause, reaction)
+            rows.append(_fail(_FLYING - _LANDING, cause, guard, target, f"{alarm}, {reaction.value}"))
     for reaction, (target, states) in _STEPS.items():
         delayed = cause in _DELAYED and reaction in {Reaction.RETURN, Reaction.LAND}
         if cause is Cause.SETPOINTS and reaction is Reaction.HOLD:
@@ -249,62 +195,45 @@ def _reactions(cause: Cause, *, from_sticks: bool = False) -> tuple[Row, ...]:
         else:
             follow_up = reaction if delayed else Reaction.NOTHING
         rows.append(
-            Row(
+            _fail(
                 states - _HOMEWARD - _at(State.FAILSAFE_HOLD) if delayed else states,
-                event,
+                cause,
                 when.reacts(cause, reaction),
                 State.FAILSAFE_HOLD if delayed else target,
-                severity=CRITICAL,
-                text=f"{alarm}, {'hold, then ' if delayed else ''}{reaction.value}",
-                cause=cause,
+                f"{alarm}, {'hold, then ' if delayed else ''}{reaction.value}",
                 follow_up=follow_up,
             )
         )
-    rows.append(
-        Row(
-            _FLYING,
-            event,
-            when.reacts(cause, Reaction.WARN),
-            severity=WARNING,
-            text=f"Warning: {cause.value}",
-        )
-    )
-    rows.append(Row(frozenset(State), event))
+    warns = when.reacts(cause, Reaction.WARN)
+    rows.append(Row(_FLYING, cause, warns, severity=WARNING, text=f"Warning: {cause.value}"))
+    rows.append(Row(frozenset(State), cause))
     return tuple(rows)
 
 
-_MANUAL_NOT_THERE = (
-    Row(
-        BY_HAND,
-        Event.MANUAL_LOST,
-        when.reacts(Cause.MANUAL, Reaction.NOTHING),
-        State.FAILSAFE_HOLD,
-        severity=CRITICAL,
-        text=f"Failsafe activated: {Cause.MANUAL.value}, hold",
-        cause=Cause.MANUAL,
-    ),
+_MANUAL_NOT_THERE = _fail(
+    BY_HAND,
+    Cause.MANUAL,
+    when.reacts(Cause.MANUAL, Reaction.NOTHING),
+    State.FAILSAFE_HOLD,
+    f"Failsafe activated: {Cause.MANUAL.value}, hold",
 )
 
 _POSITION_LOST = (
-    Row(
+    _fail(
         _at(State.POSITION),
-        Event.POSITION_LOST,
+        Cause.POSITION,
         when.manual_present,
         State.ALTITUDE,
-        severity=CRITICAL,
-        text="Position lost: altitude mode",
-        cause=Cause.POSITION,
+        "Position lost: altitude mode",
     ),
-    Row(
+    _fail(
         _FLYING - _BLIND - _at(State.FAILSAFE_DESCEND),
-        Event.POSITION_LOST,
+        Cause.POSITION,
         None,
         State.FAILSAFE_DESCEND,
-        severity=CRITICAL,
-        text="Failsafe activated: position lost, descending",
-        cause=Cause.POSITION,
+        "Failsafe activated: position lost, descending",
     ),
-    Row(frozenset(State), Event.POSITION_LOST),
+    Row(frozenset(State), Cause.POSITION),
 )
 
 _FAILSAFES = (
@@ -312,7 +241,7 @@ _FAILSAFES = (
     + tuple(_hold_ends(reaction) for reaction in (Reaction.RETURN, Reaction.LAND))
     + _POSITION_LOST
     + _reactions(Cause.SETPOINTS, from_sticks=True)
-    + _MANUAL_NOT_THERE
+    + (_MANUAL_NOT_THERE,)
     + tuple(
         row for cause in Cause if cause not in {Cause.SETPOINTS, Cause.POSITION} for row in _reactions(cause)
     )
@@ -369,9 +298,9 @@ _ARMING = (
     _refuse(_ARMED, Event.DISARM, None, "Disarming denied: not landed"),
     Row(_OFF, Event.FORCE_DISARM),
     Row(_ARMED, Event.FORCE_DISARM, None, State.DISARMED, FlightMode.HOLD, text=_DISARMED_TEXT),
-    Row(_OFF, Event.TERMINATE),
-    Row(_at(State.TERMINATED), Event.TERMINATE),
-    Row(_FLYING, Event.TERMINATE, None, State.TERMINATED, severity=CRITICAL, text="Flight terminated"),
+    Row(_OFF, FlightMode.TERMINATION),
+    Row(_at(State.TERMINATED), FlightMode.TERMINATION),
+    Row(_FLYING, FlightMode.TERMINATION, None, State.TERMINATED, severity=CRITICAL, text="Flight terminated"),
 )
 
 
@@ -380,17 +309,17 @@ def _unavailable(mode: FlightMode) -> str:
 
 
 _AFTER_TERMINATION = tuple(
-    _refuse(_at(State.TERMINATED), event, None, "Mode change refused: flight terminated")
-    for mode, event in MODE_EVENT.items()
+    _refuse(_at(State.TERMINATED), mode, None, "Mode change refused: flight terminated")
+    for mode in FlightMode
     if mode is not FlightMode.TERMINATION
 )
 _NEEDS_STICKS = tuple(
-    _refuse(_FLYING, MODE_EVENT[mode], when.manual_lost, f"{_unavailable(mode)}: no manual control")
+    _refuse(_FLYING, mode, when.manual_lost, f"{_unavailable(mode)}: no manual control")
     for mode in FlightMode
     if mode in MANUAL_MODES
 )
 _NEEDS_POSITION = tuple(
-    _refuse(_FLYING, MODE_EVENT[mode], when.position_lost, f"{_unavailable(mode)}: no position")
+    _refuse(_FLYING, mode, when.position_lost, f"{_unavailable(mode)}: no position")
     for mode in FlightMode
     if mode not in when.POSITIONLESS
     and mode not in {FlightMode.TERMINATION, FlightMode.OFFBOARD, FlightMode.LAND}
@@ -406,12 +335,11 @@ _STAYS = (
 _SETS = tuple(
     row
     for state, mode in FLOWN_MODE.items()
-    if State(mode.name.lower() if mode is not FlightMode.TERMINATION else "terminated") is state
-    and state is not State.TERMINATED
+    if state.name == mode.name
     for row in (
-        Row(_OFF, MODE_EVENT[mode], intends=mode),
-        *((Row(_at(state), MODE_EVENT[mode], intends=mode),) if state in _STAYS else ()),
-        Row(_FLYING, MODE_EVENT[mode], None, state, mode),
+        Row(_OFF, mode, intends=mode),
+        *((Row(_at(state), mode, intends=mode),) if state in _STAYS else ()),
+        Row(_FLYING, mode, None, state, mode),
     )
 )
 
@@ -421,22 +349,22 @@ _MODES = (
     *_NEEDS_POSITION,
     _refuse(
         _FLYING - _at(State.OFFBOARD),
-        Event.SET_OFFBOARD,
+        FlightMode.OFFBOARD,
         when.setpoint_lost,
         _unavailable(FlightMode.OFFBOARD),
     ),
-    _refuse(_FLYING, Event.SET_MISSION, when.no_mission, "Mission rejected: no valid mission"),
-    Row(_FLYING - _DOWNWARD, Event.SET_LAND, when.position_lost, State.FAILSAFE_DESCEND, FlightMode.LAND),
+    _refuse(_FLYING, FlightMode.MISSION, when.no_mission, "Mission rejected: no valid mission"),
+    Row(_FLYING - _DOWNWARD, FlightMode.LAND, when.position_lost, State.FAILSAFE_DESCEND, FlightMode.LAND),
     *_SETS,
 )
 
 TABLE: tuple[Row, ...] = _FAILSAFES + _PROGRESS + _ARMING + _MODES
 """All rows, in order."""
 
-RULES: dict[tuple[State, Event], tuple[Row, ...]] = {
+RULES: dict[tuple[State, Trigger], tuple[Row, ...]] = {
     (state, event): tuple(row for row in TABLE if state in row.states and row.event is event)
     for state in State
-    for event in Event
+    for event in (*Event, *FlightMode, *Cause)
 }
 """The same, by state and event."""
 
@@ -453,17 +381,3 @@ def first_match(rows: tuple[Row, ...], now: Situation) -> Row | None:
         if row.guard is None or row.guard(now):
             return row
     return None
-
-
-def mermaid() -> str:
-    """The table as a Mermaid state diagram, without rows that change no state."""
-    lines = ["stateDiagram-v2", '    state "any armed state" as armed', "    [*] --> disarmed"]
-    for row in TABLE:
-        if row.target is None:
-            continue
-        name = "" if row.event is Event.TICK else row.event.value
-        guard = f"[{row.guard.__name__.replace('_', ' ')}]" if row.guard is not None else ""
-        many = len(row.states) > _MANY and row.states <= _ARMED
-        sources = ["armed"] if many else sorted(state.value for state in row.states)
-        lines += [f"    {source} --> {row.target.value}: {f'{name} {guard}'.strip()}" for source in sources]
-    return "\n".join(lines) + "\n"

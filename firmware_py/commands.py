@@ -30,8 +30,6 @@ class FlightLimits:
         tilt_tangent: its tangent, horizontal thrust per vertical thrust.
     """
 
-    __slots__ = ("_max_tilt_rad", "max_thrust", "min_thrust", "rate_rad_s", "tilt_squared", "tilt_tangent")
-
     def __init__(self, airframe_tilt_rad: float) -> None:
         self._max_tilt_rad = airframe_tilt_rad
         self.limit_tilt(airframe_tilt_rad)
@@ -73,7 +71,6 @@ class ControlCommand:
             limit: from the commanded vertical velocity, below zero, to the one allowed, m/s down, and its
                 acceleration, m/s^2 down.
         """
-        del limit
         return self
 
     def straight_up(self) -> ControlCommand:

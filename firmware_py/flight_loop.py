@@ -10,11 +10,11 @@ from math import cos, isfinite, isnan, nan, radians
 from typing import TYPE_CHECKING
 
 from firmware_py.battery import BatteryMonitor
-from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowChecks
-from firmware_py.commander_table import Event, Row, State
+from firmware_py.commander import Commander, Observation
+from firmware_py.commander_table import Event, Row, State, Trigger
 from firmware_py.commands import ControlCommand
 from firmware_py.estimation.ideal_estimator import IdealEstimator
-from firmware_py.estimation.interface import StateEstimator
+from firmware_py.estimation.report import StateEstimator
 from firmware_py.estimation.wind import WindEstimator
 from firmware_py.ground_contact import LandDetector, LiftOff
 from firmware_py.guidance.modes import Guidance
@@ -24,6 +24,7 @@ from firmware_py.missions.store import MissionStore
 from firmware_py.navigator import Navigator
 from firmware_py.offboard_requests import SetpointQueue
 from firmware_py.parameters import Parameters
+from firmware_py.setpoints import Setpoint
 from firmware_py.status import CommandResult, LandedState, VehicleStatus
 from firmware_py.types import CRITICAL, INFO, WARNING, FlightRecord, MotorOutput, StatusText
 from framerunner.geometry.vectors import NAN3, Vec3
@@ -119,7 +120,6 @@ class FlightLoop:
         self._texts: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
         self._period_us = round(control_period_s * 1e6)
         self._now_us = 0  # advances also while samples are unusable
-        self._checks = NOT_CHECKED
         self._checks_due_us = self._ready_due_us = 0
         self._motors_stopped = self._output_finite = True
         self._state_entered = State.DISARMED
@@ -171,7 +171,7 @@ class FlightLoop:
         return self.output.speeds_rad_s
 
     def _handle(
-        self, event: Event, *, takeoff_altitude_m: float | None = None, orbit: Orbit | None = None
+        self, event: Trigger, *, takeoff_altitude_m: float | None = None, orbit: Orbit | None = None
     ) -> CommandResult:
         """Take a command, between ticks.
 
@@ -186,6 +186,17 @@ class FlightLoop:
         self._follow(row)
         self._refresh_status()
         return row.result
+
+    def accept_setpoint(self, setpoint: Setpoint) -> None:
+        """Take an offboard setpoint; it is flown in OFFBOARD, which cannot be entered without one.
+
+        An unusable one is ignored; a status text reports the first since a usable one.
+        """
+        if setpoint.is_usable:
+            self.setpoints.put(setpoint, self._now_us)
+            self._commander.note_setpoint(setpoint.time_us)
+        elif self.setpoints.refuse():
+            self.say(WARNING, "Offboard setpoint ignored: nothing in it can be flown")
 
     def say(self, severity: int, text: str) -> None:
         """Add a status text with MAV_SEVERITY; of texts that are not taken the oldest are dropped."""
@@ -225,7 +236,7 @@ class FlightLoop:
             if landed is not before:
                 self._change_ground_contact(landed)
         if now_us >= self._checks_due_us:
-            self._checks = self._check(sensors)
+            self._check(sensors)
         if self.setpoints.waiting is not None and self.setpoints.is_due(now_us):
             self._guidance.accept(self.setpoints.take())
         _, x, y, _ = state.attitude
@@ -236,7 +247,6 @@ class FlightLoop:
             1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
             detector.landed,
             self._guidance.mode.target_reached,
-            self._checks,
         )
 
     def _actuate(self, command: ControlCommand, landed: bool) -> MotorOutput:
@@ -244,17 +254,20 @@ class FlightLoop:
         stabiliser = self._stabiliser
         if stabiliser is None:
             raise RuntimeError("the stabiliser is not designed yet; call prepare()")
+        lift_off, state, guidance = self._lift_off, self.state, self._guidance
         if not landed or command.is_for_motors:
-            return self._lift_off.fly(stabiliser, self.state, command)
-        guidance = self._guidance
-        return self._lift_off.stand(
-            stabiliser,
-            self.state,
+            return stabiliser.step(state, lift_off.in_air(command, state.time_us))
+        lifting = lift_off.on_ground(
             command,
+            state.time_us,
             guidance.command_down_m_s,
-            may_lift=self._commander.state not in _STAYS_ON_GROUND or guidance.mode.departs(self.state),
+            may_lift=self._commander.state not in _STAYS_ON_GROUND or guidance.mode.departs(state),
             builds_up_climb=guidance.mode.builds_up_climb,
         )
+        if lifting is None:
+            stabiliser.reset()
+            return stabiliser.idle()
+        return stabiliser.step(state, lifting, grounded=lift_off.is_held)
 
     def _follow(self, row: Row) -> None:
         """Apply a row that matched."""
@@ -289,7 +302,7 @@ class FlightLoop:
         self.flight.failsafes = ()
         self.flight.number += 1
 
-    def _enter(self, target: State, before: State, event: Event) -> None:
+    def _enter(self, target: State, before: State, event: Trigger) -> None:
         """Start the mode of a state; a state without motors changes no mode."""
         if before is State.MISSION:
             self._navigator.leave_mission()
@@ -350,26 +363,26 @@ class FlightLoop:
             self.flight.landed_us = self._now_us
         else:
             self.flight.takeoff_us = self._now_us
-            self._guidance.left_ground()
+            self._guidance.context.trajectory.resume()  # the reference point has moved ahead on the ground
         if not self._motors_stopped:
             self.say(INFO, "Landing detected" if landed else "Takeoff detected")
 
-    def _check(self, sensors: Sensors | Readings) -> SlowChecks:
+    def _check(self, sensors: Sensors | Readings) -> None:
         """Check battery, fence and mission."""
         self._checks_due_us = self._now_us + _CHECK_PERIOD_US
         battery, navigator = self._battery, self._navigator
         navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
         battery.update(self._now_us, sensors.battery_voltage_v, sensors.battery_current_a)
         breach = navigator.breach() if self.status.armed else None
-        if breach is not None and not self._checks.fence_breached:
+        if breach is not None and not self._commander.situation.fence_breached:
             self.say(WARNING, breach)
         self._texts.extend(navigator.take_texts())
-        return SlowChecks(
-            battery.state.warning,
-            battery.can_arm,
-            self.missions.valid,
-            breach is not None,
-            "" if self.status.armed else self.estimator.report().problem,
+        self._commander.note_checks(
+            battery_warning=battery.state.warning,
+            battery_arms=battery.can_arm,
+            has_mission=self.missions.valid,
+            fence_breached=breach is not None,
+            problem="" if self.status.armed else self.estimator.report().problem,
         )
 
     def _configure(self) -> None:

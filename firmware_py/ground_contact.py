@@ -8,16 +8,12 @@ because the vehicle is light and its state without noise.
 from __future__ import annotations
 
 from math import hypot, inf, radians
-from typing import TYPE_CHECKING
 
 from firmware_py.commands import ControlCommand
-from firmware_py.guidance.limits import speed_limits
+from firmware_py.guidance.limits import SpeedLimits
 from firmware_py.parameters import Parameters
-from firmware_py.types import MotorOutput, VehicleState
+from firmware_py.types import VehicleState
 from framerunner.vehicle.airframe import GRAVITY_M_S2, Airframe
-
-if TYPE_CHECKING:
-    from firmware_py.control.stabiliser import Stabiliser  # it imports SciPy
 
 _FALL_US = 100_000  # longer vertical motion without lift-off means that the vehicle is in the air
 _MOVING_M_S = 0.3  # on the ground
@@ -43,18 +39,6 @@ class LandDetector:
         level_m_s: maximum horizontal speed (LNDMC_XY_VEL_MAX).
         turning_rad_s: maximum rate of roll and pitch (LNDMC_ROT_MAX).
     """
-
-    __slots__ = (
-        "_ground_down_m",
-        "_hover_throttle",
-        "_last_not_ground_us",
-        "_last_still_us",
-        "landed",
-        "level_m_s",
-        "trigger_us",
-        "turning_rad_s",
-        "vertical_m_s",
-    )
 
     def __init__(self, hover_throttle: float) -> None:
         """Start on the ground.
@@ -166,8 +150,6 @@ class _ClimbRamp:
         running: the climb commanded is not reached yet.
     """
 
-    __slots__ = ("_integral_m_s2", "_time_us", "climb_m_s", "climb_m_s2", "running")
-
     def __init__(self) -> None:
         self.running = False
         self.climb_m_s = self.climb_m_s2 = self._integral_m_s2 = 0.0
@@ -201,26 +183,13 @@ class _ClimbRamp:
 
 
 class LiftOff:
-    """Limits commands on the ground and at lift-off, and passes them on to the stabiliser.
+    """Limits commands on the ground and at lift-off.
 
     Attributes:
         ticks: since the lift-off began; 0: the motors idle.
         spool_up_us: motors idle this long after arming (COM_SPOOLUP_TIME).
         ramp_us: duration of the climb ramp since a climb is commanded (MPC_TKO_RAMP_T).
     """
-
-    __slots__ = (
-        "_armed_us",
-        "_build_up_m_s2",
-        "_builds_up",
-        "_max_climb_m_s",
-        "_ramp",
-        "_ramp_start_us",
-        "_wanted",
-        "ramp_us",
-        "spool_up_us",
-        "ticks",
-    )
 
     def __init__(self) -> None:
         self.ticks = 0
@@ -235,7 +204,7 @@ class LiftOff:
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Apply changed parameters."""
-        limits = speed_limits(airframe, parameters)
+        limits = SpeedLimits(airframe, parameters)
         self._max_climb_m_s, self._build_up_m_s2 = limits.up_m_s, limits.takeoff_m_s2
         self.spool_up_us = round(parameters.value("COM_SPOOLUP_TIME") * 1e6)
         self.ramp_us = round(parameters.value("MPC_TKO_RAMP_T") * 1e6)
@@ -251,48 +220,46 @@ class LiftOff:
         self.ticks = 0
         self._ramp.running = False
 
-    def fly(self, stabiliser: Stabiliser, state: VehicleState, command: ControlCommand) -> MotorOutput:
-        """Motor output for a command in the air."""
+    def in_air(self, command: ControlCommand, time_us: int) -> ControlCommand:
+        """The command to follow in the air: after a lift-off it is limited by the ramp."""
         self.ticks = 0
         self._wanted = False
-        if self._ramp.running:
-            command = self._ramped(command, state.time_us)
-        return stabiliser.step(state, command)
+        return self._ramped(command, time_us) if self._ramp.running else command
 
-    def stand(
+    def on_ground(
         self,
-        stabiliser: Stabiliser,
-        state: VehicleState,
         command: ControlCommand,
+        time_us: int,
         down_m_s: float,
         *,
         may_lift: bool,
         builds_up_climb: bool,
-    ) -> MotorOutput:
-        """Motor output for a command on the ground.
+    ) -> ControlCommand | None:
+        """The command to follow on the ground; None: the motors idle.
 
         Args:
-            stabiliser: of the airframe.
-            state: of the vehicle now.
             command: of guidance.
+            time_us: vehicle time.
             down_m_s: its vertical velocity; below zero: up.
             may_lift: the mode may leave the ground.
             builds_up_climb: see `Mode`.
         """
         self._builds_up = builds_up_climb
-        if not self._lifts(state.time_us, down_m_s, may_lift=may_lift):
-            self.ticks = 0
-            self._ramp.running = False
-            stabiliser.reset()
-            return stabiliser.idle()
+        if not self._lifts(time_us, down_m_s, may_lift=may_lift):
+            self.rest()
+            return None
         command = command.straight_up()
         if command.controls_climb and self._ramp.running:
-            command = self._ramped(command, state.time_us)
+            command = self._ramped(command, time_us)
             if self.ticks == 0 and self._ramp.climb_m_s == 0.0:
-                stabiliser.reset()
-                return stabiliser.idle()
+                return None
         self.ticks += 1
-        return stabiliser.step(state, command, grounded=self.ticks <= _LIFT_HELD_TICKS)
+        return command
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the ground may still carry the weight, so that integrals are held."""
+        return self.ticks <= _LIFT_HELD_TICKS
 
     def _lifts(self, time_us: int, down_m_s: float, *, may_lift: bool) -> bool:
         """Whether a climb is commanded that may leave the ground, possibly after a ramp."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import hypot, inf, isfinite
 
+from firmware_py.missions.checks import mission_faults
 from firmware_py.missions.executor import MissionExecutor
 from firmware_py.missions.flight import IssuedCommand, Leg, View
 from firmware_py.missions.geofence import Geofence
@@ -28,14 +29,13 @@ class Navigator:
         parameters: MIS_, NAV_, GF_ and RTL_.
     """
 
-    __slots__ = ("_executor", "_fence", "_issued", "_leg", "_parameters", "_store", "_view")
-
     def __init__(self, store: MissionStore, parameters: Parameters) -> None:
         self._store = store
         self._view = View()
         self._parameters = parameters
         self._executor = MissionExecutor(store, parameters)
         self._fence = Geofence(store, parameters)
+        self._checked: tuple[int, int, bool] = (0, 0, False)
         self._leg: Leg | None = None
         self._issued: list[IssuedCommand] = []
 
@@ -49,6 +49,18 @@ class Navigator:
         view.landed = landed
         view.projection = geo.projection
         view.home_ned_m = geo.home_ned_m if geo.home is not None else None
+
+    def check_mission(self, state: VehicleState, geo: GeoReference, *, landed: bool) -> list[StatusText]:
+        """Check whether the mission can be flown, if it, the fence or home has changed; texts for people."""
+        store, before = self._store, self._checked
+        self._checked = now = (store.mission.version, store.fence.version, geo.home is not None)
+        if now == before:
+            return []
+        self.observe(state, geo, landed=landed)
+        if now[1:] != before[1:]:
+            self._fence.breach_at(state.position_ned_m, self._view)
+        store.valid, texts = mission_faults(store.mission.items, self._view, self._parameters, self._fence)
+        return [*self._fence.take_texts(), *texts]
 
     def enter_mission(self) -> None:
         """Begin or continue the mission."""

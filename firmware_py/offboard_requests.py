@@ -198,8 +198,6 @@ class SetpointQueue:
         newest: the newest setpoint, flown or not.
     """
 
-    __slots__ = ("_refused", "_slot", "newest", "waiting")
-
     def __init__(self) -> None:
         self.waiting: Setpoint | None = None
         self.newest: Setpoint | None = None

@@ -55,7 +55,6 @@ class Setpoint(ABC):
 
         A yaw rate is only limited when flown; telemetry shows it as requested, as PX4's does.
         """
-        del limits
         return self
 
     @abstractmethod
@@ -64,7 +63,6 @@ class Setpoint(ABC):
 
     def constant_command(self, limits: SpeedLimits) -> ControlCommand | None:
         """The command, if it is the same in every tick."""
-        del limits
         return None
 
     @property

@@ -45,43 +45,33 @@ class Storage(Protocol):
 
     def entry(self, path: Path) -> Entry:
         """The file or folder at a path."""
-        ...
 
     def entries(self, path: Path) -> list[Entry]:
         """The contents of a folder, sorted by name."""
-        ...
 
     def read(self, path: Path, offset: int, count: int) -> bytes:
         """At most `count` bytes of a file; fewer at its end."""
-        ...
 
     def write(self, path: Path, offset: int, data: bytes) -> None:
         """Write into an existing file; a gap is filled with zeros."""
-        ...
 
     def create(self, path: Path) -> None:
         """Make an empty file, or empty an existing one."""
-        ...
 
     def truncate(self, path: Path, size: int) -> None:
         """Set the size of a file; it grows by zeros."""
-        ...
 
     def remove(self, path: Path) -> None:
         """Remove a file."""
-        ...
 
     def make_folder(self, path: Path) -> None:
         """Make a folder in an existing one."""
-        ...
 
     def remove_folder(self, path: Path) -> None:
         """Remove an empty folder."""
-        ...
 
     def rename(self, old: Path, new: Path) -> None:
         """Move a file or folder; a file at the new path is replaced."""
-        ...
 
 
 def refuse(code: int, path: Path) -> OSError:

@@ -152,8 +152,6 @@ class _Tilt:
         rate_limit_rad_s: of the desired rate.
     """
 
-    __slots__ = ("_k_angle", "_k_rate", "_k_velocity", "_ki", "_limit_nm", "xi")
-
     def __init__(self, gains: tuple[float, float, float, float], rate_limit_rad_s: float) -> None:
         self._k_angle, self._k_rate, k_velocity, ki = gains
         self._k_velocity = k_velocity / self._k_angle

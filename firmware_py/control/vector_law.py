@@ -53,8 +53,6 @@ class DisturbanceObserver:
         limit: bound of |d|, per axis.
     """
 
-    __slots__ = ("_fresh", "_gain", "_gain_d", "_limit", "_period_s", "_x", "_y", "_z", "d")
-
     def __init__(self, bandwidth_rad_s: float, period_s: float, limit: float) -> None:
         self._period_s = period_s
         self._gain = 2.0 * bandwidth_rad_s * period_s
@@ -142,7 +140,6 @@ class VectorLaw:
 
     def enter(self, state: VehicleState) -> None:
         """Take over in flight from another law."""
-        del state
         self.reset()
 
     def leave(self, state: VehicleState) -> None:

@@ -17,7 +17,7 @@ from firmware_py.estimation.error_state import ATTITUDE, POSITION, VELOCITY
 from firmware_py.estimation.output import OutputPredictor
 from firmware_py.estimation.report import IMU, NO_FIX, NO_HEIGHT, NOT_ALIGNED, EstimatorReport, Sensor
 from firmware_py.estimation.settings import EstimatorSettings
-from firmware_py.estimation.watch import watch_sensors
+from firmware_py.estimation.watch import SensorWatches
 from firmware_py.types import VehicleState
 from framerunner.geometry.rotations import euler_from_quaternion, yaw_of
 from framerunner.geometry.vectors import Vec3
@@ -50,7 +50,6 @@ class InertialEstimator:
         state: the estimate of the present, updated in place.
         aiding: the filter and its measurements.
         stands: set by the owner: the vehicle is disarmed on the ground.
-        late: measurements that came too late to be fused.
         latest: the newest sample of each sensor.
     """
 
@@ -60,7 +59,6 @@ class InertialEstimator:
         self.state = VehicleState()
         self.aiding = Aiding(settings, field_ned_gauss, origin)
         self.stands = True
-        self.late = 0
         self._settings = settings
         self._field = field_ned_gauss
         self._alignment: Alignment | None = Alignment()
@@ -69,7 +67,7 @@ class InertialEstimator:
         self._arrivals = 0
         self._resets = 0
         self.latest = Readings(0)
-        self._watches = watch_sensors(settings)
+        self._watches = SensorWatches(settings)
         self._now_us = self._imu_us = 0
         self._ticks = 0
         noise = settings.noise
@@ -189,50 +187,42 @@ class InertialEstimator:
 
     def _take_slow(self, sensors: Readings) -> None:
         """Keep and queue what the slower sensors deliver."""
-        latest, watches, now_us = self.latest, self._watches, self._now_us
-        latest.time_us = now_us
+        latest = self.latest
+        latest.time_us = self._now_us
         if (field := sensors.magnetometer) is not None:
             latest.magnetometer = field
-            if isfinite(sum(field.field_frd_gauss)) and watches.note(
-                Sensor.MAGNETOMETER, field.field_frd_gauss, now_us
-            ):
-                self._queue(field)
+            finite = isfinite(sum(field.field_frd_gauss))
+            self._take_one(Sensor.MAGNETOMETER, field, field.field_frd_gauss, finite=finite)
         if (pressure := sensors.barometer) is not None:
             latest.barometer = pressure
-            if isfinite(pressure.pressure_pa) and watches.note(
-                Sensor.BAROMETER, pressure.pressure_pa, now_us
-            ):
-                self._queue(pressure)
+            finite = isfinite(pressure.pressure_pa)
+            self._take_one(Sensor.BAROMETER, pressure, pressure.pressure_pa, finite=finite)
         if (fix := sensors.gps) is not None:
             latest.gps = fix
             value: object = (fix.latitude_deg, fix.longitude_deg, fix.altitude_m, fix.velocity_ned_m_s)
             if fix.fix_type < FixType.FIX_3D:
                 value = fix.time_us  # it has not hung
-            if watches.note(Sensor.GPS, value, now_us):
-                self._queue(fix)
+            self._take_one(Sensor.GPS, fix, value)
         if (distance := sensors.range_finder) is not None:
             latest.range_finder = distance
-            if watches.note(Sensor.RANGE_FINDER, distance.distance_m, now_us):
-                self._queue(distance)
+            self._take_one(Sensor.RANGE_FINDER, distance, distance.distance_m)
         if (flow := sensors.optical_flow) is not None:
             latest.optical_flow = flow
-            if isfinite(sum(flow.flow_rad) + sum(flow.gyro_rad)) and watches.note(
-                Sensor.OPTICAL_FLOW, flow.gyro_rad, now_us
-            ):
-                self._queue(flow)
+            finite = isfinite(sum(flow.flow_rad) + sum(flow.gyro_rad))
+            self._take_one(Sensor.OPTICAL_FLOW, flow, flow.gyro_rad, finite=finite)
+
+    def _take_one(self, sensor: Sensor, sample: Sample, value: object, *, finite: bool = True) -> None:
+        """Queue a sample that may be used; a sensor has hung if `value` stays the same."""
+        if finite and self._watches.note(sensor, value, self._now_us):
+            self._queue(sample)
 
     def _queue(self, sample: Sample) -> None:
-        """Keep a measurement until the filter reaches its time."""
-        if self._alignment is not None:
-            return
-        if (
-            sample.time_us < self.aiding.target.filter.time_us - _MAX_LATE_US
-            or len(self._waiting) >= _MAX_WAITING
-        ):
-            self.late += 1
-            return
-        self._arrivals += 1
-        heappush(self._waiting, (sample.time_us, self._arrivals, sample))
+        """Keep a measurement until the filter reaches its time; one that comes too late is dropped."""
+        earliest_us = self.aiding.target.filter.time_us - _MAX_LATE_US
+        is_late = sample.time_us < earliest_us or len(self._waiting) >= _MAX_WAITING
+        if self._alignment is None and not is_late:
+            self._arrivals += 1
+            heappush(self._waiting, (sample.time_us, self._arrivals, sample))
 
     def _align(self, imu: ImuSample) -> None:
         alignment, magnetometer = self._alignment, self.latest.magnetometer

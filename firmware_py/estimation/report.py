@@ -1,13 +1,19 @@
-"""What the estimator tells of itself and of its sensors, for telemetry, logs and the checks before arming."""
+"""What the flight loop needs of an estimator, and what that tells of itself and of its sensors.
+
+The report is for telemetry, logs and the checks before arming.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
 from math import nan
+from typing import Protocol
 
+from firmware_py.types import VehicleState
 from framerunner.geometry.vectors import NAN3, Vec3
-from framerunner.vehicle.measurements import Readings
+from framerunner.vehicle.geodesy import GeodeticPoint
+from framerunner.vehicle.measurements import ExternalPose, Readings, Sensors
 
 
 class Sensor(Enum):
@@ -109,3 +115,32 @@ class EstimatorReport:
     resets: int = 0
     latest: Readings = field(default_factory=lambda: Readings(0))
     problem: str = ""
+
+
+class StateEstimator(Protocol):
+    """Estimates the vehicle state from what the sensors deliver in each control tick.
+
+    Attributes:
+        state: the estimate, updated in place.
+        stands: set by the flight loop: the vehicle is disarmed.
+    """
+
+    state: VehicleState
+    stands: bool
+
+    @property
+    def has_position(self) -> bool:
+        """Whether the horizontal position is measured, or was until a short while ago."""
+
+    @property
+    def origin(self) -> GeodeticPoint | None:
+        """Where on Earth the local frame's origin is; None before it is known."""
+
+    def report(self) -> EstimatorReport:
+        """The condition now."""
+
+    def update(self, sensors: Sensors | Readings) -> bool:
+        """Take one tick's sensors; return whether they give an estimate of this tick."""
+
+    def take_external_pose(self, pose: ExternalPose) -> None:
+        """Take a pose of motion capture or visual odometry."""

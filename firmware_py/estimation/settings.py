@@ -14,7 +14,6 @@ class InertialNoise:
         accel_density: white noise of the accelerometer, m/s^2 per root of Hz. Vibration is measured.
         gyro_bias_walk: noise that drives the gyroscope's bias, rad/s per root of s.
         accel_bias_walk: noise that drives the accelerometer's bias, m/s^2 per root of s.
-        gyro_bias_sigma_rad_s: of the bias at boot.
         accel_bias_sigma_m_s2: of the bias at boot.
         gyro_scale_sigma: of the error of the gyroscope's scale factors.
         accel_scale_sigma: of the error of the accelerometer's scale factors.
@@ -24,7 +23,6 @@ class InertialNoise:
     accel_density: float = 2.0e-3
     gyro_bias_walk: float = 2.0e-5
     accel_bias_walk: float = 3.0e-4
-    gyro_bias_sigma_rad_s: float = 0.01
     accel_bias_sigma_m_s2: float = 0.1
     gyro_scale_sigma: float = 0.0
     accel_scale_sigma: float = 0.0

@@ -22,8 +22,6 @@ class NavigationState:
         position_ned_m: shape (3,).
     """
 
-    __slots__ = ("attitude", "position_ned_m", "velocity_ned_m_s")
-
     def __init__(self) -> None:
         self.attitude: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self.velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
@@ -110,8 +108,6 @@ class Increments:
         turn_frd_rad: rotation vector, shape (3,).
         push_frd_m_s: integral of the specific force, shape (3,).
     """
-
-    __slots__ = ("period_s", "push_frd_m_s", "turn_frd_rad")
 
     def __init__(self) -> None:
         self.clear()

@@ -7,11 +7,13 @@ Real sensors are noisy, so a value that is the same to the last bit again and ag
 from __future__ import annotations
 
 from firmware_py.estimation.aiding.aid import NEVER_US
-from firmware_py.estimation.report import IMU, Sensor, silent, stuck
+from firmware_py.estimation.report import Sensor, silent, stuck
 from firmware_py.estimation.settings import EstimatorSettings
 from framerunner.vehicle.measurements import ImuSample
 
 _TIMEOUTS_US = {
+    Sensor.GYROSCOPE: 50_000,
+    Sensor.ACCELEROMETER: 50_000,
     Sensor.MAGNETOMETER: 500_000,
     Sensor.BAROMETER: 500_000,
     Sensor.GPS: 1_000_000,
@@ -19,63 +21,66 @@ _TIMEOUTS_US = {
     Sensor.RANGE_FINDER: 500_000,
     Sensor.OPTICAL_FLOW: 300_000,
 }
-"""Without a sample for so long, a sensor has failed."""
-_IMU_TIMEOUT_US = 50_000
+"""Without a new sample, or with the same value, for so long, a sensor has failed."""
 
 
 class SensorWatch:
     """Watches one sensor.
 
     Args:
-        timeout_us: without a new sample for so long, it has failed.
-        stuck_us: with the same value for so long, it has failed, too.
-
-    Attributes:
-        arrived_us: when a sample with a new value arrived last.
+        timeout_us: without a new sample, or with the same value, for so long, it has failed.
     """
 
-    __slots__ = ("_stuck_us", "_timeout_us", "_value", "arrived_us", "changed_us")
-
-    def __init__(self, timeout_us: int, stuck_us: int) -> None:
+    def __init__(self, timeout_us: int) -> None:
         self._timeout_us = timeout_us
-        self._stuck_us = stuck_us
         self._value: object = None
-        self.arrived_us = NEVER_US
-        self.changed_us = NEVER_US
+        self._arrived_us = NEVER_US
+        self._changed_us = NEVER_US
 
     def note(self, value: object, now_us: int) -> bool:
         """Note a sample's value; return whether it may be used: it has not hung."""
-        self.arrived_us = now_us
+        self._arrived_us = now_us
         if value != self._value:  # NaN differs from itself, but is no measurement
             self._value = value
-            self.changed_us = now_us
+            self._changed_us = now_us
             return True
-        return now_us - self.changed_us < self._stuck_us
+        return now_us - self._changed_us < self._timeout_us
 
     def delivers(self, now_us: int) -> bool:
         """Whether it delivers usable samples."""
-        return now_us - self.arrived_us < self._timeout_us and not self.is_stuck(now_us)
+        return now_us - self._arrived_us < self._timeout_us and not self.is_stuck(now_us)
 
     def is_stuck(self, now_us: int) -> bool:
         """Whether it delivers always the same."""
-        return now_us - self.arrived_us < self._timeout_us and now_us - self.changed_us >= self._stuck_us
+        arrives = now_us - self._arrived_us < self._timeout_us
+        return arrives and now_us - self._changed_us >= self._timeout_us
 
 
 class SensorWatches:
     """Watches all sensors of a vehicle.
 
     Args:
-        watches: of the slower sensors that it has.
+        settings: of the estimator, which say what sensors there are.
 
     Attributes:
         present: sensors that it has.
     """
 
-    def __init__(self, watches: dict[Sensor, SensorWatch]) -> None:
-        self._watches = watches
-        self._gyroscope = SensorWatch(_IMU_TIMEOUT_US, _IMU_TIMEOUT_US)
-        self._accelerometer = SensorWatch(_IMU_TIMEOUT_US, _IMU_TIMEOUT_US)
-        self.present = IMU | frozenset(watches)
+    def __init__(self, settings: EstimatorSettings) -> None:
+        has = {
+            Sensor.GYROSCOPE: True,
+            Sensor.ACCELEROMETER: True,
+            Sensor.MAGNETOMETER: settings.magnetometer_sigma_gauss is not None,
+            Sensor.BAROMETER: settings.barometer_sigma_pa is not None,
+            Sensor.GPS: settings.gps,
+            Sensor.EXTERNAL_POSE: settings.external,
+            Sensor.RANGE_FINDER: settings.range_sigma_m is not None,
+            Sensor.OPTICAL_FLOW: settings.flow_sigma_rad_s is not None,
+        }
+        self._watches = {each: SensorWatch(_TIMEOUTS_US[each]) for each, present in has.items() if present}
+        self._gyroscope = self._watches[Sensor.GYROSCOPE]  # noted in each tick
+        self._accelerometer = self._watches[Sensor.ACCELEROMETER]
+        self.present = frozenset(self._watches)
 
     def note(self, sensor: Sensor, value: object, now_us: int) -> bool:
         """Note a sample; return whether it may be used: it has not hung, and the vehicle should have it."""
@@ -89,37 +94,13 @@ class SensorWatches:
 
     def healthy(self, now_us: int) -> frozenset[Sensor]:
         """Sensors that deliver."""
-        slow = frozenset(sensor for sensor, watch in self._watches.items() if watch.delivers(now_us))
-        if self._gyroscope.delivers(now_us):
-            slow |= {Sensor.GYROSCOPE}
-        return slow | {Sensor.ACCELEROMETER} if self._accelerometer.delivers(now_us) else slow
+        return frozenset(sensor for sensor, watch in self._watches.items() if watch.delivers(now_us))
 
     def problem(self, now_us: int) -> str:
         """What is wrong, in words; empty: nothing."""
-        imu = [(Sensor.GYROSCOPE, self._gyroscope), (Sensor.ACCELEROMETER, self._accelerometer)]
-        named = [(sensor.value, watch) for sensor, watch in (*imu, *self._watches.items())]
-        for name, watch in named:
+        for sensor, watch in self._watches.items():
             if watch.is_stuck(now_us):
-                return stuck(name)
+                return stuck(sensor.value)
             if not watch.delivers(now_us):
-                return silent(name)
+                return silent(sensor.value)
         return ""
-
-
-def watch_sensors(settings: EstimatorSettings) -> SensorWatches:
-    """Watches for the sensors that an estimator is set up for."""
-    sensors = {
-        Sensor.MAGNETOMETER: settings.magnetometer_sigma_gauss is not None,
-        Sensor.BAROMETER: settings.barometer_sigma_pa is not None,
-        Sensor.GPS: settings.gps,
-        Sensor.EXTERNAL_POSE: settings.external,
-        Sensor.RANGE_FINDER: settings.range_sigma_m is not None,
-        Sensor.OPTICAL_FLOW: settings.flow_sigma_rad_s is not None,
-    }
-    return SensorWatches(
-        {
-            sensor: SensorWatch(_TIMEOUTS_US[sensor], _TIMEOUTS_US[sensor])
-            for sensor, present in sensors.items()
-            if present
-        }
-    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from math import hypot, isnan, nan, radians, tan
 
@@ -10,7 +10,7 @@ from firmware_py.commands import ControlCommand, TiltCommand
 from firmware_py.guidance.limits import clamp, velocity_command, velocity_towards, yaw_rate
 from firmware_py.guidance.mode import Mode, ModeEntry, TrajectoryMode
 from firmware_py.guidance.orbit import OrbitYaw
-from firmware_py.guidance.sticks import stick_settings
+from firmware_py.guidance.sticks import StickSettings
 from firmware_py.guidance.trajectory import passing_speed
 from firmware_py.missions.flight import Leg
 from firmware_py.parameters import Parameters
@@ -154,7 +154,7 @@ class OrbitMode(TrajectoryMode):
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Apply the meaning of full sticks."""
-        self._sticks = stick_settings(airframe, parameters)
+        self._sticks = StickSettings(airframe, parameters)
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Fly the entry's orbit."""
@@ -180,31 +180,21 @@ class OrbitMode(TrajectoryMode):
         return self._follow(state, velocity_ned_m_s, yaw_rad, turn_rad_s)
 
 
-@dataclass(frozen=True, slots=True)
 class ReturnSettings:
-    """Heights above home and distances in metres; the delay in microseconds, negative: no landing."""
+    """The RTL_ and NAV_ parameters.
 
-    return_altitude_m: float
-    descend_altitude_m: float
-    cone_deg: float
-    near_m: float
-    acceptance_m: float
-    height_acceptance_m: float
-    delay_us: int
+    Heights above home and distances in metres; the delay in microseconds, negative: no landing.
+    """
 
-
-def return_settings(parameters: Parameters) -> ReturnSettings:
-    """The RTL_ and NAV_ parameters."""
-    value = parameters.value
-    return ReturnSettings(
-        value("RTL_RETURN_ALT"),
-        value("RTL_DESCEND_ALT"),
-        value("RTL_CONE_ANG"),
-        value("RTL_MIN_DIST"),
-        value("NAV_ACC_RAD"),
-        value("NAV_MC_ALT_RAD"),
-        round(value("RTL_LAND_DELAY") * 1e6),
-    )
+    def __init__(self, parameters: Parameters) -> None:
+        value = parameters.value
+        self.return_altitude_m = value("RTL_RETURN_ALT")
+        self.descend_altitude_m = value("RTL_DESCEND_ALT")
+        self.cone_deg = value("RTL_CONE_ANG")
+        self.near_m = value("RTL_MIN_DIST")
+        self.acceptance_m = value("NAV_ACC_RAD")
+        self.height_acceptance_m = value("NAV_MC_ALT_RAD")
+        self.delay_us = round(value("RTL_LAND_DELAY") * 1e6)
 
 
 def return_height_m(settings: ReturnSettings, distance_m: float, height_m: float) -> float:
@@ -246,7 +236,7 @@ class ReturnMode(TrajectoryMode):
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Apply heights and distances to the next return."""
-        self._configured = return_settings(parameters)
+        self._configured = ReturnSettings(parameters)
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Return to the entry's target."""

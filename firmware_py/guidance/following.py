@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 from math import atan2, cos, hypot, isnan, radians, remainder, sin, tau
 
@@ -30,9 +29,8 @@ class FollowHeight(IntEnum):
     TARGET = 2
 
 
-@dataclass(frozen=True, slots=True)
 class FollowSettings:
-    """How a target is followed.
+    """How a target is followed: the FLW_TGT_ parameters.
 
     Attributes:
         distance_m: horizontal distance to it.
@@ -43,25 +41,14 @@ class FollowSettings:
         around_m_s: speed around it when its course changes.
     """
 
-    distance_m: float
-    height_m: float
-    angle_rad: float
-    height: FollowHeight
-    slowness: float
-    around_m_s: float
-
-
-def follow_settings(parameters: Parameters) -> FollowSettings:
-    """The FLW_TGT_ parameters."""
-    value = parameters.value
-    return FollowSettings(
-        value("FLW_TGT_DST"),
-        value("FLW_TGT_HT"),
-        radians(value("FLW_TGT_FA")),
-        FollowHeight(parameters.integer("FLW_TGT_ALT_M")),
-        value("FLW_TGT_RS"),
-        value("FLW_TGT_MAX_VEL"),
-    )
+    def __init__(self, parameters: Parameters) -> None:
+        value = parameters.value
+        self.distance_m = value("FLW_TGT_DST")
+        self.height_m = value("FLW_TGT_HT")
+        self.angle_rad = radians(value("FLW_TGT_FA"))
+        self.height = FollowHeight(parameters.integer("FLW_TGT_ALT_M"))
+        self.slowness = value("FLW_TGT_RS")
+        self.around_m_s = value("FLW_TGT_MAX_VEL")
 
 
 class TargetFollower:
@@ -72,16 +59,6 @@ class TargetFollower:
         velocity_ned_m_s: the target's filtered velocity, shape (3,).
         seen_us: vehicle time of the target's last report; far in the past before the first.
     """
-
-    __slots__ = (
-        "_angle_rad",
-        "_course_rad",
-        "_position_ned_m",
-        "_turned_us",
-        "seen_us",
-        "settings",
-        "velocity_ned_m_s",
-    )
 
     def __init__(self, settings: FollowSettings) -> None:
         self.settings = settings
@@ -161,12 +138,12 @@ class FollowMode(TrajectoryMode):
     """
 
     def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
-        self.follower = TargetFollower(follow_settings(parameters))
+        self.follower = TargetFollower(FollowSettings(parameters))
         super().__init__(context, airframe, parameters)
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Apply the FLW_TGT_ parameters."""
-        self.follower.settings = follow_settings(parameters)
+        self.follower.settings = FollowSettings(parameters)
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Begin here."""

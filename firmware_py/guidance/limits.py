@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import cos, hypot, inf, isnan, nan, radians, remainder, sin, sqrt, tau
 
 from firmware_py.commands import VelocityCommand
@@ -44,9 +44,15 @@ class AccelerationLimits:
         return -stopping_speed(-depth_m, self.down_m_s2, self.jerk_m_s3)
 
 
-@dataclass(slots=True)
+def acceleration_limits(parameters: Parameters, jerk_m_s3: float) -> AccelerationLimits:
+    """The parameters' limits with a jerk."""
+    value = parameters.value
+    level_m_s2 = min(value("MPC_ACC_HOR"), value("MPC_ACC_HOR_MAX"))
+    return AccelerationLimits(level_m_s2, value("MPC_ACC_UP_MAX"), value("MPC_ACC_DOWN_MAX"), jerk_m_s3)
+
+
 class SpeedLimits:
-    """Limits and gains of guidance, all positive.
+    """Limits and gains of guidance, all positive: the smaller of the airframe's and the parameters'.
 
     Attributes:
         horizontal_m_s: maximum horizontal speed.
@@ -68,23 +74,26 @@ class SpeedLimits:
         land_fast_above_m: height above home down to which it has its full speed.
     """
 
-    horizontal_m_s: float
-    up_m_s: float
-    down_m_s: float
-    yaw_rate_rad_s: float
-    takeoff_m_s: float
-    land_m_s: float
-    takeoff_m_s2: float = inf
-    cruise_m_s: float = 5.0
-    auto_up_m_s: float = 3.0
-    auto_down_m_s: float = 1.5
-    acceleration: AccelerationLimits = field(default_factory=AccelerationLimits)
-    auto_yaw_rate_rad_s: float = 1.0
-    position_gain: float = 1.0
-    height_gain: float = 1.0
-    yaw_gain: float = 2.5
-    land_slow_below_m: float = 5.0
-    land_fast_above_m: float = 10.0
+    def __init__(self, airframe: Airframe, parameters: Parameters) -> None:
+        own, value = airframe.limits, parameters.value
+        ramp_s = value("MPC_TKO_RAMP_T")
+        self.horizontal_m_s = min(own.speed_horizontal_m_s, value("MPC_XY_VEL_MAX"))
+        self.up_m_s = min(own.speed_up_m_s, value("MPC_Z_VEL_MAX_UP"))
+        self.down_m_s = min(own.speed_down_m_s, value("MPC_Z_VEL_MAX_DN"))
+        self.yaw_rate_rad_s = min(own.yaw_rate_rad_s, radians(value("MC_YAWRATE_MAX")))
+        self.takeoff_m_s = min(self.up_m_s, value("MPC_TKO_SPEED"))
+        self.takeoff_m_s2 = self.takeoff_m_s / ramp_s if ramp_s > 0.0 else inf
+        self.land_m_s = min(self.down_m_s, value("MPC_LAND_SPEED"))
+        self.cruise_m_s = min(self.horizontal_m_s, value("MPC_XY_CRUISE"))
+        self.auto_up_m_s = min(self.up_m_s, value("MPC_Z_V_AUTO_UP"))
+        self.auto_down_m_s = min(self.down_m_s, value("MPC_Z_V_AUTO_DN"))
+        self.acceleration = acceleration_limits(parameters, value("MPC_JERK_AUTO"))
+        self.auto_yaw_rate_rad_s = radians(value("MPC_YAWRAUTO_MAX"))
+        self.position_gain = value("MPC_XY_P")
+        self.height_gain = value("MPC_Z_P")
+        self.yaw_gain = value("MC_YAW_P")
+        self.land_slow_below_m = value("MPC_LAND_ALT2")
+        self.land_fast_above_m = value("MPC_LAND_ALT1")
 
     def clip(self, north_m_s: float, east_m_s: float, down_m_s: float) -> Vec3:
         """Shorten a velocity to the limits; its horizontal part keeps its direction."""
@@ -103,40 +112,6 @@ class SpeedLimits:
         span_m = max(self.land_fast_above_m - self.land_slow_below_m, 0.1)
         share = min((height_m - self.land_slow_below_m) / span_m, 1.0)
         return self.land_m_s + share * (full_m_s - self.land_m_s)
-
-
-def speed_limits(airframe: Airframe, parameters: Parameters) -> SpeedLimits:
-    """The smaller of the airframe's limits and the parameters'."""
-    own, value = airframe.limits, parameters.value
-    up_m_s = min(own.speed_up_m_s, value("MPC_Z_VEL_MAX_UP"))
-    down_m_s = min(own.speed_down_m_s, value("MPC_Z_VEL_MAX_DN"))
-    horizontal_m_s = min(own.speed_horizontal_m_s, value("MPC_XY_VEL_MAX"))
-    takeoff_m_s = min(up_m_s, value("MPC_TKO_SPEED"))
-    ramp_s = value("MPC_TKO_RAMP_T")
-    return SpeedLimits(
-        horizontal_m_s=horizontal_m_s,
-        up_m_s=up_m_s,
-        down_m_s=down_m_s,
-        yaw_rate_rad_s=min(own.yaw_rate_rad_s, radians(value("MC_YAWRATE_MAX"))),
-        takeoff_m_s=takeoff_m_s,
-        takeoff_m_s2=takeoff_m_s / ramp_s if ramp_s > 0.0 else inf,
-        land_m_s=min(down_m_s, value("MPC_LAND_SPEED")),
-        cruise_m_s=min(horizontal_m_s, value("MPC_XY_CRUISE")),
-        auto_up_m_s=min(up_m_s, value("MPC_Z_V_AUTO_UP")),
-        auto_down_m_s=min(down_m_s, value("MPC_Z_V_AUTO_DN")),
-        acceleration=AccelerationLimits(
-            min(value("MPC_ACC_HOR"), value("MPC_ACC_HOR_MAX")),
-            value("MPC_ACC_UP_MAX"),
-            value("MPC_ACC_DOWN_MAX"),
-            value("MPC_JERK_AUTO"),
-        ),
-        auto_yaw_rate_rad_s=radians(value("MPC_YAWRAUTO_MAX")),
-        position_gain=value("MPC_XY_P"),
-        height_gain=value("MPC_Z_P"),
-        yaw_gain=value("MC_YAW_P"),
-        land_slow_below_m=value("MPC_LAND_ALT2"),
-        land_fast_above_m=value("MPC_LAND_ALT1"),
-    )
 
 
 def stopping_speed(

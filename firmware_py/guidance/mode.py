@@ -89,7 +89,6 @@ class Mode(ABC):
 
     def departs(self, state: VehicleState) -> bool:
         """Whether the mode flies to a place well above, for which it leaves the ground even in hold."""
-        del state
         return False
 
     @property

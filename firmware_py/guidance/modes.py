@@ -15,7 +15,7 @@ from firmware_py.guidance.auto_modes import (
     TakeoffMode,
 )
 from firmware_py.guidance.following import FollowMode
-from firmware_py.guidance.limits import speed_limits
+from firmware_py.guidance.limits import SpeedLimits
 from firmware_py.guidance.mode import Mode, ModeContext, ModeEntry
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.guidance.sticks import AcroMode, AltitudeMode, PositionMode, StabilizedMode
@@ -23,7 +23,7 @@ from firmware_py.guidance.trajectory import YawMode
 from firmware_py.missions.flight import Leg, LegKind
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import Setpoint
-from firmware_py.types import ManualInput, VehicleState
+from firmware_py.types import VehicleState
 from framerunner.geometry.vectors import NAN3, Vec3
 from framerunner.vehicle.airframe import Airframe
 
@@ -56,15 +56,17 @@ class Guidance:
         period_s: of control.
 
     Attributes:
+        context: what all modes share; sticks, region of interest and trajectory may be changed in flight.
+        follow: the follow mode, whose follower takes reports of the target.
         mode: the one flown now or last.
         command_down_m_s: vertical velocity of the last command; for a thrust, its sign.
     """
 
     def __init__(self, airframe: Airframe, parameters: Parameters, period_s: float = 0.004) -> None:
-        self._context = context = ModeContext(speed_limits(airframe, parameters), period_s)
+        self.context = context = ModeContext(SpeedLimits(airframe, parameters), period_s)
         self._hold = hold = HoldMode(context, airframe, parameters)
         land = LandMode(context, airframe, parameters)
-        self._follow = FollowMode(context, airframe, parameters)
+        self.follow = FollowMode(context, airframe, parameters)
         self._offboard = OffboardMode(context, airframe, parameters)
         stabilized = StabilizedMode(context, airframe, parameters)
         returning = ReturnMode(context, airframe, parameters)
@@ -84,7 +86,7 @@ class Guidance:
             State.RETURN: returning,
             State.FAILSAFE_RETURN: returning,
             State.ORBIT: OrbitMode(context, airframe, parameters),
-            State.FOLLOW: self._follow,
+            State.FOLLOW: self.follow,
             State.OFFBOARD: self._offboard,
         }
         self.mode: Mode = hold
@@ -93,18 +95,18 @@ class Guidance:
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Apply changed parameters."""
-        self._context.limits = speed_limits(airframe, parameters)
+        self.context.limits = SpeedLimits(airframe, parameters)
         for mode in dict.fromkeys(self._modes.values()):
             mode.configure(airframe, parameters)
         self._configure_shared(parameters)
 
     def _configure_shared(self, parameters: Parameters) -> None:
-        self._context.trajectory.yaw_mode = YawMode(parameters.integer("MPC_YAW_MODE"))
+        self.context.trajectory.yaw_mode = YawMode(parameters.integer("MPC_YAW_MODE"))
         self._hover_thrust = parameters.value("MPC_THR_HOVER")
 
     def set_home(self, home_ned_m: Vec3) -> None:
         """Set the place from which heights of return, landing and following count, shape (3,)."""
-        self._context.home_ned_m = self._context.trajectory.home_ned_m = home_ned_m
+        self.context.home_ned_m = self.context.trajectory.home_ned_m = home_ned_m
 
     def enter(
         self,
@@ -147,23 +149,3 @@ class Guidance:
         """Take a usable offboard setpoint; None changes nothing."""
         if setpoint is not None:
             self._offboard.accept(setpoint)
-
-    def take_sticks(self, sticks: ManualInput) -> None:
-        """Take a pilot's newest input."""
-        self._context.sticks = sticks
-
-    def report_target(self, time_us: int, position_ned_m: Vec3, velocity_ned_m_s: Vec3) -> None:
-        """Take a report of the target to follow, in the local frame."""
-        self._follow.follower.report(time_us, position_ned_m, velocity_ned_m_s)
-
-    def look_at(self, region_ned_m: Vec3 | None) -> None:
-        """Turn to a place, shape (3,), while flying to targets and in hold; None: no longer."""
-        self._context.region_ned_m = region_ned_m
-
-    def change_speed(self, speed_m_s: float) -> None:
-        """Fly to the present target at another horizontal speed; NaN: the cruising speed."""
-        self._context.trajectory.speed_m_s = speed_m_s
-
-    def left_ground(self) -> None:
-        """Continue from where the vehicle is: the reference point has moved ahead on the ground."""
-        self._context.trajectory.resume()

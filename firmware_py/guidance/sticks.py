@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import cos, hypot, radians, sin
 
 from firmware_py.commands import (
@@ -12,7 +12,7 @@ from firmware_py.commands import (
     TiltCommand,
     VelocityCommand,
 )
-from firmware_py.guidance.limits import AccelerationLimits, level_pair
+from firmware_py.guidance.limits import acceleration_limits, level_pair
 from firmware_py.guidance.mode import Mode, ModeEntry
 from firmware_py.guidance.trajectory import Reference
 from firmware_py.parameters import Parameters
@@ -23,7 +23,6 @@ from framerunner.vehicle.airframe import Airframe
 _FULL_THRUST = 1.0
 
 
-@dataclass(frozen=True, slots=True)
 class StickSettings:
     """What full sticks command; thrusts are shares of full thrust.
 
@@ -43,19 +42,26 @@ class StickSettings:
         braking: the same at centred sticks.
     """
 
-    forward_m_s: float
-    back_m_s: float
-    side_m_s: float
-    tilt_rad: float
-    yaw_rate_rad_s: float
-    acro_rate_frd_rad_s: tuple[float, float, float]
-    min_thrust: float
-    hover_thrust: float
-    dead: float
-    hold_level_m_s: float
-    hold_vertical_m_s: float
-    moving: AccelerationLimits
-    braking: AccelerationLimits
+    def __init__(self, airframe: Airframe, parameters: Parameters) -> None:
+        value, can = parameters.value, airframe.limits
+        back_m_s, side_m_s = value("MPC_VEL_MAN_BACK"), value("MPC_VEL_MAN_SIDE")
+        self.forward_m_s = forward_m_s = min(can.speed_horizontal_m_s, value("MPC_VEL_MANUAL"))
+        self.back_m_s = forward_m_s if back_m_s < 0.0 else min(forward_m_s, back_m_s)
+        self.side_m_s = forward_m_s if side_m_s < 0.0 else min(forward_m_s, side_m_s)
+        self.tilt_rad = min(can.tilt_rad, radians(value("MPC_MAN_TILT_MAX")))
+        self.yaw_rate_rad_s = min(can.yaw_rate_rad_s, radians(value("MPC_MAN_Y_MAX")))
+        self.acro_rate_frd_rad_s = (
+            radians(value("MC_ACRO_R_MAX")),
+            radians(value("MC_ACRO_P_MAX")),
+            radians(value("MC_ACRO_Y_MAX")),
+        )
+        self.min_thrust = value("MPC_MANTHR_MIN")
+        self.hover_thrust = value("MPC_THR_HOVER")
+        self.dead = value("MAN_DEADZONE")
+        self.hold_level_m_s = value("MPC_HOLD_MAX_XY")
+        self.hold_vertical_m_s = value("MPC_HOLD_MAX_Z")
+        self.moving = acceleration_limits(parameters, value("MPC_JERK_MAX"))
+        self.braking = replace(self.moving, level_m_s2=value("MPC_ACC_HOR_MAX"))
 
     def without_dead_zone(self, stick: float) -> float:
         """A stick's value without the dead zone around its centre, -1..1."""
@@ -80,41 +86,12 @@ class StickSettings:
         return middle + sticks.up * (_FULL_THRUST - middle)
 
 
-def stick_settings(airframe: Airframe, parameters: Parameters) -> StickSettings:
-    """What airframe and parameters say."""
-    value, can = parameters.value, airframe.limits
-    forward_m_s = min(can.speed_horizontal_m_s, value("MPC_VEL_MANUAL"))
-    back_m_s, side_m_s = value("MPC_VEL_MAN_BACK"), value("MPC_VEL_MAN_SIDE")
-    max_m_s2 = value("MPC_ACC_HOR_MAX")
-    moving = AccelerationLimits(
-        min(value("MPC_ACC_HOR"), max_m_s2),
-        value("MPC_ACC_UP_MAX"),
-        value("MPC_ACC_DOWN_MAX"),
-        value("MPC_JERK_MAX"),
-    )
-    return StickSettings(
-        forward_m_s,
-        forward_m_s if back_m_s < 0.0 else min(forward_m_s, back_m_s),
-        forward_m_s if side_m_s < 0.0 else min(forward_m_s, side_m_s),
-        min(can.tilt_rad, radians(value("MPC_MAN_TILT_MAX"))),
-        min(can.yaw_rate_rad_s, radians(value("MPC_MAN_Y_MAX"))),
-        (radians(value("MC_ACRO_R_MAX")), radians(value("MC_ACRO_P_MAX")), radians(value("MC_ACRO_Y_MAX"))),
-        value("MPC_MANTHR_MIN"),
-        value("MPC_THR_HOVER"),
-        value("MAN_DEADZONE"),
-        value("MPC_HOLD_MAX_XY"),
-        value("MPC_HOLD_MAX_Z"),
-        moving,
-        replace(moving, level_m_s2=max_m_s2),
-    )
-
-
 class ManualMode(Mode):
     """A mode flown by the sticks; telemetry shows no setpoint."""
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Apply the meaning of full sticks."""
-        self._settings = stick_settings(airframe, parameters)
+        self._settings = StickSettings(airframe, parameters)
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Begin with the present motion."""

@@ -33,8 +33,6 @@ class Reference:
         acceleration_ned_m_s2: shape (3,).
     """
 
-    __slots__ = ("acceleration_ned_m_s2", "position_ned_m", "velocity_ned_m_s")
-
     def __init__(self) -> None:
         self.position_ned_m = self.velocity_ned_m_s = self.acceleration_ned_m_s2 = ZERO3
 
@@ -187,21 +185,6 @@ class Trajectory:
         home_ned_m: shape (3,), for yaw modes towards it or away from it.
         reference: the point.
     """
-
-    __slots__ = (
-        "_arrived_ned_m",
-        "_restarts",
-        "_turning",
-        "_yaw_rad",
-        "drift_ned_m_s",
-        "home_ned_m",
-        "pass_m_s",
-        "reference",
-        "speed_m_s",
-        "target_ned_m",
-        "yaw_mode",
-        "yaw_rad",
-    )
 
     def __init__(self) -> None:
         self.target_ned_m: Vec3 = (nan, nan, nan)

@@ -10,9 +10,9 @@ Differences: velocities are not used; position and height are used together or n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from enum import IntFlag
-from math import hypot, isfinite, nan
+from math import hypot, isfinite
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
@@ -48,55 +48,41 @@ class _Use(IntFlag):
     YAW = 8
 
 
-@dataclass(frozen=True, slots=True)
-class ReceivedPose:
-    """A pose as received; NaN: not given.
+def usable_pose(received: ExternalPose, quality: int, parameters: Parameters) -> ExternalPose | None:
+    """What the parameters let the estimator use of a pose; None: nothing.
 
-    Attributes:
-        time_us: vehicle time at which it was true, as far as its sender knows.
-        position_ned_m: shape (3,).
-        attitude: body FRD to NED, not necessarily of unit length; NaN: not known.
-        position_variance_m2: shape (3,).
-        attitude_variance_rad2: shape (3,).
-        reset_counter: changes when the sender's frame has jumped.
+    Args:
+        received: of the time at which it was true, as far as its sender knows; NaN: not given; its
+            attitude is not necessarily of unit length.
         quality: percent; 0: not given.
+        parameters: EKF2_EV.
     """
-
-    time_us: int
-    position_ned_m: Vec3
-    attitude: Quaternion
-    position_variance_m2: Vec3
-    attitude_variance_rad2: Vec3
-    reset_counter: int = 0
-    quality: int = 0
-
-
-def usable_pose(received: ReceivedPose, parameters: Parameters) -> ExternalPose | None:
-    """What the parameters let the estimator use of a pose; None: nothing."""
     value = parameters.value
     use = _Use(parameters.integer("EKF2_EV_CTRL"))
     required = _Use.HORIZONTAL | _Use.HEIGHT
     if use & required != required or not all(map(isfinite, received.position_ned_m)):
         return None
     worst = parameters.integer("EKF2_EV_QMIN")
-    if worst > 0 and received.quality < worst:
+    if worst > 0 and quality < worst:
         return None
     of_message = parameters.integer("EKF2_EV_NOISE_MD") == 0
-    attitude = _valid(received.attitude) if use & _Use.YAW else None
-    return ExternalPose(
-        received.time_us - round(value("EKF2_EV_DELAY") * 1e3),
-        received.position_ned_m,
-        attitude,
-        None,
-        _variance(received.position_variance_m2 if of_message else NAN3, value("EKF2_EVP_NOISE")),
-        _variance(received.attitude_variance_rad2 if of_message else NAN3, value("EKF2_EVA_NOISE")),
-        NAN3,
-        received.reset_counter,
+    return replace(
+        received,
+        time_us=received.time_us - round(value("EKF2_EV_DELAY") * 1e3),
+        attitude=_valid(received.attitude) if use & _Use.YAW else None,
+        position_variance_m2=_variance(
+            received.position_variance_m2 if of_message else NAN3, value("EKF2_EVP_NOISE")
+        ),
+        attitude_variance_rad2=_variance(
+            received.attitude_variance_rad2 if of_message else NAN3, value("EKF2_EVA_NOISE")
+        ),
     )
 
 
-def _valid(attitude: Quaternion) -> Quaternion | None:
+def _valid(attitude: Quaternion | None) -> Quaternion | None:
     """A quaternion of unit length, or None."""
+    if attitude is None:
+        return None
     norm = hypot(*attitude)
     return normalized(attitude) if abs(norm - 1.0) <= _NORM_TOLERANCE else None  # false for NaN too
 
@@ -143,44 +129,31 @@ class ExternalPoseService(Service):
             if kind != _UNUSED:
                 self._refuse(f"ODOMETRY: estimator_type {kind} unsupported")
             return
-        w, x, y, z = message.q
         position, attitude = _diagonal(message.pose_covariance)
         if kind == _NAIVE:
             position = attitude = NAN3
         elif message.frame_id == mavlink.MAV_FRAME_LOCAL_ENU:
             position = (position[1], position[0], position[2])
-        self._use(
-            ReceivedPose(
-                self._vehicle_time_us(link, message.time_usec),
-                _position_ned_m(message.frame_id, message.x, message.y, message.z),
-                (w, x, y, z),
-                position,
-                attitude,
-                message.reset_counter,
-                message.quality,
-            )
-        )
+        w, x, y, z = message.q
+        place = _position_ned_m(message.frame_id, message.x, message.y, message.z)
+        time_us, resets = self._vehicle_time_us(link, message.time_usec), message.reset_counter
+        pose = ExternalPose(time_us, place, (w, x, y, z), None, position, attitude, NAN3, resets)
+        self._use(pose, message.quality)
 
     def _vision_position_estimate(self, link: Link, message: Message) -> None:
         position, attitude = _diagonal(message.covariance)
         angles_rad = (message.roll, message.pitch, message.yaw)
-        self._use(
-            ReceivedPose(
-                self._vehicle_time_us(link, message.usec),
-                (message.x, message.y, message.z),
-                quaternion_from_euler(*angles_rad) if all(map(isfinite, angles_rad)) else (nan,) * 4,
-                position,
-                attitude,
-                message.reset_counter,
-            )
-        )
+        turned = quaternion_from_euler(*angles_rad) if all(map(isfinite, angles_rad)) else None
+        place = (message.x, message.y, message.z)
+        time_us, resets = self._vehicle_time_us(link, message.usec), message.reset_counter
+        self._use(ExternalPose(time_us, place, turned, None, position, attitude, NAN3, resets), quality=0)
 
     def _vehicle_time_us(self, link: Link, stamp_us: int) -> int:
         now_us = self._exchange.time_us
         return min(now_us, self._clocks.on(link.profile.name).vehicle_time_us(stamp_us, now_us))
 
-    def _use(self, received: ReceivedPose) -> None:
-        pose = usable_pose(received, self._autopilot.parameters)
+    def _use(self, received: ExternalPose, quality: int) -> None:
+        pose = usable_pose(received, quality, self._autopilot.parameters)
         if pose is not None:
             self._autopilot.estimator.take_external_pose(pose)
 

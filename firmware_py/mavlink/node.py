@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.camera.component import CameraComponent
+from firmware_py.mavlink.camera.component import CameraComponent, Streaming
 from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink, VideoStream
-from firmware_py.mavlink.camera.streaming import Streaming
 from firmware_py.mavlink.commands.flight import FlightCommands
 from firmware_py.mavlink.commands.gripper import GripperService
 from firmware_py.mavlink.commands.maintenance import FailureSink, MaintenanceCommands
@@ -40,7 +39,12 @@ from firmware_py.mavlink.telemetry.motion import (
 )
 from firmware_py.mavlink.telemetry.sensing import SENSORS
 from firmware_py.mavlink.telemetry.status_texts import StatusTextService
-from firmware_py.mavlink.telemetry.streams import AutopilotSource, AutopilotTelemetry, StreamService
+from firmware_py.mavlink.telemetry.streams import (
+    AutopilotSource,
+    AutopilotTelemetry,
+    RequestService,
+    StreamService,
+)
 from firmware_py.mavlink.time_sync import Clocks
 from firmware_py.storage import Storage
 from firmware_py.types import StatusText
@@ -72,57 +76,32 @@ class NodeOptions:
     truth: Truth | None = None  # the true state, of a simulated vehicle whose sensors have errors
 
 
-@dataclass(frozen=True, slots=True)
-class _Devices:
-    """What the vehicle carries, those that it has."""
-
-    camera: CameraComponent | None = None
-    manager: GimbalManager | None = None
-    gimbal: GimbalComponent | None = None
-    gripper: GripperService | None = None
-
-    @classmethod
-    def of(cls, autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> _Devices:
-        """The devices of a vehicle's options."""
-        camera = manager = gimbal = None
-        if options.camera is not None:
-            streaming = Streaming(tuple(options.video), options.switch_video)
-            camera = CameraComponent(autopilot, exchange, options.camera, streaming, options.captures)
-        if options.gimbal is not None:
-            manager = GimbalManager(autopilot, exchange, options.gimbal)
-            gimbal = GimbalComponent(autopilot, exchange, options.gimbal)
-        return cls(camera, manager, gimbal, GripperService(autopilot) if options.gripper else None)
-
-    @property
-    def services(self) -> tuple[Service, ...]:
-        """Of those that there are."""
-        services = (self.camera, self.manager, self.gimbal, self.gripper)
-        return tuple(service for service in services if service is not None)
-
-    def command_services(self, exchange: Exchange) -> tuple[CommandService, ...]:
-        """The commands of those that are components of their own."""
-        camera, gimbal, services = self.camera, self.gimbal, []
-        if camera is not None:
-            services.append(
-                CommandService(exchange, CAMERA_COMPONENT_ID, camera.commands, camera.takes_broadcast)
-            )
-        if gimbal is not None:
-            services.append(
-                CommandService(exchange, GIMBAL_COMPONENT_ID, gimbal.commands, lambda _command: False)
-            )
-        return tuple(services)
+def _devices(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> list[Service]:
+    """The services of what the vehicle carries."""
+    devices: list[Service] = []
+    if options.camera is not None:
+        streaming = Streaming(tuple(options.video), options.switch_video)
+        devices.append(CameraComponent(autopilot, exchange, options.camera, streaming, options.captures))
+    if options.gimbal is not None:
+        devices.append(GimbalManager(autopilot, exchange, options.gimbal))
+        devices.append(GimbalComponent(autopilot, exchange, options.gimbal))
+    if options.gripper:
+        devices.append(GripperService(autopilot))
+    return devices
 
 
 def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
     """All services of the vehicle, in the order in which they are updated."""
-    devices = _Devices.of(autopilot, exchange, options)
-    camera, manager = devices.camera, devices.manager
+    devices = _devices(autopilot, exchange, options)
+    gimbals = [device.look_at for device in devices if isinstance(device, GimbalManager)]
+    look_at = gimbals[0] if gimbals else lambda point_ned_m: None
     files = options.firmware_files
     if files is None:
         files = ExtraFiles(autopilot.parameters)
     events = EventService(autopilot, exchange)
     clocks = Clocks()
-    mission = MissionExecution(autopilot, exchange, camera, manager, devices.gripper)
+    device_commands = merged(device.mission_commands for device in devices)
+    mission = MissionExecution(autopilot, exchange, device_commands, look_at)
     others: dict[int, AutopilotSource] = {
         mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
         mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: lambda autopilot: hil_state_quaternion(
@@ -141,31 +120,45 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         MissionService(autopilot, exchange, mission),
         mission,
         *((ShellService(autopilot, exchange),) if options.shell else ()),
-        *devices.services,
+        *devices,
         # The others have no `update`.
         ConnectionService(autopilot, exchange, clocks),
         ExternalPoseService(autopilot, exchange, clocks),
         AutopilotTelemetry(autopilot, state_messages),
         OffboardService(autopilot, exchange),
         ManualControlService(autopilot, exchange),
-        FlightCommands(autopilot) if manager is None else FlightCommands(autopilot, manager.look_at),
+        FlightCommands(autopilot, look_at),
         MaintenanceCommands(autopilot, options.failures),
         MetadataService(autopilot, exchange),
         RemoteIdService(autopilot, exchange),
     )
+    own = [service for service in services if service.component_id == AUTOPILOT_COMPONENT_ID]
     streams = StreamService(
         exchange,
-        merged(service.sources for service in services),
-        merged(service.replies for service in services),
+        merged(service.sources for service in own),
+        merged(service.replies for service in own),
     )
-    own = [service for service in (streams, *services) if service.component_id == AUTOPILOT_COMPONENT_ID]
-    commands = CommandService(
-        exchange,
-        AUTOPILOT_COMPONENT_ID,
-        merged(service.commands for service in own),
-        lambda command: camera is None or not camera.takes_broadcast(command),
+    requests = (
+        RequestService(exchange, each.component_id, each.replies, each.older_requests)
+        for each in devices
+        if each.component_id != AUTOPILOT_COMPONENT_ID
     )
-    return (streams, *services, commands, *devices.command_services(exchange))
+    services = (streams, *services, *requests)
+    return (*services, *_command_services(exchange, services))
+
+
+def _command_services(exchange: Exchange, services: Sequence[Service]) -> list[CommandService]:
+    """The commands of each component; those to all components are the camera's, or else the autopilot's."""
+    tables = {
+        component_id: merged(each.commands for each in services if each.component_id == component_id)
+        for component_id in {service.component_id for service in services}
+    }
+    to_camera = tables.get(CAMERA_COMPONENT_ID, {}).keys() - {mavlink.MAV_CMD_REQUEST_MESSAGE}
+
+    def owner(command: int) -> int:
+        return CAMERA_COMPONENT_ID if command in to_camera else AUTOPILOT_COMPONENT_ID
+
+    return [CommandService(exchange, component_id, table, owner) for component_id, table in tables.items()]
 
 
 class MavlinkNode:

@@ -8,15 +8,18 @@ from math import isfinite, nan
 from types import MappingProxyType
 from typing import Any, TypeVar
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.vehicle.geodesy import GeodeticPoint
-from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, device_heartbeat, mavlink
+from framerunner.wire.exchange import Exchange
 from framerunner.wire.link import Link
 
 _NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT
 _RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _EMPTY: Mapping[int, Any] = MappingProxyType({})
+_HEARTBEAT_US = 1_000_000
 Entry = TypeVar("Entry")
 
 
@@ -80,6 +83,9 @@ Handler = Callable[[Link, Message], None]
 CommandHandler = Callable[[Command], CommandResult | None]
 """Executes a command; None: it is not acknowledged."""
 
+MissionCommandHandler = Callable[[SevenParams], CommandResult]
+"""Executes a mission's command, with params 1 to 7."""
+
 Source = Callable[[], Message | None]
 """Makes a message as it is now; None: it has no content yet."""
 
@@ -98,21 +104,50 @@ class Service:
         component_id: of the component.
         handlers: by message id.
         commands: by MAV_CMD; they are acknowledged with the handler's result.
+        mission_commands: by MAV_CMD; those of a mission to a device.
         sources: by message id; messages that can be streamed and requested.
         replies: by message id; messages that can only be requested.
+        older_requests: by MAV_CMD, of requests older than REQUEST_MESSAGE: the message, and which of the
+            command's parameters is its index; 0: none.
     """
 
     component_id: int = AUTOPILOT_COMPONENT_ID
     handlers: Mapping[int, Handler] = _EMPTY
     commands: Mapping[int, CommandHandler] = _EMPTY
+    mission_commands: Mapping[int, MissionCommandHandler] = _EMPTY
     sources: Mapping[int, Source] = _EMPTY
     replies: Mapping[int, Reply] = _EMPTY
+    older_requests: Mapping[int, tuple[int, int]] = _EMPTY
 
     def update(self) -> None:
         """Send what is due; called at every update of the node."""
 
     def repeat(self) -> None:
         """Send again what is sent regularly; called ten times a second while vehicle time stands."""
+
+
+class DeviceComponent(Service):
+    """A component beside the autopilot: it sends a heartbeat once a second, with the vehicle's mode.
+
+    Attributes:
+        kind: MAV_TYPE of its heartbeat.
+    """
+
+    kind: int
+
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
+        self._autopilot = autopilot
+        self._exchange = exchange
+        self._heartbeat_due_us = 0
+
+    def update(self) -> None:
+        """Send the heartbeat, if it is due."""
+        time_us = self._exchange.time_us
+        if time_us < self._heartbeat_due_us:
+            return
+        self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
+        heartbeat = device_heartbeat(self.kind, self._autopilot.status.mode.custom_mode)
+        self._exchange.broadcast(heartbeat, self.component_id)
 
 
 def merged(tables: Iterable[Mapping[int, Entry]]) -> dict[int, Entry]:

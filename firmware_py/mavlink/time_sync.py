@@ -20,8 +20,6 @@ _MAX_DEVIATIONS = 10  # in succession, before the clock is taken to have jumped
 class TimeSync:
     """The clock of another system, seen over one link."""
 
-    __slots__ = ("_answers", "_deviations", "_offset_us", "_skew_us")
-
     def __init__(self) -> None:
         self._restart()
 

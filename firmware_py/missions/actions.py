@@ -35,8 +35,6 @@ REGIONS = frozenset({Do.NAV_ROI, Do.SET_ROI, Do.SET_ROI_LOCATION, Do.SET_ROI_NON
 class RegionOfInterest:
     """The region to look at, by yawing the whole vehicle; a gimbal looks at places too."""
 
-    __slots__ = ("_offset_rad", "_place_ned_m", "_to_target")
-
     def __init__(self) -> None:
         self.release()
 
@@ -88,8 +86,6 @@ class MissionActions:
     Attributes:
         region: where to look.
     """
-
-    __slots__ = ("_distance_m", "_events", "_last_ned_m", "_repeating", "_taken", "region")
 
     def __init__(self) -> None:
         self.region = RegionOfInterest()

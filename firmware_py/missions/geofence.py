@@ -118,18 +118,6 @@ class Geofence:
     A breach is returned as text for people, such as "outside circle of item 1"; None: no breach.
     """
 
-    __slots__ = (
-        "_braking",
-        "_height_m",
-        "_parameters",
-        "_parameters_version",
-        "_prepared",
-        "_radius_m",
-        "_shapes",
-        "_store",
-        "_texts",
-    )
-
     def __init__(self, store: MissionStore, parameters: Parameters) -> None:
         self._store = store
         self._parameters = parameters

@@ -37,8 +37,6 @@ class MissionStore:
         finished: whether its last item is done.
     """
 
-    __slots__ = ("_plans", "_reached", "current", "finished", "selections", "started", "valid")
-
     def __init__(self) -> None:
         self._plans = [Plan() for _ in PlanType]
         self._reached: deque[int] = deque(maxlen=_REACHED_KEPT)

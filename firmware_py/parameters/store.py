@@ -17,8 +17,6 @@ class Parameters:
         version: counts changes, so that a reader can detect them cheaply.
     """
 
-    __slots__ = ("_index", "_listeners", "_save_listeners", "_values", "declarations", "version")
-
     def __init__(
         self,
         values: Mapping[str, float] | None = None,

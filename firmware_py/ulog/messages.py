@@ -96,8 +96,6 @@ class Topic:
         values: packs one sample after the header.
     """
 
-    __slots__ = ("_fields", "_number", "header", "name", "values")
-
     def __init__(self, name: str, fields: str, number: int) -> None:
         self.name = name
         self._fields = [" ".join(each.split()) for each in fields.split(";") if each.strip()]

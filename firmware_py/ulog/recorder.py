@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import count
 
 from firmware_py.autopilot import Autopilot
@@ -15,8 +14,7 @@ from firmware_py.mavlink.telemetry.connection import FOLLOWED_PX4_VERSION, OWN_V
 from firmware_py.storage import LOG_SUFFIX, Path, Storage
 from firmware_py.types import WARNING, StatusText
 from firmware_py.ulog import messages
-from firmware_py.ulog.measured import Sample
-from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged
+from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged, Sample
 
 _FLUSH_US = 1_000_000
 _LOG_FOLDER: Path = ("log",)
@@ -29,15 +27,6 @@ NameLog = Callable[[int], Path]
 def name_by_time(time_us: int) -> Path:
     """A log's path where the time of day is not known, as PX4's sess001/log001.ulg."""
     return ("log", "sess001", f"log{time_us // 1_000_000:06d}.ulg")
-
-
-@dataclass(slots=True)
-class _Due:
-    """Topics of one rate and when they are due."""
-
-    period_us: int
-    topics: tuple[Logged, ...]
-    next_us: int = 0
 
 
 class UlogRecorder:
@@ -60,7 +49,7 @@ class UlogRecorder:
         self._buffer = bytearray()
         self._size = 0
         self._paused = False  # until the next flight
-        self._groups = _by_rate()
+        self._next_us = [0] * len(LOGGED)  # when each topic is due
         self._due_us = 0
         self._flush_us = 0
         self._recorded: Autopilot | None = None
@@ -113,8 +102,7 @@ class UlogRecorder:
         self._size = 0
         self._nav = ()
         self._due_us = self._flush_us = time_us
-        for group in self._groups:
-            group.next_us = time_us
+        self._next_us = [time_us] * len(LOGGED)
         self._buffer = bytearray(self._definitions(autopilot, time_us))
 
     def _unused(self, path: Path) -> Path:
@@ -170,12 +158,12 @@ class UlogRecorder:
 
     def _log_due(self, autopilot: Autopilot, time_us: int) -> None:
         sample = self._sample(autopilot, time_us)
-        for group in self._groups:
-            if time_us >= group.next_us:
-                group.next_us = max(group.next_us + group.period_us, time_us - group.period_us)
-                for each in group.topics:
-                    self._log(each, sample)
-        self._due_us = min(group.next_us for group in self._groups)
+        for index, each in enumerate(LOGGED):
+            next_us = self._next_us[index]
+            if time_us >= next_us:
+                self._next_us[index] = max(next_us + each.period_us, time_us - each.period_us)
+                self._log(each, sample)
+        self._due_us = min(self._next_us)
 
     def _log(self, logged: Logged, sample: Sample) -> None:
         values = logged.collect(sample)
@@ -232,10 +220,3 @@ class UlogRecorder:
             except FileExistsError:
                 continue
         self._storage.create(path)
-
-
-def _by_rate() -> tuple[_Due, ...]:
-    periods = sorted({each.period_us for each in LOGGED})
-    return tuple(
-        _Due(period, tuple(each for each in LOGGED if each.period_us == period)) for period in periods
-    )

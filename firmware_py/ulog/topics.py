@@ -8,19 +8,136 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import atan2, hypot, isfinite, nan
 
-from firmware_py.estimation.report import EstimatorReport
-from firmware_py.mavlink.telemetry.health import solution_flags
+from firmware_py.autopilot import Autopilot
+from firmware_py.estimation.report import EstimatorReport, Sensor
+from firmware_py.mavlink.telemetry.condition import pulses_us
+from firmware_py.mavlink.telemetry.health import accuracy_m, solution_flags
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint
 from firmware_py.status import NAVIGATION_STATES, LandedState
-from firmware_py.ulog import measured
-from firmware_py.ulog.measured import Sample, Values
 from firmware_py.ulog.messages import Topic
+from framerunner.vehicle.atmosphere import pressure_altitude_m
+from framerunner.vehicle.geodesy import GeodeticPoint
+
+Values = tuple[float, ...]
+
+_AIR_GAS_CONSTANT = 287.05  # J/(kg K), dry
+_KELVIN = 273.15
+# Bits of estimator_status.control_mode_flags (EKF2's control_status).
+_TILT_ALIGNED, _YAW_ALIGNED = 1 << 0, 1 << 1
+_AIDED_BY = {
+    Sensor.GPS: 1 << 2 | 1 << 44,  # position, velocity
+    Sensor.OPTICAL_FLOW: 1 << 3,
+    Sensor.MAGNETOMETER: 1 << 4,
+    Sensor.BAROMETER: 1 << 9,
+    Sensor.RANGE_FINDER: 1 << 10,
+    Sensor.EXTERNAL_POSE: 1 << 12 | 1 << 13 | 1 << 14,  # position, heading, height
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One sample of the autopilot, with values that several topics need.
+
+    Attributes:
+        autopilot: which is sampled.
+        time_us: vehicle time.
+        unix_us: the same since 1970; 0: not known.
+        place: position on Earth; None: not known.
+        report: of the estimator.
+    """
+
+    autopilot: Autopilot
+    time_us: int
+    unix_us: int
+    place: GeodeticPoint | None
+    report: EstimatorReport
+
+
+def control_mode_flags(report: EstimatorReport) -> int:
+    """What is known, and what aids the filter."""
+    flags = _TILT_ALIGNED | _YAW_ALIGNED if report.has_attitude else 0
+    return flags | sum(bits for sensor, bits in _AIDED_BY.items() if sensor in report.relied_on)
+
+
+def accuracies_and_ratios(report: EstimatorReport) -> Values:
+    """Accuracies of position and height, ratios of heading, velocity, position and height."""
+    ratios = report.ratios
+    return (
+        *accuracy_m(report),
+        ratios.heading,
+        ratios.velocity,
+        ratios.position_horizontal,
+        ratios.position_vertical,
+    )
+
+
+def gps(sample: Sample) -> Values | None:
+    """Values of vehicle_gps_position."""
+    fix = sample.report.latest.gps
+    if fix is None:
+        return None
+    north_m_s, east_m_s, down_m_s = fix.velocity_ned_m_s
+    return (
+        sample.time_us,
+        fix.time_us,
+        sample.unix_us,
+        fix.latitude_deg,
+        fix.longitude_deg,
+        fix.altitude_m,
+        fix.altitude_m,
+        fix.speed_accuracy_m_s,
+        nan,
+        fix.horizontal_accuracy_m,
+        fix.vertical_accuracy_m,
+        nan,
+        nan,
+        0,
+        0,
+        hypot(north_m_s, east_m_s),
+        north_m_s,
+        east_m_s,
+        down_m_s,
+        atan2(east_m_s, north_m_s),
+        nan,
+        *(int(fix.fix_type), 1, 1, True, fix.satellites),
+    )
+
+
+def air_data(sample: Sample) -> Values | None:
+    """Values of vehicle_air_data."""
+    pressure = sample.report.latest.barometer
+    if pressure is None:
+        return None
+    density_kg_m3 = pressure.pressure_pa / (_AIR_GAS_CONSTANT * pressure.temperature_k)
+    return (
+        sample.time_us,
+        sample.time_us,
+        pressure_altitude_m(pressure.pressure_pa),
+        pressure.pressure_pa,
+        pressure.temperature_k - _KELVIN,
+        density_kg_m3,
+    )
+
+
+def magnetometer(sample: Sample) -> Values | None:
+    """Values of vehicle_magnetometer."""
+    field = sample.report.latest.magnetometer
+    return None if field is None else (sample.time_us, field.time_us, *field.field_frd_gauss)
+
+
+def sensor_combined(sample: Sample) -> Values | None:
+    """Values of sensor_combined: the IMU as measured."""
+    imu = sample.report.latest.imu
+    if imu is None:
+        return None
+    rate, force, period_us = imu.angular_rate_frd_rad_s, imu.specific_force_frd_m_s2, imu.period_us
+    return (sample.time_us, *rate, period_us, 0, *force, period_us, 0, 0, 0, 0)
+
 
 _MOTORS = 12
 _OUTPUTS = 16
-_PWM_DISARMED_US, _PWM_LOW_US, _PWM_SPAN_US = 900.0, 1000.0, 1000.0
 _FAST_US = 20_000  # 50 Hz
 _USUAL_US = 100_000
 _SLOW_US = 500_000
@@ -72,13 +189,8 @@ def _actuator_motors(sample: Sample) -> Values:
 
 def _actuator_outputs(sample: Sample) -> Values:
     """Pulses in microseconds, as SERVO_OUTPUT_RAW."""
-    autopilot = sample.autopilot
-    speeds, full_rad_s = autopilot.output.speeds_rad_s, autopilot.airframe.motor.max_speed_rad_s
-    count = min(len(speeds), _OUTPUTS)
-    if autopilot.status.armed:
-        pulses = [_PWM_LOW_US + _PWM_SPAN_US * speed / full_rad_s for speed in speeds[:count]]
-    else:
-        pulses = [_PWM_DISARMED_US] * count
+    pulses = pulses_us(sample.autopilot)
+    count = len(pulses)
     return (sample.time_us, count, *pulses, *[0.0] * (_OUTPUTS - count))
 
 
@@ -103,7 +215,7 @@ def _local_position(sample: Sample) -> Values | None:
 
 def _local_quality(report: EstimatorReport) -> Values:
     """Height above ground, accuracies and validity."""
-    horizontal_m, vertical_m = measured.accuracies_and_ratios(report)[:2]
+    horizontal_m, vertical_m = accuracy_m(report)
     place, height, speed = report.has_position, report.has_height, report.has_velocity
     above_ground_m = report.height_above_ground_m
     return (
@@ -198,10 +310,10 @@ def _estimator_status(sample: Sample) -> Values:
     return (
         sample.time_us,
         sample.time_us,
-        measured.control_mode_flags(report) | (_ESTIMATOR_IN_AIR if flying else 0),
+        control_mode_flags(report) | (_ESTIMATOR_IN_AIR if flying else 0),
         0,
         *(0.0, 0.0, 0.0),
-        *measured.accuracies_and_ratios(report),
+        *accuracies_and_ratios(report),
         *(0.0, 0.0),
         0,
         solution_flags(sample.autopilot, report),
@@ -245,7 +357,7 @@ _LAYOUTS: tuple[tuple[str, int, Collector, str], ...] = (
     (
         "sensor_combined",
         _FAST_US,
-        measured.sensor_combined,
+        sensor_combined,
         _T + "float[3] gyro_rad; uint32_t gyro_integral_dt; int32_t accelerometer_timestamp_relative; "
         "float[3] accelerometer_m_s2; uint32_t accelerometer_integral_dt; uint8_t accelerometer_clipping; "
         "uint8_t gyro_clipping; uint8_t accel_calibration_count; uint8_t gyro_calibration_count",
@@ -282,7 +394,7 @@ _LAYOUTS: tuple[tuple[str, int, Collector, str], ...] = (
     (
         "vehicle_gps_position",
         _USUAL_US,
-        measured.gps,
+        gps,
         _TT + "uint64_t time_utc_usec; double latitude_deg; double longitude_deg; double altitude_msl_m; "
         "double altitude_ellipsoid_m; float s_variance_m_s; float c_variance_rad; float eph; float epv; "
         "float hdop; float vdop; int32_t noise_per_ms; int32_t jamming_indicator; float vel_m_s; "
@@ -292,10 +404,10 @@ _LAYOUTS: tuple[tuple[str, int, Collector, str], ...] = (
     (
         "vehicle_air_data",
         _USUAL_US,
-        measured.air_data,
+        air_data,
         _TT + "float baro_alt_meter; float baro_pressure_pa; float ambient_temperature; float rho",
     ),
-    ("vehicle_magnetometer", _USUAL_US, measured.magnetometer, _TT + "float[3] magnetometer_ga"),
+    ("vehicle_magnetometer", _USUAL_US, magnetometer, _TT + "float[3] magnetometer_ga"),
     (
         "vehicle_land_detected",
         _USUAL_US,

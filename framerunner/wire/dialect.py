@@ -50,8 +50,26 @@ def ground_station_heartbeat() -> Message:
 
 def component_heartbeat(kind: int) -> Message:
     """The HEARTBEAT of a component of some MAV_TYPE that is no autopilot."""
+    return _heartbeat(kind)
+
+
+def device_heartbeat(kind: int, custom_mode: int) -> Message:
+    """The HEARTBEAT of a vehicle's camera or gimbal, with the vehicle's mode.
+
+    MAVSDK's follow-me takes any component's heartbeat for the vehicle's, and would end with one without
+    a mode.
+
+    Args:
+        kind: MAV_TYPE.
+        custom_mode: of the vehicle's own heartbeat.
+    """
+    return _heartbeat(kind, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, custom_mode)
+
+
+def _heartbeat(kind: int, base_mode: int = 0, custom_mode: int = 0) -> Message:
+    state = mavlink.MAV_STATE_ACTIVE
     return mavlink.MAVLink_heartbeat_message(
-        kind, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, _MAVLINK_VERSION
+        kind, mavlink.MAV_AUTOPILOT_INVALID, base_mode, custom_mode, state, _MAVLINK_VERSION
     )
 
 

@@ -27,7 +27,6 @@ def estimator_settings(spec: SuiteSpec) -> EstimatorSettings:
         accel.noise_density_m_s2_sqrt_hz,
         _walk(gyro.bias_drift_rad_s, gyro.bias_drift_time_s),
         _walk(accel.bias_drift_m_s2, accel.bias_drift_time_s),
-        sqrt(gyro.turn_on_bias_rad_s**2 + gyro.bias_drift_rad_s**2),
         sqrt(accel.turn_on_bias_m_s2**2 + accel.bias_drift_m_s2**2),
         gyro.scale_error,
         accel.scale_error,

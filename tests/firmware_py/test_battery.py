@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_py.battery import BatteryMonitor, battery_settings, warning
+from firmware_py.battery import BatteryMonitor, BatterySettings, warning
 from firmware_py.parameters import Parameters
 from framerunner.vehicle.airframe import load_airframe
 
@@ -10,7 +10,7 @@ X500 = load_airframe("x500")
 
 
 def settings(**parameters):
-    return battery_settings(X500, Parameters(parameters, defaults=X500.parameters))
+    return BatterySettings(X500, Parameters(parameters, defaults=X500.parameters))
 
 
 def test_the_airframes_values_apply_where_parameters_give_none():

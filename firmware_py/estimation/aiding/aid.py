@@ -36,25 +36,6 @@ class Aid:
         nis: normalised innovation squared of the last one that was fused.
     """
 
-    __slots__ = (
-        "_before",
-        "_gate",
-        "_last",
-        "_last_reset_us",
-        "_last_us",
-        "_max_resets",
-        "_noise",
-        "_open",
-        "_reset_us",
-        "_resets",
-        "arrived_us",
-        "fused_us",
-        "name",
-        "nis",
-        "numbers",
-        "ratio",
-    )
-
     def __init__(
         self, name: str, numbers: int, gate: float, reset_us: int, max_resets: int | None = None
     ) -> None:

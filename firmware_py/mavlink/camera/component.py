@@ -1,52 +1,106 @@
 """The camera, a component beside the autopilot (https://mavlink.io/en/services/camera.html).
 
 It takes pictures, records video and sends the addresses of its streams. It refuses to zoom, focus or track.
+
+A stream in RTP is sent unrequested, so it can be stopped. Of a stream over HTTP each viewer has its own,
+which it begins and ends itself: no command takes the video from the others, such as an app in flight.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from math import isfinite, isnan
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera import messages
-from firmware_py.mavlink.camera.captures import MAX_COUNT, Captures
+from firmware_py.mavlink.camera.captures import MAX_COUNT, Captures, Recordings
 from firmware_py.mavlink.camera.model import (
     CAMERA_COMPONENT_ID,
     CameraModel,
     CaptureSink,
     PictureSpace,
+    VideoEncoding,
+    VideoStream,
 )
-from firmware_py.mavlink.camera.recordings import Recordings
-from firmware_py.mavlink.camera.streaming import Streaming
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Command, DeviceComponent, MissionCommandHandler
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.exchange import Exchange
-
-_HEARTBEAT_US = 1_000_000
-
-_REQUESTS: dict[int, tuple[int, int]] = {
-    # Older than REQUEST_MESSAGE: the message, and which of their parameters is its index (0: none).
-    mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: (mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, 0),
-    mavlink.MAV_CMD_REQUEST_CAMERA_SETTINGS: (mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS, 0),
-    mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: (mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION, 1),
-    mavlink.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: (mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS, 0),
-    mavlink.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE: (mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, 1),
-    mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: (mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION, 1),
-    mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: (mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS, 1),
-}
+from framerunner.wire.link import Link
 
 
-class CameraComponent(Service):
+class Streaming:
+    """The streams of a camera, numbered from 1, the preferred one first.
+
+    Args:
+        streams: of the camera.
+        switch: called with whether streams in RTP are to be sent.
+    """
+
+    def __init__(self, streams: tuple[VideoStream, ...], switch: Callable[[bool], None] | None) -> None:
+        self._streams = streams
+        self._switch = switch
+        self._sends = True
+
+    def __bool__(self) -> bool:
+        return bool(self._streams)
+
+    def start(self, params: SevenParams) -> CommandResult:
+        """VIDEO_START_STREAMING: param 1 is the stream, 0: all."""
+        return self._turn(params[0], on=True)
+
+    def stop(self, params: SevenParams) -> CommandResult:
+        """VIDEO_STOP_STREAMING: param 1 is the stream, 0: all that can be stopped; over HTTP: DENIED."""
+        return self._turn(params[0], on=False)
+
+    def information(self, _link: Link, index: int) -> list[Message]:
+        """VIDEO_STREAM_INFORMATION of a stream, or of all, 0."""
+        return [
+            messages.stream_information(stream, n, len(self._streams), running=self._is_running(stream))
+            for n, stream in self._chosen(index)
+        ]
+
+    def status(self, link: Link, index: int) -> list[Message]:
+        """VIDEO_STREAM_STATUS of a stream, or of all, 0.
+
+        MAVSDK 4.1 requests only the status, yet shows the last information that it receives: so that is sent
+        too, the preferred stream's last.
+        """
+        status = [
+            messages.stream_status(stream, n, running=self._is_running(stream))
+            for n, stream in self._chosen(index)
+        ]
+        return [*reversed(self.information(link, index)), *status]
+
+    def _chosen(self, index: int) -> list[tuple[int, VideoStream]]:
+        return [(n, stream) for n, stream in enumerate(self._streams, start=1) if index in (0, n)]
+
+    def _turn(self, number: float, *, on: bool) -> CommandResult:
+        streams = self._streams
+        if not streams or not (isnan(number) or 0 <= number <= len(streams)):
+            return CommandResult.DENIED
+        one = None if isnan(number) or number < 1 else streams[int(number) - 1]
+        if one is not None and one.encoding is VideoEncoding.MJPEG_HTTP:
+            return CommandResult.ACCEPTED if on else CommandResult.DENIED
+        if self._switch is not None and on is not self._sends:
+            self._sends = on
+            self._switch(on)
+        return CommandResult.ACCEPTED
+
+    def _is_running(self, stream: VideoStream) -> bool:
+        return self._sends or stream.encoding is VideoEncoding.MJPEG_HTTP
+
+
+class CameraComponent(DeviceComponent):
     """Answers for the camera, sends its heartbeat and takes its pictures.
 
     Without a sink pictures are only counted, and nothing is recorded.
     """
 
     component_id = CAMERA_COMPONENT_ID
+    kind = mavlink.MAV_TYPE_CAMERA
 
     def __init__(
         self,
@@ -56,17 +110,15 @@ class CameraComponent(Service):
         streaming: Streaming,
         sink: CaptureSink | None = None,
     ) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._camera = camera
         self._streaming = streaming
         self._sink = sink
         self._mode = int(mavlink.CAMERA_MODE_IMAGE)
         self._recordings = recordings = Recordings(exchange, sink, self._report_capture)
         self._captures = Captures(autopilot, exchange, camera, sink)
-        self._heartbeat_due_us = 0
         self._last_single: tuple[int, int, float] | None = None
-        self._work: dict[int, Callable[[SevenParams], CommandResult]] = {
+        self.mission_commands: Mapping[int, MissionCommandHandler] = {
             mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self._digicam,
             mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST: self._trigger_distance,
             mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: self._trigger_interval,
@@ -83,30 +135,36 @@ class CameraComponent(Service):
             mavlink.MAV_CMD_SET_CAMERA_FOCUS: _unsupported,
         }
         self.commands = {
-            **{number: partial(_run, work) for number, work in self._work.items()},
-            **{number: partial(self._answer, *request) for number, request in _REQUESTS.items()},
+            **{number: partial(_run, work) for number, work in self.mission_commands.items()},
             mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_once,
-            mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+        }
+        self.older_requests = {
+            mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: (mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, 0),
+            mavlink.MAV_CMD_REQUEST_CAMERA_SETTINGS: (mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS, 0),
+            mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: (mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION, 1),
+            mavlink.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: (mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS, 0),
+            mavlink.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE: (mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, 1),
+            mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: (
+                mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION,
+                1,
+            ),
+            mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: (mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS, 1),
+        }
+        self.replies = {
+            mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION: lambda _, __: [self._information()],
+            mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS: lambda _, __: [self._settings()],
+            mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION: self._storage_information,
+            mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS: lambda _, __: [self._capture_status()],
+            mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED: self._image_captured,
+            mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION: streaming.information,
+            mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS: streaming.status,
         }
 
     def update(self) -> None:
         """Send the heartbeat and take pictures that are due."""
-        time_us = self._exchange.time_us
-        if time_us >= self._heartbeat_due_us:
-            self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
-            beat = messages.heartbeat(self._autopilot.status.mode)
-            self._exchange.broadcast(beat, CAMERA_COMPONENT_ID)
+        super().update()
         self._captures.update()
         self._recordings.update()
-
-    def run(self, command: int, params: SevenParams) -> CommandResult:
-        """Execute a MAV_CMD to the camera, such as a mission's; UNSUPPORTED if it is not the camera's."""
-        work = self._work.get(command)
-        return CommandResult.UNSUPPORTED if work is None else work(params)
-
-    def takes_broadcast(self, command: int) -> bool:
-        """Whether a command to all components is the camera's, and not the autopilot's."""
-        return command in self.commands and command != mavlink.MAV_CMD_REQUEST_MESSAGE
 
     def _start_once(self, command: Command) -> CommandResult:
         """IMAGE_START_CAPTURE; a repeated command for one picture, by its number, takes no other."""
@@ -118,42 +176,23 @@ class CameraComponent(Service):
             self._last_single = (*command.sender, number)
         return result
 
-    def _request_message(self, command: Command) -> CommandResult:
-        message_id = command.params[0]
-        return self._send(command, int(message_id) if isfinite(message_id) else -1, command.params[1])
+    def _information(self) -> Message:
+        return messages.information(
+            self._camera,
+            streams=bool(self._streaming),
+            records=self._recordings.can_record,
+            time_us=self._exchange.time_us,
+        )
 
-    def _answer(self, message_id: int, index_param: int, command: Command) -> CommandResult:
-        """Answer a request that is older than REQUEST_MESSAGE."""
-        return self._send(command, message_id, command.all_params[index_param - 1] if index_param else 0.0)
+    def _storage_information(self, _link: Link, index: int) -> list[Message]:
+        return [messages.storage_information(self._space(), self._exchange.time_us)] if index <= 1 else []
 
-    def _send(self, command: Command, message_id: int, argument: float) -> CommandResult:
-        index = int(argument) if isfinite(argument) and 0 <= argument < 1 << 31 else 0
-        answers = self._requested(message_id, index)
-        for answer in answers:
-            self._exchange.send(command.link, answer, CAMERA_COMPONENT_ID)
-        return CommandResult.ACCEPTED if answers else CommandResult.DENIED
-
-    def _requested(self, message_id: int, index: int) -> list[Message]:
-        time_us = self._exchange.time_us
-        match message_id:
-            case mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION:
-                message = messages.information(
-                    self._camera,
-                    streams=bool(self._streaming),
-                    records=self._recordings.can_record,
-                    time_us=time_us,
-                )
-            case mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS:
-                message = messages.settings(self._mode, time_us)
-            case mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION if index <= 1:
-                message = messages.storage_information(self._space(), time_us)
-            case mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS:
-                message = self._capture_status()
-            case mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED:
-                message = self._captures.sent(index)
-            case _:
-                return self._streaming.messages(message_id, index)
+    def _image_captured(self, _link: Link, index: int) -> list[Message]:
+        message = self._captures.sent(index)
         return [] if message is None else [message]
+
+    def _settings(self) -> Message:
+        return messages.settings(self._mode, self._exchange.time_us)
 
     def _space(self) -> PictureSpace | None:
         return None if self._sink is None else self._sink.space()
@@ -195,7 +234,7 @@ class CameraComponent(Service):
         if not video and params[1] != mavlink.CAMERA_MODE_IMAGE:
             return CommandResult.DENIED
         self._mode = int(params[1])
-        self._exchange.broadcast(messages.settings(self._mode, self._exchange.time_us), CAMERA_COMPONENT_ID)
+        self._exchange.broadcast(self._settings(), CAMERA_COMPONENT_ID)
         return CommandResult.ACCEPTED
 
     def _reset(self, params: SevenParams) -> CommandResult:
@@ -220,7 +259,7 @@ class CameraComponent(Service):
         return CommandResult.ACCEPTED
 
 
-def _run(work: Callable[[SevenParams], CommandResult], command: Command) -> CommandResult:
+def _run(work: MissionCommandHandler, command: Command) -> CommandResult:
     return work(command.all_params)
 
 

@@ -7,7 +7,6 @@ from math import nan
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera.model import CameraModel, PictureSpace, VideoEncoding, VideoStream
 from firmware_py.mavlink.telemetry.connection import OWN_VERSION
-from firmware_py.status import FlightMode
 from framerunner.wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres
 from framerunner.wire.exchange import Exchange
 
@@ -26,22 +25,6 @@ _TYPES = {
 }
 _INTERVAL_SET = 2  # image_status of CAMERA_CAPTURE_STATUS
 _URI_BYTES, _NAME_BYTES, _LABEL_BYTES, _FILE_BYTES = 160, 32, 32, 205
-
-
-def heartbeat(mode: FlightMode) -> Message:
-    """HEARTBEAT of a camera, with the vehicle's mode.
-
-    MAVSDK's follow-me takes any component's heartbeat for the vehicle's, and would end with one without a
-    mode.
-    """
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_CAMERA,
-        mavlink.MAV_AUTOPILOT_INVALID,
-        mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
-        mode.custom_mode,
-        mavlink.MAV_STATE_ACTIVE,
-        3,
-    )
 
 
 def information(camera: CameraModel, *, streams: bool, records: bool, time_us: int) -> Message:

@@ -7,9 +7,6 @@ from enum import Enum
 from math import tan
 from typing import Protocol
 
-from firmware_py.missions.flight import SevenParams
-from firmware_py.status import CommandResult
-
 CAMERA_COMPONENT_ID = 100  # MAV_COMP_ID_CAMERA
 _SENSOR_WIDTH_MM = 6.17  # nominal, of a 1/2.3 inch sensor: a pinhole has an angle of view but no size
 
@@ -114,10 +111,3 @@ class CaptureSink(Protocol):
 
     def space(self) -> PictureSpace | None:
         """The storage; None if pictures are not kept."""
-
-
-class CameraControl(Protocol):
-    """The camera, as a mission uses it."""
-
-    def run(self, command: int, params: SevenParams) -> CommandResult:
-        """Execute a MAV_CMD; UNSUPPORTED if it is not the camera's."""

@@ -24,9 +24,7 @@ _MIN_ORBIT_M = 1.0
 class FlightCommands(Service):
     """Passes these commands to the autopilot; regions of interest to `look_at` too."""
 
-    def __init__(
-        self, autopilot: Autopilot, look_at: Callable[[Vec3 | None], None] = lambda point_ned_m: None
-    ) -> None:
+    def __init__(self, autopilot: Autopilot, look_at: Callable[[Vec3 | None], None]) -> None:
         self._autopilot = autopilot
         self._gimbal_look_at = look_at
         self.commands = {

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import isnan
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Service
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import mavlink
@@ -27,9 +27,10 @@ class GripperService(Service):
     def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
         self.is_closed = False
-        self.commands = {mavlink.MAV_CMD_DO_GRIPPER: self._command}
+        self.commands = {mavlink.MAV_CMD_DO_GRIPPER: lambda command: self._run(command.all_params)}
+        self.mission_commands = {mavlink.MAV_CMD_DO_GRIPPER: self._run}
 
-    def run(self, params: SevenParams) -> CommandResult:
+    def _run(self, params: SevenParams) -> CommandResult:
         """Close or open it, and tell so; DENIED for another gripper or action."""
         number, action = params[:2]
         actions = (mavlink.GRIPPER_ACTION_RELEASE, mavlink.GRIPPER_ACTION_GRAB)
@@ -40,6 +41,3 @@ class GripperService(Service):
             self.is_closed = closes
             self._autopilot.say(mavlink.MAV_SEVERITY_INFO, f"Gripper {'closed' if closes else 'opened'}")
         return CommandResult.ACCEPTED
-
-    def _command(self, command: Command) -> CommandResult:
-        return self.run(command.all_params)

@@ -27,7 +27,7 @@ class CommandService(Service):
     Args:
         component_id: of the component.
         table: of all its services, by MAV_CMD.
-        takes_broadcast: whether this component answers a command to all components.
+        owner: the component that answers a command to all components.
     """
 
     def __init__(
@@ -35,12 +35,12 @@ class CommandService(Service):
         exchange: Exchange,
         component_id: int,
         table: Mapping[int, CommandHandler],
-        takes_broadcast: Callable[[int], bool],
+        owner: Callable[[int], int],
     ) -> None:
         self._exchange = exchange
         self.component_id = component_id
         self._table = table
-        self._takes_broadcast = takes_broadcast
+        self._owner = owner
         handlers: dict[int, Handler] = {
             mavlink.MAVLINK_MSG_ID_COMMAND_LONG: partial(self._receive, Command.from_long),
             mavlink.MAVLINK_MSG_ID_COMMAND_INT: partial(self._receive, Command.from_int),
@@ -55,7 +55,7 @@ class CommandService(Service):
         or_everyone = number in _TO_EVERYONE and number in self._table
         if not self._exchange.is_for_us(message, or_everyone=or_everyone, component_id=self.component_id):
             return
-        if message.target_component != BROADCAST or self._takes_broadcast(number):
+        if message.target_component != BROADCAST or self._owner(number) == self.component_id:
             self._run(number, read(link, message))
 
     def _receive_set_mode(self, link: Link, message: Message) -> None:

@@ -5,18 +5,16 @@ It reports its attitude and describes itself. It takes orders of its manager onl
 
 from __future__ import annotations
 
-from math import cos, isfinite, sin
+from math import cos, sin
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.gimbal.model import GIMBAL_COMPONENT_ID, GimbalDevice
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import DeviceComponent
 from firmware_py.mavlink.telemetry.connection import OWN_VERSION
-from firmware_py.status import CommandResult
 from framerunner.geometry.rotations import quaternion_from_euler, yaw_of
 from framerunner.wire.dialect import BROADCAST, Message, boot_ms, mavlink
 from framerunner.wire.exchange import Exchange
 
-_HEARTBEAT_US = 1_000_000
 _ATTITUDE_US = 100_000
 _LEVEL = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
 _IN_VEHICLE_FRAME = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
@@ -36,19 +34,21 @@ def device_flags(gimbal: GimbalDevice) -> int:
     return int(_LEVEL | (mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK if gimbal.yaw_locked else 0))
 
 
-class GimbalComponent(Service):
+class GimbalComponent(DeviceComponent):
     """Answers for the gimbal device, sends its heartbeat and, at 10 Hz, its attitude."""
 
     component_id = GIMBAL_COMPONENT_ID
+    kind = mavlink.MAV_TYPE_GIMBAL
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange, gimbal: GimbalDevice) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._gimbal = gimbal
-        self._heartbeat_due_us = 0
         self._attitude_due_us = 0
         self._sent: Message | None = None  # the last attitude
-        self.commands = {mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message}
+        self.replies = {
+            mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION: lambda _, __: [self._information()],
+            mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: lambda _, __: [self._attitude()],
+        }
 
     def update(self) -> None:
         """Send what is due."""
@@ -57,37 +57,12 @@ class GimbalComponent(Service):
             self._attitude_due_us = time_us - time_us % _ATTITUDE_US + _ATTITUDE_US
             self._sent = self._attitude()
             self._exchange.broadcast(self._sent, GIMBAL_COMPONENT_ID)
-        if time_us >= self._heartbeat_due_us:
-            self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
-            self._exchange.broadcast(self._heartbeat(), GIMBAL_COMPONENT_ID)
+        super().update()
 
     def repeat(self) -> None:
         """Send the last attitude again."""
         if self._sent is not None:
             self._exchange.broadcast(self._sent, GIMBAL_COMPONENT_ID)
-
-    def _request_message(self, command: Command) -> CommandResult:
-        number = command.params[0]
-        match int(number) if isfinite(number) else -1:
-            case mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION:
-                message = self._information()
-            case mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS:
-                message = self._attitude()
-            case _:
-                return CommandResult.DENIED
-        self._exchange.send(command.link, message, GIMBAL_COMPONENT_ID)
-        return CommandResult.ACCEPTED
-
-    def _heartbeat(self) -> Message:
-        """HEARTBEAT of a gimbal, with the vehicle's mode for MAVSDK's follow-me, as the camera's."""
-        return mavlink.MAVLink_heartbeat_message(
-            mavlink.MAV_TYPE_GIMBAL,
-            mavlink.MAV_AUTOPILOT_INVALID,
-            mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
-            self._autopilot.status.mode.custom_mode,
-            mavlink.MAV_STATE_ACTIVE,
-            3,
-        )
 
     def _attitude(self) -> Message:
         """GIMBAL_DEVICE_ATTITUDE_STATUS: yaw to the vehicle's heading, which `delta_yaw` gives, to north."""

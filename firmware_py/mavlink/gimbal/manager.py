@@ -50,6 +50,13 @@ class GimbalManager(Service):
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
         }
+        own = (exchange.system_id, AUTOPILOT_COMPONENT_ID)
+        self.mission_commands = {
+            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._turn,
+            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: lambda params: self._set_control(own, params),
+            mavlink.MAV_CMD_DO_MOUNT_CONFIGURE: lambda _params: CommandResult.ACCEPTED,
+            mavlink.MAV_CMD_DO_MOUNT_CONTROL: self._mount_control,
+        }
         self.handlers = {
             mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_ATTITUDE: self._set_attitude,
             mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW: self._set_pitch_yaw,
@@ -72,21 +79,6 @@ class GimbalManager(Service):
             self._gimbal.turn(GimbalTarget(0.0, 0.0))
         self._region_ned_m = point_ned_m
 
-    def run(self, command: int, params: SevenParams) -> CommandResult:
-        """Execute a mission's MAV_CMD; UNSUPPORTED if it is not the gimbal's."""
-        own = (self._exchange.system_id, AUTOPILOT_COMPONENT_ID)
-        match command:
-            case mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
-                return self._set_control(own, params)
-            case mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:
-                return self._turn(params)
-            case mavlink.MAV_CMD_DO_MOUNT_CONFIGURE:
-                return CommandResult.ACCEPTED
-            case mavlink.MAV_CMD_DO_MOUNT_CONTROL:
-                pitch_deg, _, yaw_deg = params[:3]
-                return self._turn((pitch_deg, yaw_deg, nan, nan, 0.0, 0.0, 0.0))
-        return CommandResult.UNSUPPORTED
-
     def _pitch_yaw(self, command: Command) -> CommandResult:
         if not self._is_in_control(command.sender):
             self._refuse(command.sender)
@@ -105,6 +97,10 @@ class GimbalManager(Service):
             radians(pitch_rate_deg_s),
             radians(yaw_rate_deg_s),
         )
+
+    def _mount_control(self, params: SevenParams) -> CommandResult:
+        pitch_deg, _, yaw_deg = params[:3]
+        return self._turn((pitch_deg, yaw_deg, nan, nan, 0.0, 0.0, 0.0))
 
     def _configure(self, command: Command) -> CommandResult:
         return self._set_control(command.sender, command.all_params)

@@ -9,7 +9,7 @@ stations expect them of a health report.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntFlag
 from struct import pack
@@ -115,40 +115,31 @@ _PART_LABELS: dict[Part, str] = {
 
 def enums() -> dict[str, object]:
     """The enumerations in libevents' format."""
+    parts = {
+        int(part): (part.name, _PART_LABELS.get(part, str(part.name).replace("_", " ").capitalize()))
+        for part in Part
+    }
+    groups = {
+        1 << number: (_GROUP_NAMES.get(mode, mode.name), mode.name.capitalize())
+        for mode, number in MODE_GROUPS.items()
+    }
+    modes = {number: (mode.name, mode.name.capitalize()) for mode, number in MODE_GROUPS.items()}
     return {
-        "flight_mode_t": {
-            "type": "uint8_t",
-            "description": "Flight mode",
-            "entries": {
-                str(number): {"name": mode.name.lower(), "description": mode.name.capitalize()}
-                for mode, number in MODE_GROUPS.items()
-            },
-        },
-        "navigation_mode_group_t": {
-            "type": "uint32_t",
-            "description": "Modes that share their checks before arming",
-            "is_bitfield": True,
-            "entries": {
-                str(1 << number): {
-                    "name": _GROUP_NAMES.get(mode, mode.name.lower()),
-                    "description": mode.name.capitalize(),
-                }
-                for mode, number in MODE_GROUPS.items()
-            },
-        },
-        "health_component_t": {
-            "type": "uint32_t",
-            "description": "Parts of the vehicle",
-            "is_bitfield": True,
-            "entries": {
-                str(int(part)): {
-                    "name": str(part.name).lower(),
-                    "description": _PART_LABELS.get(
-                        part, str(part.name).replace("_", " ").lower().capitalize()
-                    ),
-                }
-                for part in Part
-            },
+        "flight_mode_t": _enum("uint8_t", "Flight mode", modes),
+        "navigation_mode_group_t": _enum("uint32_t", "Modes that share their checks before arming", groups)
+        | {"is_bitfield": True},
+        "health_component_t": _enum("uint32_t", "Parts of the vehicle", parts) | {"is_bitfield": True},
+    }
+
+
+def _enum(kind: str, description: str, entries: Mapping[int, tuple[str | None, str]]) -> dict[str, object]:
+    """An enumeration from the name and the description of each number."""
+    return {
+        "type": kind,
+        "description": description,
+        "entries": {
+            str(number): {"name": str(name).lower(), "description": words}
+            for number, (name, words) in entries.items()
         },
     }
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from math import isfinite
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.camera.model import CameraControl
-from firmware_py.mavlink.commands.gripper import GripperService
-from firmware_py.mavlink.gimbal.manager import GimbalManager
 from firmware_py.mavlink.missions.messages import mission_current
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Command, MissionCommandHandler, Service
 from firmware_py.missions.actions import REGIONS
-from firmware_py.missions.checks import mission_faults
-from firmware_py.missions.flight import IssuedCommand, View
-from firmware_py.missions.geofence import Geofence
-from firmware_py.status import CommandResult, FlightMode, LandedState
-from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection
+from firmware_py.missions.flight import IssuedCommand
+from firmware_py.status import CommandResult, FlightMode
+from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.geodesy import GeodeticPoint
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.exchange import Exchange
 
@@ -34,25 +31,25 @@ _GIMBALS = frozenset(  # every mission of MAVSDK contains them; without a gimbal
 
 
 class MissionExecution(Service):
-    """Checks missions when they change, starts them, reports their progress and passes on their commands."""
+    """Checks missions when they change, starts them, reports their progress and passes on their commands.
+
+    Args:
+        device_commands: of what the vehicle carries, by MAV_CMD.
+        look_at: points a gimbal, if there is one, at a region of interest.
+    """
 
     def __init__(
         self,
         autopilot: Autopilot,
         exchange: Exchange,
-        camera: CameraControl | None,
-        gimbal: GimbalManager | None = None,
-        gripper: GripperService | None = None,
+        device_commands: Mapping[int, MissionCommandHandler],
+        look_at: Callable[[Vec3 | None], None],
     ) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
-        self._camera = camera
-        self._gimbal = gimbal
-        self._gripper = gripper
-        self._fence = Geofence(autopilot.missions, autopilot.parameters)
-        self._view = View()
-        self._origin: GeodeticPoint | None = None
-        self._checked: tuple[int, int, bool] = (0, 0, False)
+        self._device_commands = device_commands
+        self._look_at = look_at
+        self._version = 0  # of the mission
         self._current_sent = 0
         self._reached: int | None = None
         self._repeats_left = 0
@@ -64,24 +61,11 @@ class MissionExecution(Service):
         self.sources = {mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current}
 
     def check(self) -> None:
-        """Check whether the mission can be flown, if the mission, the fence or home has changed."""
-        autopilot = self._autopilot
-        store, home_known = autopilot.missions, autopilot.status.home is not None
-        state = (store.mission.version, store.fence.version, home_known)
-        before = self._checked
-        if state == before:
-            return
-        self._checked = state
-        self._update_view(autopilot)
-        if state[1:] != before[1:]:
-            self._fence.breach_at(self._view.position_ned_m, self._view)
-        store.valid, texts = mission_faults(
-            store.mission.items, self._view, autopilot.parameters, self._fence
-        )
-        for text in (*self._fence.take_texts(), *texts):
-            autopilot.say(text.severity, text.text)
-        if state[0] != before[0]:
-            self._reached = None
+        """Check a changed mission, and forget what was reached of the one before."""
+        self._autopilot.check_mission()
+        version = self._autopilot.missions.mission.version
+        if version != self._version:
+            self._version, self._reached = version, None
 
     def update(self) -> None:
         """Broadcast a new current item, and reached ones eleven times; pass on the mission's commands."""
@@ -106,15 +90,6 @@ class MissionExecution(Service):
     def _broadcast_reached(self, seq: int) -> None:
         self._repeat_due_us = self._exchange.time_us + _REPEAT_US
         self._exchange.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
-
-    def _update_view(self, autopilot: Autopilot) -> None:
-        view, status = self._view, autopilot.status
-        if status.origin is not self._origin:
-            self._origin = status.origin
-            view.projection = None if status.origin is None else LocalProjection(status.origin)
-        view.position_ned_m = autopilot.state.position_ned_m
-        view.landed = status.landed_state is LandedState.ON_GROUND
-        view.home_ned_m = None if status.home is None else status.home_ned_m
 
     def _mission_current(self) -> Message:
         """MISSION_CURRENT, with the ids of all three plans."""
@@ -182,17 +157,14 @@ class MissionExecution(Service):
         return self._command_device(issued)
 
     def _command_device(self, issued: IssuedCommand) -> CommandResult:
-        """Pass a command on to gimbal, gripper or camera."""
-        command, gimbal = issued.command, self._gimbal
-        if command in REGIONS:
-            if gimbal is not None:
-                gimbal.look_at(issued.place_ned_m)
+        """Pass a command on to the device that has it."""
+        if issued.command in REGIONS:
+            self._look_at(issued.place_ned_m)
             return CommandResult.ACCEPTED
-        if command in _GIMBALS:
-            return CommandResult.ACCEPTED if gimbal is None else gimbal.run(command, issued.params)
-        if command == mavlink.MAV_CMD_DO_GRIPPER and self._gripper is not None:
-            return self._gripper.run(issued.params)
-        return CommandResult.UNSUPPORTED if self._camera is None else self._camera.run(command, issued.params)
+        work = self._device_commands.get(issued.command)
+        if work is None:
+            return CommandResult.ACCEPTED if issued.command in _GIMBALS else CommandResult.UNSUPPORTED
+        return work(issued.params)
 
 
 def _mission_state(autopilot: Autopilot) -> int:

@@ -12,7 +12,7 @@ from framerunner.wire.dialect import Message, boot_ms, mavlink, whole
 
 _UNKNOWN_16 = 0xFFFF
 _TEMPERATURE_UNKNOWN = 0x7FFF
-_PWM_DISARMED_US, _PWM_LOW_US, _PWM_SPAN_US = 900, 1000, 1000
+_PWM_DISARMED_US, _PWM_LOW_US, _PWM_SPAN_US = 900.0, 1000.0, 1000.0
 _SERVOS = 16
 _OUTPUTS = 32
 _BATCH = 4  # motors in one ESC message
@@ -66,8 +66,8 @@ def flight_information(autopilot: Autopilot) -> Message:
 
 
 def servo_output_raw(autopilot: Autopilot) -> Message:
-    """SERVO_OUTPUT_RAW: motor speeds as pulses, 900 µs disarmed, 1000 to 2000 µs from 0 to full speed."""
-    pulses = _pulses(autopilot)
+    """SERVO_OUTPUT_RAW: motor speeds as pulses."""
+    pulses = _whole_pulses_us(autopilot)
     return mavlink.MAVLink_servo_output_raw_message(
         autopilot.state.time_us & 0xFFFFFFFF, 0, *pulses, *[0] * (_SERVOS - len(pulses))
     )
@@ -75,7 +75,7 @@ def servo_output_raw(autopilot: Autopilot) -> Message:
 
 def actuator_output_status(autopilot: Autopilot) -> Message:
     """ACTUATOR_OUTPUT_STATUS: the same pulses."""
-    pulses = [float(pulse) for pulse in _pulses(autopilot)]
+    pulses = [float(pulse) for pulse in _whole_pulses_us(autopilot)]
     return mavlink.MAVLink_actuator_output_status_message(
         autopilot.state.time_us, len(pulses), pulses + [0.0] * (_OUTPUTS - len(pulses))
     )
@@ -117,12 +117,17 @@ def _speeds(autopilot: Autopilot) -> MotorSpeeds:
     return speeds if autopilot.status.armed else (0.0,) * len(speeds)
 
 
-def _pulses(autopilot: Autopilot) -> list[int]:
+def pulses_us(autopilot: Autopilot) -> list[float]:
+    """Motor speeds as pulses, 900 µs disarmed, 1000 to 2000 µs from 0 to full speed."""
     speeds_rad_s = autopilot.output.speeds_rad_s[:_SERVOS]
     if not autopilot.status.armed:
         return [_PWM_DISARMED_US] * len(speeds_rad_s)
     scale = _PWM_SPAN_US / autopilot.airframe.motor.max_speed_rad_s
-    return [whole(_PWM_LOW_US + scale * speed, 16, signed=False) for speed in speeds_rad_s]
+    return [_PWM_LOW_US + scale * speed for speed in speeds_rad_s]
+
+
+def _whole_pulses_us(autopilot: Autopilot) -> list[int]:
+    return [whole(pulse, 16, signed=False) for pulse in pulses_us(autopilot)]
 
 
 CONDITION: dict[int, AutopilotSource] = {

@@ -22,15 +22,9 @@ _COVARIANCE_UNKNOWN = [nan] + [0.0] * 20
 _DIAGONAL = (0, 6, 11, 15, 18, 20)  # of a symmetric matrix of 6 rows, in the rows of its upper triangle
 _MILLI_G = 1000.0 / 9.80665  # of 1 m/s²
 _GLOBAL_MODES = frozenset(
-    {
-        FlightMode.TAKEOFF,
-        FlightMode.HOLD,
-        FlightMode.MISSION,
-        FlightMode.RETURN,
-        FlightMode.LAND,
-        FlightMode.FOLLOW,
-        FlightMode.ORBIT,
-    }
+    mode
+    for mode in FlightMode
+    if mode is FlightMode.ORBIT or mode.value.flags & mavlink.MAV_MODE_FLAG_AUTO_ENABLED
 )
 _NO_ATTITUDE: Quaternion = (nan, nan, nan, nan)
 _RATES_IGNORED = (

@@ -13,7 +13,7 @@ from math import isfinite, nan
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Command, CommandHandler, Reply, Service, Source
 from firmware_py.status import CommandResult
-from framerunner.wire.dialect import Message, mavlink
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from framerunner.wire.exchange import Exchange
 from framerunner.wire.framing import Packet
 from framerunner.wire.link import Link
@@ -36,6 +36,13 @@ _SILENT = """
 """
 
 
+_OLDER_REQUESTS = {
+    mavlink.MAV_CMD_GET_HOME_POSITION: (mavlink.MAVLINK_MSG_ID_HOME_POSITION, 0),
+    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: (mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION, 0),
+    mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: (mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0),
+}
+
+
 class AutopilotTelemetry(Service):
     """Offers the messages that functions make from the autopilot's state."""
 
@@ -43,28 +50,62 @@ class AutopilotTelemetry(Service):
         self.sources = {message_id: partial(make, autopilot) for message_id, make in sources.items()}
 
 
-class StreamService(Service):
-    """Sends the streams that are due on each link, and requested messages, of all services."""
+class RequestService(Service):
+    """Answers REQUEST_MESSAGE, and the older commands that request one message, for one component.
+
+    Args:
+        component_id: of the component.
+        replies: what can be requested, by message id.
+        older: by MAV_CMD: the message, and which of the command's parameters is its index (0: none).
+    """
+
+    def __init__(
+        self,
+        exchange: Exchange,
+        component_id: int,
+        replies: Mapping[int, Reply],
+        older: Mapping[int, tuple[int, int]],
+    ) -> None:
+        self._exchange = exchange
+        self.component_id = component_id
+        self._replies = replies
+        self.commands: Mapping[int, CommandHandler] = {
+            mavlink.MAV_CMD_REQUEST_MESSAGE: lambda command: self._request(command.link, *command.params[:2]),
+            **{number: partial(self._request_older, *request) for number, request in older.items()},
+        }
+
+    def _request_older(self, message_id: int, index_param: int, command: Command) -> CommandResult:
+        argument = command.all_params[index_param - 1] if index_param else nan
+        return self._request(command.link, message_id, argument)
+
+    def _request(self, link: Link, message_id: float, argument: float) -> CommandResult:
+        """Send a message on a link; any number that is no message of ours is denied."""
+        requested = _message_id(message_id)
+        messages = [] if requested is None else self._requested(link, requested, _message_id(argument) or 0)
+        for message in messages:
+            self._exchange.send(link, message, self.component_id)
+        return CommandResult.ACCEPTED if messages else CommandResult.DENIED
+
+    def _requested(self, link: Link, message_id: int, argument: int) -> list[Message]:
+        reply = self._replies.get(message_id)
+        return [] if reply is None else reply(link, argument)
+
+
+class StreamService(RequestService):
+    """Sends the streams that are due on each link, and what is requested of the autopilot."""
 
     def __init__(
         self, exchange: Exchange, sources: Mapping[int, Source], replies: Mapping[int, Reply]
     ) -> None:
-        self._exchange = exchange
+        super().__init__(exchange, AUTOPILOT_COMPONENT_ID, replies, _OLDER_REQUESTS)
         self._sources = sources
-        self._replies = replies
         self._repeats = 0
         silent = (getattr(mavlink, f"MAVLINK_MSG_ID_{name}") for name in _SILENT.split())
         self._streamable = frozenset({*sources, _LINK_NODE_STATUS, *silent})
-        older_requests = {
-            mavlink.MAV_CMD_GET_HOME_POSITION: mavlink.MAVLINK_MSG_ID_HOME_POSITION,
-            mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION,
-            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-        }
         self.commands = {
+            **self.commands,
             mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
-            mavlink.MAV_CMD_REQUEST_MESSAGE: lambda command: self._request(command.link, *command.params[:2]),
-            **{number: self._requester(message_id) for number, message_id in older_requests.items()},
         }
 
     def update(self) -> None:
@@ -107,26 +148,13 @@ class StreamService(Service):
             return source()
         return link.node_status(self._exchange.time_us) if message_id == _LINK_NODE_STATUS else None
 
-    def _request(self, link: Link, message_id: float, argument: float = nan) -> CommandResult:
-        """Send a message on a link; any number that is no message of ours is denied."""
-        requested = _message_id(message_id)
-        messages = [] if requested is None else self._requested(link, requested, _message_id(argument) or 0)
-        for message in messages:
-            self._exchange.send(link, message)
-        return CommandResult.ACCEPTED if messages else CommandResult.DENIED
-
     def _requested(self, link: Link, message_id: int, argument: int) -> list[Message]:
-        reply = self._replies.get(message_id)
-        if reply is not None:
-            return reply(link, argument)
+        if message_id in self._replies:
+            return super()._requested(link, message_id, argument)
         if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return [self._interval(link, argument)]
         message = self._message(message_id, link)
         return [] if message is None else [message]
-
-    def _requester(self, message_id: int) -> CommandHandler:
-        """The handler of a command that is older than REQUEST_MESSAGE and requests one message."""
-        return lambda command: self._request(command.link, message_id)
 
     def _get_interval(self, command: Command) -> CommandResult:
         return self._request(command.link, mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL, command.params[0])

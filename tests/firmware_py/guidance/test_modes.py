@@ -6,15 +6,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_py.commander_table import State
-from firmware_py.guidance.limits import SpeedLimits, speed_limits
+from firmware_py.guidance.limits import AccelerationLimits, SpeedLimits
 from firmware_py.guidance.modes import Guidance
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, MotorSetpoint, TrajectorySetpoint
 from firmware_py.types import VehicleState
 from framerunner.vehicle.airframe import load_airframe
 
-LIMITS = SpeedLimits(2.0, 1.5, 1.0, 2.0, 1.2, 0.7)
 AIRFRAME = load_airframe("abejorro")
+LIMITS = SpeedLimits(AIRFRAME, Parameters())
+LIMITS.horizontal_m_s, LIMITS.up_m_s, LIMITS.down_m_s, LIMITS.yaw_rate_rad_s = 2.0, 1.5, 1.0, 2.0
+LIMITS.takeoff_m_s, LIMITS.takeoff_m_s2, LIMITS.land_m_s = 1.2, inf, 0.7
+LIMITS.cruise_m_s, LIMITS.auto_up_m_s, LIMITS.auto_down_m_s = 5.0, 3.0, 1.5
+LIMITS.acceleration, LIMITS.auto_yaw_rate_rad_s = AccelerationLimits(), 1.0
+LIMITS.position_gain, LIMITS.height_gain, LIMITS.yaw_gain = 1.0, 1.0, 2.5
+LIMITS.land_slow_below_m, LIMITS.land_fast_above_m = 5.0, 10.0
 
 any_float = st.floats(allow_nan=True, allow_infinity=True)
 any_vec3 = st.tuples(any_float, any_float, any_float)
@@ -26,7 +32,7 @@ def at(north=0.0, east=0.0, down=0.0, yaw=0.0, velocity=(0.0, 0.0, 0.0)):
 
 def limited():
     guidance = Guidance(AIRFRAME, Parameters())
-    guidance._context.limits = LIMITS
+    guidance.context.limits = LIMITS
     return guidance
 
 
@@ -39,11 +45,11 @@ def offboard(**setpoint):
 
 def test_limits_are_the_smaller_of_airframe_and_parameters():
     airframe = AIRFRAME
-    limits = speed_limits(airframe, Parameters())
+    limits = SpeedLimits(airframe, Parameters())
     assert limits.horizontal_m_s == airframe.limits.speed_horizontal_m_s
     assert limits.up_m_s == airframe.limits.speed_up_m_s
     assert limits.land_m_s == 0.7
-    slow = speed_limits(airframe, Parameters({"MPC_XY_VEL_MAX": 0.5, "MPC_Z_VEL_MAX_DN": 0.3}))
+    slow = SpeedLimits(airframe, Parameters({"MPC_XY_VEL_MAX": 0.5, "MPC_Z_VEL_MAX_DN": 0.3}))
     assert slow.horizontal_m_s == 0.5
     assert slow.down_m_s == slow.land_m_s == 0.3
 
@@ -125,7 +131,7 @@ def test_hold_brakes_smoothly_and_then_keeps_the_position():
     speeds = []
     for _ in range(500):
         speeds.append(guidance.step(state).velocity_level_m_s[0])
-        state.position_ned_m = guidance._context.trajectory.reference.position_ned_m
+        state.position_ned_m = guidance.context.trajectory.reference.position_ned_m
     assert all(after < before + 1e-3 for before, after in pairwise(speeds))
     assert speeds[0] == pytest.approx(cos(0.3), rel=0.01)
     north_m, east_m, _ = guidance.mode.setpoint.position_ned_m

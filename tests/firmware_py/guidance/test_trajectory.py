@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_py.guidance.limits import AccelerationLimits, speed_limits, stopping_speed
+from firmware_py.guidance.limits import AccelerationLimits, SpeedLimits, stopping_speed
 from firmware_py.guidance.trajectory import Reference, Trajectory
 from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
@@ -14,7 +14,7 @@ from framerunner.vehicle.airframe import load_airframe
 
 PERIOD_S = 0.004
 X500 = load_airframe("x500")
-LIMITS = speed_limits(X500, Parameters(defaults=X500.parameters))
+LIMITS = SpeedLimits(X500, Parameters(defaults=X500.parameters))
 speeds = st.floats(-12.0, 12.0)
 places = st.floats(-80.0, 80.0)
 

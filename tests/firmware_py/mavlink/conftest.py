@@ -4,13 +4,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from firmware_py.estimation.ideal_report import ideal_report
+from firmware_py.estimation.ideal_estimator import ideal_report
 from firmware_py.estimation.report import EstimatorReport
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from firmware_py.missions.store import MissionStore
+from firmware_py.navigator import Navigator
 from firmware_py.parameters import Parameters
-from firmware_py.status import CommandResult, FlightMode, VehicleStatus
+from firmware_py.status import CommandResult, FlightMode, LandedState, VehicleStatus
 from firmware_py.types import FlightRecord, MotorOutput, StatusText, VehicleState
 from framerunner.vehicle.airframe import Airframe, load_airframe
 from framerunner.vehicle.geodesy import GeodeticPoint, LocalProjection, is_on_earth
@@ -44,6 +45,9 @@ class FakeAutopilot:
     ground_station_heard_count: int = 0
     report: EstimatorReport | None = None  # None: of ideal sensors
     poses: list = field(default_factory=list)
+
+    def __post_init__(self):
+        self.navigator = Navigator(self.missions, self.parameters)
 
     @property
     def estimator(self):
@@ -98,6 +102,13 @@ class FakeAutopilot:
 
     def follow_target(self, position_ned_m, velocity_ned_m_s):
         self.calls.append(("follow_target", position_ned_m, velocity_ned_m_s))
+
+    def check_mission(self):
+        status = self.status
+        projection = None if status.origin is None else LocalProjection(status.origin)
+        geo = SimpleNamespace(projection=projection, home=status.home, home_ned_m=status.home_ned_m)
+        landed = status.landed_state is LandedState.ON_GROUND
+        self.texts += self.navigator.check_mission(self.state, geo, landed=landed)
 
     def take_issued_commands(self):
         return []
