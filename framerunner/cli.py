@@ -6,12 +6,14 @@ import errno
 import os
 import signal
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from types import FrameType
 
     from cyclopts import App
+    from cyclopts.argument import ArgumentCollection
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -54,10 +56,22 @@ def build_app() -> App:
         default_parameter=Parameter(negative=(), show_default=_shown_default),
         suppress_keyboard_interrupt=False,
         result_action="return_value",
+        config=_read_settings,
     )
     for name, made_by in _COMMANDS.items():
         app.command(f"framerunner.commands.{name}:{made_by}", name=name)
     return app
+
+
+def _read_settings(_app: App, _commands: tuple[str, ...], arguments: ArgumentCollection) -> None:
+    """Read the file of a command's option --settings, if it is given."""
+    from framerunner.commands.options.flight import SETTINGS
+
+    chosen = next((argument for argument in arguments if argument.name == SETTINGS), None)
+    if chosen is not None and chosen.tokens:
+        from framerunner.commands.options.settings_file import read_settings
+
+        read_settings(Path(chosen.tokens[-1].value), arguments)
 
 
 def _shown_default(value: object) -> str | None:

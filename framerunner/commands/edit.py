@@ -12,8 +12,8 @@ from urllib.parse import quote
 
 from cyclopts import Parameter
 
-from framerunner.commands import WholeNumber, check_range, say
-from framerunner.commands.monitor import PilotOption
+from framerunner.commands import NamedPilot, check_range, say
+from framerunner.commands.monitor import PagesPort
 from framerunner.errors import SettingError
 
 _Drone = Annotated[
@@ -32,9 +32,9 @@ def edit(
     source: Annotated[
         str, Parameter(name="--from", help="what a new one begins as: empty, example, or a mission to copy")
     ] = "empty",
-    pilot: PilotOption = None,
+    pilot: NamedPilot = None,
     drone: _Drone = None,
-    port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8090,
+    port: PagesPort = 8090,
     browser: Annotated[bool, Parameter(help="open the page in the browser", negative="--no-browser")] = True,
 ) -> int:
     """Draw and check a mission in the browser: diagram and text side by side. Stop it with Ctrl-C.

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from framerunner.commands import WholeNumber, check_range, say
+from framerunner.commands import NamedPilot, WholeNumber, check_range, say
+from framerunner.commands.options.flight import Lifeline
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
@@ -63,9 +64,7 @@ _Certificate = Annotated[
 _Key = Annotated[
     Path | None, Parameter(help="PEM file of the certificate's private key, if that is not in the same file")
 ]
-PilotOption = Annotated[
-    Path | None, Parameter(help="Python file with primitives of your own, for the editor; it is executed")
-]
+PagesPort = Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")]
 
 
 def monitor(
@@ -73,18 +72,18 @@ def monitor(
     drone: _Drone = "udpin://127.0.0.1:14550",
     scenario: _Scenario = None,
     bind: _Bind = "127.0.0.1",
-    port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8080,
+    port: PagesPort = 8080,
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
     missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
     scenarios: _Scenarios = SCENARIOS,
-    pilot: PilotOption = None,
+    pilot: NamedPilot = None,
     camera_host: _CameraHosts = (),
     trusted_proxy: _TrustedProxy = (),
     operator_socket: _OperatorSocket = None,
     certificate: _Certificate = None,
     key: _Key = None,
-    lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
+    lifeline: Lifeline = False,
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.
 
@@ -140,12 +139,12 @@ def equipment(
     *,
     missions: Path = MISSIONS,
     scenarios: Sequence[Path] = SCENARIOS,
-    pilot: Path | None = None,
+    pilot: str | None = None,
 ) -> Equipment:
     """What the monitor, which may not import other rooms' functions, is given of them.
 
     Raises:
-        MissionError: the contestant's file, which is executed, cannot be used.
+        MissionError: the pilot, whose file is executed, cannot be used.
         SettingError: the folder of missions is not there.
     """
     from tempfile import mkdtemp
@@ -162,12 +161,12 @@ def equipment(
     from framerunner.monitoring.run_library import RunFolders
     from framerunner.monitoring.scenario_library import ScenarioLibrary
     from framerunner.wire.transports.vehicle_link import VehicleLink
-    from offboard.pilot import Pilot
-    from offboard.pilot_file import read_pilot
+    from offboard.pilot_file import class_of, find_pilot, pilot_argument
 
     if missions != MISSIONS and not missions.is_dir():  # the default is made when the first mission is
         raise SettingError(f"--missions {missions}: is not a folder; make it (mkdir -p), or choose another")
-    pilot_class = Pilot if pilot is None else read_pilot(pilot).pilot_class()
+    pilot_class = class_of(None if pilot is None else find_pilot(pilot))
+    pilot = None if pilot is None else pilot_argument(pilot)
     session = Path(mkdtemp(prefix="framerunner-flights-"))
     atexit.register(shutil.rmtree, session, ignore_errors=True)
     library = ScenarioLibrary(scenarios)

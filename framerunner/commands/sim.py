@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from framerunner.commands import (
     Faults,
@@ -22,6 +22,7 @@ from framerunner.commands import (
     with_sensors,
 )
 from framerunner.commands.ardupilot import ardupilot_server
+from framerunner.commands.options.rules import Rule, check_rules, given_in
 from framerunner.commands.px4 import px4_server
 from framerunner.errors import SettingError
 from framerunner.extras import install_advice, is_installed
@@ -44,7 +45,7 @@ class _Server(Protocol):
         """Run until cancelled."""
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=Group("On board", sort_key=2))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Onboard:
     """What the drone has besides flying."""
@@ -70,7 +71,7 @@ class Onboard:
     ] = True
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=Group("Connections", sort_key=1))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Connections:
     """Where the simulator listens and sends."""
@@ -101,7 +102,7 @@ class Connections:
     show_layout: ShowLayout = False
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=Group("Autopilot", sort_key=3))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlownBy:
     """Which autopilot flies the drone."""
@@ -132,45 +133,32 @@ class FlownBy:
         ),
     ] = None
 
-    def check(self, count: int, settings: ServerSettings, *, monitor: bool) -> None:
-        """Refuse options that the chosen autopilot does not have.
 
-        Raises:
-            SettingError: one of them is given.
-        """
-        for name, folder in (("px4", self.px4), ("ardupilot", self.ardupilot)):
-            if folder is not None and name != self.autopilot:
-                raise SettingError(f"--{name} {folder}: is for {TITLES[name]}; add --autopilot {name}")
-        if self.transmitter is not None and self.autopilot != "px4":
-            raise SettingError(f"--transmitter {self.transmitter}: is for PX4; add --autopilot px4")
-        if self.autopilot == "own":
-            return
-        name, plain, sends_itself = TITLES[self.autopilot], Connections(), self.autopilot == "px4"
-        refused = [
-            (
-                "--onboard-remote",
-                sends_itself and settings.onboard_remote != plain.onboard_remote,
-                f"MAVLink is {name}'s own",
-            ),
-            (
-                "--ground-remote",
-                sends_itself and settings.ground_remote != plain.ground_remote,
-                f"MAVLink is {name}'s own",
-            ),
-            ("--count", count != 1, f"{name} flies one drone; start another simulator with --instance 1"),
-            (
-                "--monitor",
-                monitor,
-                f"run framerunner monitor beside it, which listens to {name} on UDP 14550",
-            ),
-            ("--link", bool(settings.links), f"MAVLink is {name}'s own"),
-            ("--signing-key", settings.signing_key is not None, f"MAVLink is {name}'s own"),
-            ("--parameters", settings.parameters is not None, f"{name} keeps its own, with --storage DIR"),
-            ("--shell", settings.shell, f"MAVLink is {name}'s own"),
-        ]
-        for option, given, why in refused:
-            if given:
-                raise SettingError(f"{option}: {why}; leave it out with --autopilot {self.autopilot}")
+def _rules_for(name: Literal["px4", "ardupilot"]) -> tuple[Rule, ...]:
+    """What the drone does not have if a genuine autopilot flies it."""
+    title = TITLES[name]
+    remotes = ("onboard-remote", "ground-remote") if name == "px4" else ()
+    reasons = {
+        **dict.fromkeys(("link", "signing-key", "shell", *remotes), f"MAVLink is {title}'s own"),
+        "count": f"{title} flies one drone; start another simulator with --instance 1",
+        "monitor": f"run framerunner monitor beside it, which listens to {title} on UDP 14550",
+        "parameters": f"{title} keeps its own, with --storage DIR",
+    }
+    chosen = f"autopilot {name}"
+    return (
+        Rule(name, f"is for {title}; add --{chosen}", needs=(chosen,)),
+        *(
+            Rule(option, f"{why}; leave it out with {{found}}", excludes=(chosen,), shows_value=False)
+            for option, why in reasons.items()
+        ),
+    )
+
+
+_RULES = (
+    *_rules_for("px4"),
+    *_rules_for("ardupilot"),
+    Rule("transmitter", "is for PX4; add --autopilot px4", needs=("autopilot px4",)),
+)
 
 
 @Parameter(name="*", show=False)
@@ -245,13 +233,15 @@ def sim(
     check_range("--instance", instance, 0, _MAX_INSTANCES - 1)
     check_range("--count", count, 1, _MAX_INSTANCES - instance)
     chosen, onboard, flown_by = connections or Connections(), onboard or Onboard(), flown_by or FlownBy()
+    given = given_in(chosen, onboard, flown_by)
+    given |= {name: True for name, is_given in (("count", count != 1), ("monitor", monitor)) if is_given}
+    check_rules(_RULES, given)
+    check_range("--seed", seed, 0, 2**63 - 1)
     watched = monitor and flown_by.autopilot == "own"
     watcher = _monitor(scenario, chosen.video_port, count) if watched else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
-    flown_by.check(count, settings, monitor=monitor)
-    check_range("--seed", seed, 0, 2**63 - 1)
     caller = started_by or StartedBy()
     server = _server(
         scenario, settings, onboard, fault, flown_by=flown_by, count=count, seed=seed, caller=caller
@@ -348,7 +338,6 @@ def _simulations(
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
-    check_range("--seed", seed, 0, 2**63 - 1)
     scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
     if count == 1:
         return [Simulation(scenario, seed=seed)]

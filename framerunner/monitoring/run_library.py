@@ -74,13 +74,13 @@ class RunFolders:
     Args:
         path: of the folder.
         session: a second folder, whose flights are kept until the program ends; None: there is none.
-        pilot: a contestant's file that the user named; missions that need it can be shown.
+        pilot: a contestant's file that the user named, or a pilot's name; missions that need it can be shown.
     """
 
-    def __init__(self, path: Path, session: Path | None = None, pilot: Path | None = None) -> None:
+    def __init__(self, path: Path, session: Path | None = None, pilot: str | None = None) -> None:
         self.path = path
         self._session = session
-        self._pilot = None if pilot is None else pilot.absolute()
+        self._pilot = pilot
         self._lock = threading.Lock()
         self._seen: dict[str, _Seen] = {}
         self._unpacked: OrderedDict[str, _Unpacked] = OrderedDict()
@@ -295,14 +295,14 @@ class Readers:
                 process.kill()
 
 
-def _unpack(folder: Path, mark: Mark, readers: Readers, pilot: Path | None = None) -> _Unpacked:
+def _unpack(folder: Path, mark: Mark, readers: Readers, pilot: str | None = None) -> _Unpacked:
     """Read a run in a separate process; RunError if it cannot be shown."""
     linked = [name for name in _FILES if (folder / name).is_symlink()]
     if linked:
         raise RunError(f"run '{folder.name}': its {linked[0]} is a link; linked files are not shown")
     target = TemporaryDirectory(prefix="framerunner-run-", ignore_cleanup_errors=True)
     command = [sys.executable, "-m", "framerunner.monitoring.read_run", str(folder.absolute()), target.name]
-    command += [] if pilot is None else [str(pilot)]
+    command += [] if pilot is None else [pilot]
     try:
         code, printed = readers.run(command)
     except OSError:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from framerunner.commands import check_range
-from framerunner.errors import SettingError
+from framerunner.commands.options.flight import HARDWARE_GROUP
+from framerunner.commands.options.rules import Given, Rule, each, given_in, names_of
 
 if TYPE_CHECKING:
     from framerunner.preflight.settings import HardwareSettings
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
     from scenarios.models import Scenario
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=HARDWARE_GROUP)
 @dataclass(frozen=True, slots=True)
 class HardwareOptions:
-    """As the command line gives them."""
+    """How a drone that may be a real one is flown."""
 
     max_speed: Annotated[
         float | None,
@@ -66,8 +67,30 @@ class HardwareOptions:
 
 
 NONE = HardwareOptions()
+CAPS = ("max-speed", "max-height")
+_PROCEDURE = tuple(name for name in names_of(HardwareOptions) if name not in (*CAPS, "simulated"))
+HARDWARE_RULES = (
+    *each((*_PROCEDURE, "simulated"), "is for a drone given by --drone; leave it out", needs=("drone",)),
+    *each(
+        ("yes", "simulated"),
+        "a service never flies without an operator's go; leave it out",
+        excludes=("service",),
+    ),
+    *each(
+        _PROCEDURE,
+        "a drone that is --simulated is not checked; leave one of them out",
+        excludes=("simulated",),
+    ),
+    Rule("hold-time", "is for --on-abort hold; leave it out", needs=("on-abort hold",)),
+)
 SERVICE_VARIABLE = "FRAMERUNNER_SERVICE"
 """Set by systemd/framerunner-fly.service: nobody may be near the drone when a service starts."""
+
+
+def given_hardware(options: HardwareOptions) -> Given:
+    """The options that are given; "service" among them if a service flies."""
+    service = {"service": True} if os.environ.get(SERVICE_VARIABLE) else {}
+    return {**given_in(options), **service}
 
 
 def caps_of(options: HardwareOptions, drone: str | None) -> Caps | None:
@@ -86,38 +109,16 @@ def caps_of(options: HardwareOptions, drone: str | None) -> Caps | None:
 
 
 def hardware_of(options: HardwareOptions, drone: str | None) -> HardwareSettings | None:
-    """The procedure of a flight; None for a simulated drone. Raises SettingError."""
+    """The procedure of a flight; None for a simulated drone. Raises SettingError.
+
+    The options comply with `HARDWARE_RULES`.
+    """
     from framerunner.preflight.settings import HardwareSettings
     from offboard.safety.rules import HOLD_TIME_S
 
-    given = {
-        "--dry-run": options.dry_run,
-        "--yes": options.yes,
-        "--set-parameters": options.set_parameters,
-        "--accept": bool(options.accept),
-        "--on-abort": options.on_abort != NONE.on_abort,
-        "--hold-time": options.hold_time is not None,
-        "--operator-socket": options.operator_socket is not None,
-        "--operator": bool(options.operator),
-    }
-    used = [name for name, is_given in given.items() if is_given]
-    if drone is None:
-        used += ["--simulated"] if options.simulated else []
-        if used:
-            raise SettingError(f"{used[0]}: is for a drone given by --drone; leave it out")
-        return None
-    if os.environ.get(SERVICE_VARIABLE) and (options.yes or options.simulated):
-        name = "--yes" if options.yes else "--simulated"
-        raise SettingError(f"{name}: a service never flies without an operator's go; leave it out")
-    if options.simulated:
-        if used:
-            raise SettingError(
-                f"{used[0]}: a drone that is --simulated is not checked; leave one of them out"
-            )
+    if drone is None or options.simulated:
         return None
     check_range("--hold-time", options.hold_time, 5.0, 100.0)
-    if options.hold_time is not None and options.on_abort != "hold":
-        raise SettingError("--hold-time: is for --on-abort hold; leave it out")
     if options.accept:
         from framerunner.preflight.check_names import CHECK_NAMES
         from offboard.safety.check import check_names
