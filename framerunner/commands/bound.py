@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -93,6 +92,8 @@ def _bound_one(scenario: str, mission_class: MissionClass, out: Path | None) -> 
 
 
 def _bound_level(level: str, seeds: range, mission_class: MissionClass) -> int:
+    import numpy as np
+
     from framerunner.flying.envelopes import bound_of
     from framerunner.flying.feasible import feasible
     from framerunner.flying.plan import FlightPlan
@@ -113,18 +114,9 @@ def _bound_level(level: str, seeds: range, mission_class: MissionClass) -> int:
         print(line)
     columns = ((bounds_s, "11.2f"), (possible_s, "14.2f"), (times, "8.2f"))
     for name, share in (("5 %", 0.05), ("median", 0.5), ("95 %", 0.95)):
-        cells = (format(_quantile(numbers, share), form) for numbers, form in columns if numbers)
+        cells = (format(float(np.quantile(numbers, share)), form) for numbers, form in columns if numbers)
         print(f"{name + ', class ' + mission_class:24}{''.join(cells)}")
     return 0
-
-
-def _quantile(numbers: Sequence[float], share: float) -> float:
-    """The number below which a share of them lies, interpolated."""
-    ordered = sorted(numbers)
-    place = share * (len(ordered) - 1)
-    low = int(place)
-    high = min(low + 1, len(ordered) - 1)
-    return ordered[low] + (place - low) * (ordered[high] - ordered[low])
 
 
 def _seeds(text: str) -> range:

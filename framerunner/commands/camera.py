@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,10 +19,19 @@ app = App(name="camera")
 calibration = App(name="calibrate")
 app.command(calibration)
 
-_Columns = Annotated[WholeNumber, Parameter(help="squares of the board from left to right, 4 to 20")]
-_Rows = Annotated[WholeNumber, Parameter(help="squares of the board from top to bottom, 3 to 20")]
-_Square = Annotated[float, Parameter(help="edge of a square, mm")]
-_Marker = Annotated[float, Parameter(help="edge of a marker, mm")]
+
+@Parameter(name="*", group="Board")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardOptions:
+    """The board, as it is printed."""
+
+    columns: Annotated[WholeNumber, Parameter(help="squares from left to right, 4 to 20")] = 8
+    rows: Annotated[WholeNumber, Parameter(help="squares from top to bottom, 3 to 20")] = 5
+    square: Annotated[float, Parameter(help="edge of a square, mm")] = 30.0
+    marker: Annotated[float, Parameter(help="edge of a marker, mm")] = 22.0
+
+
+_USUAL_BOARD = BoardOptions()
 
 
 @app.default
@@ -78,10 +88,7 @@ def camera(
 def board(
     *,
     out: Annotated[Path, Parameter(help="file to be written, PNG")] = Path("board.png"),
-    columns: _Columns = 8,
-    rows: _Rows = 5,
-    square: _Square = 30.0,
-    marker: _Marker = 22.0,
+    printed: BoardOptions = _USUAL_BOARD,
 ) -> int:
     """Write the board, to be printed.
 
@@ -93,7 +100,7 @@ def board(
     """
     from framerunner.camera_calibration.calibrate import write_board
 
-    write_board(_board(columns, rows, square, marker), out)
+    write_board(_board(printed), out)
     return 0
 
 
@@ -112,10 +119,7 @@ def calibrate(
     views: Annotated[
         WholeNumber, Parameter(help="how many different views to take from a camera, 8 to 60")
     ] = 20,
-    columns: _Columns = 8,
-    rows: _Rows = 5,
-    square: _Square = 30.0,
-    marker: _Marker = 22.0,
+    printed: BoardOptions = _USUAL_BOARD,
 ) -> int:
     """Find focal length, optical axis and lens distortion from images of the board.
 
@@ -135,7 +139,7 @@ def calibrate(
 
     from framerunner.camera_calibration.calibrate import calibrate as run
 
-    run(_board(columns, rows, square, marker), sources, views, out, say)
+    run(_board(printed), sources, views, out, say)
     return 0
 
 
@@ -282,8 +286,9 @@ def extrinsics(
     return 0
 
 
-def _board(columns: int, rows: int, square: float, marker: float) -> Board:
+def _board(options: BoardOptions) -> Board:
     """Check the options."""
+    columns, rows, square, marker = astuple(options)
     from vision.calibration.board import Board
 
     check_range("--columns", columns, 4, 20)

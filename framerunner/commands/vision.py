@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,25 +17,28 @@ _MAX_IMAGES = 1_000_000
 
 app = App(name="vision", help="Evaluate the detectors on images of known scenes.")
 
-_Level = Annotated[str, Parameter(help="draw scenarios of this level, name or file")]
-_Images = Annotated[WholeNumber, Parameter(help="how many images, five of a scenario")]
-_Seed = Annotated[WholeNumber, Parameter(help="of the first scenario, and of the poses")]
-_Noise = Annotated[float, Parameter(help="standard deviation of noise in every channel, 0 to 100")]
-_Blur = Annotated[float, Parameter(help="standard deviation of a blur, 0 to 10 pixels")]
-_Light = Annotated[float, Parameter(help="factor of brightness, 0.05 to 2")]
-_Jpeg = Annotated[WholeNumber | None, Parameter(help="compress with this quality, 1 to 100")]
+
+@Parameter(name="*", group="Images")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageOptions:
+    """Which images are painted."""
+
+    level: Annotated[str, Parameter(help="draw scenarios of this level, name or file")] = "calm"
+    images: Annotated[WholeNumber, Parameter(help="how many images, five of a scenario")] = 300
+    seed: Annotated[WholeNumber, Parameter(help="of the first scenario, and of the poses")] = 1
+    noise: Annotated[float, Parameter(help="standard deviation of noise in every channel, 0 to 100")] = 0.0
+    blur: Annotated[float, Parameter(help="standard deviation of a blur, 0 to 10 pixels")] = 0.0
+    light: Annotated[float, Parameter(help="factor of brightness, 0.05 to 2")] = 1.0
+    jpeg: Annotated[WholeNumber | None, Parameter(help="compress with this quality, 1 to 100")] = None
+
+
+_USUAL = ImageOptions()
 
 
 @app.command
 def evaluate(
     *,
-    level: _Level = "calm",
-    images: _Images = 300,
-    seed: _Seed = 1,
-    noise: _Noise = 0.0,
-    blur: _Blur = 0.0,
-    light: _Light = 1.0,
-    jpeg: _Jpeg = None,
+    options: ImageOptions = _USUAL,
     detector: Annotated[
         str | None, Parameter(help="one that a package adds, to be rated beside ours")
     ] = None,
@@ -56,8 +59,8 @@ def evaluate(
     """
     from framerunner.vision_evaluation.evaluate import evaluate_vision
 
-    default = Path("runs") / f"vision-{Path(level).stem}-{images}-{seed}"
-    settings = _settings(level, images, seed, (noise, blur, light, jpeg), out or default)
+    default = Path("runs") / f"vision-{Path(options.level).stem}-{options.images}-{options.seed}"
+    settings = _settings(options, out or default)
     evaluate_vision(replace(settings, detector=detector))
     return 0
 
@@ -66,13 +69,7 @@ def evaluate(
 def dataset(
     folder: Annotated[Path, Parameter(help="for the images and labels.json")],
     *,
-    level: _Level = "calm",
-    images: _Images = 300,
-    seed: _Seed = 1,
-    noise: _Noise = 0.0,
-    blur: _Blur = 0.0,
-    light: _Light = 1.0,
-    jpeg: _Jpeg = None,
+    options: ImageOptions = _USUAL,
 ) -> int:
     """Write such images, and what is to be seen in them, for your own detector.
 
@@ -82,24 +79,22 @@ def dataset(
     """
     from framerunner.vision_evaluation.evaluate import write_dataset
 
-    write_dataset(_settings(level, images, seed, (noise, blur, light, jpeg), folder))
+    write_dataset(_settings(options, folder))
     return 0
 
 
-def _settings(
-    level: str, images: int, seed: int, harder: tuple[float, float, float, int | None], out: Path
-) -> VisionSettings:
+def _settings(options: ImageOptions, out: Path) -> VisionSettings:
     """Check the options."""
     from framerunner.vision_evaluation.evaluate import VisionSettings
     from framerunner.vision_evaluation.labelled_images import Disturbance
     from scenarios.random_numbers import MAX_SEED
     from scenarios.random_scenarios import load_level
 
-    noise, blur, light, jpeg = harder
-    check_range("--images", images, 1, _MAX_IMAGES)
-    check_range("--seed", seed, 0, MAX_SEED - _MAX_IMAGES)
-    check_range("--noise", noise, 0.0, 100.0)
-    check_range("--blur", blur, 0.0, 10.0)
-    check_range("--light", light, 0.05, 2.0)
-    check_range("--jpeg", jpeg, 1, 100)
-    return VisionSettings(load_level(level), images, seed, Disturbance(noise, blur, light, jpeg), out)
+    check_range("--images", options.images, 1, _MAX_IMAGES)
+    check_range("--seed", options.seed, 0, MAX_SEED - _MAX_IMAGES)
+    check_range("--noise", options.noise, 0.0, 100.0)
+    check_range("--blur", options.blur, 0.0, 10.0)
+    check_range("--light", options.light, 0.05, 2.0)
+    check_range("--jpeg", options.jpeg, 1, 100)
+    harder = Disturbance(options.noise, options.blur, options.light, options.jpeg)
+    return VisionSettings(load_level(options.level), options.images, options.seed, harder, out)

@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from framerunner.film.film_file import FilmFile, GifFile, Mp4File, film_file, mp4_codec
+from framerunner.film.film_file import FilmFile, film_file, mp4_codec
 from framerunner.film.film_painter import FilmPainter
 from framerunner.film.timeline import Timeline
 from framerunner.flying.plan import FlightPlan
@@ -111,8 +111,8 @@ def _write_film(timeline: Timeline, settings: FilmSettings) -> FilmSummary:
             sample_times_s = np.linspace(timeline.begin_s, timeline.end_s, _SAMPLES)
             samples = [painter.paint(float(time_s)) for time_s in sample_times_s]
             samples.append(painter.paint(timeline.end_s, over=True))
-            return GifFile(path, settings.size_px, settings.fps, samples)
-        return Mp4File(path, settings.size_px, settings.fps, codec)
+            return FilmFile(path, codec, settings.size_px, settings.fps, samples)
+        return FilmFile(path, codec, settings.size_px, settings.fps)
 
     with film_file(settings.out, open_film) as film, _progress() as progress:
         task = progress.add_task(settings.out.name, total=moving + held)

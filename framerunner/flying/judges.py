@@ -148,19 +148,48 @@ class TruthJudge:
             await asyncio.sleep(_POLL_S)
 
 
-class TelemetryJudge:
-    """A referee in this process that sees the drone's telemetry, and so no contacts with frames."""
+class RefereeJudge:
+    """A referee in this process.
 
-    source = "telemetry"
+    Attributes:
+        referee: that judges.
+    """
+
+    source = "truth"
 
     def __init__(self, referee: Referee) -> None:
-        self._referee = referee
+        self.referee = referee
+
+    def see(self, moment: Moment) -> None:
+        """Nothing: it is shown the states elsewhere."""
+
+    async def standing(self) -> RefereeSnapshot | None:
+        """As of now."""
+        return self.referee.snapshot()
+
+    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
+        """Judge what was seen."""
+        return self.referee.report(mission_state, ended)
+
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
+        """Judge what was seen."""
+        return self.referee.report(mission_state, ended)
+
+    async def faults(self) -> FaultFacts:
+        """It does not know."""
+        return FaultFacts()
+
+
+class TelemetryJudge(RefereeJudge):
+    """A referee that sees the drone's telemetry, and so no contacts with frames."""
+
+    source = "telemetry"
 
     def see(self, moment: Moment) -> None:
         """Show the drone's state to the referee."""
         state = moment.state
         half = state.yaw / 2
-        self._referee.update(
+        self.referee.update(
             TrueState(
                 state.time_us,
                 (state.x, state.y, state.z),
@@ -169,22 +198,6 @@ class TelemetryJudge:
                 state.armed,
             )
         )
-
-    async def standing(self) -> RefereeSnapshot | None:
-        """As of the last tick."""
-        return self._referee.snapshot()
-
-    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
-        """Judge what was seen."""
-        return self._referee.report(mission_state, ended)
-
-    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
-        """Judge what was seen."""
-        return self._referee.report(mission_state, ended)
-
-    async def faults(self) -> FaultFacts:
-        """Telemetry does not tell."""
-        return FaultFacts()
 
 
 def _warn(words: str) -> None:

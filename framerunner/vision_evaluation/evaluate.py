@@ -13,16 +13,7 @@ from rich.progress import track
 
 from framerunner.errors import SettingError
 from framerunner.vision_evaluation.labelled_images import Disturbance, LabelledImage, labelled_images
-from framerunner.vision_evaluation.scores import (
-    ANGLES_DEG,
-    DISTANCES_M,
-    RATED_ANGLE_DEG,
-    Scores,
-    detect_all,
-    rated,
-    row_of,
-    rows_by,
-)
+from framerunner.vision_evaluation.scores import Scores, detect_all
 from framerunner.vision_evaluation.terminal import print_scores
 from framerunner.wire.finite_json import finite
 from scenarios.random_scenarios import Level
@@ -127,19 +118,14 @@ def _make_folder(path: Path) -> None:
 
 
 def _as_json(settings: VisionSettings, scores: Scores) -> dict[str, object]:
-    samples = rated(scores.samples)
-    near = [s for s in scores.samples if s.angle_deg < RATED_ANGLE_DEG]
-    by_distance = rows_by(scores.kinds, near, lambda sample: sample.distance_m, DISTANCES_M)
-    by_angle = rows_by(scores.kinds, samples, lambda sample: sample.angle_deg, ANGLES_DEG)
-    total = [row_of(kind, 0.0, 0.0, [s for s in samples if s.kind == kind]) for kind in scores.kinds]
     return {
         "level": settings.level.name,
         "images": scores.images,
         "seed": settings.seed,
         "disturbance": asdict(settings.disturbance),
-        "detectors": [asdict(row) for row in total],
-        "by_distance_m": [asdict(row) for row in by_distance],
-        "by_angle_deg": [asdict(row) for row in by_angle],
+        "detectors": [asdict(row) for row in scores.in_sum()],
+        "by_distance_m": [asdict(row) for row in scores.by_distance()],
+        "by_angle_deg": [asdict(row) for row in scores.by_angle()],
         "false_alarms": scores.false_alarms,
         "median_ms": {kind: sorted(times)[len(times) // 2] for kind, times in scores.times_ms.items()},
     }

@@ -9,17 +9,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from framerunner.vision_evaluation.scores import (
-    ANGLES_DEG,
-    DISTANCES_M,
-    RATED_ANGLE_DEG,
-    RATED_DISTANCE_M,
-    ErrorRow,
-    Scores,
-    rated,
-    row_of,
-    rows_by,
-)
+from framerunner.vision_evaluation.scores import RATED_ANGLE_DEG, RATED_DISTANCE_M, ErrorRow, Scores
 
 _ERRORS = ("distance", "95 %", "bearing", "tilt", "95 %", "first right", "corners / std", "> 4 std")
 
@@ -33,16 +23,10 @@ def print_scores(scores: Scores, title: str) -> None:
     console.print(
         f"wholly in view, up to {RATED_DISTANCE_M:g} m and {RATED_ANGLE_DEG:g}° off the normal", markup=False
     )
-    samples = rated(scores.samples)
-    total = [row_of(kind, 0.0, 0.0, [s for s in samples if s.kind == kind]) for kind in scores.kinds]
-    console.print(_table("detector", [(row.kind, row) for row in total]))
-    near = [s for s in scores.samples if s.angle_deg < RATED_ANGLE_DEG]
-    rows = rows_by(scores.kinds, near, lambda sample: sample.distance_m, DISTANCES_M)
-    console.print(
-        _table("by distance", [(f"{row.kind}  {row.low:g} to {row.high:g} m", row) for row in rows])
-    )
-    rows = rows_by(scores.kinds, samples, lambda sample: sample.angle_deg, ANGLES_DEG)
-    console.print(_table("by angle", [(f"{row.kind}  {row.low:g} to {row.high:g}°", row) for row in rows]))
+    console.print(_table("detector", [(row.kind, row) for row in scores.in_sum()]))
+    for what, unit, rows in (("distance", " m", scores.by_distance()), ("angle", "°", scores.by_angle())):
+        named = [(f"{row.kind}  {row.low:g} to {row.high:g}{unit}", row) for row in rows]
+        console.print(_table(f"by {what}", named))
     for kind in scores.kinds:
         times_ms = np.percentile(scores.times_ms[kind], (50, 95))
         console.print(
