@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
 from framerunner.commands import for_genuine, say, with_faults, with_sensors
 
@@ -23,17 +23,19 @@ app = App(name="ardupilot", help="What a genuine ArduCopter needs to fly in the 
 
 @app.command
 def params(
-    airframe: Annotated[str, Parameter(help="name or file of the airframe")] = "x500",
+    airframe: str = "x500",
     *,
-    sensors: Annotated[
-        str, Parameter(help="sensor suite: mocap for poses of motion capture, outdoor for GPS, or a file")
-    ] = "mocap",
+    sensors: str = "mocap",
 ) -> int:
     """Print the parameters by which ArduCopter flies an airframe here: one `NAME VALUE` a line.
 
     **Examples**
 
         framerunner ardupilot params abejorro > abejorro.parm
+
+    Args:
+        airframe: name or file of the airframe
+        sensors: sensor suite: mocap for poses of motion capture, outdoor for GPS, or a file
     """
     from framerunner.vehicle.airframe import load_airframe
     from sitl.ardupilot.parameters import all_parameters, file_of

@@ -16,20 +16,14 @@ if TYPE_CHECKING:
 
 _MAX_SCENARIOS = 10_000
 
-_Level = Annotated[str | None, Parameter(help="scenarios of this level, name or file, instead of one")]
-_Seeds = Annotated[
-    str | None, Parameter(help="of the level's scenarios: the first and the last, such as 1:300")
-]
-_Class = Annotated[Literal["contest", "open"], Parameter(name="--class", help="of the mission's limits")]
-
 
 def bound(
-    scenario: Annotated[str | None, Parameter(help="name or file")] = None,
+    scenario: str | None = None,
     *,
-    level: _Level = None,
-    seeds: _Seeds = None,
-    mission_class: _Class = "contest",
-    out: Annotated[Path | None, Parameter(help="PNG file: one scenario with both paths")] = None,
+    level: str | None = None,
+    seeds: str | None = None,
+    mission_class: Annotated[Literal["contest", "open"], Parameter(name="--class")] = "contest",
+    out: Path | None = None,
 ) -> int:
     """For a pilot who knows the layout: a lower bound of the time of a try, and a flight that is possible.
 
@@ -41,6 +35,13 @@ def bound(
         framerunner bound test-case-1 --out bound.png
 
         framerunner bound --level calm --seeds 1:300
+
+    Args:
+        scenario: name or file
+        level: scenarios of this level, name or file, instead of one
+        seeds: of the level's scenarios: the first and the last, such as 1:300
+        mission_class: of the mission's limits
+        out: PNG file: one scenario with both paths
     """
     if (scenario is None) == (level is None):
         raise SettingError("bound: give either a scenario or --level and --seeds")

@@ -43,7 +43,7 @@ def list_(*, language: LanguageOption = "en") -> int:
 def start(
     lesson: LessonName,
     *,
-    out: Annotated[Path, Parameter(help="folder to write the mission to")] = Path("."),
+    out: Path = Path("."),
     language: LanguageOption = "en",
 ) -> int:
     """Begin a lesson: print what to do, and write the mission to start from. Nothing is overwritten.
@@ -53,6 +53,11 @@ def start(
         framerunner course start 1
 
         framerunner course start 3 --out missions --language es
+
+    Args:
+        lesson: number or name.
+        out: folder to write the mission to
+        language: of the texts.
     """
     from framerunner.course.lessons import find_lesson
 
@@ -79,7 +84,7 @@ def start(
 @app.command
 def check(
     lesson: LessonName,
-    mission: Annotated[str, Parameter(help="name or file")],
+    mission: str,
     *,
     pilot: NamedPilot = None,
 ) -> int:
@@ -92,6 +97,11 @@ def check(
         framerunner course check 1 lesson_1.yaml
 
         framerunner course check 5 frame_challenge
+
+    Args:
+        lesson: number or name.
+        mission: name or file
+        pilot: primitives of your own.
     """
     from framerunner.course.lessons import find_lesson
     from framerunner.flying.lockstep import fly_lockstep

@@ -52,9 +52,15 @@ _RULES = (
 @Parameter(name="*", group=Group("Scenarios", sort_key=1))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScenarioOptions:
-    """Which scenarios are flown, if none are named."""
+    """Which scenarios are flown, if none are named.
 
-    level: Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")] = None
+    Attributes:
+        level: draw scenarios of this level, name or file
+        count: how many scenarios of the level.
+        seed: of the first scenario.
+    """
+
+    level: str | None = None
     count: Annotated[
         WholeNumber | None, Parameter(help=f"how many scenarios of the level; {COUNT} if not given")
     ] = None
@@ -66,7 +72,7 @@ class ScenarioOptions:
 
 @Parameter(name="*", group=SIMULATION_GROUP)
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SimulationOptions:
+class FlightOptions:
     """How the simulated drones differ from the scenarios'."""
 
     sensors: Sensors = None
@@ -83,33 +89,35 @@ class SimulationOptions:
 @Parameter(name="*", group=Group("Machines and files", sort_key=3))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluationOptions:
-    """Where flights are flown, and what is left of them."""
+    """Where flights are flown, and what is left of them.
 
-    jobs: Annotated[
-        WholeNumber | None,
-        Parameter(help="flights at once; if not given one a core, with a genuine autopilot 1"),
-    ] = None
-    out: Annotated[
-        Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
-    ] = None
-    again: Annotated[bool, Parameter(help="fly again what is in the folder already")] = False
-    compare: Annotated[Path | None, Parameter(help="folder of an earlier evaluation")] = None
-    backend: Annotated[
-        Literal["loky", "dask", "ray"], Parameter(help="loky: this machine; the others: a cluster")
-    ] = "loky"
-    address: Annotated[str | None, Parameter(help="of the cluster's scheduler")] = None
+    Attributes:
+        jobs: flights at once; if not given one a core, with a genuine autopilot 1
+        out: folder; by default one in `runs/` that the same command finds again
+        again: fly again what is in the folder already
+        compare: folder of an earlier evaluation
+        backend: loky: this machine; the others: a cluster
+        address: of the cluster's scheduler
+    """
+
+    jobs: WholeNumber | None = None
+    out: Path | None = None
+    again: bool = False
+    compare: Path | None = None
+    backend: Literal["loky", "dask", "ray"] = "loky"
+    address: str | None = None
 
 
-_SCENARIOS, _SIMULATION, _OWN = ScenarioOptions(), SimulationOptions(), GenuineOptions()
+_SCENARIOS, _SIMULATION, _OWN = ScenarioOptions(), FlightOptions(), GenuineOptions()
 _EVALUATION = EvaluationOptions()
 
 
 def evaluate(
-    *scenarios: Annotated[str, Parameter(help="names, files or folders of scenarios, instead of --level")],
+    *scenarios: str,
     drawn: ScenarioOptions = _SCENARIOS,
-    mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
+    mission: str = DEFAULT_MISSION,
     pilot: NamedPilot = None,
-    simulated: SimulationOptions = _SIMULATION,
+    simulated: FlightOptions = _SIMULATION,
     genuine: GenuineOptions = _OWN,
     options: EvaluationOptions = _EVALUATION,
 ) -> int:
@@ -132,6 +140,15 @@ def evaluate(
         framerunner evaluate --level calm --count 10 --px4 ../PX4-Autopilot
 
         framerunner evaluate --level calm --backend dask --address tcp://10.0.0.1:8786
+
+    Args:
+        scenarios: names, files or folders of scenarios, instead of --level
+        drawn: which scenarios, if none are named.
+        mission: name or file of the mission
+        pilot: primitives of your own.
+        simulated: a simulated drone.
+        genuine: a genuine autopilot.
+        options: where flights are flown, and what is left.
     """
     given = given_in(drawn, simulated, genuine, options)
     check_rules(_RULES, given)

@@ -60,59 +60,47 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=DRONE_GROUP)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DroneOptions:
-    """A drone that is running already."""
+    """A drone that is running already.
 
-    drone: Annotated[
-        str | None, Parameter(help="MAVLink URL of a running drone; without it a simulated one is started")
-    ] = None
-    camera: Annotated[
-        str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")
-    ] = None
+    Attributes:
+        drone: MAVLink URL of a running drone; without it a simulated one is started
+        camera: URL, device or folder of its camera; needed with --drone
+        camera_delay: age of an image that arrives without a time stamp.
+        calibration: its camera's calibration, a file of `framerunner camera calibrate`; for a simulated drone
+            it replaces the camera's true one
+        simulator: with --drone: http://HOST:PORT of the simulator that flies it: its referee judges, and
+            without --camera its camera is used. By default that of an http --camera, if there is one
+        drone_limits: with --drone, for a mission of class open: what the drone can do in m/s and rad/s,
+            forward=2,left=1.5,up=1,yaw-rate=1.5; down=NUMBER if it is not as up
+    """
+
+    drone: str | None = None
+    camera: str | None = None
     camera_delay: CameraDelay = None
-    calibration: Annotated[
-        Path | None,
-        Parameter(
-            help="its camera's calibration, a file of `framerunner camera calibrate`; for a simulated drone "
-            "it replaces the camera's true one"
-        ),
-    ] = None
-    simulator: Annotated[
-        str | None,
-        Parameter(
-            help="with --drone: http://HOST:PORT of the simulator that flies it: its referee judges, and "
-            "without --camera its camera is used. By default that of an http --camera, if there is one"
-        ),
-    ] = None
-    drone_limits: Annotated[
-        str | None,
-        Parameter(
-            help="with --drone, for a mission of class open: what the drone can do in m/s and rad/s, "
-            "forward=2,left=1.5,up=1,yaw-rate=1.5; down=NUMBER if it is not as up"
-        ),
-    ] = None
+    calibration: Path | None = None
+    simulator: str | None = None
+    drone_limits: str | None = None
 
 
 @Parameter(name="*", group=SIMULATION_GROUP)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationOptions:
-    """A simulated drone that is started."""
+    """A simulated drone that is started.
 
-    speed: Annotated[float, Parameter(help="simulated seconds a second, 0.01 to 100")] = 1.0
-    instance: Annotated[
-        WholeNumber | None,
-        Parameter(
-            help="shifts its ports, 0 to 9; by default 0, with --px4 or --ardupilot the first that is free"
-        ),
-    ] = None
-    lockstep: Annotated[
-        bool, Parameter(help="in simulated time, as fast as the machine can, the same each time; no log")
-    ] = False
-    seed: Annotated[
-        WholeNumber | None,
-        Parameter(
-            help="of everything random in a lockstep flight, or with --px4 or --ardupilot; 0 if not given"
-        ),
-    ] = None
+    Attributes:
+        speed: simulated seconds a second, 0.01 to 100
+        instance: shifts its ports, 0 to 9; by default 0, with --px4 or --ardupilot the first that is free
+        lockstep: in simulated time, as fast as the machine can, the same each time; no log
+        seed: of everything random in a lockstep flight, or with --px4 or --ardupilot; 0 if not given
+        sensors: the drone's sensor suite.
+        fault: what fails.
+        response: a vehicle that answers late.
+    """
+
+    speed: float = 1.0
+    instance: WholeNumber | None = None
+    lockstep: bool = False
+    seed: WholeNumber | None = None
     sensors: Sensors = None
     fault: Faults = ()
     response: Response = None
@@ -121,28 +109,24 @@ class SimulationOptions:
 @Parameter(name="*", group=OUTPUT_GROUP)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputOptions:
-    """What a flight leaves, and where it is shown."""
+    """What a flight leaves, and where it is shown.
 
-    out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs")
-    record: Annotated[
-        bool, Parameter(help="write flight.mcap as well, for `framerunner replay` and Foxglove")
-    ] = False
-    video: Annotated[
-        bool, Parameter(help="write video.avi also in lockstep; in real time it is always written")
-    ] = False
-    monitor: Annotated[
-        bool,
-        Parameter(
-            help="open the Game Monitor as well, on http://127.0.0.1:8080/; it stays open until Ctrl-C"
-        ),
-    ] = False
-    wait_for_viewer: Annotated[
-        bool, Parameter(negative=(), help="with --monitor: fly when a browser shows it")
-    ] = False
-    monitor_link: Annotated[
-        str | None,
-        Parameter(help="MAVLink URL of a monitor that runs already, such as udpout://127.0.0.1:14550"),
-    ] = None
+    Attributes:
+        out: folder in which this flight's folder is made
+        record: write flight.mcap as well, for `framerunner replay` and Foxglove
+        video: write video.avi also in lockstep; in real time it is always written
+        monitor: open the Game Monitor as well, on http://127.0.0.1:8080/; it stays open until Ctrl-C
+        wait_for_viewer: with --monitor: fly when a browser shows it
+        monitor_link: MAVLink URL of a monitor that runs already, such as udpout://127.0.0.1:14550
+        settings: file of options.
+    """
+
+    out: Path = Path("runs")
+    record: bool = False
+    video: bool = False
+    monitor: bool = False
+    wait_for_viewer: Annotated[bool, Parameter(negative=())] = False
+    monitor_link: str | None = None
     settings: SettingsFile = None
 
 
@@ -179,9 +163,9 @@ _RULES = (
 
 
 def fly(
-    scenario: Annotated[str, Parameter(help="name or file of the scenario")] = "test-case-1",
+    scenario: str = "test-case-1",
     *,
-    mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
+    mission: str = DEFAULT_MISSION,
     pilot: NamedPilot = None,
     flown: DroneOptions = _DRONE,
     simulated: SimulationOptions = _SIMULATION,
@@ -207,6 +191,17 @@ def fly(
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
 
         framerunner fly --settings flight.yaml
+
+    Args:
+        scenario: name or file of the scenario
+        mission: name or file of the mission
+        pilot: primitives of your own.
+        flown: a drone that is running already.
+        simulated: a simulated drone.
+        genuine: a genuine autopilot.
+        output: what is left, and where it is shown.
+        hardware: how a real drone is flown.
+        lifeline: stop when standard input ends.
     """
     check_rules(_RULES, {**given_in(flown, simulated, genuine, output), **given_hardware(hardware)})
     check_range("--camera-delay", flown.camera_delay, 0.0, 0.5)

@@ -38,51 +38,25 @@ SYSTEM_ID = 250
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 
 
-_Drone = Annotated[str, Parameter(help="MAVLink URL: where drones send to ground stations")]
-_Scenario = Annotated[
-    str | None, Parameter(help="name or file; for a drone without a referee, such as a real one")
-]
-_Scenarios = Annotated[
-    tuple[Path, ...],
-    Parameter(help="your own scenarios, files or folders: they can be drawn, and their arena is shown"),
-]
-_Bind = Annotated[str, Parameter(help="address to listen on; 0.0.0.0 lets other machines in")]
-_CameraHosts = Annotated[
-    tuple[str, ...],
-    Parameter(help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"),
-]
-_TrustedProxy = Annotated[
-    tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
-]
-_OperatorSocket = Annotated[
-    Path | None,
-    Parameter(help="local socket at which it listens for flights with an operator (fly --operator-socket)"),
-]
-_Certificate = Annotated[
-    Path | None, Parameter(help="PEM file: serve https:// with it, and the pages' WebSockets as wss://")
-]
-_Key = Annotated[
-    Path | None, Parameter(help="PEM file of the certificate's private key, if that is not in the same file")
-]
 PagesPort = Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")]
 
 
 def monitor(
     *,
-    drone: _Drone = "udpin://127.0.0.1:14550",
-    scenario: _Scenario = None,
-    bind: _Bind = "127.0.0.1",
+    drone: str = "udpin://127.0.0.1:14550",
+    scenario: str | None = None,
+    bind: str = "127.0.0.1",
     port: PagesPort = 8080,
-    database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
-    runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
-    missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
-    scenarios: _Scenarios = SCENARIOS,
+    database: str = DATABASE,
+    runs: Path = Path("runs"),
+    missions: Path = MISSIONS,
+    scenarios: tuple[Path, ...] = SCENARIOS,
     pilot: NamedPilot = None,
-    camera_host: _CameraHosts = (),
-    trusted_proxy: _TrustedProxy = (),
-    operator_socket: _OperatorSocket = None,
-    certificate: _Certificate = None,
-    key: _Key = None,
+    camera_host: tuple[str, ...] = (),
+    trusted_proxy: tuple[str, ...] = (),
+    operator_socket: Path | None = None,
+    certificate: Path | None = None,
+    key: Path | None = None,
     lifeline: Lifeline = False,
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.
@@ -99,6 +73,23 @@ def monitor(
         framerunner monitor --bind 0.0.0.0 --certificate monitor.crt --key monitor.key
 
         framerunner monitor --drone serial:///dev/ttyUSB0:57600 --scenario test-case-1
+
+    Args:
+        drone: MAVLink URL: where drones send to ground stations
+        scenario: name or file; for a drone without a referee, such as a real one
+        bind: address to listen on; 0.0.0.0 lets other machines in
+        port: TCP port of the pages.
+        database: of teams and tries; SQLAlchemy URL
+        runs: folder of recorded flights
+        missions: folder that the editor shows
+        scenarios: your own scenarios, files or folders: they can be drawn, and their arena is shown
+        pilot: primitives of your own.
+        camera_host: HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from
+        trusted_proxy: address or network of a proxy whose X-Forwarded-For is believed
+        operator_socket: local socket at which it listens for flights with an operator (fly --operator-socket)
+        certificate: PEM file: serve https:// with it, and the pages' WebSockets as wss://
+        key: PEM file of the certificate's private key, if that is not in the same file
+        lifeline: stop when standard input ends.
     """
     check_range("--port", port, 0, 65535)
     from framerunner.child_process import until_standard_input_ends

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
 from framerunner.commands import for_genuine, say, with_faults, with_sensors
 
@@ -22,16 +22,12 @@ app = App(name="px4", help="What a genuine PX4 needs to fly in the simulated wor
 
 @app.command
 def params(
-    airframe: Annotated[str, Parameter(help="name or file of the airframe")] = "x500",
+    airframe: str = "x500",
     *,
-    sensors: Annotated[
-        str, Parameter(help="sensor suite for which PX4's estimator is set up: mocap, outdoor, …, or a file")
-    ] = "mocap",
-    speed: Annotated[float, Parameter(help="of the simulation, by which PX4's time-outs grow")] = 1.0,
-    env: Annotated[
-        bool, Parameter(help="as environment variables, by which PX4 takes them at its start")
-    ] = False,
-    transmitter: Annotated[bool, Parameter(help="for a pilot's remote control, too")] = False,
+    sensors: str = "mocap",
+    speed: float = 1.0,
+    env: bool = False,
+    transmitter: bool = False,
 ) -> int:
     """Print the parameters by which PX4 flies an airframe here: one `NAME VALUE` a line.
 
@@ -40,6 +36,13 @@ def params(
         framerunner px4 params x500
 
         framerunner px4 params abejorro --sensors outdoor --env
+
+    Args:
+        airframe: name or file of the airframe
+        sensors: sensor suite for which PX4's estimator is set up: mocap, outdoor, …, or a file
+        speed: of the simulation, by which PX4's time-outs grow
+        env: as environment variables, by which PX4 takes them at its start
+        transmitter: for a pilot's remote control, too
     """
     from framerunner.vehicle.airframe import load_airframe
     from sitl.autopilots.parameters import text_of

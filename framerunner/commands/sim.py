@@ -48,90 +48,69 @@ class _Server(Protocol):
 @Parameter(name="*", group=Group("On board", sort_key=2))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Onboard:
-    """What the drone has besides flying."""
+    """What the drone has besides flying.
 
-    storage: Annotated[
-        Path | None,
-        Parameter(help="folder for its files and flight logs, DIR/0 for instance 0; else kept in memory"),
-    ] = None
-    parameters: Annotated[
-        Path | None,
-        Parameter(help="file of changed parameters (.params), read at start and saved when one changes"),
-    ] = None
+    Attributes:
+        storage: folder for its files and flight logs, DIR/0 for instance 0; else kept in memory
+        parameters: file of changed parameters (.params), read at start and saved when one changes
+        sensors: the drone's sensor suite.
+        shell: answer MAVLink's shell (SERIAL_CONTROL), for the drone only
+        camera: announce the camera over MAVLink, as a separate component, take photos, record video
+    """
+
+    storage: Path | None = None
+    parameters: Path | None = None
     sensors: Sensors = None
-    shell: Annotated[bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), for the drone only")] = (
-        False
-    )
-    camera: Annotated[
-        bool,
-        Parameter(
-            negative="--no-camera",
-            help="announce the camera over MAVLink, as a separate component, take photos, record video",
-        ),
-    ] = True
+    shell: bool = False
+    camera: Annotated[bool, Parameter(negative="--no-camera")] = True
 
 
 @Parameter(name="*", group=Group("Connections", sort_key=1))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Connections:
-    """Where the simulator listens and sends."""
+    """Where the simulator listens and sends.
 
-    bind: Annotated[str, Parameter(help="address to listen on")] = "127.0.0.1"
-    onboard_remote: Annotated[
-        str, Parameter(help="host or host:port that gets the onboard link, UDP 14540 + instance")
-    ] = "127.0.0.1"
-    ground_remote: Annotated[
-        str, Parameter(help="host or host:port that gets the ground link, UDP 14550")
-    ] = "127.0.0.1"
-    link: Annotated[
-        tuple[str, ...],
-        Parameter(
-            help="one more link: udpout://HOST:PORT, udpin://…, tcpin://…, tcpout://…, serial:///TTY:BAUD, "
-            "optionally followed by ?streams=onboard|ground|normal&rate=BYTES; may be repeated"
-        ),
-    ] = ()
-    signing_key: Annotated[
-        Path | None, Parameter(help="file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it")
-    ] = None
-    video_port: Annotated[
-        WholeNumber | None, Parameter(help="TCP port of the video; 8100 + instance if not given")
-    ] = None
-    video_rtp: Annotated[
-        str, Parameter(help="host or host:port that gets the video as H.264 in RTP, UDP 5600, or off")
-    ] = "127.0.0.1"
+    Attributes:
+        bind: address to listen on
+        onboard_remote: host or host:port that gets the onboard link, UDP 14540 + instance
+        ground_remote: host or host:port that gets the ground link, UDP 14550
+        link: one more link: udpout://HOST:PORT, udpin://…, tcpin://…, tcpout://…, serial:///TTY:BAUD,
+            optionally followed by ?streams=onboard|ground|normal&rate=BYTES; may be repeated
+        signing_key: file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it
+        video_port: TCP port of the video; 8100 + instance if not given
+        video_rtp: host or host:port that gets the video as H.264 in RTP, UDP 5600, or off
+        show_layout: tell every app the layout.
+    """
+
+    bind: str = "127.0.0.1"
+    onboard_remote: str = "127.0.0.1"
+    ground_remote: str = "127.0.0.1"
+    link: tuple[str, ...] = ()
+    signing_key: Path | None = None
+    video_port: WholeNumber | None = None
+    video_rtp: str = "127.0.0.1"
     show_layout: ShowLayout = False
 
 
 @Parameter(name="*", group=Group("Autopilot", sort_key=3))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlownBy:
-    """Which autopilot flies the drone."""
+    """Which autopilot flies the drone.
 
-    autopilot: Annotated[
-        Literal["own", "px4", "ardupilot"],
-        Parameter(help="what flies: this project's autopilot, or a genuine PX4 or ArduCopter"),
-    ] = "own"
-    px4: Annotated[
-        Path | None,
-        Parameter(
-            help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
-        ),
-    ] = None
-    ardupilot: Annotated[
-        Path | None,
-        Parameter(
-            help="with --autopilot ardupilot: folder of an ArduPilot built for SITL, to be started; else "
-            "start it yourself"
-        ),
-    ] = None
+    Attributes:
+        autopilot: what flies: this project's autopilot, or a genuine PX4 or ArduCopter
+        px4: with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself
+        ardupilot: with --autopilot ardupilot: folder of an ArduPilot built for SITL, to be started; else
+            start it yourself
+        transmitter: with --autopilot px4: a pilot's remote control: `centred`, or a transmitter on USB such
+            as /dev/input/js0
+    """
 
-    transmitter: Annotated[
-        str | None,
-        Parameter(
-            help="with --autopilot px4: a pilot's remote control: `centred`, or a transmitter on USB such as "
-            "/dev/input/js0"
-        ),
-    ] = None
+    autopilot: Literal["own", "px4", "ardupilot"] = "own"
+    px4: Path | None = None
+    ardupilot: Path | None = None
+
+    transmitter: str | None = None
 
 
 def _rules_for(name: Literal["px4", "ardupilot"]) -> tuple[Rule, ...]:
@@ -164,11 +143,17 @@ _RULES = (
 @Parameter(name="*", show=False)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartedBy:
-    """What the program that has started this one wants of it, over descriptors of sockets."""
+    """What the program that has started this one wants of it, over descriptors of sockets.
 
-    lifeline: Annotated[bool, Parameter(help="stop when standard input ends")] = False
-    time_grants: Annotated[int | None, Parameter(help="by which it grants time")] = None
-    truth: Annotated[int | None, Parameter(help="by which it gets true states")] = None
+    Attributes:
+        lifeline: stop when standard input ends
+        time_grants: by which it grants time
+        truth: by which it gets true states
+    """
+
+    lifeline: bool = False
+    time_grants: int | None = None
+    truth: int | None = None
 
     def grants(self) -> TimeGrants | None:
         """Its end of the channel of time; None: it grants none, and time runs."""
@@ -189,22 +174,16 @@ class StartedBy:
 
 def sim(
     *,
-    scenario: Annotated[
-        str, Parameter(help="name or file; without it an open field and an x500")
-    ] = "open-field",
-    speed: Annotated[float, Parameter(help="simulated seconds a second, 0.01 to 1000")] = 1.0,
-    instance: Annotated[WholeNumber, Parameter(help="shifts ports and the system id, 0 to 9")] = 0,
-    count: Annotated[
-        WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
-    ] = 1,
-    seed: Annotated[WholeNumber, Parameter(help="of everything random, such as turbulence")] = 0,
+    scenario: str = "open-field",
+    speed: float = 1.0,
+    instance: WholeNumber = 0,
+    count: WholeNumber = 1,
+    seed: WholeNumber = 0,
     fault: Faults = (),
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     flown_by: FlownBy | None = None,
-    monitor: Annotated[
-        bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")
-    ] = False,
+    monitor: bool = False,
     started_by: StartedBy | None = None,
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8100/.
@@ -228,6 +207,19 @@ def sim(
         framerunner sim --autopilot px4 --px4 ../PX4-Autopilot
 
         framerunner sim --autopilot ardupilot --ardupilot ../ardupilot
+
+    Args:
+        scenario: name or file; without it an open field and an x500
+        speed: simulated seconds a second, 0.01 to 1000
+        instance: shifts ports and the system id, 0 to 9
+        count: how many drones fly side by side; they have the next instances' ports
+        seed: of everything random, such as turbulence
+        fault: what fails.
+        connections: where it listens and sends.
+        onboard: what the drone has besides flying.
+        flown_by: which autopilot flies.
+        monitor: open the Game Monitor as well, on http://127.0.0.1:8080/
+        started_by: what the program that started it wants.
     """
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, _MAX_INSTANCES - 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cyclopts import App, Parameter
 
@@ -21,15 +21,25 @@ app = App(name="vision", help="Evaluate the detectors on images of known scenes.
 @Parameter(name="*", group="Images")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageOptions:
-    """Which images are painted."""
+    """Which images are painted.
 
-    level: Annotated[str, Parameter(help="draw scenarios of this level, name or file")] = "calm"
-    images: Annotated[WholeNumber, Parameter(help="how many images, five of a scenario")] = 300
-    seed: Annotated[WholeNumber, Parameter(help="of the first scenario, and of the poses")] = 1
-    noise: Annotated[float, Parameter(help="standard deviation of noise in every channel, 0 to 100")] = 0.0
-    blur: Annotated[float, Parameter(help="standard deviation of a blur, 0 to 10 pixels")] = 0.0
-    light: Annotated[float, Parameter(help="factor of brightness, 0.05 to 2")] = 1.0
-    jpeg: Annotated[WholeNumber | None, Parameter(help="compress with this quality, 1 to 100")] = None
+    Attributes:
+        level: draw scenarios of this level, name or file
+        images: how many images, five of a scenario
+        seed: of the first scenario, and of the poses
+        noise: standard deviation of noise in every channel, 0 to 100
+        blur: standard deviation of a blur, 0 to 10 pixels
+        light: factor of brightness, 0.05 to 2
+        jpeg: compress with this quality, 1 to 100
+    """
+
+    level: str = "calm"
+    images: WholeNumber = 300
+    seed: WholeNumber = 1
+    noise: float = 0.0
+    blur: float = 0.0
+    light: float = 1.0
+    jpeg: WholeNumber | None = None
 
 
 _USUAL = ImageOptions()
@@ -39,10 +49,8 @@ _USUAL = ImageOptions()
 def evaluate(
     *,
     options: ImageOptions = _USUAL,
-    detector: Annotated[
-        str | None, Parameter(help="one that a package adds, to be rated beside ours")
-    ] = None,
-    out: Annotated[Path | None, Parameter(help="folder for the report and the picture")] = None,
+    detector: str | None = None,
+    out: Path | None = None,
 ) -> int:
     """Tell how often and how exactly frames are found: by shape, and by the paper's boxes.
 
@@ -56,6 +64,11 @@ def evaluate(
         framerunner vision evaluate --level calm --images 300
 
         framerunner vision evaluate --level crowded --noise 4 --blur 0.7 --light 0.7 --jpeg 90
+
+    Args:
+        options: which images.
+        detector: one that a package adds, to be rated beside ours
+        out: folder for the report and the picture
     """
     from framerunner.vision_evaluation.evaluate import evaluate_vision
 
@@ -67,7 +80,7 @@ def evaluate(
 
 @app.command
 def dataset(
-    folder: Annotated[Path, Parameter(help="for the images and labels.json")],
+    folder: Path,
     *,
     options: ImageOptions = _USUAL,
 ) -> int:
@@ -76,6 +89,10 @@ def dataset(
     **Example**
 
         framerunner vision dataset my_images --level crowded --images 1000
+
+    Args:
+        folder: for the images and labels.json
+        options: which images.
     """
     from framerunner.vision_evaluation.evaluate import write_dataset
 

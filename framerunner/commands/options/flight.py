@@ -44,12 +44,15 @@ Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input 
 @Parameter(name="*", group=SIMULATION_GROUP)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GenuineOptions:
-    """A genuine autopilot that flies the simulated drone instead of ours."""
+    """A genuine autopilot that flies the simulated drone instead of ours.
 
-    px4: Annotated[Path | None, Parameter(help="folder of a PX4 built for SITL, which flies instead")] = None
-    ardupilot: Annotated[
-        Path | None, Parameter(help="folder of an ArduPilot built for SITL, which flies instead")
-    ] = None
+    Attributes:
+        px4: folder of a PX4 built for SITL, which flies instead
+        ardupilot: folder of an ArduPilot built for SITL, which flies instead
+    """
+
+    px4: Path | None = None
+    ardupilot: Path | None = None
 
     @property
     def autopilot(self) -> GenuineAutopilot | None:

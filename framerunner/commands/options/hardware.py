@@ -22,48 +22,33 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=HARDWARE_GROUP)
 @dataclass(frozen=True, slots=True)
 class HardwareOptions:
-    """How a drone that may be a real one is flown."""
+    """How a drone that may be a real one is flown.
 
-    max_speed: Annotated[
-        float | None,
-        Parameter(
-            help="cap on the level speed in m/s, whatever the mission asks; with --drone 2 if not given"
-        ),
-    ] = None
-    max_height: Annotated[
-        float | None, Parameter(help="cap on the height above the start in m; the box's ceiling if not given")
-    ] = None
-    dry_run: Annotated[
-        bool, Parameter(help="with --drone, propellers off: checks, camera, mission, setpoints; never arms")
-    ] = False
-    yes: Annotated[
-        bool,
-        Parameter(negative="", help="with --drone: checks, but no operator's go; for simulations and CI"),
-    ] = False
-    simulated: Annotated[
-        bool, Parameter(negative="", help="with --drone: it is a simulation; no checks, no operator, no caps")
-    ] = False
-    set_parameters: Annotated[
-        bool, Parameter(help="with --drone: set failsafe parameters that fail, and keep their old values")
-    ] = False
-    accept: Annotated[
-        tuple[str, ...],
-        Parameter(
-            negative="", help="with --drone: fly although the check of this name fails; may be repeated"
-        ),
-    ] = ()
-    on_abort: Annotated[
-        Literal["land", "hold"], Parameter(help="with --drone: what it does when the flight is aborted")
-    ] = "land"
-    hold_time: Annotated[
-        float | None,
-        Parameter(help="with --on-abort hold: s until it lands, 5 to 100; 30 if not given"),
-    ] = None
-    operator_socket: Annotated[
-        Path | None,
-        Parameter(help="with --drone: socket of a monitor with the operator's page; --monitor has its own"),
-    ] = None
-    operator: Annotated[str, Parameter(help="with --drone: who flies, for the flight card")] = ""
+    Attributes:
+        max_speed: cap on the level speed in m/s, whatever the mission asks; with --drone 2 if not given
+        max_height: cap on the height above the start in m; the box's ceiling if not given
+        dry_run: with --drone, propellers off: checks, camera, mission, setpoints; never arms
+        yes: with --drone: checks, but no operator's go; for simulations and CI
+        simulated: with --drone: it is a simulation; no checks, no operator, no caps
+        set_parameters: with --drone: set failsafe parameters that fail, and keep their old values
+        accept: with --drone: fly although the check of this name fails; may be repeated
+        on_abort: with --drone: what it does when the flight is aborted
+        hold_time: with --on-abort hold: s until it lands, 5 to 100; 30 if not given
+        operator_socket: with --drone: socket of a monitor with the operator's page; --monitor has its own
+        operator: with --drone: who flies, for the flight card
+    """
+
+    max_speed: float | None = None
+    max_height: float | None = None
+    dry_run: bool = False
+    yes: Annotated[bool, Parameter(negative="")] = False
+    simulated: Annotated[bool, Parameter(negative="")] = False
+    set_parameters: bool = False
+    accept: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    on_abort: Literal["land", "hold"] = "land"
+    hold_time: float | None = None
+    operator_socket: Path | None = None
+    operator: str = ""
 
 
 NONE = HardwareOptions()
