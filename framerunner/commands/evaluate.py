@@ -33,8 +33,8 @@ from sitl.autopilots import TITLES
 
 if TYPE_CHECKING:
     from framerunner.evaluation.backends import Pool
-    from framerunner.evaluation.genuine_flight import GenuineUse
     from framerunner.evaluation.plan import Plan
+    from framerunner.evaluation.runner import GenuineUse
     from framerunner.flying.simulator_process import GenuineAutopilot
 
 _GENUINE_SPEED, _MAX_GENUINE_SPEED = 4.0, 100.0
@@ -234,7 +234,7 @@ def _genuine_use(
     """By which a genuine autopilot is flown, if one is chosen."""
     if autopilot is None:
         return None
-    from framerunner.evaluation.genuine_flight import GenuineUse
+    from framerunner.evaluation.runner import GenuineUse
     from framerunner.instances import INSTANCES
 
     check_range("--speed", speed, 0.01, _MAX_GENUINE_SPEED)

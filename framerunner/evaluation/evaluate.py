@@ -12,10 +12,9 @@ from rich.console import Console
 from framerunner.errors import SettingError
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
-from framerunner.evaluation.genuine_flight import GenuineUse
 from framerunner.evaluation.plan import Plan
 from framerunner.evaluation.rows import Row, csv_text
-from framerunner.evaluation.runner import Terms, fly_all
+from framerunner.evaluation.runner import GenuineUse, Terms, fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
 from framerunner.evaluation.terminal import EvaluationProgress, print_comparison, print_summary

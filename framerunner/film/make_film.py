@@ -17,8 +17,8 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.recording.collected import CollectedFlight, collect
 from framerunner.recording.events import RecordingError
 from framerunner.recording.open_recording import recorded_flight
+from framerunner.runs.run_files import SCENARIO, RunFiles
 from offboard.pilot_file import PilotSource
-from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 
 HOLD_S = 1.5
@@ -79,10 +79,10 @@ def make_film(folder: Path, settings: FilmSettings, pilot: PilotSource | None = 
 def _scenario(folder: Path) -> Scenario:
     if not folder.is_dir():
         raise RecordingError(f"film '{folder}': is no folder; name one that `framerunner fly` left")
-    path = folder / "scenario.yaml"
-    if not path.is_file():
-        raise RecordingError(f"film '{folder}': holds no scenario.yaml, so no flight of `framerunner fly`")
-    return load_scenario(path)
+    scenario = RunFiles(folder).load_scenario()
+    if scenario is None:
+        raise RecordingError(f"film '{folder}': holds no {SCENARIO}, so no flight of `framerunner fly`")
+    return scenario
 
 
 def _lifted(scenario: Scenario, flight: CollectedFlight) -> Scenario:

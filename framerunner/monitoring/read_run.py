@@ -25,13 +25,13 @@ from framerunner.files.text_file import TextError, read_text
 from framerunner.flying.navigation_reporter import navigation_json
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.open_recording import recorded_flight
+from framerunner.runs.run_files import RunFiles
 from offboard.app import Moment
 from offboard.chart.spec import enter_state
 from offboard.engine import DONE, TransitionTaken
 from offboard.mission import Mission, MissionError, load_mission, mermaid
 from offboard.navigation.view import NavigationView
 from offboard.pilot_file import PilotSource, find_pilot
-from scenarios.loader import load_scenario
 from scenarios.models import COLOURS, Scenario
 from vision.types import Detection, Detections
 
@@ -83,9 +83,9 @@ def read_run(folder: Path, target: Path, pilot: PilotSource | None = None) -> No
     Raises:
         RecordingError: there is nothing to show, or it is damaged.
     """
-    scenario_file = folder / "scenario.yaml"
-    scenario = load_scenario(scenario_file) if scenario_file.is_file() else None
-    mission, source = _load_mission(folder / "mission.yaml", pilot)
+    files = RunFiles(folder)
+    scenario = files.load_scenario()
+    mission, source = _load_mission(files.mission, pilot)
     with (target / IMAGES).open("w+b") as file:
         with recorded_flight(folder, pilot) as recorded:
             flight = collect(recorded, ImageFile(file))

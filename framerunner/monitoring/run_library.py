@@ -20,6 +20,7 @@ from typing import Any
 
 from framerunner.monitor.ports import RunError, RunInfo, RunNotReadError
 from framerunner.monitoring.read_run import IMAGES, RECORDING, SPANS
+from framerunner.runs import run_files
 from scenarios.result import MAX_RESULT_BYTES, FlightResult
 
 KEPT_RUNS = 6
@@ -30,8 +31,8 @@ _MAX_FAILURES = 100
 _MAX_NAME = 80
 _MAX_READ_S = 300.0
 _MAX_STDERR_BYTES = 100_000
-_SIGNS = ("result.json", "flight.mcap", "flight.tlog")
-_FILES = (*_SIGNS, "scenario.yaml", "mission.yaml", "video.avi")
+_SIGNS = (run_files.RESULT, run_files.RECORDING, run_files.LOG)
+_FILES = (*_SIGNS, run_files.SCENARIO, run_files.MISSION, run_files.VIDEO)
 _STAMP = re.compile(r"\d{8}-\d{6}")
 
 Mark = tuple[int, ...]
@@ -204,7 +205,7 @@ def _mark(folder: Path) -> Mark:
 def _info(folder: Path) -> RunInfo:
     name = folder.name
     try:
-        result = _result(folder / "result.json")
+        result = _result(folder / run_files.RESULT)
     except (OSError, ValueError, RecursionError):
         return RunInfo(name, "", "", UNREADABLE, None, _started("", name))
     stamp = _STAMP.match(name)
