@@ -18,27 +18,27 @@ if TYPE_CHECKING:
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 _INTERRUPT_AGAIN_S = 0.02
-# Each command, in the module of its name, which is imported only if the command, or help of all, is wanted.
+# Each command: its module, imported only if the command, or help of all, is wanted, and its name there.
 _COMMANDS = {
-    "sim": "sim",
-    "fly": "fly",
-    "camera": "app",
-    "mocap": "mocap",
-    "doctor": "doctor",
-    "preflight": "preflight",
-    "evaluate": "evaluate",
-    "bound": "bound",
-    "monitor": "monitor",
-    "px4": "app",
-    "ardupilot": "app",
-    "replay": "replay",
-    "film": "film",
-    "mission": "app",
-    "edit": "edit",
-    "course": "app",
-    "scenario": "app",
-    "vision": "app",
-    "list": "list_",
+    "sim": "sim:sim",
+    "fly": "fly:fly",
+    "camera": "camera:app",
+    "mocap": "mocap:mocap",
+    "doctor": "doctor:doctor",
+    "preflight": "preflight:preflight",
+    "evaluate": "evaluate:evaluate",
+    "bound": "bound:bound",
+    "monitor": "monitor:monitor",
+    "px4": "genuine:px4",
+    "ardupilot": "genuine:ardupilot",
+    "replay": "replay:replay",
+    "film": "film:film",
+    "mission": "mission:app",
+    "edit": "edit:edit",
+    "course": "course:app",
+    "scenario": "scenario:app",
+    "vision": "vision:app",
+    "list": "list:list_",
 }
 _DISK_REFUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
@@ -58,8 +58,8 @@ def build_app() -> App:
         result_action="return_value",
         config=_read_settings,
     )
-    for name, made_by in _COMMANDS.items():
-        app.command(f"framerunner.commands.{name}:{made_by}", name=name)
+    for name, place in _COMMANDS.items():
+        app.command(f"framerunner.commands.{place}", name=name)
     return app
 
 

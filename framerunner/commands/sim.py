@@ -17,13 +17,13 @@ from framerunner.commands import (
     ShowLayout,
     WholeNumber,
     check_range,
+    for_genuine,
     say,
     with_faults,
     with_sensors,
 )
-from framerunner.commands.ardupilot import ardupilot_server
+from framerunner.commands.genuine import ardupilot_server, px4_server
 from framerunner.commands.options.rules import Rule, check_rules, given_in
-from framerunner.commands.px4 import px4_server
 from framerunner.errors import SettingError
 from framerunner.extras import install_advice, is_installed
 from framerunner.files.text_file import TextError, read_text
@@ -32,6 +32,7 @@ from sitl.autopilots import TITLES
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
     from framerunner.wire.signing import SigningKey
+    from scenarios.models import Scenario
     from sitl.pacing.time_grants import TimeGrants
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
@@ -254,25 +255,25 @@ def _server(
     caller: StartedBy,
 ) -> _Server:
     """The simulator with the chosen autopilot; only with ours it tells the truth."""
+    from scenarios.loader import load_scenario
+
     grants = caller.grants()
+    chosen = with_faults(with_sensors(load_scenario(scenario), onboard.sensors), fault)
     if flown_by.autopilot == "px4":
         return px4_server(
-            scenario,
+            for_genuine("PX4", chosen),
             settings,
-            onboard,
-            fault,
-            px4=flown_by.px4,
+            folder=flown_by.px4,
             transmitter=flown_by.transmitter,
             seed=seed,
             grants=grants,
         )
     if flown_by.autopilot == "ardupilot":
-        return ardupilot_server(
-            scenario, settings, onboard, fault, ardupilot=flown_by.ardupilot, seed=seed, grants=grants
-        )
+        genuine = for_genuine("ArduPilot", chosen)
+        return ardupilot_server(genuine, settings, folder=flown_by.ardupilot, seed=seed, grants=grants)
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
+    simulations = _simulations(chosen, count=count, seed=seed)
     return SimulatorServer(simulations, settings, notice=say, grants=grants, truth=caller.truth_channel())
 
 
@@ -322,15 +323,11 @@ def _settings(
     return settings
 
 
-def _simulations(
-    name: str, sensors: str | None, fault: tuple[str, ...], *, count: int, seed: int
-) -> list[Simulation]:
+def _simulations(scenario: Scenario, *, count: int, seed: int) -> list[Simulation]:
     from framerunner.vehicle.airframe import load_airframe
-    from scenarios.loader import load_scenario
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
-    scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
     if count == 1:
         return [Simulation(scenario, seed=seed)]
     airframe = load_airframe(scenario.airframe)
