@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
 
 from framerunner.errors import SettingError
+from framerunner.files.text_file import make_file
 
 if TYPE_CHECKING:
     from scenarios.models import Scenario
@@ -98,6 +100,24 @@ def with_faults(scenario: Scenario, fault: tuple[str, ...]) -> Scenario:
     if len(faults) > MAX_FAULTS:
         raise FaultError(f"--fault: a scenario has at most {MAX_FAULTS} faults, not {len(faults)}")
     return scenario.model_copy(update={"faults": faults}) if fault else scenario
+
+
+def write_new(texts: Mapping[Path, str], options: str = "--out", *, makes_folder: bool = False) -> None:
+    """Write new files, completely.
+
+    Raises:
+        SettingError: one is there already, so none is written, or one cannot be written; `options` name them.
+    """
+    for path in texts:
+        if path.exists():
+            raise SettingError(f"{path} is there already and is left as it is; choose another {options}")
+    try:
+        for path, text in texts.items():
+            if makes_folder:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            make_file(path, text)
+    except OSError as error:
+        raise SettingError(f"--out {path}: cannot be written ({error.strerror}); choose another") from None
 
 
 def say(line: str) -> None:

@@ -7,9 +7,7 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from framerunner.commands import NamedPilot, say
-from framerunner.errors import SettingError
-from framerunner.files.text_file import make_file
+from framerunner.commands import NamedPilot, say, write_new
 
 app = App(
     name="course", help="Five short lessons: take off, fly to points, look, cross, the whole challenge."
@@ -63,13 +61,7 @@ def start(
 
     found = find_lesson(lesson)
     text, path = found.text, out / f"lesson_{found.number}.yaml"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        make_file(path, found.start)
-    except FileExistsError:
-        raise SettingError(f"{path} is there already and is left as it is; choose another --out") from None
-    except OSError as error:
-        raise SettingError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
+    write_new({path: found.start}, makes_folder=True)
     print(f"{text.title.in_language(language)}\n\n{text.goal.in_language(language)}\n")
     print(f"written: {path}. The steps are for the editor:\n\n  framerunner edit {path}\n")
     for number, step in enumerate(text.steps, start=1):

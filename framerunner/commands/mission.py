@@ -4,24 +4,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Literal
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
-from framerunner.commands import NamedPilot, say
+from framerunner.commands import NamedPilot, say, write_new
 from framerunner.errors import SettingError
-from framerunner.files.text_file import make_file
-
-if TYPE_CHECKING:
-    from offboard.mission import NewMission
 
 app = App(name="mission", help="List, show, check, create, export and import missions.")
 
 MAX_IMPORT_BYTES = 1_000_000
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
-PilotOption = Annotated[
-    Path | None, Parameter(help="Python file with a subclass of Pilot that the mission uses; it is executed")
-]
 
 
 @app.command(name="list")
@@ -181,12 +174,7 @@ def _print_or_write(text: str, out: Path | None) -> None:
     if out is None:
         print(text, end="")
         return
-    try:
-        make_file(out, text)
-    except FileExistsError:
-        raise SettingError(f"{out} is there already and is left as it is; choose another --out") from None
-    except OSError as error:
-        raise SettingError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
+    write_new({out: text})
     print(f"written: {out}")
 
 
@@ -219,24 +207,10 @@ def new(
             f"NAME '{name}': use small letters, digits and _, a letter first, such as 'my_mission'"
         )
     files = new_mission(name, out, python=python)
-    _write(files)
+    write_new(files.texts, "NAME or --out", makes_folder=True)
     print(f"written: {', '.join(map(str, files.texts))}\n")
     print(f"  framerunner mission check {files.arguments}")
     print(f"  framerunner fly test-case-1 --lockstep --mission {files.arguments}\n")
     print("The first says whether it is good, the second flies it. The comments in the file explain it.")
     print("It crosses red only, so the referee will judge the flight aborted: add green and blue yourself.")
     return 0
-
-
-def _write(files: NewMission) -> None:
-    """Write all files or, if one of them is there already, none."""
-    for path in files.texts:
-        if path.exists():
-            raise SettingError(f"{path} is there already and is left as it is; choose another NAME or --out")
-    path = files.mission.parent
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        for path, text in files.texts.items():
-            make_file(path, text)
-    except OSError as error:
-        raise SettingError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None

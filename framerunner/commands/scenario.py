@@ -7,8 +7,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from framerunner.commands import WholeNumber, say
-from framerunner.errors import SettingError
+from framerunner.commands import WholeNumber, say, write_new
 
 app = App(name="scenario", help="List, show and check scenarios.")
 
@@ -120,11 +119,6 @@ def random(
     if out is None:
         print(dump_yaml(drawn), end="")
         return 0
-    if out.is_file():
-        raise SettingError(f"--out {out}: is there already and is left as it is; choose another")
-    try:
-        out.write_text(dump_yaml(drawn), encoding="utf-8")
-    except OSError as error:
-        raise SettingError(f"--out {out}: cannot be written ({error.strerror}); choose another") from None
+    write_new({out: dump_yaml(drawn)})
     say(f"scenario '{drawn.name}' written to {out}")
     return 0
