@@ -6,7 +6,7 @@ import asyncio
 import sys
 from dataclasses import replace
 from math import cos, sin
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
@@ -35,32 +35,60 @@ _SETTLE_LIMIT_US = 5_000_000
 _CLOCK_STOPPED_S = 3.0  # wall time without progress of vehicle time
 
 
-class Judge(Protocol):
-    """A referee in this process or elsewhere."""
+class Judge:
+    """A referee in this process or elsewhere; as it is here, one that is shown the states by others.
 
-    source: str
-    """The states that it judges by: "truth" or "telemetry"."""
+    Attributes:
+        source: the states that it judges by: "truth" or "telemetry".
+        referee: that judges.
+    """
+
+    source = "truth"
+
+    def __init__(self, referee: Referee) -> None:
+        self.referee = referee
 
     def see(self, moment: Moment) -> None:
         """Take a tick of the flight."""
 
     async def standing(self) -> RefereeSnapshot | None:
         """How the try stands now; None if that is unknown."""
+        return self.referee.snapshot()
 
     def so_far(self, mission_state: str, ended: str) -> RefereeReport:
         """Judge the ticks seen so far, at once."""
-        ...
+        return self.referee.report(mission_state, ended)
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Return the report, when the drone has come to rest."""
-        ...
+        return self.referee.report(mission_state, ended)
 
     async def faults(self) -> FaultFacts:
         """What failed in the flight; nothing if that is unknown."""
-        ...
+        return FaultFacts()
 
 
-class TruthJudge:
+class TelemetryJudge(Judge):
+    """A referee that sees the drone's telemetry, and so no contacts with frames."""
+
+    source = "telemetry"
+
+    def see(self, moment: Moment) -> None:
+        """Show the drone's state to the referee."""
+        state = moment.state
+        half = state.yaw / 2
+        self.referee.update(
+            TrueState(
+                state.time_us,
+                (state.x, state.y, state.z),
+                state.velocity_arena_m_s,
+                (cos(half), 0.0, 0.0, sin(half)),
+                state.armed,
+            )
+        )
+
+
+class TruthJudge(TelemetryJudge):
     """The simulator's referee, which sees the true state of every control tick, over HTTP.
 
     If the simulator ends, the verdict is made from the telemetry seen so far; likewise if the referee still
@@ -82,20 +110,12 @@ class TruthJudge:
         source: str = "truth",
         earlier_us: int | None = None,
     ) -> None:
+        super().__init__(plan.new_referee())
         self.source = source
         self._earlier_us = earlier_us
         self._api = api
         self._session = session
         self._latest: Standing | None = None
-        self._substitute = TelemetryJudge(plan.new_referee())
-
-    def see(self, moment: Moment) -> None:
-        """Show the tick to the substitute; the referee itself sees the simulation."""
-        self._substitute.see(moment)
-
-    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
-        """By the telemetry seen."""
-        return self._substitute.so_far(mission_state, ended)
 
     async def standing(self) -> RefereeSnapshot | None:
         """As of now, or None without a valid answer."""
@@ -114,8 +134,8 @@ class TruthJudge:
         parameters = {"state": mission_state, **({"ended": ended} if ended else {})}
         answer = await ask_referee(self._api, self._session, parameters)
         if answer is None or self._is_earlier(answer):
-            self.source = self._substitute.source
-            return await self._substitute.report(mission_state, ended)
+            self.source = TelemetryJudge.source
+            return await super().report(mission_state, ended)
         return answer.report
 
     async def faults(self) -> FaultFacts:
@@ -146,58 +166,6 @@ class TruthJudge:
             if time_us - began_us > _SETTLE_LIMIT_US or loop.time() - newest_s > _CLOCK_STOPPED_S:
                 return
             await asyncio.sleep(_POLL_S)
-
-
-class RefereeJudge:
-    """A referee in this process.
-
-    Attributes:
-        referee: that judges.
-    """
-
-    source = "truth"
-
-    def __init__(self, referee: Referee) -> None:
-        self.referee = referee
-
-    def see(self, moment: Moment) -> None:
-        """Nothing: it is shown the states elsewhere."""
-
-    async def standing(self) -> RefereeSnapshot | None:
-        """As of now."""
-        return self.referee.snapshot()
-
-    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
-        """Judge what was seen."""
-        return self.referee.report(mission_state, ended)
-
-    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
-        """Judge what was seen."""
-        return self.referee.report(mission_state, ended)
-
-    async def faults(self) -> FaultFacts:
-        """It does not know."""
-        return FaultFacts()
-
-
-class TelemetryJudge(RefereeJudge):
-    """A referee that sees the drone's telemetry, and so no contacts with frames."""
-
-    source = "telemetry"
-
-    def see(self, moment: Moment) -> None:
-        """Show the drone's state to the referee."""
-        state = moment.state
-        half = state.yaw / 2
-        self.referee.update(
-            TrueState(
-                state.time_us,
-                (state.x, state.y, state.z),
-                state.velocity_arena_m_s,
-                (cos(half), 0.0, 0.0, sin(half)),
-                state.armed,
-            )
-        )
 
 
 def _warn(words: str) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 
 from framerunner.flying.detector import others_of, plan_detector
 from framerunner.flying.fly import FinishedFlight, fly
-from framerunner.flying.judges import RefereeJudge
+from framerunner.flying.judges import Judge
 from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import LateResponse
@@ -126,7 +126,7 @@ class LockstepVehicle:
         )
 
 
-class _SimulationJudge(RefereeJudge):
+class _SimulationJudge(Judge):
     """The simulation's own referee, which sees the true state of every control tick."""
 
     def __init__(self, vehicle: LockstepVehicle) -> None:
