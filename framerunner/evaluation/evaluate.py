@@ -126,23 +126,12 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
 
     console = Console(stderr=True)
     with console.status("drawing the report") as status:
-        from framerunner.evaluation.report import Page, write_report
+        from framerunner.evaluation.report import write_report
 
         def advance(done: int, total: int) -> None:
             status.update(f"drawing the report, plot {done + 1} of {total}")
 
-        plan = settings.plan
-        genuine = None if settings.genuine is None else settings.genuine.autopilot
-        page = Page(
-            title=plan.title,
-            mission=settings.mission,
-            pilot=settings.pilot,
-            command=settings.command,
-            summary=summary,
-            comparison=comparison,
-            genuine=genuine,
-        )
-        write_report(folder, page, advance)
+        write_report(folder, settings, summary, comparison, advance)
     print(f"left in {folder.path}/: report.html, results.csv", flush=True)
     return code
 
