@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +10,7 @@ from cyclopts import Parameter, Token
 
 from framerunner.errors import SettingError
 from framerunner.files.text_file import make_file
+from framerunner.terminal import say as say
 
 if TYPE_CHECKING:
     from scenarios.models import Scenario
@@ -118,8 +118,3 @@ def write_new(texts: Mapping[Path, str], options: str = "--out", *, makes_folder
             make_file(path, text)
     except OSError as error:
         raise SettingError(f"--out {path}: cannot be written ({error.strerror}); choose another") from None
-
-
-def say(line: str) -> None:
-    """Print a line on standard error at once."""
-    print(line, file=sys.stderr, flush=True)

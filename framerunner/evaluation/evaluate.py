@@ -18,6 +18,7 @@ from framerunner.evaluation.runner import GenuineUse, Terms, fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
 from framerunner.evaluation.terminal import EvaluationProgress, print_comparison, print_summary
+from framerunner.terminal import say
 from scenarios.verdict import Verdict
 
 EXIT_INTERRUPTED = 130
@@ -76,7 +77,7 @@ def evaluate(settings: EvaluationSettings) -> int:
         except KeyboardInterrupt:
             count = len(folder.rows())  # from disk: the signal may have come between writing and counting
             kept = f"{count} of {len(settings.plan)} flights are kept in {folder.path}"
-            _note(f"interrupted; {kept}; continue with:\n  {settings.command}")
+            say(f"interrupted; {kept}; continue with:\n  {settings.command}")
             return EXIT_INTERRUPTED
 
 
@@ -84,7 +85,7 @@ def _fly_missing(settings: EvaluationSettings, folder: EvaluationFolder) -> None
     plan = settings.plan
     kept = len(folder.done)
     if kept:
-        _note(f"{kept} of {len(plan)} flights are in {folder.path} already")
+        say(f"{kept} of {len(plan)} flights are in {folder.path} already")
     if kept == len(plan):
         return
     scenarios = {scenario.name: scenario for scenario in plan.scenarios}
@@ -144,7 +145,3 @@ def _print_flown(settings: EvaluationSettings, folder: EvaluationFolder, last: R
         summarise([*rows, last]), f"{settings.plan.title}: {folder.identity.mission}, the first {flown}"
     )
     sys.stdout.flush()
-
-
-def _note(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)

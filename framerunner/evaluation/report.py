@@ -129,6 +129,7 @@ def replay_command(
     pilot: str | None,
     seed: int,
     response: str = "",
+    *,
     genuine: GenuineUse | None = None,
 ) -> str:
     """The command that flies the scenario of a file again, in lockstep the same to the last bit."""
@@ -172,7 +173,7 @@ def _failures(
                 done += 1
             file = folder.scenario_file(row.scenario)
             command = replay_command(
-                file, settings.mission, settings.pilot, row.seed or 0, row.response, settings.genuine
+                file, settings.mission, settings.pilot, row.seed or 0, row.response, genuine=settings.genuine
             )
             failures.append(Failure(row, command, plot, _traceback(folder, row)))
         groups.append((cause.verdict, cause.ended_in, failures))

@@ -14,6 +14,7 @@ from rich.table import Table
 from framerunner.evaluation.compare import Comparison
 from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import Spread, Summary
+from framerunner.terminal import table_console
 from scenarios.verdict import Verdict
 
 _LINE_S = 5.0
@@ -81,7 +82,7 @@ def _duration(seconds: float) -> str:
 
 def print_summary(summary: Summary, title: str) -> None:
     """Print rates, distributions and why flights were not clean to standard output."""
-    console = _console()
+    console = table_console(110)
     rates = _table(title, "flights", "share (95 % interval)")
     for verdict, rate in summary.verdicts.items():
         rates.add_row(verdict, str(rate.count), str(rate))
@@ -120,7 +121,7 @@ def print_summary(summary: Summary, title: str) -> None:
 
 def print_comparison(comparison: Comparison) -> None:
     """Print two evaluations side by side to standard output."""
-    console = _console()
+    console = table_console(110)
     table = _table(f"against {comparison.path} ({len(comparison.pairs)} same scenarios)", "before", "now")
     table.add_row("landed in time", str(comparison.landed_before), str(comparison.landed_after))
     table.add_row("landed only then / only now", str(comparison.lost), str(comparison.won))
@@ -162,13 +163,6 @@ def spread_cells(spread: Spread | None, form: str, unknown: str) -> list[str]:
     if spread is None:
         return [unknown] * 4
     return [format(number, form) for number in (spread.p10, spread.median, spread.p90, spread.mean)]
-
-
-def _console() -> Console:
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = max(console.width, 110)  # a pipe has no width; do not cut what is written to a file
-    return console
 
 
 def _table(title: str, *columns: str) -> Table:

@@ -15,6 +15,7 @@ from rich.table import Table
 
 from framerunner.flying.judges import Judge
 from framerunner.runs.recorder import FlightRecorder
+from framerunner.terminal import say
 from offboard.app import MissionEnd, Moment
 from offboard.safety.operator import GO_WORDS
 from scenarios.result import FlightResult, RefereeSnapshot
@@ -75,11 +76,9 @@ class FlightDisplay:
         self._line_state, self._line_s = moment.mission_state + paused, time_s
         crossed = ", ".join(standing.crossed) if standing else ""
         place, note = place_in_words(moment), paused or moment.remark
-        print(
+        say(
             f"{time_s:6.1f} s  {moment.mission_state:22s} {place}  crossed: {crossed or 'none'}"
-            f"{'  ' if note else ''}{note}",
-            file=sys.stderr,
-            flush=True,
+            f"{'  ' if note else ''}{note}"
         )
 
     def _table(self, standing: RefereeSnapshot | None) -> Table:

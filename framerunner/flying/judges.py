@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from dataclasses import replace
 from math import cos, sin
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ from pydantic import ValidationError
 
 from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
+from framerunner.terminal import warn
 from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import Moment
 from scenarios.models import Scenario, TrueState
@@ -168,10 +168,6 @@ class TruthJudge(TelemetryJudge):
             await asyncio.sleep(_POLL_S)
 
 
-def _warn(words: str) -> None:
-    print(f"warning: {words}", file=sys.stderr, flush=True)
-
-
 def _started_at(plan: FlightPlan, place: StandingPlace | None, api: SimulatorApi) -> FlightPlan:
     """The plan of a drone that starts from where it stands; as it was, with a warning, if it cannot."""
     problem = "does not stand upright with its motors off"
@@ -182,7 +178,7 @@ def _started_at(plan: FlightPlan, place: StandingPlace | None, api: SimulatorApi
             return replace(plan, scenario=Scenario.model_validate({**scenario.model_dump(), "start": start}))
         except ValidationError as error:
             problem = f"stands where no flight can start, {first_error(error)}"
-    _warn(f"the drone at {api.url} has flown before and {problem}; start the simulator again")
+    warn(f"the drone at {api.url} has flown before and {problem}; start the simulator again")
     return plan
 
 
@@ -240,7 +236,7 @@ async def choose_judge(
             )
         )
     if api is not None and answer is not None:
-        _warn(
+        warn(
             f"{api.url} shows the scenario {answer.scenario}, and {plan.scenario.name} is flown; "
             f"start it with --scenario {plan.scenario.name}"
         )

@@ -16,7 +16,8 @@ from framerunner.files.text_file import read_text
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.plan import FlightPlan
 from framerunner.runs.recorder import RecordingCamera, RunRecords
-from framerunner.runs.run_folder import RunFolder, warn
+from framerunner.runs.run_folder import RunFolder
+from framerunner.terminal import warn
 from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import MissionEnd
 from offboard.safety.rules import SIMULATED, SafetyRules

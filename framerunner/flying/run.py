@@ -15,7 +15,8 @@ from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings, flight_guard, fly_in_real_time
 from framerunner.runs.recorder import RunRecords, VideoFile
-from framerunner.runs.run_folder import RunFolder, left_lines, warn, write_outcome
+from framerunner.runs.run_folder import RunFolder, left_lines, write_outcome
+from framerunner.terminal import warn
 from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import INTERRUPTED
 from vision.types import Image

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from framerunner.preflight.card import FlightCard
-from framerunner.runs.run_folder import warn
+from framerunner.terminal import warn
 
 HTML_NAME, PDF_NAME = "flight_card.html", "flight_card.pdf"
 

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from framerunner.flying.display import moment_table, place_in_words
 from framerunner.recording.events import Crossed, Recorded, time_of_event
+from framerunner.terminal import say
 from offboard.app import Moment
 from sitl.video import VideoServer
 
@@ -62,7 +63,7 @@ class ReplayDisplay:
             return
         self._line_state, self._line_s = moment.mission_state, time_s
         line = f"{time_s:6.1f} s  {moment.mission_state:22s} {place_in_words(moment)}  crossed: {crossed}"
-        print(line, file=sys.stderr, flush=True)
+        say(line)
 
     def _table(self, moment: Moment, crossed: str) -> Table:
         table = moment_table(self._title, moment, f"{moment.flight_time_s:.1f} s")
@@ -84,7 +85,7 @@ async def replay(recorded: Recorded, speed: float, video: VideoServer | None) ->
     """
     if video is not None:
         await video.start()
-        print(f"video: {video.url}  (stream: {video.url}video)", file=sys.stderr, flush=True)
+        say(f"video: {video.url}  (stream: {video.url}video)")
     try:
         with ReplayDisplay(recorded.title) as display:
             pace = _Pace(speed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime
@@ -16,6 +15,7 @@ from framerunner.files.text_file import replace_file
 from framerunner.runs import PlotError
 from framerunner.runs.run_files import RunFiles
 from framerunner.runs.track import Track
+from framerunner.terminal import warn
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import dump_yaml
@@ -151,12 +151,6 @@ def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: F
     _try(folder.result, lambda: folder.write_result(result))
     _try(folder.track, plot)
     return folder.result.exists()
-
-
-def warn(problem: str) -> None:
-    """Print a problem on standard error; nothing if it is empty."""
-    if problem:
-        print(f"warning: {problem}", file=sys.stderr, flush=True)
 
 
 def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:

@@ -15,6 +15,7 @@ from rich.progress import track
 from rich.table import Table
 
 from framerunner.errors import SettingError
+from framerunner.terminal import table_console
 from framerunner.vision_evaluation.labelled_images import Disturbance, LabelledImage, labelled_images
 from framerunner.vision_evaluation.scores import (
     RATED_ANGLE_DEG,
@@ -142,9 +143,7 @@ def _as_json(settings: VisionSettings, scores: Scores) -> dict[str, object]:
 
 def print_scores(scores: Scores, title: str) -> None:
     """Print rates and errors of the detectors to standard output."""
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = max(console.width, 130)  # a pipe has no width; do not cut what is written to a file
+    console = table_console(130)
     console.print(f"{title}: {scores.images} images", markup=False)
     console.print(
         f"wholly in view, up to {RATED_DISTANCE_M:g} m and {RATED_ANGLE_DEG:g}° off the normal", markup=False
