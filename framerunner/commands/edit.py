@@ -100,15 +100,14 @@ def _drone_url(given: str | None) -> str:
         LinkError: the URL is none.
         SettingError: its port is taken.
     """
+    from framerunner.child_process import free_port
     from framerunner.editing.live import GROUND_PORT, is_free
     from framerunner.wire.transports.urls import parse_url
 
     if given is None:
         if is_free(GROUND_PORT, socket.SOCK_DGRAM):
             return f"udpin://127.0.0.1:{GROUND_PORT}"
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = free_port()
         say(
             f"UDP port {GROUND_PORT} is taken, by a monitor for example, which shows other drones; those "
             f"that are started in the editor are shown here, by port {port}"

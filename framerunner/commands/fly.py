@@ -47,6 +47,7 @@ from framerunner.commands.options.hardware import (
 )
 from framerunner.commands.options.rules import Rule, check_rules, each, given_in
 from framerunner.errors import SettingError
+from framerunner.flying.output import OutputSettings
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -106,31 +107,7 @@ class SimulationOptions:
     response: Response = None
 
 
-@Parameter(name="*", group=OUTPUT_GROUP)
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OutputOptions:
-    """What a flight leaves, and where it is shown.
-
-    Attributes:
-        out: folder in which this flight's folder is made
-        record: write flight.mcap as well, for `framerunner replay` and Foxglove
-        video: write video.avi also in lockstep; in real time it is always written
-        monitor: open the Game Monitor as well, on http://127.0.0.1:8080/; it stays open until Ctrl-C
-        wait_for_viewer: with --monitor: fly when a browser shows it
-        monitor_link: MAVLink URL of a monitor that runs already, such as udpout://127.0.0.1:14550
-        settings: file of options.
-    """
-
-    out: Path = Path("runs")
-    record: bool = False
-    video: bool = False
-    monitor: bool = False
-    wait_for_viewer: Annotated[bool, Parameter(negative=())] = False
-    monitor_link: str | None = None
-    settings: SettingsFile = None
-
-
-_DRONE, _SIMULATION, _OWN, _OUTPUT = DroneOptions(), SimulationOptions(), GenuineOptions(), OutputOptions()
+_DRONE, _SIMULATION, _OWN, _OUTPUT = DroneOptions(), SimulationOptions(), GenuineOptions(), OutputSettings()
 _RULES = (
     Rule("simulator", "is for a drone that is running already; name it with --drone", needs=("drone",)),
     ONE_AUTOPILOT,
@@ -170,7 +147,8 @@ def fly(
     flown: DroneOptions = _DRONE,
     simulated: SimulationOptions = _SIMULATION,
     genuine: GenuineOptions = _OWN,
-    output: OutputOptions = _OUTPUT,
+    output: Annotated[OutputSettings, Parameter(name="*", group=OUTPUT_GROUP)] = _OUTPUT,
+    settings: SettingsFile = None,
     hardware: HardwareOptions = NONE,
     lifeline: Lifeline = False,
 ) -> int:
@@ -200,6 +178,7 @@ def fly(
         simulated: a simulated drone.
         genuine: a genuine autopilot.
         output: what is left, and where it is shown.
+        settings: file of options.
         hardware: how a real drone is flown.
         lifeline: stop when standard input ends.
     """
@@ -231,17 +210,8 @@ def fly(
             camera_delay=delay_of(flown.camera_delay, plan.calibration),
             hardware=procedure,
         )
-        settings = FlightSettings(
-            plan=plan,
-            real_time=None if simulated.lockstep else real_time,
-            out=output.out,
-            record=output.record,
-            video=output.video,
-            monitor=output.monitor,
-            wait_for_viewer=output.wait_for_viewer,
-            monitor_link=output.monitor_link,
-        )
-        return _run(settings, lifeline=lifeline)
+        flight = FlightSettings(plan, None if simulated.lockstep else real_time, output)
+        return _run(flight, lifeline=lifeline)
 
 
 def _instance(given: int | None, autopilot: GenuineAutopilot | None) -> AbstractContextManager[int]:
