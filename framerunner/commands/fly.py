@@ -48,6 +48,7 @@ from framerunner.commands.options.hardware import (
 from framerunner.commands.options.rules import Rule, check_rules, each, given_in
 from framerunner.errors import SettingError
 from framerunner.flying.output import OutputSettings
+from framerunner.preflight.settings import HardwareSettings
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -239,7 +240,7 @@ def _run(settings: FlightSettings, *, lifeline: bool) -> int:
 def _scenario(
     name: str,
     options: SimulationOptions,
-    hardware: HardwareOptions,
+    hardware: HardwareSettings,
     autopilot: GenuineAutopilot | None,
     *,
     starts: bool,

@@ -75,16 +75,18 @@ def preflight(
         raise SettingError("--any-vehicle: is for --restore-parameters; leave it out")
 
     from framerunner.camera_calibration.calibration_file import load_calibration
-    from framerunner.commands.options.hardware import HardwareOptions, caps_of
+    from framerunner.commands.options.hardware import caps_of
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.check_names import CHECK_NAMES
     from framerunner.preflight.run import PreflightSettings
+    from framerunner.preflight.settings import HardwareSettings
     from offboard.mission import load_mission
     from offboard.safety.check import check_names
     from scenarios.loader import load_scenario
 
     check_names(accept, CHECK_NAMES)
-    caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission(mission)
+    caps = caps_of(HardwareSettings(max_speed=max_speed, max_height=max_height), drone)
+    loaded = load_mission(mission)
     known = None if calibration is None else load_calibration(calibration)
     plan = FlightPlan(load_scenario(scenario), loaded, None, calibration=known, caps=caps)
     delay = delay_of(camera_delay, known)

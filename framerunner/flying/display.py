@@ -10,12 +10,11 @@ from math import isfinite
 from rich.console import Console
 from rich.live import Live
 from rich.markup import escape
-from rich.status import Status
 from rich.table import Table
 
 from framerunner.flying.judges import Judge
 from framerunner.runs.recorder import FlightRecorder
-from framerunner.terminal import say
+from framerunner.terminal import ProgressLine, say
 from offboard.app import MissionEnd, Moment
 from offboard.safety.operator import GO_WORDS
 from scenarios.result import FlightResult, RefereeSnapshot
@@ -23,9 +22,6 @@ from vision.types import Detection
 
 _REFRESH_S = 0.2
 _LINE_S = 10.0
-_PROGRESS_QUIET_S = 1.0
-_PROGRESS_REFRESH_S = 0.25
-_PROGRESS_LINE_S = 2.0
 
 
 class FlightDisplay:
@@ -142,44 +138,21 @@ def _seen(detection: Detection) -> str:
     return f"{detection.d:.2f} m away, {detection.a:.0f} degrees aside"
 
 
-class LockstepProgress:
-    """A status line in a terminal, elsewhere a line every two seconds; nothing in the first second."""
+class LockstepProgress(ProgressLine):
+    """How far a flight in lockstep is; a line every two seconds where there is no terminal."""
 
     def __init__(self, limit_s: float) -> None:
+        super().__init__(quiet_s=1.0, line_s=2.0, refresh_s=0.25)
         self._limit_s = limit_s
-        self._console = Console(stderr=True)
-        self._status: Status | None = None
-        self._started_s = time.monotonic()
-        self._next_s = self._started_s + _PROGRESS_QUIET_S
-
-    def __enter__(self) -> LockstepProgress:
-        """Start to count the first second."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Remove the status line."""
-        if self._status is not None:
-            self._status.stop()
 
     def see(self, moment: Moment) -> None:
         """Show a tick of the flight, if the last one shown is old enough."""
-        now_s = time.monotonic()
-        if now_s < self._next_s:
-            return
-        speed = moment.flight_time_s / (now_s - self._started_s)
-        text = (
-            f"{moment.flight_time_s:6.1f} s of {self._limit_s:g} s  {moment.mission_state:22s} "
-            f"{speed:.0f} times real time"
-        )
-        if not self._console.is_terminal:
-            self._next_s = now_s + _PROGRESS_LINE_S
-            self._console.print(text, markup=False, highlight=False)
-            return
-        self._next_s = now_s + _PROGRESS_REFRESH_S
-        if self._status is None:
-            self._status = self._console.status(text)
-            self._status.start()
-        self._status.update(text)
+        if self.is_due:
+            speed = moment.flight_time_s / (time.monotonic() - self.started_s)
+            self.show(
+                f"{moment.flight_time_s:6.1f} s of {self._limit_s:g} s  {moment.mission_state:22s} "
+                f"{speed:.0f} times real time"
+            )
 
 
 def _faults_in_words(result: FlightResult) -> str:

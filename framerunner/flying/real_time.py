@@ -249,9 +249,9 @@ class _RealTimeFlight:
             settings.camera_url,
             settings.camera_delay,
             set_parameters=hardware.set_parameters,
-            accepted=hardware.accepted,
+            accepted=hardware.accept,
             folder=self._records.folder.path,
-            abort=hardware.abort,
+            abort=hardware.on_abort,
         )
         show = {} if link is None else {"show": link.show_card}
         safety, system_id = await prepare(plan, checks, hardware, operator, **show)

@@ -48,7 +48,7 @@ def test_a_file_gives_options_and_the_command_line_goes_before_it():
         ("record: true\nspeed: fast", 'flight.yaml:2: speed is "fast": must be a number'),
         ("instance: 1.5", "flight.yaml:1: instance is 1.5: must be a whole number"),
         ("lockstep: yes", 'flight.yaml:1: lockstep is "yes": must be true or false'),
-        ("on-abort: fly", "flight.yaml:1: on-abort is \"fly\": must be 'land' or 'hold'"),
+        ("on-abort: fly", "flight.yaml:1: on-abort is \"fly\": must be 'hold' or 'land'"),
         ("accept: gps", 'flight.yaml:1: accept is "gps": must be a list'),
         ("drone:", "flight.yaml:1: drone is empty: must be text"),
         ("settings: other.yaml", "flight.yaml:1: settings is not a known field"),
