@@ -44,8 +44,8 @@ class ProgressLine:
 
     def __init__(
         self,
-        quiet_s: float,
         line_s: float,
+        quiet_s: float = 0.0,
         refresh_s: float = 0.0,
         *,
         total: int | None = None,

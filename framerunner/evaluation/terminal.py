@@ -31,6 +31,7 @@ class EvaluationProgress(ProgressLine):
         self._rows = self._kept = len(kept)
         self._verdicts = Counter(row.verdict for row in kept)
         self._simulated_s = 0.0
+        self._live.update(self._task, description=self.text())
 
     def add(self, row: Row) -> None:
         """Count a flight that has ended."""
