@@ -183,7 +183,10 @@ def fly(
         hardware: how a real drone is flown.
         lifeline: stop when standard input ends.
     """
-    check_rules(_RULES, {**given_in(flown, simulated, genuine, output), **given_hardware(hardware)})
+    given = {**given_in(flown, simulated, genuine, output), **given_hardware(hardware)}
+    if simulated.instance == 0:  # as without the option
+        del given["instance"]
+    check_rules(_RULES, given)
     check_range("--camera-delay", flown.camera_delay, 0.0, 0.5)
     check_range("--speed", simulated.speed, 0.01, 100)
     check_range("--instance", simulated.instance, 0, 9)

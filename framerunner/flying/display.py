@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import sys
 import time
+from collections.abc import Sequence
 from math import isfinite
 
 from rich.console import Console
@@ -24,6 +25,26 @@ _REFRESH_S = 0.2
 _LINE_S = 10.0
 
 
+class MomentLines:
+    """Ticks of a flight where there is no terminal: a line at every change and every ten seconds."""
+
+    def __init__(self) -> None:
+        self._told = ""
+        self._line_s = -_LINE_S
+
+    def show(self, moment: Moment, crossed: Sequence[str], also: str) -> None:
+        """Print a line if it is due, or if the mission's state or `also` has changed."""
+        time_s, told = moment.flight_time_s, moment.mission_state + also
+        if told == self._told and time_s - self._line_s < _LINE_S:
+            return
+        self._told, self._line_s = told, time_s
+        note = pause_in_words(moment) or moment.remark
+        say(
+            f"{time_s:6.1f} s  {moment.mission_state:22s} {place_in_words(moment)}  "
+            f"crossed: {', '.join(crossed) or 'none'}{'  ' if note else ''}{note}"
+        )
+
+
 class FlightDisplay:
     """A live table in a terminal; elsewhere a line at every change of state and every ten seconds.
 
@@ -36,8 +57,6 @@ class FlightDisplay:
         self._recorder = recorder
         self._judge = judge
         self._console = Console(file=sys.stderr)
-        self._line_state = ""  # in the last line
-        self._line_s = -_LINE_S
         self._showing: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> FlightDisplay:
@@ -53,29 +72,16 @@ class FlightDisplay:
 
     async def _show(self) -> None:
         if not self._console.is_terminal:
+            lines = MomentLines()
             while True:
-                self._print_line(await self._judge.standing())
+                standing, moment = await self._judge.standing(), self._recorder.latest
+                if moment is not None:
+                    lines.show(moment, standing.crossed if standing else (), pause_in_words(moment))
                 await asyncio.sleep(_REFRESH_S)
         with Live(console=self._console, auto_refresh=False, transient=True) as live:
             while True:
                 live.update(self._table(await self._judge.standing()), refresh=True)
                 await asyncio.sleep(_REFRESH_S)
-
-    def _print_line(self, standing: RefereeSnapshot | None) -> None:
-        moment = self._recorder.latest
-        if moment is None:
-            return
-        time_s = moment.flight_time_s
-        paused = pause_in_words(moment)
-        if moment.mission_state + paused == self._line_state and time_s - self._line_s < _LINE_S:
-            return
-        self._line_state, self._line_s = moment.mission_state + paused, time_s
-        crossed = ", ".join(standing.crossed) if standing else ""
-        place, note = place_in_words(moment), paused or moment.remark
-        say(
-            f"{time_s:6.1f} s  {moment.mission_state:22s} {place}  crossed: {crossed or 'none'}"
-            f"{'  ' if note else ''}{note}"
-        )
 
     def _table(self, standing: RefereeSnapshot | None) -> Table:
         moment = self._recorder.latest

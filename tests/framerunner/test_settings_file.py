@@ -94,6 +94,7 @@ def test_every_rule_names_options_that_there_are():
         (["--camera", "0"], "--camera 0: needs the URL of its drone too; add --drone"),
         (["--drone", "udpin://:1", "--camera", "0", "--speed", "2"], "--speed 2: is for the simulated drone"),
         (["--seed", "1"], "add one of them or leave it out"),
+        (["--lockstep", "--instance", "0", "--speed", "2"], "in this process; leave out --speed"),
         (["--response", "lag=0.5"], "add --lockstep"),
         (["--dry-run"], "--dry-run: is for a drone given by --drone"),
         (["--drone", "u", "--camera", "0", "--simulated", "--yes"], "--yes: a drone that is --simulated"),
