@@ -71,7 +71,8 @@ class ProgressLine:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._live.stop()
+        if self._console.is_terminal:  # elsewhere it prints an empty line
+            self._live.stop()
 
     @property
     def is_due(self) -> bool:

@@ -45,7 +45,7 @@ from framerunner.commands.options.hardware import (
     hardware_of,
     with_dry_limit,
 )
-from framerunner.commands.options.rules import Rule, check_rules, each, given_in
+from framerunner.commands.options.rules import Rule, check_rules, for_each, given_in
 from framerunner.errors import SettingError
 from framerunner.flying.output import OutputSettings
 from framerunner.preflight.settings import HardwareSettings
@@ -112,11 +112,11 @@ _DRONE, _SIMULATION, _OWN, _OUTPUT = DroneOptions(), SimulationOptions(), Genuin
 _RULES = (
     Rule("simulator", "is for a drone that is running already; name it with --drone", needs=("drone",)),
     ONE_AUTOPILOT,
-    *each(GENUINE, "flies a simulator that is started; leave it out with --drone", excludes=("drone",)),
-    *each(GENUINE, "it is another process; leave out --lockstep", excludes=("lockstep",)),
+    *for_each(GENUINE, "flies a simulator that is started; leave it out with --drone", excludes=("drone",)),
+    *for_each(GENUINE, "it is another process; leave out --lockstep", excludes=("lockstep",)),
     Rule("drone", "needs the URL of its camera too; add --camera", needs=("camera", "simulator")),
     Rule("camera", "needs the URL of its drone too; add --drone", needs=("drone",)),
-    *each(
+    *for_each(
         ("speed", "instance"), "is for the simulated drone; leave it out with --drone", excludes=("drone",)
     ),
     Rule(
@@ -132,7 +132,9 @@ _RULES = (
         "is seed 0",
         needs=("lockstep", *GENUINE),
     ),
-    *each(("sensors", "fault"), "is for a simulated drone; leave it out with --drone", excludes=("drone",)),
+    *for_each(
+        ("sensors", "fault"), "is for a simulated drone; leave it out with --drone", excludes=("drone",)
+    ),
     Rule("response", "is for a simulated vehicle in lockstep; add --lockstep", needs=("lockstep",)),
     Rule("drone-limits", "is for a drone given by --drone; leave it out", needs=("drone",)),
     *HARDWARE_RULES,

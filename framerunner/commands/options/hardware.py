@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from framerunner.commands import check_range
 from framerunner.commands.options.flight import HARDWARE_GROUP
-from framerunner.commands.options.rules import Given, Rule, each, given_in, names_of
+from framerunner.commands.options.rules import Given, Rule, for_each, given_in, names_of
 from framerunner.preflight.settings import DRY_RUN_S, HardwareSettings
 
 if TYPE_CHECKING:
@@ -22,13 +22,13 @@ NONE = HardwareSettings()
 CAPS = ("max-speed", "max-height")
 _PROCEDURE = tuple(name for name in names_of(HardwareSettings) if name not in (*CAPS, "simulated"))
 HARDWARE_RULES = (
-    *each((*_PROCEDURE, "simulated"), "is for a drone given by --drone; leave it out", needs=("drone",)),
-    *each(
+    *for_each((*_PROCEDURE, "simulated"), "is for a drone given by --drone; leave it out", needs=("drone",)),
+    *for_each(
         ("yes", "simulated"),
         "a service never flies without an operator's go; leave it out",
         excludes=("service",),
     ),
-    *each(
+    *for_each(
         _PROCEDURE,
         "a drone that is --simulated is not checked; leave one of them out",
         excludes=("simulated",),

@@ -46,7 +46,7 @@ class Rule:
             raise SettingError(f"--{self.option}{shown}: {words}")
 
 
-def each(options: Iterable[str], words: str, **how: Any) -> tuple[Rule, ...]:  # noqa: ANN401 - those of `Rule`
+def for_each(options: Iterable[str], words: str, **how: Any) -> tuple[Rule, ...]:  # noqa: ANN401 - those of `Rule`
     """The same rule for several options."""
     return tuple(Rule(option, words, **how) for option in options)
 
@@ -80,12 +80,8 @@ def words_of(given: Given) -> list[str]:
     words: list[str] = []
     for name, value in given.items():
         if " " not in name:
-            values = value if isinstance(value, tuple) else (value,)
-            words += [
-                word
-                for one in values
-                for word in ((f"--{name}",) if one is True else (f"--{name}", _text(one)))
-            ]
+            for one in value if isinstance(value, tuple) else (value,):
+                words += [f"--{name}"] if one is True else [f"--{name}", str(one)]
     return words
 
 
