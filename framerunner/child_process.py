@@ -17,6 +17,7 @@ from typing import Self, TypeVar
 
 from framerunner.errors import SettingError
 from framerunner.monitor import FIRST_VIEWER
+from framerunner.terminal import say, warn
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 
@@ -207,14 +208,12 @@ class MonitorProcess(ChildProcess):
 
     async def viewed(self) -> None:
         """Wait until a browser shows it; SettingError with its last line if it ends."""
-        print(
-            "the flight begins when a browser shows the monitor (Ctrl-C stops)", file=sys.stderr, flush=True
-        )
+        say("the flight begins when a browser shows the monitor (Ctrl-C stops)")
         await self.guard(asyncio.create_task(self._viewed.wait()))
 
     async def stay(self) -> None:
         """Wait for Ctrl-C or SIGTERM, which then ends only this wait."""
-        print("the monitor stays open (Ctrl-C or SIGTERM ends it)", file=sys.stderr, flush=True)
+        say("the monitor stays open (Ctrl-C or SIGTERM ends it)")
         try:
             await self.failed()
         except asyncio.CancelledError:
@@ -222,11 +221,11 @@ class MonitorProcess(ChildProcess):
 
     async def _warn_of_its_end(self) -> None:
         """The monitor's end must not end a flight."""
-        print(f"warning: {await self.failed()}", file=sys.stderr, flush=True)
+        warn(await self.failed())
 
     def _relay(self, line: str) -> None:
         if not line.startswith("error: "):  # the reason of its end is printed by what waits for it
-            print(line, file=sys.stderr, flush=True)
+            say(line)
         if "http://" in line:
             self._open.set()
         if line == FIRST_VIEWER:

@@ -6,37 +6,39 @@ import errno
 import os
 import signal
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from types import FrameType
 
     from cyclopts import App
+    from cyclopts.argument import ArgumentCollection
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 _INTERRUPT_AGAIN_S = 0.02
-# Each command, in the module of its name, which is imported only if the command, or help of all, is wanted.
+# Each command: its module, imported only if the command, or help of all, is wanted, and its name there.
 _COMMANDS = {
-    "sim": "sim",
-    "fly": "fly",
-    "camera": "app",
-    "mocap": "mocap",
-    "doctor": "doctor",
-    "preflight": "preflight",
-    "evaluate": "evaluate",
-    "bound": "bound",
-    "monitor": "monitor",
-    "px4": "app",
-    "ardupilot": "app",
-    "replay": "replay",
-    "film": "film",
-    "mission": "app",
-    "edit": "edit",
-    "course": "app",
-    "scenario": "app",
-    "vision": "app",
-    "list": "list_",
+    "sim": "sim:sim",
+    "fly": "fly:fly",
+    "camera": "camera:app",
+    "mocap": "mocap:mocap",
+    "doctor": "doctor:doctor",
+    "preflight": "preflight:preflight",
+    "evaluate": "evaluate:evaluate",
+    "bound": "bound:bound",
+    "monitor": "monitor:monitor",
+    "px4": "genuine:px4",
+    "ardupilot": "genuine:ardupilot",
+    "replay": "replay:replay",
+    "film": "film:film",
+    "mission": "mission:app",
+    "edit": "edit:edit",
+    "course": "course:app",
+    "scenario": "scenario:app",
+    "vision": "vision:app",
+    "list": "list:list_",
 }
 _DISK_REFUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
@@ -54,10 +56,22 @@ def build_app() -> App:
         default_parameter=Parameter(negative=(), show_default=_shown_default),
         suppress_keyboard_interrupt=False,
         result_action="return_value",
+        config=_read_settings,
     )
-    for name, made_by in _COMMANDS.items():
-        app.command(f"framerunner.commands.{name}:{made_by}", name=name)
+    for name, place in _COMMANDS.items():
+        app.command(f"framerunner.commands.{place}", name=name)
     return app
+
+
+def _read_settings(_app: App, _commands: tuple[str, ...], arguments: ArgumentCollection) -> None:
+    """Read the file of a command's option --settings, if it is given."""
+    from framerunner.commands.options.flight import SETTINGS
+
+    chosen = next((argument for argument in arguments if argument.name == SETTINGS), None)
+    if chosen is not None and chosen.tokens:
+        from framerunner.commands.options.settings_file import read_settings
+
+        read_settings(Path(chosen.tokens[-1].value), arguments)
 
 
 def _shown_default(value: object) -> str | None:

@@ -6,12 +6,14 @@ from importlib.util import find_spec
 
 _EXTRAS = {
     "av": "video",
+    "distributed": "dask",
     "fastapi": "monitor",
     "ifaddr": "monitor",
     "mcap": "recording",
     "motioncapture": "mocap",
     "multipart": "monitor",
     "PIL": "video",
+    "ray": "ray",
     "segno": "monitor",
     "sqlalchemy": "monitor",
     "starlette": "monitor",

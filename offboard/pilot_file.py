@@ -130,7 +130,7 @@ def find_pilot(name_or_path: str | Path) -> PilotSource:
         ExtensionError: a package does, but it cannot be used.
     """
     name = str(name_or_path)
-    if isinstance(name_or_path, Path) or name.endswith(".py") or "/" in name:
+    if _is_path(name_or_path):
         return read_pilot(name_or_path)
     added = find_extension("pilot", name)
     if added is None:
@@ -142,6 +142,15 @@ def find_pilot(name_or_path: str | Path) -> PilotSource:
     for _, reason in _unusable_members(kind):
         raise added.refused(reason)
     return kind
+
+
+def pilot_argument(name_or_path: str) -> str:
+    """What another process, in any folder, is given for `find_pilot`: an absolute path of a file."""
+    return str(Path(name_or_path).absolute()) if _is_path(name_or_path) else name_or_path
+
+
+def _is_path(name_or_path: str | Path) -> bool:
+    return isinstance(name_or_path, Path) or name_or_path.endswith(".py") or "/" in name_or_path
 
 
 def read_pilot(path: str | Path) -> PilotFile:

@@ -21,7 +21,7 @@ import yaml
 
 import framerunner
 from framerunner.camera_calibration.calibration_file import load_calibration
-from framerunner.cli import run
+from framerunner.cli import build_app, run
 from framerunner.vehicle.airframe import load_airframe
 from offboard.mission import load_mission, new_mission
 from offboard.navigation.camera_model import CameraModel
@@ -177,6 +177,13 @@ def read_transitions(text, folder):
     read_mission(yaml.safe_dump({"name": "shown", "initial": "shown", "states": states}), folder)
 
 
+def read_options(text, folder):
+    (folder / "shown.yaml").write_text(text, encoding="utf-8")
+    build_app().parse_args(
+        ["fly", "--settings", str(folder / "shown.yaml")], print_error=False, exit_on_error=False
+    )
+
+
 def read_states_of_first_mission(text, folder):
     """The states of the exercise, in the mission that `mission new` writes; it then flies clean."""
     made = new_mission("my_mission", folder)
@@ -195,6 +202,7 @@ KINDS = {
     "camera.md": [read_scenario, read_scenario, read_level, read_calibration, read_part_of_calibration],
     "devices.md": [read_scenario],
     "faults.md": [read_scenario],
+    "flight-files.md": [read_options],
     "missions.md": [read_mission, read_with_omissions, read_transitions],
     "real-drone.md": [read_whole_scenario],
     "scenarios.md": [
@@ -243,6 +251,8 @@ def test_messages_in_troubleshooting_are_those_of_the_program():
         "framerunner: command not found",  # the shell's
         "… cannot be opened (Address already in use); if another simulator",
         "--ardupilot …: has no arducopter",
+        "--drone …: needs the URL of its camera too; add --camera",  # of a table of rules, as the next
+        "--monitor: shows flights in real time; leave it out with --lockstep",
         "unknown scenario",
     )
     texts = "\n".join([*texts_of_the_program(), (ROOT / "Makefile").read_text(encoding="utf-8")])

@@ -83,7 +83,9 @@ def test_the_readme_shows_the_four_uses_in_order():
 
 
 @pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS.keys())
-def test_documented_commands_are_understood(words):
+def test_documented_commands_are_understood(words, tmp_path, monkeypatch):
+    (tmp_path / "flight.yaml").write_text("max-speed: 0.5\n", encoding="utf-8")  # for --settings
+    monkeypatch.chdir(tmp_path)
     program().parse_args(words, print_error=False, exit_on_error=False)
 
 

@@ -20,8 +20,8 @@ from framerunner.geometry.vectors import Vec3
 from framerunner.recording.events import RecordedImage
 from framerunner.recording.open_recording import recorded_flight
 from framerunner.recording.tlog_reader import TlogRecording
+from framerunner.runs.run_files import RunFiles
 from offboard.app import Moment
-from scenarios.loader import load_scenario
 from vision.calibration.model import Calibration, CalibrationError, Mounting
 from vision.calibration.mounting import (
     MAX_DELAY_STD_S,
@@ -215,8 +215,7 @@ def measure_recorded(
             )
         result = recorded.result
         simulated = result is not None and result.judged_by == "truth"
-        scenario_file = folder / "scenario.yaml"
-        scenario = load_scenario(scenario_file) if scenario_file.is_file() else None
+        scenario = RunFiles(folder).load_scenario()
         known = _calibration(calibration, scenario if simulated else None)
         smooth = scenario is not None and scenario.camera.effects is not None
         detect = new_detector("frames", calibration=known, rendered=simulated, smooth=smooth)

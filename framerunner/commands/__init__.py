@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
 
 from framerunner.errors import SettingError
+from framerunner.files.text_file import make_file
+from framerunner.terminal import say as say
 
 if TYPE_CHECKING:
     from scenarios.models import Scenario
@@ -100,6 +102,19 @@ def with_faults(scenario: Scenario, fault: tuple[str, ...]) -> Scenario:
     return scenario.model_copy(update={"faults": faults}) if fault else scenario
 
 
-def say(line: str) -> None:
-    """Print a line on standard error at once."""
-    print(line, file=sys.stderr, flush=True)
+def write_new(texts: Mapping[Path, str], options: str = "--out", *, makes_folder: bool = False) -> None:
+    """Write new files, completely.
+
+    Raises:
+        SettingError: one is there already, so none is written, or one cannot be written; `options` name them.
+    """
+    for path in texts:
+        if path.exists():
+            raise SettingError(f"{path} is there already and is left as it is; choose another {options}")
+    try:
+        for path, text in texts.items():
+            if makes_folder:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            make_file(path, text)
+    except OSError as error:
+        raise SettingError(f"--out {path}: cannot be written ({error.strerror}); choose another") from None

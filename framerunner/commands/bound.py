@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -17,20 +16,14 @@ if TYPE_CHECKING:
 
 _MAX_SCENARIOS = 10_000
 
-_Level = Annotated[str | None, Parameter(help="scenarios of this level, name or file, instead of one")]
-_Seeds = Annotated[
-    str | None, Parameter(help="of the level's scenarios: the first and the last, such as 1:300")
-]
-_Class = Annotated[Literal["contest", "open"], Parameter(name="--class", help="of the mission's limits")]
-
 
 def bound(
-    scenario: Annotated[str | None, Parameter(help="name or file")] = None,
+    scenario: str | None = None,
     *,
-    level: _Level = None,
-    seeds: _Seeds = None,
-    mission_class: _Class = "contest",
-    out: Annotated[Path | None, Parameter(help="PNG file: one scenario with both paths")] = None,
+    level: str | None = None,
+    seeds: str | None = None,
+    mission_class: Annotated[Literal["contest", "open"], Parameter(name="--class")] = "contest",
+    out: Path | None = None,
 ) -> int:
     """For a pilot who knows the layout: a lower bound of the time of a try, and a flight that is possible.
 
@@ -42,6 +35,13 @@ def bound(
         framerunner bound test-case-1 --out bound.png
 
         framerunner bound --level calm --seeds 1:300
+
+    Args:
+        scenario: name or file
+        level: scenarios of this level, name or file, instead of one
+        seeds: of the level's scenarios: the first and the last, such as 1:300
+        mission_class: of the mission's limits
+        out: PNG file: one scenario with both paths
     """
     if (scenario is None) == (level is None):
         raise SettingError("bound: give either a scenario or --level and --seeds")
@@ -93,6 +93,8 @@ def _bound_one(scenario: str, mission_class: MissionClass, out: Path | None) -> 
 
 
 def _bound_level(level: str, seeds: range, mission_class: MissionClass) -> int:
+    import numpy as np
+
     from framerunner.flying.envelopes import bound_of
     from framerunner.flying.feasible import feasible
     from framerunner.flying.plan import FlightPlan
@@ -113,18 +115,9 @@ def _bound_level(level: str, seeds: range, mission_class: MissionClass) -> int:
         print(line)
     columns = ((bounds_s, "11.2f"), (possible_s, "14.2f"), (times, "8.2f"))
     for name, share in (("5 %", 0.05), ("median", 0.5), ("95 %", 0.95)):
-        cells = (format(_quantile(numbers, share), form) for numbers, form in columns if numbers)
+        cells = (format(float(np.quantile(numbers, share)), form) for numbers, form in columns if numbers)
         print(f"{name + ', class ' + mission_class:24}{''.join(cells)}")
     return 0
-
-
-def _quantile(numbers: Sequence[float], share: float) -> float:
-    """The number below which a share of them lies, interpolated."""
-    ordered = sorted(numbers)
-    place = share * (len(ordered) - 1)
-    low = int(place)
-    high = min(low + 1, len(ordered) - 1)
-    return ordered[low] + (place - low) * (ordered[high] - ordered[low])
 
 
 def _seeds(text: str) -> range:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cyclopts import App, Parameter
 
@@ -18,29 +19,37 @@ app = App(name="camera")
 calibration = App(name="calibrate")
 app.command(calibration)
 
-_Columns = Annotated[WholeNumber, Parameter(help="squares of the board from left to right, 4 to 20")]
-_Rows = Annotated[WholeNumber, Parameter(help="squares of the board from top to bottom, 3 to 20")]
-_Square = Annotated[float, Parameter(help="edge of a square, mm")]
-_Marker = Annotated[float, Parameter(help="edge of a marker, mm")]
+
+@Parameter(name="*", group="Board")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardOptions:
+    """The board, as it is printed.
+
+    Attributes:
+        columns: squares from left to right, 4 to 20
+        rows: squares from top to bottom, 3 to 20
+        square: edge of a square, mm
+        marker: edge of a marker, mm
+    """
+
+    columns: WholeNumber = 8
+    rows: WholeNumber = 5
+    square: float = 30.0
+    marker: float = 22.0
+
+
+_USUAL_BOARD = BoardOptions()
 
 
 @app.default
 def camera(
     *,
-    drone: Annotated[
-        str, Parameter(help="MAVLink URL on which the drone is heard")
-    ] = "udpin://127.0.0.1:14550",
-    scenario: Annotated[
-        str, Parameter(help="name or file of the scenario whose frames are seen")
-    ] = "test-case-1",
-    no_base: Annotated[
-        bool, Parameter(help="the drone starts from the floor: there is no base under it")
-    ] = False,
-    level: Annotated[
-        bool, Parameter(help="held level, as by a gimbal, whatever the drone's roll and pitch")
-    ] = False,
-    bind: Annotated[str, Parameter(help="address to serve the video on")] = "127.0.0.1",
-    port: Annotated[WholeNumber, Parameter(help="TCP port of the video")] = 8100,
+    drone: str = "udpin://127.0.0.1:14550",
+    scenario: str = "test-case-1",
+    no_base: bool = False,
+    level: bool = False,
+    bind: str = "127.0.0.1",
+    port: WholeNumber = 8100,
     show_layout: ShowLayout = False,
 ) -> int:
     """Render what a camera on a drone would see of the arena, from the pose that the drone reports.
@@ -57,6 +66,15 @@ def camera(
         framerunner camera --scenario test-case-1 --no-base --port 8081
 
         framerunner camera --drone serial:///dev/ttyUSB1:921600 --bind 0.0.0.0
+
+    Args:
+        drone: MAVLink URL on which the drone is heard
+        scenario: name or file of the scenario whose frames are seen
+        no_base: the drone starts from the floor: there is no base under it
+        level: held level, as by a gimbal, whatever the drone's roll and pitch
+        bind: address to serve the video on
+        port: TCP port of the video
+        show_layout: tell every app the layout.
     """
     check_range("--port", port, 1, 65535)
 
@@ -77,11 +95,8 @@ def camera(
 @calibration.command
 def board(
     *,
-    out: Annotated[Path, Parameter(help="file to be written, PNG")] = Path("board.png"),
-    columns: _Columns = 8,
-    rows: _Rows = 5,
-    square: _Square = 30.0,
-    marker: _Marker = 22.0,
+    out: Path = Path("board.png"),
+    printed: BoardOptions = _USUAL_BOARD,
 ) -> int:
     """Write the board, to be printed.
 
@@ -90,32 +105,25 @@ def board(
     **Example**
 
         framerunner camera calibrate board --out board.png
+
+    Args:
+        out: file to be written, PNG
+        printed: the board.
     """
     from framerunner.camera_calibration.calibrate import write_board
 
-    write_board(_board(columns, rows, square, marker), out)
+    write_board(_board(printed), out)
     return 0
 
 
 @calibration.default
 def calibrate(
-    sources: Annotated[
-        list[str],
-        Parameter(
-            help="images, folders of images, a video, the URL or device of a camera, or a calibration file "
-            "of ROS or OpenCV, which is converted"
-        ),
-    ],
+    sources: list[str],
     /,
     *,
-    out: Annotated[Path, Parameter(help="file to be written, YAML")] = Path("camera.yaml"),
-    views: Annotated[
-        WholeNumber, Parameter(help="how many different views to take from a camera, 8 to 60")
-    ] = 20,
-    columns: _Columns = 8,
-    rows: _Rows = 5,
-    square: _Square = 30.0,
-    marker: _Marker = 22.0,
+    out: Path = Path("camera.yaml"),
+    views: WholeNumber = 20,
+    printed: BoardOptions = _USUAL_BOARD,
 ) -> int:
     """Find focal length, optical axis and lens distortion from images of the board.
 
@@ -130,30 +138,30 @@ def calibrate(
         framerunner camera calibrate rtsp://10.0.0.2/1 --views 25
 
         framerunner camera calibrate ost.yaml --out camera.yaml
+
+    Args:
+        sources: images, folders of images, a video, the URL or device of a camera, or a calibration file of
+            ROS or OpenCV, which is converted
+        out: file to be written, YAML
+        views: how many different views to take from a camera, 8 to 60
+        printed: the board.
     """
     check_range("--views", views, 8, 60)
 
     from framerunner.camera_calibration.calibrate import calibrate as run
 
-    run(_board(columns, rows, square, marker), sources, views, out, say)
+    run(_board(printed), sources, views, out, say)
     return 0
 
 
 @app.command
 def latency(
-    source: Annotated[str, Parameter(help="URL or device of the camera, as for `fly --camera`")],
+    source: str,
     /,
     *,
-    seconds: Annotated[WholeNumber, Parameter(help="how long to film, 8 to 300 s")] = 20,
-    led: Annotated[
-        Path | None,
-        Parameter(
-            help="file that switches an LED instead: /sys/class/leds/NAME/brightness; 1 is lit, 0 dark"
-        ),
-    ] = None,
-    display_delay: Annotated[
-        float, Parameter(help="of terminal and screen, s; it is subtracted. An LED has none")
-    ] = 0.03,
+    seconds: WholeNumber = 20,
+    led: Path | None = None,
+    display_delay: float = 0.03,
 ) -> int:
     """Measure how long the camera's images take from exposure to arrival.
 
@@ -166,6 +174,12 @@ def latency(
         framerunner camera latency /dev/video0
 
         framerunner camera latency rtsp://10.0.0.2/1 --led /sys/class/leds/ACT/brightness
+
+    Args:
+        source: URL or device of the camera, as for `fly --camera`
+        seconds: how long to film, 8 to 300 s
+        led: file that switches an LED instead: /sys/class/leds/NAME/brightness; 1 is lit, 0 dark
+        display_delay: of terminal and screen, s; it is subtracted. An LED has none
     """
     check_range("--seconds", seconds, 8, 300)
     check_range("--display-delay", display_delay, 0.0, 0.2)
@@ -186,14 +200,10 @@ def latency(
 
 @app.command
 def colours(
-    swatches: Annotated[
-        list[str], Parameter(help="red=SOURCE green=SOURCE blue=SOURCE: images of the paint, or a camera")
-    ],
+    swatches: list[str],
     /,
     *,
-    calibration: Annotated[
-        Path, Parameter(help="file of `framerunner camera calibrate`, which is given the colours")
-    ] = Path("camera.yaml"),
+    calibration: Path = Path("camera.yaml"),
 ) -> int:
     """Learn the colours of your frames from swatches of their paint.
 
@@ -206,6 +216,10 @@ def colours(
         framerunner camera colours red=red.jpg green=green.jpg blue=blue.jpg
 
         framerunner camera colours red=0 green=0 blue=0 --calibration camera.yaml
+
+    Args:
+        swatches: red=SOURCE green=SOURCE blue=SOURCE: images of the paint, or a camera
+        calibration: file of `framerunner camera calibrate`, which is given the colours
     """
     from framerunner.camera_calibration.colours import learn
 
@@ -221,27 +235,14 @@ def colours(
 
 @app.command
 def extrinsics(
-    flight: Annotated[
-        Path | None,
-        Parameter(help="a run folder of `fly --record`; without it --drone and --camera are watched"),
-    ] = None,
+    flight: Path | None = None,
     /,
     *,
-    drone: Annotated[str | None, Parameter(help="MAVLink URL on which the drone is heard")] = None,
-    camera: Annotated[
-        str | None, Parameter(help="URL or device of its camera, as for `fly --camera`")
-    ] = None,
-    calibration: Annotated[
-        Path, Parameter(help="file of `framerunner camera calibrate`, which is given the mounting")
-    ] = Path("camera.yaml"),
-    position: Annotated[
-        str | None,
-        Parameter(
-            help="of the lens from the drone's centre in m, by a ruler: forward=0.08,left=0,up=0.02; by "
-            "default that of the file, else 0.08 m forward"
-        ),
-    ] = None,
-    seconds: Annotated[WholeNumber, Parameter(help="s for which a live drone is watched, 20 to 1800")] = 180,
+    drone: str | None = None,
+    camera: str | None = None,
+    calibration: Path = Path("camera.yaml"),
+    position: str | None = None,
+    seconds: WholeNumber = 180,
 ) -> int:
     """Measure how the camera is mounted on the drone: roll, pitch, yaw, place, and the delay of its images.
 
@@ -255,6 +256,15 @@ def extrinsics(
         framerunner camera extrinsics runs/20261124-120000-hall --calibration camera.yaml
 
         framerunner camera extrinsics --drone serial:///dev/ttyUSB0:921600 --camera 0
+
+    Args:
+        flight: a run folder of `fly --record`; without it --drone and --camera are watched
+        drone: MAVLink URL on which the drone is heard
+        camera: URL or device of its camera, as for `fly --camera`
+        calibration: file of `framerunner camera calibrate`, which is given the mounting
+        position: of the lens from the drone's centre in m, by a ruler: forward=0.08,left=0,up=0.02; by
+            default that of the file, else 0.08 m forward
+        seconds: s for which a live drone is watched, 20 to 1800
     """
     check_range("--seconds", seconds, 20, 1800)
 
@@ -281,8 +291,9 @@ def extrinsics(
     return 0
 
 
-def _board(columns: int, rows: int, square: float, marker: float) -> Board:
+def _board(options: BoardOptions) -> Board:
     """Check the options."""
+    columns, rows, square, marker = astuple(options)
     from vision.calibration.board import Board
 
     check_range("--columns", columns, 4, 20)

@@ -7,9 +7,7 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from framerunner.commands import NamedPilot, say
-from framerunner.errors import SettingError
-from framerunner.files.text_file import make_file
+from framerunner.commands import NamedPilot, say, write_new
 
 app = App(
     name="course", help="Five short lessons: take off, fly to points, look, cross, the whole challenge."
@@ -43,7 +41,7 @@ def list_(*, language: LanguageOption = "en") -> int:
 def start(
     lesson: LessonName,
     *,
-    out: Annotated[Path, Parameter(help="folder to write the mission to")] = Path("."),
+    out: Path = Path("."),
     language: LanguageOption = "en",
 ) -> int:
     """Begin a lesson: print what to do, and write the mission to start from. Nothing is overwritten.
@@ -53,18 +51,17 @@ def start(
         framerunner course start 1
 
         framerunner course start 3 --out missions --language es
+
+    Args:
+        lesson: number or name.
+        out: folder to write the mission to
+        language: of the texts.
     """
     from framerunner.course.lessons import find_lesson
 
     found = find_lesson(lesson)
     text, path = found.text, out / f"lesson_{found.number}.yaml"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        make_file(path, found.start)
-    except FileExistsError:
-        raise SettingError(f"{path} is there already and is left as it is; choose another --out") from None
-    except OSError as error:
-        raise SettingError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
+    write_new({path: found.start}, makes_folder=True)
     print(f"{text.title.in_language(language)}\n\n{text.goal.in_language(language)}\n")
     print(f"written: {path}. The steps are for the editor:\n\n  framerunner edit {path}\n")
     for number, step in enumerate(text.steps, start=1):
@@ -79,7 +76,7 @@ def start(
 @app.command
 def check(
     lesson: LessonName,
-    mission: Annotated[str, Parameter(help="name or file")],
+    mission: str,
     *,
     pilot: NamedPilot = None,
 ) -> int:
@@ -92,6 +89,11 @@ def check(
         framerunner course check 1 lesson_1.yaml
 
         framerunner course check 5 frame_challenge
+
+    Args:
+        lesson: number or name.
+        mission: name or file
+        pilot: primitives of your own.
     """
     from framerunner.course.lessons import find_lesson
     from framerunner.flying.lockstep import fly_lockstep

@@ -6,9 +6,7 @@ import asyncio
 import time
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from framerunner.commands import check_range
 
@@ -18,14 +16,10 @@ if TYPE_CHECKING:
 
 def doctor(
     *,
-    drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
-    seconds: Annotated[float, Parameter(help="how long to listen, 2 to 600 s")] = 6.0,
-    camera: Annotated[
-        str | None, Parameter(help="URL or device of its camera, as for `fly --camera`: it is watched, too")
-    ] = None,
-    calibration: Annotated[
-        Path | None, Parameter(help="calibration of its camera, a file of `framerunner camera calibrate`")
-    ] = None,
+    drone: str = "udpin://0.0.0.0:14540",
+    seconds: float = 6.0,
+    camera: str | None = None,
+    calibration: Path | None = None,
 ) -> int:
     """Listen to a drone, request its data, and say in one page whether it can fly the challenge.
 
@@ -46,6 +40,12 @@ def doctor(
         framerunner doctor --drone serial:///dev/ttyUSB0:57600 --seconds 15
 
         framerunner doctor --camera rtsp://10.0.0.2/1 --calibration camera.yaml
+
+    Args:
+        drone: MAVLink URL of the drone
+        seconds: how long to listen, 2 to 600 s
+        camera: URL or device of its camera, as for `fly --camera`: it is watched, too
+        calibration: calibration of its camera, a file of `framerunner camera calibrate`
     """
     check_range("--seconds", seconds, 2.0, 600.0)
 

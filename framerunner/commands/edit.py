@@ -12,30 +12,21 @@ from urllib.parse import quote
 
 from cyclopts import Parameter
 
-from framerunner.commands import WholeNumber, check_range, say
-from framerunner.commands.monitor import PilotOption
+from framerunner.commands import NamedPilot, check_range, say
+from framerunner.commands.monitor import PagesPort
 from framerunner.errors import SettingError
 
-_Drone = Annotated[
-    str | None,
-    Parameter(
-        help="MAVLink URL: where drones send to ground stations; by default udpin://127.0.0.1:14550, or "
-        "another port if that one is taken"
-    ),
-]
 _SUFFIXES = (".yaml", ".yml")
 
 
 def edit(
-    mission: Annotated[Path | None, Parameter(help="YAML file; one that does not exist is made")] = None,
+    mission: Path | None = None,
     *,
-    source: Annotated[
-        str, Parameter(name="--from", help="what a new one begins as: empty, example, or a mission to copy")
-    ] = "empty",
-    pilot: PilotOption = None,
-    drone: _Drone = None,
-    port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8090,
-    browser: Annotated[bool, Parameter(help="open the page in the browser", negative="--no-browser")] = True,
+    source: Annotated[str, Parameter(name="--from")] = "empty",
+    pilot: NamedPilot = None,
+    drone: str | None = None,
+    port: PagesPort = 8090,
+    browser: Annotated[bool, Parameter(negative="--no-browser")] = True,
 ) -> int:
     """Draw and check a mission in the browser: diagram and text side by side. Stop it with Ctrl-C.
 
@@ -49,6 +40,15 @@ def edit(
         framerunner edit my_mission.yaml --from frame_challenge
 
         framerunner edit my_mission.yaml --pilot my_pilot.py
+
+    Args:
+        mission: YAML file; one that does not exist is made
+        source: what a new one begins as: empty, example, or a mission to copy
+        pilot: primitives of your own.
+        drone: MAVLink URL: where drones send to ground stations; by default udpin://127.0.0.1:14550, or
+            another port if that one is taken
+        port: TCP port of the pages.
+        browser: open the page in the browser
     """
     check_range("--port", port, 0, 65535)
     from framerunner.commands.monitor import equipment, prepare_server
@@ -100,15 +100,14 @@ def _drone_url(given: str | None) -> str:
         LinkError: the URL is none.
         SettingError: its port is taken.
     """
+    from framerunner.child_process import free_port
     from framerunner.editing.live import GROUND_PORT, is_free
     from framerunner.wire.transports.urls import parse_url
 
     if given is None:
         if is_free(GROUND_PORT, socket.SOCK_DGRAM):
             return f"udpin://127.0.0.1:{GROUND_PORT}"
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = free_port()
         say(
             f"UDP port {GROUND_PORT} is taken, by a monitor for example, which shows other drones; those "
             f"that are started in the editor are shown here, by port {port}"

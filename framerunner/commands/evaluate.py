@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from framerunner.commands import (
     DEFAULT_MISSION,
@@ -18,76 +18,108 @@ from framerunner.commands import (
     say,
     with_sensors,
 )
+from framerunner.commands.options.flight import (
+    GENUINE,
+    ONE_AUTOPILOT,
+    SIMULATION_GROUP,
+    GenuineOptions,
+    Response,
+    program_of,
+)
+from framerunner.commands.options.rules import Rule, check_rules, given_in, words_of
 from framerunner.errors import SettingError
 from framerunner.evaluation import COUNT, SEED
+from sitl.autopilots import TITLES
 
 if TYPE_CHECKING:
-    from framerunner.evaluation.backends import Backend, Pool
-    from framerunner.evaluation.genuine_flight import GenuineUse
+    from framerunner.evaluation.backends import Pool
     from framerunner.evaluation.plan import Plan
+    from framerunner.evaluation.runner import GenuineUse
     from framerunner.flying.simulator_process import GenuineAutopilot
 
 _GENUINE_SPEED, _MAX_GENUINE_SPEED = 4.0, 100.0
-_Level = Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")]
-_CountOption = Annotated[
-    WholeNumber | None, Parameter(help=f"how many scenarios of the level; {COUNT} if not given")
-]
-_SeedOption = Annotated[
-    WholeNumber | None,
-    Parameter(help=f"of the first scenario; each next one has one more; {SEED} if not given"),
-]
-_Jobs = Annotated[
-    WholeNumber | None,
-    Parameter(help="flights at once; if not given one a core, with a genuine autopilot 1"),
-]
-_Out = Annotated[
-    Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
-]
-_Response = Annotated[
-    str | None,
-    Parameter(
-        help="a vehicle that answers late, lag=0.6,dead-time=0.15,height-wander=0.05 in seconds and metres"
+_RULES = (
+    ONE_AUTOPILOT,
+    Rule("speed", "is for flights with --px4 or --ardupilot; leave it out", needs=GENUINE),
+    Rule("response", "changes our autopilot's flights; leave it out with {found}", excludes=GENUINE),
+    *(
+        Rule("backend", f"{TITLES[name]} is started on this machine; leave it out with {{found}}", (name,))
+        for name in GENUINE
     ),
-]
-_Px4 = Annotated[
-    Path | None,
-    Parameter(help="folder of a PX4 built for SITL: it flies instead of our autopilot, as in `fly --px4`"),
-]
-_ArduPilot = Annotated[
-    Path | None,
-    Parameter(help="folder of an ArduPilot built for SITL: likewise an ArduCopter, as in `fly --ardupilot`"),
-]
-_Speed = Annotated[
-    float | None,
-    Parameter(
-        help="with --px4 or --ardupilot: simulated seconds a second, if the machine can, 0.01 to "
-        f"{_MAX_GENUINE_SPEED:g}; {_GENUINE_SPEED:g} if not given"
-    ),
-]
-_Again = Annotated[bool, Parameter(help="fly again what is in the folder already")]
-_Backend = Annotated[
-    Literal["loky", "dask", "ray"], Parameter(help="loky: this machine; the others: a cluster")
-]
+)
+
+
+@Parameter(name="*", group=Group("Scenarios", sort_key=1))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenarioOptions:
+    """Which scenarios are flown, if none are named.
+
+    Attributes:
+        level: draw scenarios of this level, name or file
+        count: how many scenarios of the level.
+        seed: of the first scenario.
+    """
+
+    level: str | None = None
+    count: Annotated[
+        WholeNumber | None, Parameter(help=f"how many scenarios of the level; {COUNT} if not given")
+    ] = None
+    seed: Annotated[
+        WholeNumber | None,
+        Parameter(help=f"of the first scenario; each next one has one more; {SEED} if not given"),
+    ] = None
+
+
+@Parameter(name="*", group=SIMULATION_GROUP)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightOptions:
+    """How the simulated drones differ from the scenarios'."""
+
+    sensors: Sensors = None
+    response: Response = None
+    speed: Annotated[
+        float | None,
+        Parameter(
+            help="with --px4 or --ardupilot: simulated seconds a second, if the machine can, 0.01 to "
+            f"{_MAX_GENUINE_SPEED:g}; {_GENUINE_SPEED:g} if not given"
+        ),
+    ] = None
+
+
+@Parameter(name="*", group=Group("Machines and files", sort_key=3))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvaluationOptions:
+    """Where flights are flown, and what is left of them.
+
+    Attributes:
+        jobs: flights at once; if not given one a core, with a genuine autopilot 1
+        out: folder; by default one in `runs/` that the same command finds again
+        again: fly again what is in the folder already
+        compare: folder of an earlier evaluation
+        backend: loky: this machine; the others: a cluster
+        address: of the cluster's scheduler
+    """
+
+    jobs: WholeNumber | None = None
+    out: Path | None = None
+    again: bool = False
+    compare: Path | None = None
+    backend: Literal["loky", "dask", "ray"] = "loky"
+    address: str | None = None
+
+
+_SCENARIOS, _SIMULATION, _OWN = ScenarioOptions(), FlightOptions(), GenuineOptions()
+_EVALUATION = EvaluationOptions()
 
 
 def evaluate(
-    *scenarios: Annotated[str, Parameter(help="names, files or folders of scenarios, instead of --level")],
-    level: _Level = None,
-    count: _CountOption = None,
-    seed: _SeedOption = None,
-    mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
+    *scenarios: str,
+    drawn: ScenarioOptions = _SCENARIOS,
+    mission: str = DEFAULT_MISSION,
     pilot: NamedPilot = None,
-    sensors: Sensors = None,
-    response: _Response = None,
-    px4: _Px4 = None,
-    ardupilot: _ArduPilot = None,
-    speed: _Speed = None,
-    jobs: _Jobs = None,
-    out: _Out = None,
-    again: _Again = False,
-    compare: Annotated[Path | None, Parameter(help="folder of an earlier evaluation")] = None,
-    backend: _Backend = "loky",
-    address: Annotated[str | None, Parameter(help="of the cluster's scheduler")] = None,
+    simulated: FlightOptions = _SIMULATION,
+    genuine: GenuineOptions = _OWN,
+    options: EvaluationOptions = _EVALUATION,
 ) -> int:
     """Fly a mission on many scenarios in lockstep; report how often it lands, how well, and why it fails.
 
@@ -108,24 +140,36 @@ def evaluate(
         framerunner evaluate --level calm --count 10 --px4 ../PX4-Autopilot
 
         framerunner evaluate --level calm --backend dask --address tcp://10.0.0.1:8786
+
+    Args:
+        scenarios: names, files or folders of scenarios, instead of --level
+        drawn: which scenarios, if none are named.
+        mission: name or file of the mission
+        pilot: primitives of your own.
+        simulated: a simulated drone.
+        genuine: a genuine autopilot.
+        options: where flights are flown, and what is left.
     """
-    given = dict(locals())
-    use = _genuine_use(_autopilot(px4, ardupilot), speed, jobs, response=response, backend=backend)
+    given = given_in(drawn, simulated, genuine, options)
+    check_rules(_RULES, given)
+    use = _genuine_use(genuine.autopilot, simulated.speed, options.jobs)
     from framerunner.evaluation import evaluate as evaluation
     from framerunner.evaluation.plan import plan_flights
     from offboard.mission import load_mission
 
-    plan = plan_flights(scenarios, level, seed, count, load_mission(mission, pilot))
-    plan = _flown_by(_sensing_by(plan, sensors), response, use)
+    plan = plan_flights(scenarios, drawn.level, drawn.seed, drawn.count, load_mission(mission, pilot))
+    plan = _flown_by(_sensing_by(plan, simulated.sensors), simulated.response, use)
+    flown = {"mission": mission} if pilot is None else {"mission": mission, "pilot": pilot}
+    given.pop("again", None)  # to continue, not from the beginning
     settings = evaluation.EvaluationSettings(
         plan=plan,
-        pool=_pool(backend, jobs, address, use),
-        out=plan.default_out if out is None else out,
-        again=again,
-        against=compare,
+        pool=_pool(options, use),
+        out=plan.default_out if options.out is None else options.out,
+        again=options.again,
+        against=options.compare,
         mission=mission,
         pilot=pilot,
-        command=_command(scenarios, given),
+        command=shlex.join(["framerunner", "evaluate", *scenarios, *words_of({**flown, **given})]),
         genuine=use,
     )
     return evaluation.evaluate(settings)
@@ -171,75 +215,29 @@ def _plan_for_genuine(plan: Plan, autopilot: GenuineAutopilot) -> Plan:
         say(f"{title} has its own link to the app: {whole}")
     if ideal:
         say(f"{title} takes no true state: drones with ideal sensors have {SUITE_INSTEAD_OF_IDEAL}")
-    return plan.flown_by(version_of(title, _program(autopilot)), flown)
+    return plan.flown_by(version_of(title, program_of(autopilot)), flown)
 
 
-def _program(autopilot: GenuineAutopilot) -> Path:
-    """Raises `SettingError` if there is none."""
-    from sitl.ardupilot.build import find_build as find_ardupilot
-    from sitl.px4.build import find_build as find_px4
-
-    if autopilot.name == "ardupilot":
-        return find_ardupilot(autopilot.folder)
-    return find_px4(autopilot.folder) / "bin" / "px4"
-
-
-def _pool(backend: Backend, jobs: int | None, address: str | None, use: GenuineUse | None) -> Pool:
+def _pool(options: EvaluationOptions, use: GenuineUse | None) -> Pool:
     """Where flights are flown: on all cores, but with a genuine autopilot one after another."""
     from joblib import cpu_count
 
     from framerunner.evaluation.backends import Pool
 
     at_once = cpu_count() if use is None else 1
-    return Pool(backend, at_once if jobs is None else jobs, address)
-
-
-def _autopilot(px4: Path | None, ardupilot: Path | None) -> GenuineAutopilot | None:
-    """The genuine autopilot that was chosen; None: our own."""
-    from framerunner.flying.simulator_process import GenuineAutopilot
-
-    if px4 is not None and ardupilot is not None:
-        raise SettingError(f"--ardupilot {ardupilot}: PX4 flies, by --px4 {px4}; leave one of them out")
-    if px4 is not None:
-        return GenuineAutopilot("px4", px4.resolve())
-    return None if ardupilot is None else GenuineAutopilot("ardupilot", ardupilot.resolve())
+    return Pool(options.backend, at_once if options.jobs is None else options.jobs, options.address)
 
 
 def _genuine_use(
-    autopilot: GenuineAutopilot | None,
-    speed: float | None,
-    jobs: int | None,
-    *,
-    response: str | None,
-    backend: str,
+    autopilot: GenuineAutopilot | None, speed: float | None, jobs: int | None
 ) -> GenuineUse | None:
-    """By which a genuine autopilot is flown; refuses options that do not go with it."""
+    """By which a genuine autopilot is flown, if one is chosen."""
     if autopilot is None:
-        if speed is not None:
-            raise SettingError(f"--speed {speed:g}: is for flights with --px4 or --ardupilot; leave it out")
         return None
-    option, title = f"--{autopilot.name}", autopilot.title
-    if response is not None:
-        raise SettingError(
-            f"--response {response}: changes our autopilot's flights; leave it out with {option}"
-        )
-    if backend != "loky":
-        raise SettingError(
-            f"--backend {backend}: {title} is started on this machine; leave it out with {option}"
-        )
-    from framerunner.evaluation.genuine_flight import GenuineUse
+    from framerunner.evaluation.runner import GenuineUse
     from framerunner.instances import INSTANCES
 
     check_range("--speed", speed, 0.01, _MAX_GENUINE_SPEED)
     check_range("--jobs", jobs, 1, INSTANCES)
-    _program(autopilot)
+    program_of(autopilot)
     return GenuineUse(autopilot, _GENUINE_SPEED if speed is None else speed)
-
-
-def _command(scenarios: tuple[str, ...], given: Mapping[str, object]) -> str:
-    """The command that continues this evaluation; --again would start it from the beginning."""
-    words = ["framerunner", "evaluate", *scenarios]
-    for name, value in given.items():
-        if value is not None and name not in ("scenarios", "again") and (name, value) != ("backend", "loky"):
-            words += [f"--{name}", str(value)]
-    return shlex.join(words)

@@ -4,38 +4,21 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from framerunner.commands import check_range
 from framerunner.errors import SettingError
 
-_Size = Annotated[
-    str | None, Parameter(help="width and height in pixels; 960x540, of a GIF 640x360 if not given")
-]
-_Fps = Annotated[float | None, Parameter(help="images a second; 25, of a GIF 10 if not given")]
-
 
 def film(
-    flight: Annotated[Path, Parameter(help="run folder, as `framerunner fly` left it")],
+    flight: Path,
     *,
-    out: Annotated[
-        Path | None, Parameter(help="file to write, .mp4 or .gif; `film.mp4` in the run folder if not given")
-    ] = None,
-    speed: Annotated[
-        float | None, Parameter(help="seconds of the flight in a second of the film; 8 if not given")
-    ] = None,
-    seconds: Annotated[
-        float | None, Parameter(help="length of the film in s, 3 to 600, from which the speed follows")
-    ] = None,
-    size: _Size = None,
-    fps: _Fps = None,
-    force: Annotated[bool, Parameter(help="replace a film that is there")] = False,
-    pilot: Annotated[
-        str | None,
-        Parameter(help="of a mission that has to be flown again and needs one: a Python file, or a name"),
-    ] = None,
+    out: Path | None = None,
+    speed: float | None = None,
+    seconds: float | None = None,
+    size: str | None = None,
+    fps: float | None = None,
+    force: bool = False,
+    pilot: str | None = None,
 ) -> int:
     """Make a short film of a flight: the arena, the camera's image, the mission's state, times and verdict.
 
@@ -49,6 +32,16 @@ def film(
         framerunner film runs/20260101-120000-test-case-1 --out short.gif --seconds 9
 
         framerunner film runs/20260101-120000-test-case-1 --speed 4 --size 720x1280
+
+    Args:
+        flight: run folder, as `framerunner fly` left it
+        out: file to write, .mp4 or .gif; `film.mp4` in the run folder if not given
+        speed: seconds of the flight in a second of the film; 8 if not given
+        seconds: length of the film in s, 3 to 600, from which the speed follows
+        size: width and height in pixels; 960x540, of a GIF 640x360 if not given
+        fps: images a second; 25, of a GIF 10 if not given
+        force: replace a film that is there
+        pilot: of a mission that has to be flown again and needs one: a Python file, or a name
     """
     target = flight / "film.mp4" if out is None else out
     suffix = target.suffix.lower()

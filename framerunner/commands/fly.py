@@ -23,8 +23,32 @@ from framerunner.commands import (
     with_faults,
     with_sensors,
 )
-from framerunner.commands.options.hardware import NONE, HardwareOptions, caps_of, hardware_of, with_dry_limit
+from framerunner.commands.options.flight import (
+    DRONE_GROUP,
+    GENUINE,
+    ONE_AUTOPILOT,
+    OUTPUT_GROUP,
+    SIMULATION_GROUP,
+    CameraDelay,
+    GenuineOptions,
+    Lifeline,
+    Response,
+    SettingsFile,
+    program_of,
+)
+from framerunner.commands.options.hardware import (
+    HARDWARE_RULES,
+    NONE,
+    HardwareOptions,
+    caps_of,
+    given_hardware,
+    hardware_of,
+    with_dry_limit,
+)
+from framerunner.commands.options.rules import Rule, check_rules, for_each, given_in
 from framerunner.errors import SettingError
+from framerunner.flying.output import OutputSettings
+from framerunner.preflight.settings import HardwareSettings
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -34,139 +58,102 @@ if TYPE_CHECKING:
     from offboard.mission import Mission
     from scenarios.models import Scenario
 
-_Drone = Annotated[
-    str | None, Parameter(help="MAVLink URL of a running drone; without it a simulated one is started")
-]
-_Camera = Annotated[str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")]
-_CameraDelay = Annotated[
-    float | None,
-    Parameter(
-        help="with --camera: age in s of an image that arrives without a time stamp; by default that of the "
-        "calibration, else 0.1"
+
+@Parameter(name="*", group=DRONE_GROUP)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DroneOptions:
+    """A drone that is running already.
+
+    Attributes:
+        drone: MAVLink URL of a running drone; without it a simulated one is started
+        camera: URL, device or folder of its camera; needed with --drone
+        camera_delay: age of an image that arrives without a time stamp.
+        calibration: its camera's calibration, a file of `framerunner camera calibrate`; for a simulated drone
+            it replaces the camera's true one
+        simulator: with --drone: http://HOST:PORT of the simulator that flies it: its referee judges, and
+            without --camera its camera is used. By default that of an http --camera, if there is one
+        drone_limits: with --drone, for a mission of class open: what the drone can do in m/s and rad/s,
+            forward=2,left=1.5,up=1,yaw-rate=1.5; down=NUMBER if it is not as up
+    """
+
+    drone: str | None = None
+    camera: str | None = None
+    camera_delay: CameraDelay = None
+    calibration: Path | None = None
+    simulator: str | None = None
+    drone_limits: str | None = None
+
+
+@Parameter(name="*", group=SIMULATION_GROUP)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulationOptions:
+    """A simulated drone that is started.
+
+    Attributes:
+        speed: simulated seconds a second, 0.01 to 100
+        instance: shifts its ports, 0 to 9; by default 0, with --px4 or --ardupilot the first that is free
+        lockstep: in simulated time, as fast as the machine can, the same each time; no log
+        seed: of everything random in a lockstep flight, or with --px4 or --ardupilot; 0 if not given
+        sensors: the drone's sensor suite.
+        fault: what fails.
+        response: a vehicle that answers late.
+    """
+
+    speed: float = 1.0
+    instance: WholeNumber | None = None
+    lockstep: bool = False
+    seed: WholeNumber | None = None
+    sensors: Sensors = None
+    fault: Faults = ()
+    response: Response = None
+
+
+_DRONE, _SIMULATION, _OWN, _OUTPUT = DroneOptions(), SimulationOptions(), GenuineOptions(), OutputSettings()
+_RULES = (
+    Rule("simulator", "is for a drone that is running already; name it with --drone", needs=("drone",)),
+    ONE_AUTOPILOT,
+    *for_each(GENUINE, "flies a simulator that is started; leave it out with --drone", excludes=("drone",)),
+    *for_each(GENUINE, "it is another process; leave out --lockstep", excludes=("lockstep",)),
+    Rule("drone", "needs the URL of its camera too; add --camera", needs=("camera", "simulator")),
+    Rule("camera", "needs the URL of its drone too; add --drone", needs=("drone",)),
+    *for_each(
+        ("speed", "instance"), "is for the simulated drone; leave it out with --drone", excludes=("drone",)
     ),
-]
-_Calibration = Annotated[
-    Path | None,
-    Parameter(
-        help="its camera's calibration, a file of `framerunner camera calibrate`; for a simulated drone it "
-        "replaces the camera's true one"
+    Rule(
+        "lockstep",
+        "flies a simulated drone in this process; leave out {found}",
+        excludes=("drone", "speed", "instance"),
     ),
-]
-_Simulator = Annotated[
-    str | None,
-    Parameter(
-        help="with --drone: http://HOST:PORT of the simulator that flies it: its referee judges, and without "
-        "--camera its camera is used. By default that of an http --camera, if there is one"
+    Rule("monitor", "shows flights in real time; leave it out with --lockstep", excludes=("lockstep",)),
+    Rule("wait-for-viewer", "is for a monitor that is opened; add --monitor as well", needs=("monitor",)),
+    Rule(
+        "seed",
+        "is for a flight in lockstep, or with --px4 or --ardupilot; add one of them or leave it out, which "
+        "is seed 0",
+        needs=("lockstep", *GENUINE),
     ),
-]
-_Instance = Annotated[
-    WholeNumber | None,
-    Parameter(
-        help="of the simulated drone: shifts its ports, 0 to 9; by default 0, with --px4 or --ardupilot the "
-        "first that is free"
+    *for_each(
+        ("sensors", "fault"), "is for a simulated drone; leave it out with --drone", excludes=("drone",)
     ),
-]
-_Lockstep = Annotated[
-    bool, Parameter(help="in simulated time, as fast as the machine can, the same each time; no log")
-]
-_Seed = Annotated[
-    WholeNumber | None,
-    Parameter(help="of everything random in a lockstep flight, or with --px4 or --ardupilot; 0 if not given"),
-]
-_Record = Annotated[bool, Parameter(help="write flight.mcap as well, for `framerunner replay` and Foxglove")]
-_Video = Annotated[
-    bool, Parameter(help="write video.avi also in lockstep; in real time it is always written")
-]
-_Monitor = Annotated[
-    bool,
-    Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/; it stays open until Ctrl-C"),
-]
-_WaitForViewer = Annotated[bool, Parameter(negative=(), help="with --monitor: fly when a browser shows it")]
-_DroneLimits = Annotated[
-    str | None,
-    Parameter(
-        help="with --drone, for a mission of class open: what the drone can do in m/s and rad/s, "
-        "forward=2,left=1.5,up=1,yaw-rate=1.5; down=NUMBER if it is not as up"
-    ),
-]
-_Response = Annotated[
-    str | None,
-    Parameter(
-        help="with --lockstep: a vehicle that answers late, lag=0.6,dead-time=0.15,height-wander=0.05 in "
-        "seconds and metres"
-    ),
-]
-_MonitorLink = Annotated[
-    str | None,
-    Parameter(help="MAVLink URL of a monitor that runs already, such as udpout://127.0.0.1:14550"),
-]
-_Lifeline = Annotated[bool, Parameter(show=False, help="stop when standard input ends")]
-
-
-@Parameter(name="*")
-@dataclass(frozen=True, slots=True)
-class GenuineOptions:
-    """A genuine autopilot, as the command line gives it."""
-
-    px4: Annotated[
-        Path | None,
-        Parameter(
-            help="folder of a PX4 built for SITL: it flies the simulated drone instead of our autopilot"
-        ),
-    ] = None
-    ardupilot: Annotated[
-        Path | None, Parameter(help="folder of an ArduPilot built for SITL, which flies it likewise")
-    ] = None
-
-
-_OWN = GenuineOptions()
-
-
-@Parameter(name="*")
-@dataclass(frozen=True, slots=True)
-class MonitorOptions:
-    """Where a flight is shown, as the command line gives it."""
-
-    monitor: _Monitor = False
-    wait_for_viewer: _WaitForViewer = False
-    monitor_link: _MonitorLink = None
-
-    @property
-    def checked(self) -> tuple[bool, bool, str | None]:
-        """All three; SettingError if there is no monitor whose viewer can be waited for."""
-        if self.wait_for_viewer and not self.monitor:
-            raise SettingError("--wait-for-viewer: is for a monitor that is opened; add --monitor as well")
-        return (self.monitor, self.wait_for_viewer, self.monitor_link)
-
-
-_NO_MONITOR = MonitorOptions()
+    Rule("response", "is for a simulated vehicle in lockstep; add --lockstep", needs=("lockstep",)),
+    Rule("drone-limits", "is for a drone given by --drone; leave it out", needs=("drone",)),
+    *HARDWARE_RULES,
+)
+"""Which options exclude or need which others; the first rule that is broken is told."""
 
 
 def fly(
-    scenario: Annotated[str, Parameter(help="name or file of the scenario")] = "test-case-1",
+    scenario: str = "test-case-1",
     *,
-    mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
-    drone: _Drone = None,
-    camera: _Camera = None,
-    camera_delay: _CameraDelay = None,
-    calibration: _Calibration = None,
-    simulator: _Simulator = None,
-    speed: Annotated[float, Parameter(help="of the simulated drone: seconds a second, 0.01 to 100")] = 1.0,
-    instance: _Instance = None,
-    genuine: GenuineOptions = _OWN,
-    lockstep: _Lockstep = False,
-    seed: _Seed = None,
-    sensors: Sensors = None,
-    fault: Faults = (),
-    record: _Record = False,
-    video: _Video = False,
-    shown: MonitorOptions = _NO_MONITOR,
+    mission: str = DEFAULT_MISSION,
     pilot: NamedPilot = None,
-    drone_limits: _DroneLimits = None,
-    response: _Response = None,
+    flown: DroneOptions = _DRONE,
+    simulated: SimulationOptions = _SIMULATION,
+    genuine: GenuineOptions = _OWN,
+    output: Annotated[OutputSettings, Parameter(name="*", group=OUTPUT_GROUP)] = _OUTPUT,
+    settings: SettingsFile = None,
     hardware: HardwareOptions = NONE,
-    out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
-    lifeline: _Lifeline = False,
+    lifeline: Lifeline = False,
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
@@ -183,33 +170,54 @@ def fly(
         framerunner fly --dry-run --drone serial:///dev/ttyUSB0:57600 --camera 0
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
+
+        framerunner fly --settings flight.yaml
+
+    Args:
+        scenario: name or file of the scenario
+        mission: name or file of the mission
+        pilot: primitives of your own.
+        flown: a drone that is running already.
+        simulated: a simulated drone.
+        genuine: a genuine autopilot.
+        output: what is left, and where it is shown.
+        settings: file of options.
+        hardware: how a real drone is flown.
+        lifeline: stop when standard input ends.
     """
-    api, autopilot = _simulator_api(simulator, drone), _genuine(genuine, drone=drone, lockstep=lockstep)
-    camera = api.video_url if api is not None and camera is None else camera
-    _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
-    seed, procedure = _checked_seed(seed, shown.monitor, lockstep, autopilot), hardware_of(hardware, drone)
+    given = {**given_in(flown, simulated, genuine, output), **given_hardware(hardware)}
+    if simulated.instance == 0:  # as without the option
+        del given["instance"]
+    check_rules(_RULES, given)
+    check_range("--camera-delay", flown.camera_delay, 0.0, 0.5)
+    check_range("--speed", simulated.speed, 0.01, 100)
+    check_range("--instance", simulated.instance, 0, 9)
+    check_range("--seed", simulated.seed, 0, 2**63 - 1)
+    api, autopilot, drone = _simulator_api(flown.simulator), genuine.autopilot, flown.drone
+    if autopilot is not None:
+        program_of(autopilot)
+    procedure = hardware_of(hardware, drone)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings
     from offboard.mission import load_mission
 
     loaded = load_mission(mission, pilot)
-    chosen = _scenario(scenario, sensors, fault, hardware, autopilot, starts=drone is None, lockstep=lockstep)
-    plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    plan = replace(_calibrated(plan, calibration), caps=caps_of(hardware, drone))
-    with _instance(instance, autopilot) as number:
+    chosen = _scenario(scenario, simulated, hardware, autopilot, starts=drone is None)
+    plan = replace(_plan(chosen, loaded, flown, simulated, autopilot), caps=caps_of(hardware, drone))
+    with _instance(simulated.instance, autopilot) as number:
         real_time = RealTimeSettings(
             drone_url=drone,
-            camera_url=camera,
+            camera_url=api.video_url if api is not None and flown.camera is None else flown.camera,
             simulator=api,
-            speed=speed,
+            speed=simulated.speed,
             instance=number,
             autopilot=autopilot,
-            camera_delay=delay_of(camera_delay, plan.calibration),
+            camera_delay=delay_of(flown.camera_delay, plan.calibration),
             hardware=procedure,
         )
-        flown = None if lockstep else real_time
-        return _run(FlightSettings(plan, flown, out, record, video, *shown.checked), lifeline=lifeline)
+        flight = FlightSettings(plan, None if simulated.lockstep else real_time, output)
+        return _run(flight, lifeline=lifeline)
 
 
 def _instance(given: int | None, autopilot: GenuineAutopilot | None) -> AbstractContextManager[int]:
@@ -236,25 +244,19 @@ def _run(settings: FlightSettings, *, lifeline: bool) -> int:
 
 def _scenario(
     name: str,
-    sensors: str | None,
-    fault: tuple[str, ...],
-    hardware: HardwareOptions,
+    options: SimulationOptions,
+    hardware: HardwareSettings,
     autopilot: GenuineAutopilot | None,
     *,
     starts: bool,
-    lockstep: bool,
 ) -> Scenario:
     """The scenario that the options describe; `starts`: a simulated drone is started."""
     from scenarios.loader import load_scenario
 
-    if sensors is not None and not starts:
-        raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
-    if fault and not starts:
-        raise SettingError("--fault: is for a simulated drone that is started; leave it out with --drone")
     loaded = with_dry_limit(load_scenario(name), hardware)
-    scenario = with_faults(with_sensors(loaded, sensors), fault)
+    scenario = with_faults(with_sensors(loaded, options.sensors), options.fault)
     failing = next((each for each in scenario.faults if each.part == "link"), None)
-    if failing is not None and starts and not lockstep:
+    if failing is not None and starts and not options.lockstep:
         advice = "add --lockstep, or start framerunner sim and fly it with --drone"
         raise SettingError(
             f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
@@ -263,136 +265,48 @@ def _scenario(
     return scenario if autopilot is None else for_genuine(autopilot.title, scenario)
 
 
-def _calibrated(plan: FlightPlan, path: Path | None) -> FlightPlan:
-    """The plan with the calibration of the drone's camera, if one is given."""
-    if path is None:
-        return plan
-    from framerunner.camera_calibration.calibration_file import load_calibration
-
-    if plan.chart.vision == "boxes":
-        raise SettingError(
-            f"--calibration: mission {plan.chart.name} sees boxes, whose formulas know no lens; leave it out "
-            "or fly one with vision: frames"
-        )
-    return replace(plan, calibration=load_calibration(path))
-
-
 def _plan(
     scenario: Scenario,
     mission: Mission,
-    seed: int | None,
-    *,
-    response: str | None,
-    drone: str | None,
-    drone_limits: str | None,
+    flown: DroneOptions,
+    simulated: SimulationOptions,
+    autopilot: GenuineAutopilot | None,
 ) -> FlightPlan:
-    """The flight that the options describe; a seed is given in lockstep."""
+    """The flight that the options describe, with the calibration of the drone's camera, if one is given."""
+    from framerunner.camera_calibration.calibration_file import load_calibration
     from framerunner.commands.options.named_numbers import limits_of, response_of
     from framerunner.flying.plan import FlightPlan
 
-    if response is not None and seed is None:
-        raise SettingError("--response: is for a simulated vehicle in lockstep; add --lockstep")
-    is_open = mission.mission_class == "open"
-    if drone_limits is not None and (drone is None or not is_open):
-        why = (
-            "a mission of class contest flies by the contest's"
-            if drone
-            else "is for a drone given by --drone"
-        )
-        raise SettingError(f"--drone-limits: {why}; leave it out")
-    if drone is not None and is_open and drone_limits is None:
+    limits, is_open = flown.drone_limits, mission.mission_class == "open"
+    if limits is not None and not is_open:
+        raise SettingError("--drone-limits: a mission of class contest flies by the contest's; leave it out")
+    if flown.drone is not None and is_open and limits is None:
         raise SettingError(
             f"--drone-limits: mission {mission.name} is of class open, so say what the drone can do, such as "
             "--drone-limits forward=2,left=1.5,up=1,yaw-rate=1.5"
         )
+    if flown.calibration is not None and mission.vision == "boxes":
+        raise SettingError(
+            f"--calibration: mission {mission.name} sees boxes, whose formulas know no lens; leave it out "
+            "or fly one with vision: frames"
+        )
+    is_seeded = simulated.lockstep or autopilot is not None
     return FlightPlan(
         scenario,
         mission,
-        seed,
-        drone_limits=None if drone_limits is None else limits_of(drone_limits),
-        response=None if response is None else response_of(response),
+        (simulated.seed or 0) if is_seeded else None,
+        drone_limits=None if limits is None else limits_of(limits),
+        response=None if simulated.response is None else response_of(simulated.response),
+        calibration=None if flown.calibration is None else load_calibration(flown.calibration),
     )
 
 
-def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
+def _simulator_api(url: str | None) -> SimulatorApi | None:
     if url is None:
         return None
-    if drone is None:
-        raise SettingError("--simulator: is for a drone that is running already; name it with --drone")
     from framerunner.wire.simulator_api import SimulatorApi
 
     try:
         return SimulatorApi.at(url)
     except ValueError as error:
         raise SettingError(f"--simulator {error}") from None
-
-
-def _genuine(given: GenuineOptions, *, drone: str | None, lockstep: bool) -> GenuineAutopilot | None:
-    """The autopilot of the user's that flies the simulated drone, if one is given."""
-    from framerunner.flying.simulator_process import GenuineAutopilot
-
-    px4, ardupilot = given.px4, given.ardupilot
-    if px4 is not None and ardupilot is not None:
-        raise SettingError(f"--ardupilot {ardupilot}: one autopilot flies; leave it or --px4 out")
-    if px4 is not None:
-        from sitl.px4.build import find_build
-
-        chosen = GenuineAutopilot("px4", px4)
-    elif ardupilot is not None:
-        from sitl.ardupilot.build import find_build
-
-        chosen = GenuineAutopilot("ardupilot", ardupilot)
-    else:
-        return None
-    option = f"--{chosen.name} {chosen.folder}"
-    if drone is not None:
-        raise SettingError(f"{option}: flies a simulator that is started; leave it out with --drone")
-    if lockstep:
-        raise SettingError(f"{option}: it is another process; leave out --lockstep")
-    find_build(chosen.folder)
-    return chosen
-
-
-def _check(
-    drone: str | None,
-    camera: str | None,
-    delay_s: float | None,
-    speed: float,
-    instance: int | None,
-    *,
-    lockstep: bool,
-) -> None:
-    """Refuse options that do not go together, and numbers out of range."""
-    check_range("--camera-delay", delay_s, 0.0, 0.5)
-    if drone is not None and camera is None:
-        raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")
-    if drone is None and camera is not None:
-        raise SettingError("--drone: a camera given by --camera needs the URL of its drone too")
-    if drone is not None and (speed != 1.0 or instance):
-        raise SettingError("--speed and --instance are for the simulated drone; leave them out with --drone")
-    unused = [("--drone", drone is not None), ("--speed", speed != 1.0), ("--instance", bool(instance))]
-    given = [option for option, is_given in unused if is_given]
-    if lockstep and given:
-        raise SettingError(
-            f"--lockstep: flies a simulated drone in this process; leave out {' and '.join(given)}"
-        )
-    check_range("--speed", speed, 0.01, 100)
-    check_range("--instance", instance, 0, 9)
-
-
-def _checked_seed(
-    seed: int | None, monitor: bool, lockstep: bool, autopilot: GenuineAutopilot | None
-) -> int | None:
-    """The seed of a flight in lockstep or of one with a genuine autopilot; None in real time."""
-    if monitor and lockstep:
-        raise SettingError("--monitor: shows flights in real time; leave it out with --lockstep")
-    if seed is None:
-        return 0 if lockstep or autopilot is not None else None
-    if not lockstep and autopilot is None:
-        raise SettingError(
-            f"--seed {seed}: is for a flight in lockstep, or with --px4 or --ardupilot; add one of them "
-            "or leave it out, which is seed 0"
-        )
-    if not 0 <= seed < 2**63:
-        raise SettingError(f"--seed {seed}: must be from 0 to {2**63 - 1}")
-    return seed

@@ -4,24 +4,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Literal
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
-from framerunner.commands import NamedPilot, say
+from framerunner.commands import NamedPilot, say, write_new
 from framerunner.errors import SettingError
-from framerunner.files.text_file import make_file
-
-if TYPE_CHECKING:
-    from offboard.mission import NewMission
 
 app = App(name="mission", help="List, show, check, create, export and import missions.")
 
 MAX_IMPORT_BYTES = 1_000_000
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
-PilotOption = Annotated[
-    Path | None, Parameter(help="Python file with a subclass of Pilot that the mission uses; it is executed")
-]
 
 
 @app.command(name="list")
@@ -43,7 +36,7 @@ def list_() -> int:
 
 
 @app.command
-def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: NamedPilot = None) -> int:
+def show(mission: str, *, pilot: NamedPilot = None) -> int:
     """Print a mission's diagram in Mermaid's language (paste it into any Markdown page or mermaid.live).
 
     **Examples**
@@ -53,6 +46,10 @@ def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: Name
         framerunner mission show my_mission.yaml > my_mission.mmd
 
         framerunner mission show my_mission.yaml --pilot my_mission.py
+
+    Args:
+        mission: name or file
+        pilot: primitives of your own.
     """
     from offboard.mission import load_mission, mermaid
 
@@ -61,7 +58,7 @@ def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: Name
 
 
 @app.command
-def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: NamedPilot = None) -> int:
+def check(file: Path, *, pilot: NamedPilot = None) -> int:
     """Say whether a mission file is good, or every fault with its line; then what may go wrong with it.
 
     A warning names a part that does nothing, such as a transition that is never taken; advice, a state that
@@ -72,6 +69,10 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: NamedPil
         framerunner mission check my_mission.yaml
 
         framerunner mission check my_mission.yaml --pilot my_mission.py
+
+    Args:
+        file: YAML file
+        pilot: primitives of your own.
     """
     from offboard.chart.native import load_chart
     from offboard.mission import load_mission
@@ -90,13 +91,11 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: NamedPil
 
 @app.command
 def export(
-    mission: Annotated[str, Parameter(help="name or file")],
+    mission: str,
     *,
-    format: Annotated[  # noqa: A002 - the option's name
-        Literal["scxml", "mermaid"], Parameter(help="W3C State Chart XML, or Mermaid's language")
-    ] = "scxml",
+    format: Literal["scxml", "mermaid"] = "scxml",  # noqa: A002 - the option's name
     pilot: NamedPilot = None,
-    out: Annotated[Path | None, Parameter(help="file to write; it must not exist")] = None,
+    out: Path | None = None,
 ) -> int:
     """Print or write a mission for other programs: as SCXML for statechart editors, or as a Mermaid diagram.
 
@@ -105,6 +104,12 @@ def export(
         framerunner mission export frame_challenge --format scxml --out frame_challenge.scxml
 
         framerunner mission export my_mission.yaml --format mermaid
+
+    Args:
+        mission: name or file
+        format: W3C State Chart XML, or Mermaid's language
+        pilot: primitives of your own.
+        out: file to write; it must not exist
     """
     from offboard.authoring import export_scxml
     from offboard.mission import load_mission, mermaid
@@ -117,10 +122,10 @@ def export(
 
 @app.command(name="import")
 def import_(
-    file: Annotated[Path, Parameter(help="SCXML file")],
+    file: Path,
     *,
     pilot: NamedPilot = None,
-    out: Annotated[Path | None, Parameter(help="mission file to write; it must not exist")] = None,
+    out: Path | None = None,
 ) -> int:
     """Print or write the mission that an SCXML file describes, and say what the checker finds in it.
 
@@ -131,6 +136,11 @@ def import_(
         framerunner mission import chart.scxml
 
         framerunner mission import chart.scxml --out my_mission.yaml
+
+    Args:
+        file: SCXML file
+        pilot: primitives of your own.
+        out: mission file to write; it must not exist
     """
     from offboard.authoring import Document, check_document, import_scxml
     from offboard.pilot_file import class_of, find_pilot
@@ -164,21 +174,16 @@ def _print_or_write(text: str, out: Path | None) -> None:
     if out is None:
         print(text, end="")
         return
-    try:
-        make_file(out, text)
-    except FileExistsError:
-        raise SettingError(f"{out} is there already and is left as it is; choose another --out") from None
-    except OSError as error:
-        raise SettingError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
+    write_new({out: text})
     print(f"written: {out}")
 
 
 @app.command
 def new(
-    name: Annotated[str, Parameter(help="of the mission: small letters, digits and _")],
+    name: str,
     *,
-    python: Annotated[bool, Parameter(help="with a Python file that adds a primitive of its own")] = False,
-    out: Annotated[Path, Parameter(help="folder to write to")] = Path("."),
+    python: bool = False,
+    out: Path = Path("."),
 ) -> int:
     """Create a mission: write a small one that flies, with comments that explain it.
 
@@ -189,6 +194,11 @@ def new(
         framerunner mission new my_mission
 
         framerunner mission new my_mission --python --out missions
+
+    Args:
+        name: of the mission: small letters, digits and _
+        python: with a Python file that adds a primitive of its own
+        out: folder to write to
     """
     from offboard.mission import new_mission
 
@@ -197,24 +207,10 @@ def new(
             f"NAME '{name}': use small letters, digits and _, a letter first, such as 'my_mission'"
         )
     files = new_mission(name, out, python=python)
-    _write(files)
+    write_new(files.texts, "NAME or --out", makes_folder=True)
     print(f"written: {', '.join(map(str, files.texts))}\n")
     print(f"  framerunner mission check {files.arguments}")
     print(f"  framerunner fly test-case-1 --lockstep --mission {files.arguments}\n")
     print("The first says whether it is good, the second flies it. The comments in the file explain it.")
     print("It crosses red only, so the referee will judge the flight aborted: add green and blue yourself.")
     return 0
-
-
-def _write(files: NewMission) -> None:
-    """Write all files or, if one of them is there already, none."""
-    for path in files.texts:
-        if path.exists():
-            raise SettingError(f"{path} is there already and is left as it is; choose another NAME or --out")
-    path = files.mission.parent
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        for path, text in files.texts.items():
-            make_file(path, text)
-    except OSError as error:
-        raise SettingError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None

@@ -18,51 +18,34 @@ if TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sending:
-    """How poses are sent."""
+    """How poses are sent.
 
-    rate: Annotated[float, Parameter(help="poses a second that are sent at most, 1 to 250")] = 50.0
-    delay: Annotated[
-        float, Parameter(help="milliseconds by which poses are older than they seem here, 0 to 500")
-    ] = 0.0
-    position_sigma: Annotated[float, Parameter(help="standard deviation of positions, m")] = 0.005
-    attitude_sigma: Annotated[float, Parameter(help="standard deviation of attitudes, rad")] = 0.01
-    velocity_sigma: Annotated[
-        float, Parameter(help="standard deviation of velocities, m/s, if the source has them")
-    ] = 0.05
-    origin: Annotated[
-        str | None,
-        Parameter(
-            help="LATITUDE,LONGITUDE,ALTITUDE of the room, degrees and metres: set in a drone that has none",
-            allow_leading_hyphen=True,
-        ),
-    ] = None
+    Attributes:
+        rate: poses a second that are sent at most, 1 to 250
+        delay: milliseconds by which poses are older than they seem here, 0 to 500
+        position_sigma: standard deviation of positions, m
+        attitude_sigma: standard deviation of attitudes, rad
+        velocity_sigma: standard deviation of velocities, m/s, if the source has them
+        origin: LATITUDE,LONGITUDE,ALTITUDE of the room, degrees and metres: set in a drone that has none
+    """
+
+    rate: float = 50.0
+    delay: float = 0.0
+    position_sigma: float = 0.005
+    attitude_sigma: float = 0.01
+    velocity_sigma: float = 0.05
+    origin: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
 
 
 def mocap(
-    source: Annotated[
-        str,
-        Parameter(
-            help="where poses come from: udpin://HOST:PORT, optitrack://HOST, vicon://HOST, qualisys://HOST, "
-            "vrpn://HOST, a .csv or .jsonl file, or sitl"
-        ),
-    ],
+    source: str,
     *,
-    drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
-    frame: Annotated[
-        Literal["flu", "ned", "enu", "yup"],
-        Parameter(help="axes of room and body, for poses that do not name theirs"),
-    ] = "flu",
-    forward: Annotated[
-        float,
-        Parameter(help="degrees from the tracked body's x axis to the drone's forward, counter-clockwise"),
-    ] = 0.0,
-    body: Annotated[
-        str | None, Parameter(help="name of the tracked body; by default the first that comes")
-    ] = None,
+    drone: str = "udpin://0.0.0.0:14540",
+    frame: Literal["flu", "ned", "enu", "yup"] = "flu",
+    forward: float = 0.0,
+    body: str | None = None,
     sending: Sending | None = None,
-    seconds: Annotated[
-        float | None, Parameter(help="stop after this many seconds; if not given at Ctrl-C")
-    ] = None,
+    seconds: float | None = None,
 ) -> int:
     """Send a motion capture's poses to a drone with PX4 or ArduPilot, and check that it uses them.
 
@@ -88,6 +71,16 @@ def mocap(
         framerunner mocap sitl --drone udpin://127.0.0.1:19410
 
         framerunner mocap poses.csv --drone udpin://0.0.0.0:14550 --origin 40.4168,-3.7038,650
+
+    Args:
+        source: where poses come from: udpin://HOST:PORT, optitrack://HOST, vicon://HOST, qualisys://HOST,
+            vrpn://HOST, a .csv or .jsonl file, or sitl
+        drone: MAVLink URL of the drone
+        frame: axes of room and body, for poses that do not name theirs
+        forward: degrees from the tracked body's x axis to the drone's forward, counter-clockwise
+        body: name of the tracked body; by default the first that comes
+        sending: how poses are sent.
+        seconds: stop after this many seconds; if not given at Ctrl-C
     """
     check_range("--forward", forward, -360.0, 360.0)
     check_range("--seconds", seconds, 1.0, 1e6)

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from framerunner.commands import WholeNumber, check_range, say
+from framerunner.commands import NamedPilot, WholeNumber, check_range, say
+from framerunner.commands.options.flight import Lifeline
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
@@ -37,54 +38,26 @@ SYSTEM_ID = 250
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 
 
-_Drone = Annotated[str, Parameter(help="MAVLink URL: where drones send to ground stations")]
-_Scenario = Annotated[
-    str | None, Parameter(help="name or file; for a drone without a referee, such as a real one")
-]
-_Scenarios = Annotated[
-    tuple[Path, ...],
-    Parameter(help="your own scenarios, files or folders: they can be drawn, and their arena is shown"),
-]
-_Bind = Annotated[str, Parameter(help="address to listen on; 0.0.0.0 lets other machines in")]
-_CameraHosts = Annotated[
-    tuple[str, ...],
-    Parameter(help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"),
-]
-_TrustedProxy = Annotated[
-    tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
-]
-_OperatorSocket = Annotated[
-    Path | None,
-    Parameter(help="local socket at which it listens for flights with an operator (fly --operator-socket)"),
-]
-_Certificate = Annotated[
-    Path | None, Parameter(help="PEM file: serve https:// with it, and the pages' WebSockets as wss://")
-]
-_Key = Annotated[
-    Path | None, Parameter(help="PEM file of the certificate's private key, if that is not in the same file")
-]
-PilotOption = Annotated[
-    Path | None, Parameter(help="Python file with primitives of your own, for the editor; it is executed")
-]
+PagesPort = Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")]
 
 
 def monitor(
     *,
-    drone: _Drone = "udpin://127.0.0.1:14550",
-    scenario: _Scenario = None,
-    bind: _Bind = "127.0.0.1",
-    port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8080,
-    database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
-    runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
-    missions: Annotated[Path, Parameter(help="folder that the editor shows")] = MISSIONS,
-    scenarios: _Scenarios = SCENARIOS,
-    pilot: PilotOption = None,
-    camera_host: _CameraHosts = (),
-    trusted_proxy: _TrustedProxy = (),
-    operator_socket: _OperatorSocket = None,
-    certificate: _Certificate = None,
-    key: _Key = None,
-    lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
+    drone: str = "udpin://127.0.0.1:14550",
+    scenario: str | None = None,
+    bind: str = "127.0.0.1",
+    port: PagesPort = 8080,
+    database: str = DATABASE,
+    runs: Path = Path("runs"),
+    missions: Path = MISSIONS,
+    scenarios: tuple[Path, ...] = SCENARIOS,
+    pilot: NamedPilot = None,
+    camera_host: tuple[str, ...] = (),
+    trusted_proxy: tuple[str, ...] = (),
+    operator_socket: Path | None = None,
+    certificate: Path | None = None,
+    key: Path | None = None,
+    lifeline: Lifeline = False,
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.
 
@@ -100,6 +73,23 @@ def monitor(
         framerunner monitor --bind 0.0.0.0 --certificate monitor.crt --key monitor.key
 
         framerunner monitor --drone serial:///dev/ttyUSB0:57600 --scenario test-case-1
+
+    Args:
+        drone: MAVLink URL: where drones send to ground stations
+        scenario: name or file; for a drone without a referee, such as a real one
+        bind: address to listen on; 0.0.0.0 lets other machines in
+        port: TCP port of the pages.
+        database: of teams and tries; SQLAlchemy URL
+        runs: folder of recorded flights
+        missions: folder that the editor shows
+        scenarios: your own scenarios, files or folders: they can be drawn, and their arena is shown
+        pilot: primitives of your own.
+        camera_host: HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from
+        trusted_proxy: address or network of a proxy whose X-Forwarded-For is believed
+        operator_socket: local socket at which it listens for flights with an operator (fly --operator-socket)
+        certificate: PEM file: serve https:// with it, and the pages' WebSockets as wss://
+        key: PEM file of the certificate's private key, if that is not in the same file
+        lifeline: stop when standard input ends.
     """
     check_range("--port", port, 0, 65535)
     from framerunner.child_process import until_standard_input_ends
@@ -140,12 +130,12 @@ def equipment(
     *,
     missions: Path = MISSIONS,
     scenarios: Sequence[Path] = SCENARIOS,
-    pilot: Path | None = None,
+    pilot: str | None = None,
 ) -> Equipment:
     """What the monitor, which may not import other rooms' functions, is given of them.
 
     Raises:
-        MissionError: the contestant's file, which is executed, cannot be used.
+        MissionError: the pilot, whose file is executed, cannot be used.
         SettingError: the folder of missions is not there.
     """
     from tempfile import mkdtemp
@@ -162,12 +152,12 @@ def equipment(
     from framerunner.monitoring.run_library import RunFolders
     from framerunner.monitoring.scenario_library import ScenarioLibrary
     from framerunner.wire.transports.vehicle_link import VehicleLink
-    from offboard.pilot import Pilot
-    from offboard.pilot_file import read_pilot
+    from offboard.pilot_file import class_of, find_pilot, pilot_argument
 
     if missions != MISSIONS and not missions.is_dir():  # the default is made when the first mission is
         raise SettingError(f"--missions {missions}: is not a folder; make it (mkdir -p), or choose another")
-    pilot_class = Pilot if pilot is None else read_pilot(pilot).pilot_class()
+    pilot_class = class_of(None if pilot is None else find_pilot(pilot))
+    pilot = None if pilot is None else pilot_argument(pilot)
     session = Path(mkdtemp(prefix="framerunner-flights-"))
     atexit.register(shutil.rmtree, session, ignore_errors=True)
     library = ScenarioLibrary(scenarios)

@@ -17,50 +17,23 @@ from framerunner.errors import SettingError
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.run import PreflightSettings
-_CameraDelay = Annotated[
-    float | None,
-    Parameter(
-        help="age in s of an image that arrives without a time stamp; by default the calibration's, else 0.1"
-    ),
-]
-_Calibration = Annotated[
-    Path | None, Parameter(help="the camera's calibration, a file of `framerunner camera calibrate`")
-]
-_MaxHeight = Annotated[
-    float | None, Parameter(help="cap on the height above the start in m; the box's ceiling if not given")
-]
-_SetParameters = Annotated[
-    bool, Parameter(negative="", help="set failsafe parameters that fail, and keep their old values")
-]
-_Restore = Annotated[
-    Path | None,
-    Parameter(help="only return the parameters and the fence of this file, which a check wrote before"),
-]
-_AnyVehicle = Annotated[
-    bool, Parameter(negative="", help="with --restore-parameters: also to another vehicle than they are of")
-]
-_Accept = Annotated[
-    tuple[str, ...], Parameter(negative="", help="name of a check that may fail; may be repeated")
-]
 
 
 def preflight(
-    scenario: Annotated[str, Parameter(help="name or file of the scenario")] = "test-case-1",
+    scenario: str = "test-case-1",
     *,
-    drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
-    camera: Annotated[
-        str | None, Parameter(help="URL, device or folder of its camera; checked if given")
-    ] = None,
-    camera_delay: _CameraDelay = None,
-    calibration: _Calibration = None,
-    mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
-    max_speed: Annotated[float, Parameter(help="cap on the level speed, m/s")] = 2.0,
-    max_height: _MaxHeight = None,
-    set_parameters: _SetParameters = False,
-    restore_parameters: _Restore = None,
-    any_vehicle: _AnyVehicle = False,
-    accept: _Accept = (),
-    out: Annotated[Path, Parameter(help="folder for the flight card and for old parameters")] = Path(),
+    drone: str = "udpin://0.0.0.0:14540",
+    camera: str | None = None,
+    camera_delay: float | None = None,
+    calibration: Path | None = None,
+    mission: str = DEFAULT_MISSION,
+    max_speed: float = 2.0,
+    max_height: float | None = None,
+    set_parameters: Annotated[bool, Parameter(negative="")] = False,
+    restore_parameters: Path | None = None,
+    any_vehicle: Annotated[bool, Parameter(negative="")] = False,
+    accept: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    out: Path = Path(),
 ) -> int:
     """Check a real drone as `fly` does before it arms it, and write the flight card; nothing is armed.
 
@@ -77,6 +50,22 @@ def preflight(
         framerunner preflight --set-parameters
 
         framerunner preflight --restore-parameters parameters-before.params
+
+    Args:
+        scenario: name or file of the scenario
+        drone: MAVLink URL of the drone
+        camera: URL, device or folder of its camera; checked if given
+        camera_delay: age in s of an image that arrives without a time stamp; by default the calibration's,
+            else 0.1
+        calibration: the camera's calibration, a file of `framerunner camera calibrate`
+        mission: name or file of the mission
+        max_speed: cap on the level speed, m/s
+        max_height: cap on the height above the start in m; the box's ceiling if not given
+        set_parameters: set failsafe parameters that fail, and keep their old values
+        restore_parameters: only return the parameters and the fence of this file, which a check wrote before
+        any_vehicle: with --restore-parameters: also to another vehicle than they are of
+        accept: name of a check that may fail; may be repeated
+        out: folder for the flight card and for old parameters
     """
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     if restore_parameters is not None:
@@ -85,16 +74,18 @@ def preflight(
         raise SettingError("--any-vehicle: is for --restore-parameters; leave it out")
 
     from framerunner.camera_calibration.calibration_file import load_calibration
-    from framerunner.commands.options.hardware import HardwareOptions, caps_of
+    from framerunner.commands.options.hardware import caps_of
     from framerunner.flying.plan import FlightPlan
     from framerunner.preflight.check_names import CHECK_NAMES
     from framerunner.preflight.run import PreflightSettings
+    from framerunner.preflight.settings import HardwareSettings
     from offboard.mission import load_mission
     from offboard.safety.check import check_names
     from scenarios.loader import load_scenario
 
     check_names(accept, CHECK_NAMES)
-    caps, loaded = caps_of(HardwareOptions(max_speed, max_height), drone), load_mission(mission)
+    caps = caps_of(HardwareSettings(max_speed=max_speed, max_height=max_height), drone)
+    loaded = load_mission(mission)
     known = None if calibration is None else load_calibration(calibration)
     plan = FlightPlan(load_scenario(scenario), loaded, None, calibration=known, caps=caps)
     delay = delay_of(camera_delay, known)

@@ -13,21 +13,13 @@ from framerunner.errors import SettingError
 
 
 def replay(
-    flight: Annotated[Path, Parameter(help="run folder, or an MCAP file of framerunner's")],
+    flight: Path,
     *,
-    speed: Annotated[float, Parameter(help="simulated seconds a second; 0 as fast as possible")] = 1.0,
-    fast: Annotated[bool, Parameter(help="as fast as possible, as --speed 0")] = False,
-    video: Annotated[
-        bool | None,
-        Parameter(
-            negative="--no-video", help="serve the images; by default if the flight is shown at some speed"
-        ),
-    ] = None,
-    port: Annotated[WholeNumber, Parameter(help="TCP port of the video; 0 lets the system choose")] = 8090,
-    pilot: Annotated[
-        str | None,
-        Parameter(help="of a mission that has to be flown again and needs one: a Python file, or a name"),
-    ] = None,
+    speed: float = 1.0,
+    fast: bool = False,
+    video: Annotated[bool | None, Parameter(negative="--no-video")] = None,
+    port: WholeNumber = 8090,
+    pilot: str | None = None,
 ) -> int:
     """Show a flight again: its states in the terminal, its images at http://127.0.0.1:8090/.
 
@@ -41,6 +33,14 @@ def replay(
         framerunner replay runs/20260101-120000-test-case-1 --speed 4
 
         framerunner replay flight.mcap --fast
+
+    Args:
+        flight: run folder, or an MCAP file of framerunner's
+        speed: simulated seconds a second; 0 as fast as possible
+        fast: as fast as possible, as --speed 0
+        video: serve the images; by default if the flight is shown at some speed
+        port: TCP port of the video; 0 lets the system choose
+        pilot: of a mission that has to be flown again and needs one: a Python file, or a name
     """
     speed = 0.0 if fast else speed
     if speed != 0.0 and not 0.01 <= speed <= 1000:

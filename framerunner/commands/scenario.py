@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
-from framerunner.commands import WholeNumber, say
-from framerunner.errors import SettingError
+from framerunner.commands import WholeNumber, say, write_new
 
 app = App(name="scenario", help="List, show and check scenarios.")
 
@@ -32,9 +30,9 @@ def list_() -> int:
 
 @app.command
 def show(
-    scenario: Annotated[str, Parameter(help="name or file")],
+    scenario: str,
     *,
-    out: Annotated[Path | None, Parameter(help="PNG file to write; by default `<name>.png`")] = None,
+    out: Path | None = None,
 ) -> int:
     """Draw a scenario from above and from the side, and print it.
 
@@ -43,6 +41,10 @@ def show(
         framerunner scenario show test-case-1
 
         framerunner scenario show my.yaml --out my.png
+
+    Args:
+        scenario: name or file
+        out: PNG file to write; by default `<name>.png`
     """
     from framerunner.runs import check_plot_format
     from scenarios.loader import dump_yaml, load_scenario
@@ -59,12 +61,15 @@ def show(
 
 
 @app.command
-def check(file: Annotated[Path, Parameter(help="YAML file")]) -> int:
+def check(file: Path) -> int:
     """Say whether a scenario file is good, or what is wrong and where.
 
     **Example**
 
         framerunner scenario check my.yaml
+
+    Args:
+        file: YAML file
     """
     from scenarios.loader import load_scenario
 
@@ -90,9 +95,9 @@ def schema() -> int:
 @app.command
 def random(
     *,
-    level: Annotated[str, Parameter(help="level of difficulty, name or file")],
-    seed: Annotated[WholeNumber, Parameter(help="a whole number; the same seed gives the same scenario")],
-    out: Annotated[Path | None, Parameter(help="YAML file to write; by default it is printed")] = None,
+    level: str,
+    seed: WholeNumber,
+    out: Path | None = None,
 ) -> int:
     """Draw a scenario at random.
 
@@ -101,6 +106,11 @@ def random(
         framerunner scenario random --level calm --seed 17
 
         framerunner scenario random --level calm --seed 17 --out calm-17.yaml
+
+    Args:
+        level: level of difficulty, name or file
+        seed: a whole number; the same seed gives the same scenario
+        out: YAML file to write; by default it is printed
     """
     from scenarios.loader import dump_yaml
     from scenarios.random_scenarios import load_level, random_scenario
@@ -109,11 +119,6 @@ def random(
     if out is None:
         print(dump_yaml(drawn), end="")
         return 0
-    if out.is_file():
-        raise SettingError(f"--out {out}: is there already and is left as it is; choose another")
-    try:
-        out.write_text(dump_yaml(drawn), encoding="utf-8")
-    except OSError as error:
-        raise SettingError(f"--out {out}: cannot be written ({error.strerror}); choose another") from None
+    write_new({out: dump_yaml(drawn)})
     say(f"scenario '{drawn.name}' written to {out}")
     return 0

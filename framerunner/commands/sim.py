@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from framerunner.commands import (
     Faults,
@@ -17,12 +17,13 @@ from framerunner.commands import (
     ShowLayout,
     WholeNumber,
     check_range,
+    for_genuine,
     say,
     with_faults,
     with_sensors,
 )
-from framerunner.commands.ardupilot import ardupilot_server
-from framerunner.commands.px4 import px4_server
+from framerunner.commands.genuine import ardupilot_server, px4_server
+from framerunner.commands.options.rules import Rule, check_rules, given_in
 from framerunner.errors import SettingError
 from framerunner.extras import install_advice, is_installed
 from framerunner.files.text_file import TextError, read_text
@@ -31,6 +32,7 @@ from sitl.autopilots import TITLES
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
     from framerunner.wire.signing import SigningKey
+    from scenarios.models import Scenario
     from sitl.pacing.time_grants import TimeGrants
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
@@ -44,143 +46,115 @@ class _Server(Protocol):
         """Run until cancelled."""
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=Group("On board", sort_key=2))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Onboard:
-    """What the drone has besides flying."""
+    """What the drone has besides flying.
 
-    storage: Annotated[
-        Path | None,
-        Parameter(help="folder for its files and flight logs, DIR/0 for instance 0; else a temporary one"),
-    ] = None
-    parameters: Annotated[
-        Path | None,
-        Parameter(help="file of changed parameters (.params), read at start and saved when one changes"),
-    ] = None
+    Attributes:
+        storage: folder for its files and flight logs, DIR/0 for instance 0; else a temporary one
+        parameters: file of changed parameters (.params), read at start and saved when one changes
+        sensors: the drone's sensor suite.
+        shell: answer MAVLink's shell (SERIAL_CONTROL), for the drone only
+        camera: announce the camera over MAVLink, as a separate component, take photos, record video
+    """
+
+    storage: Path | None = None
+    parameters: Path | None = None
     sensors: Sensors = None
-    shell: Annotated[bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), for the drone only")] = (
-        False
-    )
-    camera: Annotated[
-        bool,
-        Parameter(
-            negative="--no-camera",
-            help="announce the camera over MAVLink, as a separate component, take photos, record video",
-        ),
-    ] = True
+    shell: bool = False
+    camera: Annotated[bool, Parameter(negative="--no-camera")] = True
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=Group("Connections", sort_key=1))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Connections:
-    """Where the simulator listens and sends."""
+    """Where the simulator listens and sends.
 
-    bind: Annotated[str, Parameter(help="address to listen on")] = "127.0.0.1"
-    onboard_remote: Annotated[
-        str, Parameter(help="host or host:port that gets the onboard link, UDP 14540 + instance")
-    ] = "127.0.0.1"
-    ground_remote: Annotated[
-        str, Parameter(help="host or host:port that gets the ground link, UDP 14550")
-    ] = "127.0.0.1"
-    link: Annotated[
-        tuple[str, ...],
-        Parameter(
-            help="one more link: udpout://HOST:PORT, udpin://…, tcpin://…, tcpout://…, serial:///TTY:BAUD, "
-            "optionally followed by ?streams=onboard|ground|normal&rate=BYTES; may be repeated"
-        ),
-    ] = ()
-    signing_key: Annotated[
-        Path | None, Parameter(help="file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it")
-    ] = None
-    video_port: Annotated[
-        WholeNumber | None, Parameter(help="TCP port of the video; 8100 + instance if not given")
-    ] = None
-    video_rtp: Annotated[
-        str, Parameter(help="host or host:port that gets the video as H.264 in RTP, UDP 5600, or off")
-    ] = "127.0.0.1"
+    Attributes:
+        bind: address to listen on
+        onboard_remote: host or host:port that gets the onboard link, UDP 14540 + instance
+        ground_remote: host or host:port that gets the ground link, UDP 14550
+        link: one more link: udpout://HOST:PORT, udpin://…, tcpin://…, tcpout://…, serial:///TTY:BAUD,
+            optionally followed by ?streams=onboard|ground|normal&rate=BYTES; may be repeated
+        signing_key: file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it
+        video_port: TCP port of the video; 8100 + instance if not given
+        video_rtp: host or host:port that gets the video as H.264 in RTP, UDP 5600, or off
+        show_layout: tell every app the layout.
+    """
+
+    bind: str = "127.0.0.1"
+    onboard_remote: str = "127.0.0.1"
+    ground_remote: str = "127.0.0.1"
+    link: tuple[str, ...] = ()
+    signing_key: Path | None = None
+    video_port: WholeNumber | None = None
+    video_rtp: str = "127.0.0.1"
     show_layout: ShowLayout = False
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=Group("Autopilot", sort_key=3))
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlownBy:
-    """Which autopilot flies the drone."""
+    """Which autopilot flies the drone.
 
-    autopilot: Annotated[
-        Literal["own", "px4", "ardupilot"],
-        Parameter(help="what flies: this project's autopilot, or a genuine PX4 or ArduCopter"),
-    ] = "own"
-    px4: Annotated[
-        Path | None,
-        Parameter(
-            help="with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself"
+    Attributes:
+        autopilot: what flies: this project's autopilot, or a genuine PX4 or ArduCopter
+        px4: with --autopilot px4: folder of a PX4 built for SITL, to be started; else start it yourself
+        ardupilot: with --autopilot ardupilot: folder of an ArduPilot built for SITL, to be started; else
+            start it yourself
+        transmitter: with --autopilot px4: a pilot's remote control: `centred`, or a transmitter on USB such
+            as /dev/input/js0
+    """
+
+    autopilot: Literal["own", "px4", "ardupilot"] = "own"
+    px4: Path | None = None
+    ardupilot: Path | None = None
+
+    transmitter: str | None = None
+
+
+def _rules_for(name: Literal["px4", "ardupilot"]) -> tuple[Rule, ...]:
+    """What the drone does not have if a genuine autopilot flies it."""
+    title = TITLES[name]
+    remotes = ("onboard-remote", "ground-remote") if name == "px4" else ()
+    reasons = {
+        **dict.fromkeys(("link", "signing-key", "shell", *remotes), f"MAVLink is {title}'s own"),
+        "count": f"{title} flies one drone; start another simulator with --instance 1",
+        "monitor": f"run framerunner monitor beside it, which listens to {title} on UDP 14550",
+        "parameters": f"{title} keeps its own, with --storage DIR",
+    }
+    chosen = f"autopilot {name}"
+    return (
+        Rule(name, f"is for {title}; add --{chosen}", needs=(chosen,)),
+        *(
+            Rule(option, f"{why}; leave it out with {{found}}", excludes=(chosen,), shows_value=False)
+            for option, why in reasons.items()
         ),
-    ] = None
-    ardupilot: Annotated[
-        Path | None,
-        Parameter(
-            help="with --autopilot ardupilot: folder of an ArduPilot built for SITL, to be started; else "
-            "start it yourself"
-        ),
-    ] = None
+    )
 
-    transmitter: Annotated[
-        str | None,
-        Parameter(
-            help="with --autopilot px4: a pilot's remote control: `centred`, or a transmitter on USB such as "
-            "/dev/input/js0"
-        ),
-    ] = None
 
-    def check(self, count: int, settings: ServerSettings, *, monitor: bool) -> None:
-        """Refuse options that the chosen autopilot does not have.
-
-        Raises:
-            SettingError: one of them is given.
-        """
-        for name, folder in (("px4", self.px4), ("ardupilot", self.ardupilot)):
-            if folder is not None and name != self.autopilot:
-                raise SettingError(f"--{name} {folder}: is for {TITLES[name]}; add --autopilot {name}")
-        if self.transmitter is not None and self.autopilot != "px4":
-            raise SettingError(f"--transmitter {self.transmitter}: is for PX4; add --autopilot px4")
-        if self.autopilot == "own":
-            return
-        name, plain, sends_itself = TITLES[self.autopilot], Connections(), self.autopilot == "px4"
-        refused = [
-            (
-                "--onboard-remote",
-                sends_itself and settings.onboard_remote != plain.onboard_remote,
-                f"MAVLink is {name}'s own",
-            ),
-            (
-                "--ground-remote",
-                sends_itself and settings.ground_remote != plain.ground_remote,
-                f"MAVLink is {name}'s own",
-            ),
-            ("--count", count != 1, f"{name} flies one drone; start another simulator with --instance 1"),
-            (
-                "--monitor",
-                monitor,
-                f"run framerunner monitor beside it, which listens to {name} on UDP 14550",
-            ),
-            ("--link", bool(settings.links), f"MAVLink is {name}'s own"),
-            ("--signing-key", settings.signing_key is not None, f"MAVLink is {name}'s own"),
-            ("--parameters", settings.parameters is not None, f"{name} keeps its own, with --storage DIR"),
-            ("--shell", settings.shell, f"MAVLink is {name}'s own"),
-        ]
-        for option, given, why in refused:
-            if given:
-                raise SettingError(f"{option}: {why}; leave it out with --autopilot {self.autopilot}")
+_RULES = (
+    *_rules_for("px4"),
+    *_rules_for("ardupilot"),
+    Rule("transmitter", "is for PX4; add --autopilot px4", needs=("autopilot px4",)),
+)
 
 
 @Parameter(name="*", show=False)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartedBy:
-    """What the program that has started this one wants of it, over descriptors of sockets."""
+    """What the program that has started this one wants of it, over descriptors of sockets.
 
-    lifeline: Annotated[bool, Parameter(help="stop when standard input ends")] = False
-    time_grants: Annotated[int | None, Parameter(help="by which it grants time")] = None
-    truth: Annotated[int | None, Parameter(help="by which it gets true states")] = None
+    Attributes:
+        lifeline: stop when standard input ends
+        time_grants: by which it grants time
+        truth: by which it gets true states
+    """
+
+    lifeline: bool = False
+    time_grants: int | None = None
+    truth: int | None = None
 
     def grants(self) -> TimeGrants | None:
         """Its end of the channel of time; None: it grants none, and time runs."""
@@ -201,22 +175,16 @@ class StartedBy:
 
 def sim(
     *,
-    scenario: Annotated[
-        str, Parameter(help="name or file; without it an open field and an x500")
-    ] = "open-field",
-    speed: Annotated[float, Parameter(help="simulated seconds a second, 0.01 to 1000")] = 1.0,
-    instance: Annotated[WholeNumber, Parameter(help="shifts ports and the system id, 0 to 9")] = 0,
-    count: Annotated[
-        WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
-    ] = 1,
-    seed: Annotated[WholeNumber, Parameter(help="of everything random, such as turbulence")] = 0,
+    scenario: str = "open-field",
+    speed: float = 1.0,
+    instance: WholeNumber = 0,
+    count: WholeNumber = 1,
+    seed: WholeNumber = 0,
     fault: Faults = (),
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     flown_by: FlownBy | None = None,
-    monitor: Annotated[
-        bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")
-    ] = False,
+    monitor: bool = False,
     started_by: StartedBy | None = None,
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8100/.
@@ -240,18 +208,33 @@ def sim(
         framerunner sim --autopilot px4 --px4 ../PX4-Autopilot
 
         framerunner sim --autopilot ardupilot --ardupilot ../ardupilot
+
+    Args:
+        scenario: name or file; without it an open field and an x500
+        speed: simulated seconds a second, 0.01 to 1000
+        instance: shifts ports and the system id, 0 to 9
+        count: how many drones fly side by side; they have the next instances' ports
+        seed: of everything random, such as turbulence
+        fault: what fails.
+        connections: where it listens and sends.
+        onboard: what the drone has besides flying.
+        flown_by: which autopilot flies.
+        monitor: open the Game Monitor as well, on http://127.0.0.1:8080/
+        started_by: what the program that started it wants.
     """
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, _MAX_INSTANCES - 1)
     check_range("--count", count, 1, _MAX_INSTANCES - instance)
     chosen, onboard, flown_by = connections or Connections(), onboard or Onboard(), flown_by or FlownBy()
+    given = given_in(chosen, onboard, flown_by)
+    given |= {name: True for name, is_given in (("count", count != 1), ("monitor", monitor)) if is_given}
+    check_rules(_RULES, given)
+    check_range("--seed", seed, 0, 2**63 - 1)
     watched = monitor and flown_by.autopilot == "own"
     watcher = _monitor(scenario, chosen.video_port, count) if watched else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
-    flown_by.check(count, settings, monitor=monitor)
-    check_range("--seed", seed, 0, 2**63 - 1)
     caller = started_by or StartedBy()
     server = _server(
         scenario, settings, onboard, fault, flown_by=flown_by, count=count, seed=seed, caller=caller
@@ -272,25 +255,25 @@ def _server(
     caller: StartedBy,
 ) -> _Server:
     """The simulator with the chosen autopilot; only with ours it tells the truth."""
+    from scenarios.loader import load_scenario
+
     grants = caller.grants()
+    chosen = with_faults(with_sensors(load_scenario(scenario), onboard.sensors), fault)
     if flown_by.autopilot == "px4":
         return px4_server(
-            scenario,
+            for_genuine("PX4", chosen),
             settings,
-            onboard,
-            fault,
-            px4=flown_by.px4,
+            folder=flown_by.px4,
             transmitter=flown_by.transmitter,
             seed=seed,
             grants=grants,
         )
     if flown_by.autopilot == "ardupilot":
-        return ardupilot_server(
-            scenario, settings, onboard, fault, ardupilot=flown_by.ardupilot, seed=seed, grants=grants
-        )
+        genuine = for_genuine("ArduPilot", chosen)
+        return ardupilot_server(genuine, settings, folder=flown_by.ardupilot, seed=seed, grants=grants)
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
+    simulations = _simulations(chosen, count=count, seed=seed)
     return SimulatorServer(simulations, settings, notice=say, grants=grants, truth=caller.truth_channel())
 
 
@@ -340,16 +323,11 @@ def _settings(
     return settings
 
 
-def _simulations(
-    name: str, sensors: str | None, fault: tuple[str, ...], *, count: int, seed: int
-) -> list[Simulation]:
+def _simulations(scenario: Scenario, *, count: int, seed: int) -> list[Simulation]:
     from framerunner.vehicle.airframe import load_airframe
-    from scenarios.loader import load_scenario
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
-    check_range("--seed", seed, 0, 2**63 - 1)
-    scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
     if count == 1:
         return [Simulation(scenario, seed=seed)]
     airframe = load_airframe(scenario.airframe)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cyclopts import App, Parameter
 
@@ -17,29 +17,40 @@ _MAX_IMAGES = 1_000_000
 
 app = App(name="vision", help="Evaluate the detectors on images of known scenes.")
 
-_Level = Annotated[str, Parameter(help="draw scenarios of this level, name or file")]
-_Images = Annotated[WholeNumber, Parameter(help="how many images, five of a scenario")]
-_Seed = Annotated[WholeNumber, Parameter(help="of the first scenario, and of the poses")]
-_Noise = Annotated[float, Parameter(help="standard deviation of noise in every channel, 0 to 100")]
-_Blur = Annotated[float, Parameter(help="standard deviation of a blur, 0 to 10 pixels")]
-_Light = Annotated[float, Parameter(help="factor of brightness, 0.05 to 2")]
-_Jpeg = Annotated[WholeNumber | None, Parameter(help="compress with this quality, 1 to 100")]
+
+@Parameter(name="*", group="Images")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageOptions:
+    """Which images are painted.
+
+    Attributes:
+        level: draw scenarios of this level, name or file
+        images: how many images, five of a scenario
+        seed: of the first scenario, and of the poses
+        noise: standard deviation of noise in every channel, 0 to 100
+        blur: standard deviation of a blur, 0 to 10 pixels
+        light: factor of brightness, 0.05 to 2
+        jpeg: compress with this quality, 1 to 100
+    """
+
+    level: str = "calm"
+    images: WholeNumber = 300
+    seed: WholeNumber = 1
+    noise: float = 0.0
+    blur: float = 0.0
+    light: float = 1.0
+    jpeg: WholeNumber | None = None
+
+
+_USUAL = ImageOptions()
 
 
 @app.command
 def evaluate(
     *,
-    level: _Level = "calm",
-    images: _Images = 300,
-    seed: _Seed = 1,
-    noise: _Noise = 0.0,
-    blur: _Blur = 0.0,
-    light: _Light = 1.0,
-    jpeg: _Jpeg = None,
-    detector: Annotated[
-        str | None, Parameter(help="one that a package adds, to be rated beside ours")
-    ] = None,
-    out: Annotated[Path | None, Parameter(help="folder for the report and the picture")] = None,
+    options: ImageOptions = _USUAL,
+    detector: str | None = None,
+    out: Path | None = None,
 ) -> int:
     """Tell how often and how exactly frames are found: by shape, and by the paper's boxes.
 
@@ -53,53 +64,54 @@ def evaluate(
         framerunner vision evaluate --level calm --images 300
 
         framerunner vision evaluate --level crowded --noise 4 --blur 0.7 --light 0.7 --jpeg 90
+
+    Args:
+        options: which images.
+        detector: one that a package adds, to be rated beside ours
+        out: folder for the report and the picture
     """
     from framerunner.vision_evaluation.evaluate import evaluate_vision
 
-    default = Path("runs") / f"vision-{Path(level).stem}-{images}-{seed}"
-    settings = _settings(level, images, seed, (noise, blur, light, jpeg), out or default)
+    default = Path("runs") / f"vision-{Path(options.level).stem}-{options.images}-{options.seed}"
+    settings = _settings(options, out or default)
     evaluate_vision(replace(settings, detector=detector))
     return 0
 
 
 @app.command
 def dataset(
-    folder: Annotated[Path, Parameter(help="for the images and labels.json")],
+    folder: Path,
     *,
-    level: _Level = "calm",
-    images: _Images = 300,
-    seed: _Seed = 1,
-    noise: _Noise = 0.0,
-    blur: _Blur = 0.0,
-    light: _Light = 1.0,
-    jpeg: _Jpeg = None,
+    options: ImageOptions = _USUAL,
 ) -> int:
     """Write such images, and what is to be seen in them, for your own detector.
 
     **Example**
 
         framerunner vision dataset my_images --level crowded --images 1000
+
+    Args:
+        folder: for the images and labels.json
+        options: which images.
     """
     from framerunner.vision_evaluation.evaluate import write_dataset
 
-    write_dataset(_settings(level, images, seed, (noise, blur, light, jpeg), folder))
+    write_dataset(_settings(options, folder))
     return 0
 
 
-def _settings(
-    level: str, images: int, seed: int, harder: tuple[float, float, float, int | None], out: Path
-) -> VisionSettings:
+def _settings(options: ImageOptions, out: Path) -> VisionSettings:
     """Check the options."""
     from framerunner.vision_evaluation.evaluate import VisionSettings
     from framerunner.vision_evaluation.labelled_images import Disturbance
     from scenarios.random_numbers import MAX_SEED
     from scenarios.random_scenarios import load_level
 
-    noise, blur, light, jpeg = harder
-    check_range("--images", images, 1, _MAX_IMAGES)
-    check_range("--seed", seed, 0, MAX_SEED - _MAX_IMAGES)
-    check_range("--noise", noise, 0.0, 100.0)
-    check_range("--blur", blur, 0.0, 10.0)
-    check_range("--light", light, 0.05, 2.0)
-    check_range("--jpeg", jpeg, 1, 100)
-    return VisionSettings(load_level(level), images, seed, Disturbance(noise, blur, light, jpeg), out)
+    check_range("--images", options.images, 1, _MAX_IMAGES)
+    check_range("--seed", options.seed, 0, MAX_SEED - _MAX_IMAGES)
+    check_range("--noise", options.noise, 0.0, 100.0)
+    check_range("--blur", options.blur, 0.0, 10.0)
+    check_range("--light", options.light, 0.05, 2.0)
+    check_range("--jpeg", options.jpeg, 1, 100)
+    harder = Disturbance(options.noise, options.blur, options.light, options.jpeg)
+    return VisionSettings(load_level(options.level), options.images, options.seed, harder, out)

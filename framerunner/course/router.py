@@ -56,11 +56,12 @@ class CourseRouter:
 
     Args:
         folder: of the pupils' missions; the class's progress is kept there, too.
-        pilot: a contestant's file, which flights execute; None: missions use `Pilot` itself.
+        pilot: a contestant's file, which flights execute, or a pilot's name; None: missions use `Pilot`
+            itself.
         pupils: of the class, who log in; None: there is none.
     """
 
-    def __init__(self, folder: Path, pilot: Path | None = None, pupils: PupilBook | None = None) -> None:
+    def __init__(self, folder: Path, pilot: str | None = None, pupils: PupilBook | None = None) -> None:
         self._folder = folder
         self._pupils = pupils
         self._progress = CourseProgress(folder / "course-progress.jsonl")

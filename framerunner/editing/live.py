@@ -39,12 +39,12 @@ class LiveSettings:
     Attributes:
         drone_url: where the monitor listens for drones.
         runs: folder of runs.
-        pilot: a contestant's file; None: there is none.
+        pilot: a contestant's file or a pilot's name; None: there is none.
     """
 
     drone_url: str
     runs: Path
-    pilot: Path | None = None
+    pilot: str | None = None
 
 
 class LiveFlight:
@@ -136,7 +136,7 @@ class LiveFlight:
             *("fly", str(scenario), "--mission", str(mission), "--speed", f"{request.speed:g}"),
             *("--instance", str(instance), "--out", str(self._settings.runs), "--lifeline"),
             *(word for link in links for word in ("--monitor-link", link)),
-            *(() if pilot is None else ("--pilot", str(pilot.absolute()))),
+            *(() if pilot is None else ("--pilot", pilot)),
         ]
 
     def _runs(self) -> set[str]:

@@ -399,7 +399,7 @@ class _WorkerTask(StrictModel):
     """What a worker process is given first.
 
     Attributes:
-        pilot: a contestant's file, which is executed; only from the server's command line.
+        pilot: a contestant's file, which is executed, or a pilot's name; only from the server's command line.
         keep: folder in which the flight's run folder is made, for replays; None: nowhere.
         processor_s: processor time of one flight.
         memory_bytes: beyond that of the libraries.

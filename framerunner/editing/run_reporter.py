@@ -10,7 +10,7 @@ from framerunner.flying.cause import lost_in
 from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.guard_reporter import plain_value
 from framerunner.flying.run_control import RunStanding
-from framerunner.runs.chart_record import ChartRecord, StateSpan
+from framerunner.runs.track import ChartRecord, StateSpan
 from framerunner.wire.finite_json import finite
 from offboard.app import Moment
 from offboard.drone import DroneState

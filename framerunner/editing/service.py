@@ -36,7 +36,8 @@ class EditingSettings:
     """Limits of what browsers may start.
 
     Attributes:
-        pilot: a contestant's Python file, which workers execute; None: missions use `Pilot` itself.
+        pilot: a contestant's Python file, which workers execute, or a pilot's name; None: missions use
+            `Pilot` itself.
         keep: folder for the run folders of flights, for replays; None: they are not kept.
         max_runs: flights under control at the same time; more wait.
         max_batches: batches at the same time; more wait.
@@ -49,7 +50,7 @@ class EditingSettings:
         live: how flights in the real simulator are flown; None: there are none.
     """
 
-    pilot: Path | None = None
+    pilot: str | None = None
     keep: Path | None = None
     max_runs: int = 8
     max_batches: int = 1
@@ -213,7 +214,7 @@ class EditingService:
         name = secrets.token_urlsafe(9)
         settings = self._settings
         common = {
-            "pilot": None if settings.pilot is None else str(settings.pilot),
+            "pilot": settings.pilot,
             "keep": None if settings.keep is None else str(settings.keep),
             "processor_s": settings.processor_s,
             "memory_bytes": settings.memory_bytes,

@@ -33,7 +33,7 @@ from framerunner.flying.lockstep import lockstep_flight
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.run_control import RunControl
 from offboard.mission import Mission, MissionError, mission_from_text
-from offboard.pilot_file import PilotFile, read_pilot
+from offboard.pilot_file import PilotSource, find_pilot
 
 _SPARE_S = 120  # processor time for all but flying
 _NICENESS = 5
@@ -90,7 +90,7 @@ def _carry_out(task: messages.RunTask | messages.BatchTask, tell: Tell) -> None:
     limit_resources(task.memory_bytes, round(task.processor_s) * flights + _SPARE_S)
     tag = task.start.tag
     try:
-        pilot = None if task.pilot is None else read_pilot(Path(task.pilot))
+        pilot = None if task.pilot is None else find_pilot(task.pilot)
         mission = mission_from_text(task.start.text, pilot)
         if isinstance(task, messages.BatchTask):
             fly_batch(task, mission, tell)
@@ -114,7 +114,9 @@ def refusal(tag: int, error: UserError, language: Language, run: str = "") -> me
 class _ControlledRun:
     """A flight that follows orders."""
 
-    def __init__(self, task: messages.RunTask, mission: Mission, pilot: PilotFile | None, tell: Tell) -> None:
+    def __init__(
+        self, task: messages.RunTask, mission: Mission, pilot: PilotSource | None, tell: Tell
+    ) -> None:
         start = task.start
         _check_breaks(start.break_on, mission)
         self._task, self._mission, self._pilot, self._tell = task, mission, pilot, tell

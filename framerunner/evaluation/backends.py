@@ -58,7 +58,8 @@ def open_pool(pool: Pool) -> AbstractContextManager[Workers]:
     """Start the workers or connect to them; the context stops or disconnects them.
 
     Raises:
-        SettingError: a package is not installed, or no cluster answers at the address.
+        SettingError: no cluster answers at the address.
+        ModuleNotFoundError: a package is not installed; see `extras.install_advice`.
     """
     return {"loky": _loky, "dask": _dask, "ray": _ray}[pool.backend](pool)
 
@@ -73,10 +74,7 @@ def _loky(pool: Pool) -> Iterator[Workers]:
 
 @contextmanager
 def _dask(pool: Pool) -> Iterator[Workers]:
-    try:
-        from distributed import Client
-    except ImportError:
-        raise _not_installed("dask") from None
+    from distributed import Client
     from joblib import parallel_config
 
     try:
@@ -95,12 +93,9 @@ def _dask(pool: Pool) -> Iterator[Workers]:
 
 @contextmanager
 def _ray(pool: Pool) -> Iterator[Workers]:
-    try:
-        import ray
-        from ray.util.joblib import register_ray
-    except ImportError:
-        raise _not_installed("ray") from None
+    import ray
     from joblib import parallel_config
+    from ray.util.joblib import register_ray
 
     try:
         ray.init(address=pool.address, log_to_driver=False)
@@ -129,7 +124,3 @@ def _in_batches(calls: Iterable[Any]) -> Generator[Any, None, None]:
     calls = iter(calls)
     while batch := list(islice(calls, 4 * effective_n_jobs())):
         yield from Parallel(batch_size=1)(batch)
-
-
-def _not_installed(backend: str) -> SettingError:
-    return SettingError(f"--backend {backend}: is not installed; pip install 'framerunner[{backend}]'")

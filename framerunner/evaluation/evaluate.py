@@ -12,13 +12,13 @@ from rich.console import Console
 from framerunner.errors import SettingError
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
-from framerunner.evaluation.genuine_flight import GenuineUse
 from framerunner.evaluation.plan import Plan
 from framerunner.evaluation.rows import Row, csv_text
-from framerunner.evaluation.runner import Terms, fly_all
+from framerunner.evaluation.runner import GenuineUse, Terms, fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
 from framerunner.evaluation.terminal import EvaluationProgress, print_comparison, print_summary
+from framerunner.terminal import say
 from scenarios.verdict import Verdict
 
 EXIT_INTERRUPTED = 130
@@ -77,7 +77,7 @@ def evaluate(settings: EvaluationSettings) -> int:
         except KeyboardInterrupt:
             count = len(folder.rows())  # from disk: the signal may have come between writing and counting
             kept = f"{count} of {len(settings.plan)} flights are kept in {folder.path}"
-            _note(f"interrupted; {kept}; continue with:\n  {settings.command}")
+            say(f"interrupted; {kept}; continue with:\n  {settings.command}")
             return EXIT_INTERRUPTED
 
 
@@ -85,7 +85,7 @@ def _fly_missing(settings: EvaluationSettings, folder: EvaluationFolder) -> None
     plan = settings.plan
     kept = len(folder.done)
     if kept:
-        _note(f"{kept} of {len(plan)} flights are in {folder.path} already")
+        say(f"{kept} of {len(plan)} flights are in {folder.path} already")
     if kept == len(plan):
         return
     scenarios = {scenario.name: scenario for scenario in plan.scenarios}
@@ -127,23 +127,12 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
 
     console = Console(stderr=True)
     with console.status("drawing the report") as status:
-        from framerunner.evaluation.report import Page, write_report
+        from framerunner.evaluation.report import write_report
 
         def advance(done: int, total: int) -> None:
             status.update(f"drawing the report, plot {done + 1} of {total}")
 
-        plan = settings.plan
-        genuine = None if settings.genuine is None else settings.genuine.autopilot
-        page = Page(
-            title=plan.title,
-            mission=settings.mission,
-            pilot=settings.pilot,
-            command=settings.command,
-            summary=summary,
-            comparison=comparison,
-            genuine=genuine,
-        )
-        write_report(folder, page, advance)
+        write_report(folder, settings, summary, comparison, advance)
     print(f"left in {folder.path}/: report.html, results.csv", flush=True)
     return code
 
@@ -156,7 +145,3 @@ def _print_flown(settings: EvaluationSettings, folder: EvaluationFolder, last: R
         summarise([*rows, last]), f"{settings.plan.title}: {folder.identity.mission}, the first {flown}"
     )
     sys.stdout.flush()
-
-
-def _note(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)

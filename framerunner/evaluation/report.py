@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from io import BytesIO, StringIO
 from math import ceil
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -27,11 +28,14 @@ from framerunner.evaluation.statistics import Summary, crossing_offsets_m, mean_
 from framerunner.evaluation.store import REPORT, EvaluationFolder
 from framerunner.evaluation.terminal import comparison_lines, spread_cells
 from framerunner.files.text_file import TextError, read_text
-from framerunner.flying.simulator_process import GenuineAutopilot
 from framerunner.runs.plots import draw_track
 from scenarios.loader import load_scenario
 from scenarios.models import COLOURS, ScenarioError
 from scenarios.verdict import Verdict
+
+if TYPE_CHECKING:
+    from framerunner.evaluation.evaluate import EvaluationSettings
+    from framerunner.evaluation.runner import GenuineUse
 
 MAX_PLOTS = 150
 """Of tracks; some 60 kB each. Phones cannot show a page with more."""
@@ -68,33 +72,21 @@ class Failure:
     traceback: str
 
 
-@dataclass(frozen=True, slots=True)
-class Page:
-    """The content of a report, beside the flights.
-
-    Attributes:
-        title: what was flown, such as "level calm, seeds 1 to 200".
-        mission: name or file, as on the command line.
-        pilot: a contestant's file, as on the command line; None without one.
-        command: makes the same evaluation.
-        summary: of the flights.
-        comparison: with an earlier evaluation; None without.
-        genuine: the genuine autopilot that flew; None: our own did.
-    """
-
-    title: str
-    mission: str
-    pilot: str | None
-    command: str
-    summary: Summary
-    comparison: Comparison | None
-    genuine: GenuineAutopilot | None = None
-
-
 def write_report(
-    folder: EvaluationFolder, page: Page, advance: Callable[[int, int], None] = lambda _done, _total: None
+    folder: EvaluationFolder,
+    settings: EvaluationSettings,
+    summary: Summary,
+    comparison: Comparison | None,
+    advance: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> None:
-    """Draw and write the page; `advance` is called with the number of tracks plotted so far and in all.
+    """Draw and write the page.
+
+    Args:
+        folder: of the evaluation.
+        settings: by which it was flown.
+        summary: of its flights.
+        comparison: with an earlier evaluation; None without.
+        advance: called with the number of tracks plotted so far and in all.
 
     Raises:
         SettingError: the page cannot be written.
@@ -108,7 +100,7 @@ def write_report(
     )
     environment.filters["spread"] = lambda spread, form: spread_cells(spread, form, "–")
     rows = list(folder.rows().values())
-    failures = _failures(folder, page, advance)
+    failures = _failures(folder, settings, summary, advance)
     with mpl.rc_context({"text.parse_math": False}):  # a state's name may have a dollar sign
         charts = [
             ("Try times", "how long from motors on to motors off", Markup(_time_chart(rows))),
@@ -116,12 +108,13 @@ def write_report(
             ("Where time goes", "mean seconds in each state of the mission", Markup(_state_chart(rows))),
         ]
     text = environment.get_template("report.html.j2").render(
-        page=page,
+        title=settings.plan.title,
+        command=settings.command,
         identity=folder.identity,
         is_open=any(row.mission_class == "open" for row in rows),
-        summary=page.summary,
-        comparison=page.comparison,
-        comparison_lines=comparison_lines(page.comparison) if page.comparison else [],
+        summary=summary,
+        comparison=comparison,
+        comparison_lines=comparison_lines(comparison) if comparison else [],
         charts=charts,
         colours=VERDICT_COLOURS,
         failures=failures,
@@ -137,14 +130,16 @@ def replay_command(
     seed: int,
     response: str = "",
     *,
-    genuine: GenuineAutopilot | None = None,
+    genuine: GenuineUse | None = None,
 ) -> str:
     """The command that flies the scenario of a file again, in lockstep the same to the last bit."""
     words = ["framerunner", "fly", str(path), "--mission", mission]
     words += ["--pilot", pilot] if pilot else []
     words += ["--seed", str(seed)] if seed else []
     words += ["--response", response] if response else []
-    words += ["--lockstep"] if genuine is None else [f"--{genuine.name}", str(genuine.folder)]
+    words += (
+        ["--lockstep"] if genuine is None else [f"--{genuine.autopilot.name}", str(genuine.autopilot.folder)]
+    )
     return shlex.join(words)
 
 
@@ -159,13 +154,16 @@ def picked_for_plots(summary: Summary, count: int) -> set[str]:
 
 
 def _failures(
-    folder: EvaluationFolder, page: Page, advance: Callable[[int, int], None]
+    folder: EvaluationFolder,
+    settings: EvaluationSettings,
+    summary: Summary,
+    advance: Callable[[int, int], None],
 ) -> list[tuple[str, str, list[Failure]]]:
     """Verdict, end and flights, for each group of flights that were not clean."""
-    picked = picked_for_plots(page.summary, MAX_PLOTS)
+    picked = picked_for_plots(summary, MAX_PLOTS)
     done = 0
     groups = []
-    for cause in page.summary.causes:
+    for cause in summary.causes:
         failures = []
         for row in cause.rows:
             plot = None
@@ -175,7 +173,7 @@ def _failures(
                 done += 1
             file = folder.scenario_file(row.scenario)
             command = replay_command(
-                file, page.mission, page.pilot, row.seed or 0, row.response, genuine=page.genuine
+                file, settings.mission, settings.pilot, row.seed or 0, row.response, genuine=settings.genuine
             )
             failures.append(Failure(row, command, plot, _traceback(folder, row)))
         groups.append((cause.verdict, cause.ended_in, failures))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import os
 import pickle
@@ -10,24 +11,33 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Coroutine, Generator, Iterable, Iterator
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import metadata
+from itertools import count
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from typing import Any
+from types import FrameType
+from typing import Any, TypeVar
 
 from framerunner.evaluation.backends import Pool, Workers, is_lost_worker, open_pool
-from framerunner.evaluation.genuine_flight import GenuineUse, fly_with_genuine
 from framerunner.evaluation.rows import Row
+from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
-from framerunner.runs.chart_record import ChartRecord
-from framerunner.runs.track import Track
+from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
+from framerunner.flying.simulator_process import GenuineAutopilot
+from framerunner.instances import claimed_instance
+from framerunner.runs.recorder import RunRecords
+from framerunner.runs.run_folder import RunFolder
+from framerunner.runs.track import ChartRecord, Track
 from offboard.mission import Mission
 from scenarios.verdict import Verdict
+from sitl.temporary_folder import TemporaryFolder
+
+T = TypeVar("T")
 
 _PARENT_CHECK_S = 0.5
 _AGAIN_S = 2.0  # processor time after which a flight that goes on is ended once more
@@ -328,3 +338,51 @@ def thinned(track: Track, step_s: float = TRACK_STEP_S) -> Track:
     columns = ([round(column[index], 3) for index in kept] for column in (times, track.x, track.y, track.z))
     time_s, x, y, z = columns
     return Track(time_s, x, y, z, [states[index] for index in kept], track.estimates)
+
+
+@dataclass(frozen=True, slots=True)
+class GenuineUse:
+    """By which flights with a genuine autopilot are flown.
+
+    Attributes:
+        autopilot: that flies, and where it was built.
+        speed: simulated seconds a second, if the machine can.
+    """
+
+    autopilot: GenuineAutopilot
+    speed: float
+
+
+def fly_with_genuine(plan: FlightPlan, use: GenuineUse) -> FinishedFlight:
+    """Fly a plan with an autopilot and a simulator that are started for it and end with it.
+
+    Raises:
+        DroneError: the drone does not get ready.
+        SettingError: simulator or autopilot cannot be started, or have ended.
+        ValueError: the plan has no mission.
+    """
+    with claimed_instance() as instance, closing(TemporaryFolder("framerunner-flight-")) as out:
+        folder = RunFolder(out.path, plan.scenario.name)
+        folder.write_plan(plan.scenario, plan.chart)
+        settings = RealTimeSettings(
+            speed=use.speed, instance=instance, autopilot=use.autopilot, unattended=True
+        )
+        return asyncio.run(interrupted_once(fly_in_real_time(plan, settings, RunRecords(folder, None), None)))
+
+
+async def interrupted_once(work: Coroutine[object, object, T]) -> T:
+    """Do some work of `asyncio.run`, which ends in order at Ctrl-C, also if it is pressed again meanwhile."""
+    if threading.current_thread() is not threading.main_thread():  # no signals come here
+        return await work
+    before = signal.getsignal(signal.SIGINT)  # asyncio's, which cancels only once
+    interrupts = count()
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        if next(interrupts) == 0 and callable(before):
+            before(number, frame)
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        return await work
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -7,66 +7,46 @@ from collections import Counter
 from collections.abc import Sequence
 
 from rich import box
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
 from framerunner.evaluation.compare import Comparison
 from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import Spread, Summary
+from framerunner.terminal import ProgressLine, table_console
 from scenarios.verdict import Verdict
 
-_LINE_S = 5.0
 _MAX_NAMES = 8
 _MAX_CAUSES = 20
 
 
-class EvaluationProgress:
-    """A live line on standard error in a terminal, elsewhere a line every five seconds.
+class EvaluationProgress(ProgressLine):
+    """A bar and a text in a terminal, elsewhere a line every five seconds and at the end.
 
     It counts `total` flights, of which those in `kept` were flown before.
     """
 
     def __init__(self, total: int, kept: Sequence[Row]) -> None:
+        super().__init__(line_s=5.0, total=total, done=len(kept))
         self._total = total
         self._rows = self._kept = len(kept)
         self._verdicts = Counter(row.verdict for row in kept)
         self._simulated_s = 0.0
-        self._console = Console(stderr=True)
-        self._started_s = self._printed_s = time.monotonic()
-        self._live = Progress(
-            BarColumn(bar_width=24), TextColumn("{task.description}"), console=self._console, transient=True
-        )
-        self._task = self._live.add_task(self.text(), total=total, completed=self._rows)
-
-    def __enter__(self) -> EvaluationProgress:
-        if self._console.is_terminal:
-            self._live.start()
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        if self._console.is_terminal:
-            self._live.stop()
+        self._live.update(self._task, description=self.text())
 
     def add(self, row: Row) -> None:
         """Count a flight that has ended."""
         self._rows += 1
         self._verdicts[row.verdict] += 1
         self._simulated_s += row.try_time_s
-        if self._console.is_terminal:
-            self._live.update(self._task, completed=self._rows, description=self.text())
-            return
-        now_s = time.monotonic()
-        if now_s - self._printed_s >= _LINE_S or self._rows == self._total:
-            self._printed_s = now_s
-            self._console.print(self.text(), markup=False, highlight=False, soft_wrap=True)
+        if self.is_due or self._rows == self._total:
+            self.show(self.text(), self._rows)
 
     def text(self) -> str:
         """The progress in one line."""
         clean, completed = self._verdicts[Verdict.CLEAN], self._verdicts[Verdict.COMPLETED]
         parts = [f"{self._rows} of {self._total} flown", f"{clean} clean", f"{completed} completed"]
         flown = self._rows - self._kept
-        spent_s = time.monotonic() - self._started_s if flown else 0.0
+        spent_s = time.monotonic() - self.started_s if flown else 0.0
         if spent_s > 0.0:
             left_s = spent_s / flown * (self._total - self._rows)
             parts += [f"{self._simulated_s / spent_s:.0f} times real time", f"{_duration(left_s)} left"]
@@ -81,7 +61,7 @@ def _duration(seconds: float) -> str:
 
 def print_summary(summary: Summary, title: str) -> None:
     """Print rates, distributions and why flights were not clean to standard output."""
-    console = _console()
+    console = table_console(110)
     rates = _table(title, "flights", "share (95 % interval)")
     for verdict, rate in summary.verdicts.items():
         rates.add_row(verdict, str(rate.count), str(rate))
@@ -120,7 +100,7 @@ def print_summary(summary: Summary, title: str) -> None:
 
 def print_comparison(comparison: Comparison) -> None:
     """Print two evaluations side by side to standard output."""
-    console = _console()
+    console = table_console(110)
     table = _table(f"against {comparison.path} ({len(comparison.pairs)} same scenarios)", "before", "now")
     table.add_row("landed in time", str(comparison.landed_before), str(comparison.landed_after))
     table.add_row("landed only then / only now", str(comparison.lost), str(comparison.won))
@@ -162,13 +142,6 @@ def spread_cells(spread: Spread | None, form: str, unknown: str) -> list[str]:
     if spread is None:
         return [unknown] * 4
     return [format(number, form) for number in (spread.p10, spread.median, spread.p90, spread.mean)]
-
-
-def _console() -> Console:
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = max(console.width, 110)  # a pipe has no width; do not cut what is written to a file
-    return console
 
 
 def _table(title: str, *columns: str) -> Table:

@@ -38,6 +38,7 @@ _COMPARISONS = {
     "literal_error": "must be {expected}",
 }
 _TYPES = {
+    "bool_type": "must be true or false",
     "finite_number": "must be a finite number",
     "float_type": "must be a number",
     "int_type": "must be a whole number",
@@ -64,6 +65,7 @@ class FileKind(Generic[Model]):
     folder: str  # of the package, with the files that are installed with it
     package: str = "scenarios"
     extension: Kind | None = None  # what other packages may add
+    example: str = ""  # of a field, for messages; if not given the name
 
     def own_names(self) -> list[str]:
         """Names of the files of this package, sorted."""
@@ -153,11 +155,12 @@ class FileKind(Generic[Model]):
             raise error(f"{source}:{failure.line or 1}: {words}") from None
         except YamlError as failure:
             raise error(f"{failure.place}: {failure}") from None
+        example = self.example or f"name: my-{kind}"
         if root is None or plain(root) is None:
-            raise error(f"{source}:1: empty; a {kind} needs at least `name: my-{kind}`")
+            raise error(f"{source}:1: empty; a {kind} needs at least `{example}`")
         if not isinstance(root, MapNode):
             what = _show(plain(root))
-            raise error(f"{source}:{root.place.line}: must hold fields like `name: my-{kind}`, not {what}")
+            raise error(f"{source}:{root.place.line}: must hold fields like `{example}`, not {what}")
         return root
 
 

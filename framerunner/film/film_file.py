@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
@@ -20,7 +19,11 @@ from vision.types import Image
 if TYPE_CHECKING:
     from av.video.stream import VideoStream
 
-_X264 = {"crf": "21", "preset": "medium", "tune": "animation"}
+_OPTIONS = {
+    "libx264": {"crf": "21", "preset": "medium", "tune": "animation"},
+    "mpeg4": {"qscale": "3"},
+    "gif": {},
+}
 _PALETTE_COLOURS = 160  # fewer make smaller files, and flat shades need no more
 
 
@@ -28,95 +31,69 @@ class FilmError(UserError):
     """A film that cannot be written; the message is one line for people."""
 
 
-class FilmFile(ABC):
+class FilmFile:
     """A film that is being written; `film_file` finishes and closes it.
+
+    An MP4 has H.264 in yuv420p, which every player supports, or MPEG-4; see `mp4_codec`. A GIF repeats, and
+    its palette is made from some sample images.
 
     Args:
         path: the file.
-        kind: container, as FFmpeg calls it.
+        codec: "gif", or one of `mp4_codec`.
         size_px: width and height of the images; both even.
         fps: images a second.
+        samples: of a GIF.
     """
 
-    def __init__(self, path: Path, kind: str, size_px: tuple[int, int], fps: float) -> None:
-        options = {"movflags": "+faststart"} if kind == "mp4" else {}
-        self._container = av.open(str(path), "w", format=kind, options=options)
+    def __init__(
+        self, path: Path, codec: str, size_px: tuple[int, int], fps: float, samples: Sequence[Image] = ()
+    ) -> None:
+        is_gif = codec == "gif"
+        options = {} if is_gif else {"movflags": "+faststart"}
+        self._container = av.open(str(path), "w", format="gif" if is_gif else "mp4", options=options)
         self._rate = Fraction(fps).limit_denominator(1000)
         self._size_px = size_px
         self._count = 0
-        self._stream: VideoStream
+        stream = self._container.add_stream(codec, rate=self._rate, options=_OPTIONS[codec])
+        self._stream = cast("VideoStream", stream)
+        self._stream.width, self._stream.height = size_px
+        self._stream.pix_fmt = "pal8" if is_gif else "yuv420p"
+        self._stream.time_base = 1 / self._rate
+        if codec == "mpeg4":
+            self._stream.bit_rate = 4_000_000
+        self._palette_use = self._palette_graph(self._palette(samples)) if is_gif else None
 
-    @abstractmethod
     def add(self, image: Image) -> None:
         """Add an image, BGR, shape (height, width, 3)."""
+        if self._palette_use is None:
+            self._encode(self._frame(image, self._count, "yuv420p"))
+        else:
+            self._encode_filtered(self._frame(image, self._count, "rgb32"), *self._palette_use)
+        self._count += 1
 
-    @abstractmethod
     def finish(self) -> None:
-        """Write the images that the encoder still holds."""
+        """Write the images that filter and encoder still hold."""
+        if self._palette_use is not None:
+            self._encode_filtered(None, *self._palette_use)
+        self._encode(None)
 
     def close(self) -> None:
         """Close the file."""
         self._container.close()
 
-    def _open_stream(self, codec: str, pixels: str, options: dict[str, str]) -> None:
-        stream = cast("VideoStream", self._container.add_stream(codec, rate=self._rate, options=options))
-        stream.width, stream.height = self._size_px
-        stream.pix_fmt = pixels
-        stream.time_base = 1 / self._rate
-        self._stream = stream
-
     def _encode(self, frame: Any) -> None:  # noqa: ANN401 - PyAV's frame, or None at the end
         for packet in self._stream.encode(frame):
             self._container.mux(packet)
+
+    def _encode_filtered(self, frame: Any, graph: Graph, source: Any) -> None:  # noqa: ANN401 - likewise
+        source.push(frame)
+        for filtered in _pulled(graph):
+            self._encode(filtered)
 
     def _frame(self, image: Image, number: int, pixels: str) -> av.VideoFrame:
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="bgr24")
         frame.pts, frame.time_base = number, 1 / self._rate
         return frame.reformat(format=pixels)
-
-
-class Mp4File(FilmFile):
-    """H.264 in yuv420p, which every player supports, or MPEG-4; see `mp4_codec` and `FilmFile`."""
-
-    def __init__(self, path: Path, size_px: tuple[int, int], fps: float, codec: str) -> None:
-        super().__init__(path, "mp4", size_px, fps)
-        self._open_stream(codec, "yuv420p", _X264 if codec == "libx264" else {"qscale": "3"})
-        if codec != "libx264":
-            self._stream.bit_rate = 4_000_000
-
-    def add(self, image: Image) -> None:
-        """Add an image."""
-        self._encode(self._frame(image, self._count, "yuv420p"))
-        self._count += 1
-
-    def finish(self) -> None:
-        """Write the images that the encoder still holds."""
-        self._encode(None)
-
-
-class GifFile(FilmFile):
-    """An animated GIF that repeats; its palette is made from some sample images. See `FilmFile`."""
-
-    def __init__(self, path: Path, size_px: tuple[int, int], fps: float, samples: Sequence[Image]) -> None:
-        super().__init__(path, "gif", size_px, fps)
-        self._open_stream("gif", "pal8", {})
-        self._graph, self._source = self._palette_graph(self._palette(samples))
-
-    def add(self, image: Image) -> None:
-        """Add an image."""
-        self._source.push(self._frame(image, self._count, "rgb32"))
-        self._count += 1
-        self._encode_filtered()
-
-    def finish(self) -> None:
-        """Write the images that filter and encoder still hold."""
-        self._source.push(None)
-        self._encode_filtered()
-        self._encode(None)
-
-    def _encode_filtered(self) -> None:
-        for frame in _pulled(self._graph):
-            self._encode(frame)
 
     def _palette(self, samples: Sequence[Image]) -> av.VideoFrame:
         graph = Graph()

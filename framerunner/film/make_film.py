@@ -10,15 +10,15 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from framerunner.film.film_file import FilmFile, GifFile, Mp4File, film_file, mp4_codec
+from framerunner.film.film_file import FilmFile, film_file, mp4_codec
 from framerunner.film.film_painter import FilmPainter
 from framerunner.film.timeline import Timeline
 from framerunner.flying.plan import FlightPlan
 from framerunner.recording.collected import CollectedFlight, collect
 from framerunner.recording.events import RecordingError
 from framerunner.recording.open_recording import recorded_flight
+from framerunner.runs.run_files import SCENARIO, RunFiles
 from offboard.pilot_file import PilotSource
-from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 
 HOLD_S = 1.5
@@ -79,10 +79,10 @@ def make_film(folder: Path, settings: FilmSettings, pilot: PilotSource | None = 
 def _scenario(folder: Path) -> Scenario:
     if not folder.is_dir():
         raise RecordingError(f"film '{folder}': is no folder; name one that `framerunner fly` left")
-    path = folder / "scenario.yaml"
-    if not path.is_file():
-        raise RecordingError(f"film '{folder}': holds no scenario.yaml, so no flight of `framerunner fly`")
-    return load_scenario(path)
+    scenario = RunFiles(folder).load_scenario()
+    if scenario is None:
+        raise RecordingError(f"film '{folder}': holds no {SCENARIO}, so no flight of `framerunner fly`")
+    return scenario
 
 
 def _lifted(scenario: Scenario, flight: CollectedFlight) -> Scenario:
@@ -111,8 +111,8 @@ def _write_film(timeline: Timeline, settings: FilmSettings) -> FilmSummary:
             sample_times_s = np.linspace(timeline.begin_s, timeline.end_s, _SAMPLES)
             samples = [painter.paint(float(time_s)) for time_s in sample_times_s]
             samples.append(painter.paint(timeline.end_s, over=True))
-            return GifFile(path, settings.size_px, settings.fps, samples)
-        return Mp4File(path, settings.size_px, settings.fps, codec)
+            return FilmFile(path, codec, settings.size_px, settings.fps, samples)
+        return FilmFile(path, codec, settings.size_px, settings.fps)
 
     with film_file(settings.out, open_film) as film, _progress() as progress:
         task = progress.add_task(settings.out.name, total=moving + held)

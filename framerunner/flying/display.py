@@ -5,16 +5,17 @@ from __future__ import annotations
 import asyncio
 import sys
 import time
+from collections.abc import Sequence
 from math import isfinite
 
 from rich.console import Console
 from rich.live import Live
 from rich.markup import escape
-from rich.status import Status
 from rich.table import Table
 
 from framerunner.flying.judges import Judge
 from framerunner.runs.recorder import FlightRecorder
+from framerunner.terminal import ProgressLine, say
 from offboard.app import MissionEnd, Moment
 from offboard.safety.operator import GO_WORDS
 from scenarios.result import FlightResult, RefereeSnapshot
@@ -22,9 +23,26 @@ from vision.types import Detection
 
 _REFRESH_S = 0.2
 _LINE_S = 10.0
-_PROGRESS_QUIET_S = 1.0
-_PROGRESS_REFRESH_S = 0.25
-_PROGRESS_LINE_S = 2.0
+
+
+class MomentLines:
+    """Ticks of a flight where there is no terminal: a line at every change and every ten seconds."""
+
+    def __init__(self) -> None:
+        self._told = ""
+        self._line_s = -_LINE_S
+
+    def show(self, moment: Moment, crossed: Sequence[str], also: str) -> None:
+        """Print a line if it is due, or if the mission's state or `also` has changed."""
+        time_s, told = moment.flight_time_s, moment.mission_state + also
+        if told == self._told and time_s - self._line_s < _LINE_S:
+            return
+        self._told, self._line_s = told, time_s
+        note = pause_in_words(moment) or moment.remark
+        say(
+            f"{time_s:6.1f} s  {moment.mission_state:22s} {place_in_words(moment)}  "
+            f"crossed: {', '.join(crossed) or 'none'}{'  ' if note else ''}{note}"
+        )
 
 
 class FlightDisplay:
@@ -39,8 +57,6 @@ class FlightDisplay:
         self._recorder = recorder
         self._judge = judge
         self._console = Console(file=sys.stderr)
-        self._line_state = ""  # in the last line
-        self._line_s = -_LINE_S
         self._showing: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> FlightDisplay:
@@ -56,31 +72,16 @@ class FlightDisplay:
 
     async def _show(self) -> None:
         if not self._console.is_terminal:
+            lines = MomentLines()
             while True:
-                self._print_line(await self._judge.standing())
+                standing, moment = await self._judge.standing(), self._recorder.latest
+                if moment is not None:
+                    lines.show(moment, standing.crossed if standing else (), pause_in_words(moment))
                 await asyncio.sleep(_REFRESH_S)
         with Live(console=self._console, auto_refresh=False, transient=True) as live:
             while True:
                 live.update(self._table(await self._judge.standing()), refresh=True)
                 await asyncio.sleep(_REFRESH_S)
-
-    def _print_line(self, standing: RefereeSnapshot | None) -> None:
-        moment = self._recorder.latest
-        if moment is None:
-            return
-        time_s = moment.flight_time_s
-        paused = pause_in_words(moment)
-        if moment.mission_state + paused == self._line_state and time_s - self._line_s < _LINE_S:
-            return
-        self._line_state, self._line_s = moment.mission_state + paused, time_s
-        crossed = ", ".join(standing.crossed) if standing else ""
-        place, note = place_in_words(moment), paused or moment.remark
-        print(
-            f"{time_s:6.1f} s  {moment.mission_state:22s} {place}  crossed: {crossed or 'none'}"
-            f"{'  ' if note else ''}{note}",
-            file=sys.stderr,
-            flush=True,
-        )
 
     def _table(self, standing: RefereeSnapshot | None) -> Table:
         moment = self._recorder.latest
@@ -143,44 +144,21 @@ def _seen(detection: Detection) -> str:
     return f"{detection.d:.2f} m away, {detection.a:.0f} degrees aside"
 
 
-class LockstepProgress:
-    """A status line in a terminal, elsewhere a line every two seconds; nothing in the first second."""
+class LockstepProgress(ProgressLine):
+    """How far a flight in lockstep is; a line every two seconds where there is no terminal."""
 
     def __init__(self, limit_s: float) -> None:
+        super().__init__(quiet_s=1.0, line_s=2.0, refresh_s=0.25)
         self._limit_s = limit_s
-        self._console = Console(stderr=True)
-        self._status: Status | None = None
-        self._started_s = time.monotonic()
-        self._next_s = self._started_s + _PROGRESS_QUIET_S
-
-    def __enter__(self) -> LockstepProgress:
-        """Start to count the first second."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Remove the status line."""
-        if self._status is not None:
-            self._status.stop()
 
     def see(self, moment: Moment) -> None:
         """Show a tick of the flight, if the last one shown is old enough."""
-        now_s = time.monotonic()
-        if now_s < self._next_s:
-            return
-        speed = moment.flight_time_s / (now_s - self._started_s)
-        text = (
-            f"{moment.flight_time_s:6.1f} s of {self._limit_s:g} s  {moment.mission_state:22s} "
-            f"{speed:.0f} times real time"
-        )
-        if not self._console.is_terminal:
-            self._next_s = now_s + _PROGRESS_LINE_S
-            self._console.print(text, markup=False, highlight=False)
-            return
-        self._next_s = now_s + _PROGRESS_REFRESH_S
-        if self._status is None:
-            self._status = self._console.status(text)
-            self._status.start()
-        self._status.update(text)
+        if self.is_due:
+            speed = moment.flight_time_s / (time.monotonic() - self.started_s)
+            self.show(
+                f"{moment.flight_time_s:6.1f} s of {self._limit_s:g} s  {moment.mission_state:22s} "
+                f"{speed:.0f} times real time"
+            )
 
 
 def _faults_in_words(result: FlightResult) -> str:

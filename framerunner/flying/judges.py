@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from dataclasses import replace
 from math import cos, sin
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
 from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
+from framerunner.terminal import warn
 from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import Moment
 from scenarios.models import Scenario, TrueState
@@ -35,32 +35,60 @@ _SETTLE_LIMIT_US = 5_000_000
 _CLOCK_STOPPED_S = 3.0  # wall time without progress of vehicle time
 
 
-class Judge(Protocol):
-    """A referee in this process or elsewhere."""
+class Judge:
+    """A referee in this process or elsewhere; as it is here, one that is shown the states by others.
 
-    source: str
-    """The states that it judges by: "truth" or "telemetry"."""
+    Attributes:
+        source: the states that it judges by: "truth" or "telemetry".
+        referee: that judges.
+    """
+
+    source = "truth"
+
+    def __init__(self, referee: Referee) -> None:
+        self.referee = referee
 
     def see(self, moment: Moment) -> None:
         """Take a tick of the flight."""
 
     async def standing(self) -> RefereeSnapshot | None:
         """How the try stands now; None if that is unknown."""
+        return self.referee.snapshot()
 
     def so_far(self, mission_state: str, ended: str) -> RefereeReport:
         """Judge the ticks seen so far, at once."""
-        ...
+        return self.referee.report(mission_state, ended)
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Return the report, when the drone has come to rest."""
-        ...
+        return self.referee.report(mission_state, ended)
 
     async def faults(self) -> FaultFacts:
         """What failed in the flight; nothing if that is unknown."""
-        ...
+        return FaultFacts()
 
 
-class TruthJudge:
+class TelemetryJudge(Judge):
+    """A referee that sees the drone's telemetry, and so no contacts with frames."""
+
+    source = "telemetry"
+
+    def see(self, moment: Moment) -> None:
+        """Show the drone's state to the referee."""
+        state = moment.state
+        half = state.yaw / 2
+        self.referee.update(
+            TrueState(
+                state.time_us,
+                (state.x, state.y, state.z),
+                state.velocity_arena_m_s,
+                (cos(half), 0.0, 0.0, sin(half)),
+                state.armed,
+            )
+        )
+
+
+class TruthJudge(TelemetryJudge):
     """The simulator's referee, which sees the true state of every control tick, over HTTP.
 
     If the simulator ends, the verdict is made from the telemetry seen so far; likewise if the referee still
@@ -82,20 +110,12 @@ class TruthJudge:
         source: str = "truth",
         earlier_us: int | None = None,
     ) -> None:
+        super().__init__(plan.new_referee())
         self.source = source
         self._earlier_us = earlier_us
         self._api = api
         self._session = session
         self._latest: Standing | None = None
-        self._substitute = TelemetryJudge(plan.new_referee())
-
-    def see(self, moment: Moment) -> None:
-        """Show the tick to the substitute; the referee itself sees the simulation."""
-        self._substitute.see(moment)
-
-    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
-        """By the telemetry seen."""
-        return self._substitute.so_far(mission_state, ended)
 
     async def standing(self) -> RefereeSnapshot | None:
         """As of now, or None without a valid answer."""
@@ -114,8 +134,8 @@ class TruthJudge:
         parameters = {"state": mission_state, **({"ended": ended} if ended else {})}
         answer = await ask_referee(self._api, self._session, parameters)
         if answer is None or self._is_earlier(answer):
-            self.source = self._substitute.source
-            return await self._substitute.report(mission_state, ended)
+            self.source = TelemetryJudge.source
+            return await super().report(mission_state, ended)
         return answer.report
 
     async def faults(self) -> FaultFacts:
@@ -148,49 +168,6 @@ class TruthJudge:
             await asyncio.sleep(_POLL_S)
 
 
-class TelemetryJudge:
-    """A referee in this process that sees the drone's telemetry, and so no contacts with frames."""
-
-    source = "telemetry"
-
-    def __init__(self, referee: Referee) -> None:
-        self._referee = referee
-
-    def see(self, moment: Moment) -> None:
-        """Show the drone's state to the referee."""
-        state = moment.state
-        half = state.yaw / 2
-        self._referee.update(
-            TrueState(
-                state.time_us,
-                (state.x, state.y, state.z),
-                state.velocity_arena_m_s,
-                (cos(half), 0.0, 0.0, sin(half)),
-                state.armed,
-            )
-        )
-
-    async def standing(self) -> RefereeSnapshot | None:
-        """As of the last tick."""
-        return self._referee.snapshot()
-
-    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
-        """Judge what was seen."""
-        return self._referee.report(mission_state, ended)
-
-    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
-        """Judge what was seen."""
-        return self._referee.report(mission_state, ended)
-
-    async def faults(self) -> FaultFacts:
-        """Telemetry does not tell."""
-        return FaultFacts()
-
-
-def _warn(words: str) -> None:
-    print(f"warning: {words}", file=sys.stderr, flush=True)
-
-
 def _started_at(plan: FlightPlan, place: StandingPlace | None, api: SimulatorApi) -> FlightPlan:
     """The plan of a drone that starts from where it stands; as it was, with a warning, if it cannot."""
     problem = "does not stand upright with its motors off"
@@ -201,7 +178,7 @@ def _started_at(plan: FlightPlan, place: StandingPlace | None, api: SimulatorApi
             return replace(plan, scenario=Scenario.model_validate({**scenario.model_dump(), "start": start}))
         except ValidationError as error:
             problem = f"stands where no flight can start, {first_error(error)}"
-    _warn(f"the drone at {api.url} has flown before and {problem}; start the simulator again")
+    warn(f"the drone at {api.url} has flown before and {problem}; start the simulator again")
     return plan
 
 
@@ -259,7 +236,7 @@ async def choose_judge(
             )
         )
     if api is not None and answer is not None:
-        _warn(
+        warn(
             f"{api.url} shows the scenario {answer.scenario}, and {plan.scenario.name} is flown; "
             f"start it with --scenario {plan.scenario.name}"
         )

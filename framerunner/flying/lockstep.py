@@ -19,15 +19,16 @@ import numpy as np
 
 from framerunner.flying.detector import others_of, plan_detector
 from framerunner.flying.fly import FinishedFlight, fly
+from framerunner.flying.judges import Judge
 from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import LateResponse
-from offboard.app import Moment, Observer, TickHook
+from offboard.app import Observer, TickHook
 from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraSilentError, ImageChoice
 from offboard.safety.caps import CapKeeper
 from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.models import Scenario, TrueState
-from scenarios.result import FaultFacts, RefereeReport, RefereeSnapshot
+from scenarios.result import FaultFacts, RefereeReport
 from sitl.camera import CameraFeed, Exposure
 from sitl.faults.images import new_feed
 from sitl.simulation import Simulation
@@ -125,27 +126,16 @@ class LockstepVehicle:
         )
 
 
-class _SimulationJudge:
+class _SimulationJudge(Judge):
     """The simulation's own referee, which sees the true state of every control tick."""
 
-    source = "truth"
-
     def __init__(self, vehicle: LockstepVehicle) -> None:
+        super().__init__(vehicle.simulation.referee)
         self._vehicle = vehicle
-
-    def see(self, moment: Moment) -> None:
-        pass
-
-    async def standing(self) -> RefereeSnapshot:
-        return self._vehicle.simulation.referee.snapshot()
-
-    def so_far(self, mission_state: str, ended: str) -> RefereeReport:
-        """By the states so far."""
-        return self._vehicle.simulation.referee.report(mission_state, ended)
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         self._vehicle.drone.settle()
-        return self._vehicle.simulation.referee.report(mission_state, ended)
+        return await super().report(mission_state, ended)
 
     async def faults(self) -> FaultFacts:
         return self._vehicle.simulation.fault_facts()

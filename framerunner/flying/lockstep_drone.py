@@ -21,7 +21,6 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
-from framerunner.flying.faulty_link import FaultyLink
 from framerunner.flying.response import LateResponse
 from framerunner.geometry.axes import Alignment, Pose
 from framerunner.geometry.rotations import normalized, quaternion_from_euler
@@ -31,6 +30,7 @@ from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.link.gimbal import GimbalAttitude
 from offboard.safety.caps import CapKeeper
 from scenarios.models import TrueState
+from sitl.faults.link import LinkFault, Way
 from sitl.payload.gimbal import SimulatedGimbal
 from sitl.simulation import Simulation
 
@@ -59,6 +59,8 @@ _ONE = Struct("<f")
 _THREE = Struct("<3f")
 
 TruthObserver = Callable[[TrueState], None]
+SentVelocity = tuple[Vec3, float]
+"""Forward, right, down (m/s) and the yaw rate, clockwise (rad/s)."""
 
 
 @dataclass(slots=True)
@@ -431,3 +433,45 @@ def _rounded(value: float) -> float:
 
 _DEGREES = _rounded(180.0 / _rounded(pi))
 _RADIANS = _rounded(_rounded(pi) / 180.0)
+
+
+class FaultyLink:
+    """Velocities up and states down the link; to be used while it is active.
+
+    Args:
+        simulation: whose link may fail.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+
+    @property
+    def active(self) -> bool:
+        """Whether the link has a fault now."""
+        return self._simulation.faults.link is not None
+
+    def loses(self) -> bool:
+        """Whether the next packet is lost."""
+        fault = self._simulation.faults.link
+        return fault is not None and fault.loses()
+
+    def send(self, velocity: SentVelocity) -> None:
+        """Send a velocity to the vehicle."""
+        self._fault.up.send(self._simulation.time_us, velocity)
+
+    def arrived(self) -> SentVelocity | None:
+        """The newest velocity that has reached the vehicle since the last call."""
+        up: Way[SentVelocity] = self._fault.up
+        return up.newest(self._simulation.time_us)
+
+    def receive(self, state: DroneState) -> DroneState | None:
+        """What arrives at the app of a state that is sent now; None: nothing."""
+        down: Way[DroneState] = self._fault.down
+        down.send(self._simulation.time_us, state)
+        return down.newest(self._simulation.time_us)
+
+    @property
+    def _fault(self) -> LinkFault:
+        fault = self._simulation.faults.link
+        assert fault is not None, "it is active"
+        return fault

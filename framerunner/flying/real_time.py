@@ -15,9 +15,9 @@ from framerunner.errors import SettingError
 from framerunner.files.text_file import read_text
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.plan import FlightPlan
-from framerunner.flying.timing import flight_timing
 from framerunner.runs.recorder import RecordingCamera, RunRecords
-from framerunner.runs.run_folder import RunFolder, warn
+from framerunner.runs.run_folder import RunFolder
+from framerunner.terminal import warn
 from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import MissionEnd
 from offboard.safety.rules import SIMULATED, SafetyRules
@@ -29,11 +29,13 @@ if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow t
 
     from framerunner.flying.judges import Judge
     from framerunner.flying.mission_reporter import MissionReporter
-    from framerunner.flying.simulator_process import GenuineAutopilot, SitlProcess
+    from framerunner.flying.simulator_process import GenuineAutopilot, SimulatorClock, SitlProcess
     from framerunner.preflight.settings import HardwareSettings
     from offboard.link.process_guard import ProcessGuard
     from offboard.mavsdk_drone import MavsdkDrone
     from offboard.perception import Camera, CameraPerception
+
+SLOW_FACTOR = 0.95  # of the requested speed; below, vehicle time had to wait
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,204 +96,233 @@ async def fly_in_real_time(
         CameraError: the camera gives no image.
         SettingError: the simulator cannot be started, or does not judge this scenario.
     """
-    import aiohttp
-
-    from framerunner.flying.display import FlightDisplay
-    from framerunner.flying.mission_reporter import MissionReporter
-    from offboard.link.companion import Companion
-
     async with AsyncExitStack() as stack:
-        session = await stack.enter_async_context(aiohttp.ClientSession())
-        vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
-        judge, plan = await _judge(plan, vehicle, settings, records, session)
-        plan, safety, system_id = await _safety(plan, settings, records, stack)
-        companion = Companion()
-        stack.push_async_callback(companion.close)
+        return await _RealTimeFlight(plan, settings, records, stack).fly(monitor_url, guard)
+
+
+class _RealTimeFlight:
+    """One flight over MAVLink; what it opens is closed with the stack. See `fly_in_real_time`."""
+
+    def __init__(
+        self, plan: FlightPlan, settings: RealTimeSettings, records: RunRecords, stack: AsyncExitStack
+    ) -> None:
+        self._plan = plan
+        self._settings = settings
+        self._records = records
+        self._stack = stack
+        self._vehicle: _Endpoints
+        self._drone: MavsdkDrone
+
+    async def fly(self, monitor_url: str | None, guard: ProcessGuard | None) -> FinishedFlight:
+        import aiohttp
+
+        from framerunner.flying.display import FlightDisplay
+        from framerunner.flying.mission_reporter import MissionReporter
+        from offboard.link.companion import Companion
+
+        session = await self._stack.enter_async_context(aiohttp.ClientSession())
+        records, settings = self._records, self._settings
+        self._vehicle = await self._find_vehicle(monitor_url)
+        judge = await self._choose_judge(session)
+        safety, system_id = await self._check()
+        plan, companion = self._plan, Companion()
+        self._stack.push_async_callback(companion.close)
         source = read_text(records.folder.mission)
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
-        drone = _drone(
-            plan, vehicle, records, stack, safety, settings=settings, system_id=system_id, guard=guard
-        )
-        drone.use_companion(companion)
-        camera = await _camera(plan, vehicle, records, stack, reporter, drone=drone, settings=settings)
-        perception = _perception(plan, vehicle, judge, camera, drone=drone, delay=settings.camera_delay)
-        clock = None if vehicle.sitl is None else vehicle.sitl.clock
+        self._drone = self._new_drone(safety, system_id, guard)
+        self._drone.use_companion(companion)
+        camera = await self._open_camera(reporter)
+        perception = self._new_perception(judge, camera)
         display = FlightDisplay(plan.title, plan.limit_s, records.recorder, judge)
-        shown = nullcontext() if settings.unattended else display
-
-        def timing() -> dict[str, Timing]:
-            measured = flight_timing(
-                drone,
-                perception,
-                clock,
-                factor=records.recorder.real_time_factor,
-                speed=settings.speed,
-                fused=plan.chart.vision == "frames",
-                repeats=settings.repeats and not records.recorder.paused,  # sticks move in wall time
-            )
-            return {"timing": measured}
-
         flown = await fly(
             plan,
-            drone,
+            self._drone,
             perception,
             judge,
             observers=(records.see, reporter.see),
-            run=partial(_run, shown=shown, camera=camera, vehicle=vehicle, settings=settings),
-            measured=timing,
+            run=partial(self._run, camera=camera, shown=nullcontext() if settings.unattended else display),
+            measured=lambda: {"timing": self._timing(perception)},
             before_tick=reporter.look,
             safety=safety,
             keep=None if guard is None else records.keep_unfinished,
         )
         await reporter.send_result(records.complete(flown.result))
-    return flown
+        return flown
 
+    async def _run(
+        self,
+        flight: Coroutine[Any, Any, MissionEnd],
+        *,
+        camera: RecordingCamera,
+        shown: AbstractAsyncContextManager[object],
+    ) -> MissionEnd:
+        """Wait for the flight itself, which is shown meanwhile."""
+        sitl = self._vehicle.sitl
+        async with shown:
+            task = asyncio.create_task(flight)
+            outcome = await (task if sitl is None else sitl.guard(task))
+        camera.close()
+        warn(camera.problem)
+        if self._settings.unattended and sitl is not None and sitl.clock.gone:
+            raise SettingError(sitl.clock.gone)  # such a flight is not one of an evaluation
+        return outcome
 
-async def _run(
-    flight: Coroutine[Any, Any, MissionEnd],
-    shown: AbstractAsyncContextManager[object],
-    *,
-    camera: RecordingCamera,
-    vehicle: _Endpoints,
-    settings: RealTimeSettings,
-) -> MissionEnd:
-    """Wait for the flight itself, which is shown meanwhile."""
-    async with shown:
-        task = asyncio.create_task(flight)
-        outcome = await (task if vehicle.sitl is None else vehicle.sitl.guard(task))
-    camera.close()
-    warn(camera.problem)
-    if settings.unattended and vehicle.sitl is not None and vehicle.sitl.clock.gone:
-        raise SettingError(vehicle.sitl.clock.gone)  # such a flight is not one of an evaluation
-    return outcome
+    def _timing(self, perception: CameraPerception) -> Timing:
+        """Whether the machine kept up."""
+        recorder = self._records.recorder
+        return flight_timing(
+            self._drone,
+            perception,
+            None if self._vehicle.sitl is None else self._vehicle.sitl.clock,
+            factor=recorder.real_time_factor,
+            speed=self._settings.speed,
+            fused=self._plan.chart.vision == "frames",
+            repeats=self._settings.repeats and not recorder.paused,  # sticks move in wall time
+        )
 
+    async def _find_vehicle(self, monitor_url: str | None) -> _Endpoints:
+        """Those of the running drone, or of a simulator that is started."""
+        settings, records = self._settings, self._records
+        if settings.drone_url is not None and settings.camera_url is not None:
+            api = settings.simulator or SimulatorApi.of_video(settings.camera_url)
+            return _Endpoints(settings.drone_url, settings.camera_url, api, shared_with=monitor_url)
+        from framerunner.flying.simulator_process import SitlProcess
 
-async def _judge(
-    plan: FlightPlan,
-    vehicle: _Endpoints,
-    settings: RealTimeSettings,
-    records: RunRecords,
-    session: aiohttp.ClientSession,
-) -> tuple[Judge, FlightPlan]:
-    """The judge, and the plan as the simulator has it, by which the flight is replayed."""
-    from framerunner.flying.judges import choose_judge
+        autopilot = settings.autopilot
+        started = SitlProcess(
+            # The simulator reads the scenario that was checked here, even if the user's file changes.
+            str(records.folder.scenario),
+            speed=settings.speed,
+            instance=settings.instance,
+            links=() if monitor_url is None or autopilot is not None else (monitor_url,),  # others: their own
+            seed=self._plan.seed or 0,
+            autopilot=autopilot,
+            storage=None if autopilot is None else records.folder.path,
+            on_warning=(lambda line: None) if settings.unattended else warn,
+        )
+        sitl = await self._stack.enter_async_context(started)
+        shared = None if autopilot is None else monitor_url
+        return _Endpoints(sitl.drone_url, sitl.api.video_url, sitl.api, sitl, shared_with=shared)
 
-    judge, changed = await choose_judge(plan, vehicle.api, session, named=settings.simulator is not None)
-    if changed.scenario is not plan.scenario:
-        records.folder.write_plan(changed.scenario, changed.chart)
-    return judge, changed
+    async def _choose_judge(self, session: aiohttp.ClientSession) -> Judge:
+        """The judge; the plan becomes as the simulator has it, by which the flight is replayed."""
+        from framerunner.flying.judges import choose_judge
 
+        named = self._settings.simulator is not None
+        judge, changed = await choose_judge(self._plan, self._vehicle.api, session, named=named)
+        if changed.scenario is not self._plan.scenario:
+            self._records.folder.write_plan(changed.scenario, changed.chart)
+        self._plan = changed
+        return judge
 
-async def _safety(
-    plan: FlightPlan, settings: RealTimeSettings, records: RunRecords, stack: AsyncExitStack
-) -> tuple[FlightPlan, SafetyRules, int | None]:
-    """Let a drone that may be a real one be checked, and read its operator's keys until the flight's end.
+    async def _check(self) -> tuple[SafetyRules, int | None]:
+        """Let a drone that may be a real one be checked, and read its operator's keys until the flight's end.
 
-    A drone that says that it is framerunner's simulated one needs neither, nor caps that nobody asked for.
-    Only the drone with the MAVLink id that is returned may be flown; None: it is not known.
-    """
-    hardware, drone_url = settings.hardware, settings.drone_url
-    if hardware is None or drone_url is None:
-        return plan, SIMULATED, None
-    from framerunner.preflight.prepare import own_simulator_id
+        A drone that says that it is framerunner's simulated one needs neither, nor caps that nobody asked
+        for. Only the drone with the MAVLink id that is returned may be flown; None: it is not known.
+        """
+        plan, settings = self._plan, self._settings
+        hardware, drone_url = settings.hardware, settings.drone_url
+        if hardware is None or drone_url is None:
+            return SIMULATED, None
+        from framerunner.preflight.prepare import own_simulator_id
 
-    if hardware.asks_nothing:
-        simulated_id = await own_simulator_id(drone_url, settings.camera_url)
-        if simulated_id is not None:
-            return replace(plan, caps=plan.caps if hardware.capped else None), SIMULATED, simulated_id
-    from framerunner.preflight.keys import TerminalKeys, has_terminal
-    from framerunner.preflight.operator_link import OperatorLink
-    from framerunner.preflight.prepare import new_operator, prepare
-    from framerunner.preflight.run import PreflightSettings
+        if hardware.asks_nothing:
+            simulated_id = await own_simulator_id(drone_url, settings.camera_url)
+            if simulated_id is not None:
+                self._plan = replace(plan, caps=plan.caps if hardware.capped else None)
+                return SIMULATED, simulated_id
+        from framerunner.preflight.keys import TerminalKeys, has_terminal
+        from framerunner.preflight.operator_link import OperatorLink
+        from framerunner.preflight.prepare import new_operator, prepare
+        from framerunner.preflight.run import PreflightSettings
 
-    socket = hardware.operator_socket or settings.monitor_socket
-    operator = new_operator(hardware, has_page=socket is not None)
-    link = None
-    if socket is not None:
-        title = f"{plan.title}, {'dry run' if hardware.dry_run else 'flight'}"
-        link = OperatorLink(socket, operator, title, terminal=has_terminal() or operator.has_go)
-        await stack.enter_async_context(link)
-    checks = PreflightSettings(
-        drone_url,
-        settings.camera_url,
-        settings.camera_delay,
-        set_parameters=hardware.set_parameters,
-        accepted=hardware.accepted,
-        folder=records.folder.path,
-        abort=hardware.abort,
-    )
-    show = {} if link is None else {"show": link.show_card}
-    safety, system_id = await prepare(plan, checks, hardware, operator, **show)
-    await stack.enter_async_context(TerminalKeys(operator))
-    return plan, safety, system_id
+        socket = hardware.operator_socket or settings.monitor_socket
+        operator = new_operator(hardware, has_page=socket is not None)
+        link = None
+        if socket is not None:
+            title = f"{plan.title}, {'dry run' if hardware.dry_run else 'flight'}"
+            link = OperatorLink(socket, operator, title, terminal=has_terminal() or operator.has_go)
+            await self._stack.enter_async_context(link)
+        checks = PreflightSettings(
+            drone_url,
+            settings.camera_url,
+            settings.camera_delay,
+            set_parameters=hardware.set_parameters,
+            accepted=hardware.accept,
+            folder=self._records.folder.path,
+            abort=hardware.on_abort,
+        )
+        show = {} if link is None else {"show": link.show_card}
+        safety, system_id = await prepare(plan, checks, hardware, operator, **show)
+        await self._stack.enter_async_context(TerminalKeys(operator))
+        return safety, system_id
 
+    def _new_drone(
+        self, safety: SafetyRules, system_id: int | None, guard: ProcessGuard | None
+    ) -> MavsdkDrone:
+        """The drone on its link; in a dry run it is never armed."""
+        from offboard.dry_run import DryRunDrone
+        from offboard.mavsdk_drone import MavsdkDrone
 
-async def _vehicle(
-    plan: FlightPlan,
-    settings: RealTimeSettings,
-    records: RunRecords,
-    stack: AsyncExitStack,
-    monitor_url: str | None,
-) -> _Endpoints:
-    """Those of the running drone, or of a simulator that is started."""
-    if settings.drone_url is not None and settings.camera_url is not None:
-        api = settings.simulator or SimulatorApi.of_video(settings.camera_url)
-        return _Endpoints(settings.drone_url, settings.camera_url, api, shared_with=monitor_url)
-    from framerunner.flying.simulator_process import SitlProcess
+        plan, vehicle, hardware = self._plan, self._vehicle, self._settings.hardware
+        dry_run = hardware is not None and hardware.dry_run
+        drone = (DryRunDrone if dry_run else MavsdkDrone)(
+            vehicle.drone_url,
+            start_arena=plan.start_pose,
+            guard=guard,
+            box=plan.box,
+            corrects=plan.corrects_commands,
+            caps=plan.caps,
+            system_id=system_id,
+            when_hung=safety.abort,
+        )
+        drone.record_to(self._records.folder.tlog)
+        self._stack.callback(lambda: warn(drone.recording_problem))
+        if vehicle.sitl is not None:
+            drone.use_clock(vehicle.sitl.clock, vehicle.sitl.system_id)
+        if vehicle.shared_with is not None:
+            drone.share_with(vehicle.shared_with)
+        self._stack.push_async_callback(drone.disconnect)  # not before the result has been sent over its link
+        return drone
 
-    # The simulator reads the scenario that was checked here, even if the user's file changes.
-    scenario_file, autopilot = str(records.folder.scenario), settings.autopilot
-    links = () if monitor_url is None or autopilot is not None else (monitor_url,)  # others have their own
-    storage = None if autopilot is None else records.folder.path
-    started = SitlProcess(
-        scenario_file,
-        speed=settings.speed,
-        instance=settings.instance,
-        links=links,
-        seed=plan.seed or 0,
-        autopilot=autopilot,
-        storage=storage,
-        on_warning=(lambda line: None) if settings.unattended else warn,
-    )
-    sitl = await stack.enter_async_context(started)
-    shared = None if autopilot is None else monitor_url
-    return _Endpoints(sitl.drone_url, sitl.api.video_url, sitl.api, sitl, shared_with=shared)
+    async def _open_camera(self, reporter: MissionReporter) -> RecordingCamera:
+        """The camera, whose images are recorded."""
+        from vision.sources import open_source
 
+        def keep(frame: CameraFrame) -> None:
+            # Without a time of its own it is recorded at that of its arrival, which is between two ticks.
+            time_us = (
+                self._drone.vehicle_time_us(frame.received_s) if frame.time_us is None else frame.time_us
+            )
+            self._records.see_frame(replace(frame, time_us=time_us))
+            reporter.see_frame(frame)
 
-def _drone(
-    plan: FlightPlan,
-    vehicle: _Endpoints,
-    records: RunRecords,
-    stack: AsyncExitStack,
-    safety: SafetyRules,
-    *,
-    settings: RealTimeSettings,
-    system_id: int | None,
-    guard: ProcessGuard | None,
-) -> MavsdkDrone:
-    """The drone on its link, which is closed with the stack; in a dry run it is never armed."""
-    from offboard.dry_run import DryRunDrone
-    from offboard.mavsdk_drone import MavsdkDrone
+        source: Camera
+        if self._vehicle.sitl is not None:
+            source = self._vehicle.sitl.clock.images
+        else:
+            opened = open_source(self._vehicle.camera_url, reconnects=True)
+            source = await self._stack.enter_async_context(opened)
+        path = None if self._settings.unattended else self._records.folder.video
+        camera = RecordingCamera(source, path, self._plan.scenario.camera.rate_hz, keep)
+        self._stack.callback(camera.close)
+        return camera
 
-    dry_run = settings.hardware is not None and settings.hardware.dry_run
-    drone = (DryRunDrone if dry_run else MavsdkDrone)(
-        vehicle.drone_url,
-        start_arena=plan.start_pose,
-        guard=guard,
-        box=plan.box,
-        corrects=plan.corrects_commands,
-        caps=plan.caps,
-        system_id=system_id,
-        when_hung=safety.abort,
-    )
-    drone.record_to(records.folder.tlog)
-    stack.callback(lambda: warn(drone.recording_problem))
-    if vehicle.sitl is not None:
-        drone.use_clock(vehicle.sitl.clock, vehicle.sitl.system_id)
-    if vehicle.shared_with is not None:
-        drone.share_with(vehicle.shared_with)
-    stack.push_async_callback(drone.disconnect)  # not before the result has been sent over its link
-    return drone
+    def _new_perception(self, judge: Judge, camera: RecordingCamera) -> CameraPerception:
+        """What the mission sees through the camera."""
+        from framerunner.flying.detector import plan_detector
+        from framerunner.flying.judges import TruthJudge
+        from offboard.perception import CameraPerception
+
+        sitl = self._vehicle.sitl
+        rendered = isinstance(judge, TruthJudge) and self._vehicle.has_camera_of_simulator
+        detector = plan_detector(self._plan, rendered=rendered)
+        perception = CameraPerception(camera, detector, patient=sitl is not None)
+        perception.assume_times(self._drone.vehicle_time_us, self._settings.camera_delay.age_s)
+        if sitl is not None:
+            sitl.clock.wait_for_images_of(perception)
+        return perception
 
 
 def flight_guard(settings: RealTimeSettings, folder: RunFolder) -> ProcessGuard:
@@ -313,56 +344,62 @@ def flight_guard(settings: RealTimeSettings, folder: RunFolder) -> ProcessGuard:
     )
 
 
-async def _camera(
-    plan: FlightPlan,
-    vehicle: _Endpoints,
-    records: RunRecords,
-    stack: AsyncExitStack,
-    reporter: MissionReporter,
-    *,
+def flight_timing(
     drone: MavsdkDrone,
-    settings: RealTimeSettings,
-) -> RecordingCamera:
-    """The camera, whose images are recorded; closed with the stack."""
-    from vision.sources import open_source
-
-    def keep(frame: CameraFrame) -> None:
-        # Without a time of its own it is recorded at that of its arrival, which is between two ticks.
-        time_us = drone.vehicle_time_us(frame.received_s) if frame.time_us is None else frame.time_us
-        records.see_frame(replace(frame, time_us=time_us))
-        reporter.see_frame(frame)
-
-    source: Camera
-    if vehicle.sitl is not None:
-        source = vehicle.sitl.clock.images
-    else:
-        opened = open_source(vehicle.camera_url, reconnects=True)
-        source = await stack.enter_async_context(opened)
-    path = None if settings.unattended else records.folder.video
-    camera = RecordingCamera(source, path, plan.scenario.camera.rate_hz, keep)
-    stack.callback(camera.close)
-    return camera
-
-
-def _perception(
-    plan: FlightPlan,
-    vehicle: _Endpoints,
-    judge: Judge,
-    camera: RecordingCamera,
+    perception: CameraPerception,
+    clock: SimulatorClock | None,
+    factor: float | None,
+    speed: float,
     *,
-    drone: MavsdkDrone,
-    delay: CameraDelay,
-) -> CameraPerception:
-    """What the mission sees through the camera."""
-    from framerunner.flying.detector import plan_detector
-    from framerunner.flying.judges import TruthJudge
-    from offboard.perception import CameraPerception
+    fused: bool,
+    repeats: bool = True,
+) -> Timing:
+    """What was late, and so whether the machine was fast enough for the requested speed.
 
-    rendered = isinstance(judge, TruthJudge) and vehicle.has_camera_of_simulator
-    perception = CameraPerception(
-        camera, plan_detector(plan, rendered=rendered), patient=vehicle.sitl is not None
+    Args:
+        drone: that was flown.
+        perception: through which it saw.
+        clock: of a simulator whose time waits for this program; None: vehicle time does not wait.
+        factor: vehicle time per wall time; None before two ticks.
+        speed: the requested factor.
+        fused: the mission's navigator uses images by their time stamps.
+        repeats: of a vehicle whose time waits, the flight depends on nothing else than its seed.
+    """
+    ticks, late = drone.ticks_in_flight
+    slow = factor is not None and factor < SLOW_FACTOR * speed
+    images = 0 if clock is None else clock.images_missed
+    setpoints = 0 if clock is None else clock.setpoints_missed
+    timing = Timing(
+        kept_up=not (slow or late or images or setpoints),
+        vehicle_time_waits=clock is not None,
+        speed=speed if factor is None else factor / speed,
+        ticks=ticks,
+        late_ticks=late,
+        late_share=late / max(ticks, 1),
+        late_images=images,
+        late_setpoints=setpoints,
+        oldest_image_s=perception.oldest_s,
     )
-    perception.assume_times(drone.vehicle_time_us, delay.age_s)
-    if vehicle.sitl is not None:
-        vehicle.sitl.clock.wait_for_images_of(perception)
-    return perception
+    return timing.model_copy(update={"words": in_words(timing, fused=fused, repeats=repeats)})
+
+
+def in_words(timing: Timing, *, fused: bool, repeats: bool) -> str:
+    """One line for people if the machine was too slow; empty if it was not. See `flight_timing`."""
+    if timing.kept_up:
+        return ""
+    late = []
+    if timing.late_ticks:
+        late.append(f"{100 * timing.late_share:.1f} % of ticks were late")
+    for count, what in ((timing.late_images, "image"), (timing.late_setpoints, "setpoint")):
+        if count:
+            late.append(f"{count} {what}{'s' if count > 1 else ''} came late")
+    if late:
+        oldest = f"the oldest image was {timing.oldest_image_s:.2f} s old"
+        still = "was still fused by time stamps" if fused else "may differ from one on a free machine"
+        return f"the machine did not keep up: {', '.join(late)}, {oldest}; the flight {still}"
+    pace = f"the machine did not keep up: vehicle time ran at {timing.speed:.2f} of the requested speed"
+    if timing.vehicle_time_waits and repeats:
+        return f"{pace}; it waited for the app, so the flight is the same as on a free machine"
+    if timing.vehicle_time_waits:
+        return f"{pace}; it waited for the app, but the flight may differ from one on a free machine"
+    return f"{pace}; nothing came late to the app"

@@ -5,17 +5,18 @@ from __future__ import annotations
 import asyncio
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from framerunner.errors import UserError
 from framerunner.flying.display import LockstepProgress, dry_run_line, result_lines
 from framerunner.flying.fly import FinishedFlight
+from framerunner.flying.output import OutputSettings
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings, flight_guard, fly_in_real_time
 from framerunner.runs.recorder import RunRecords, VideoFile
-from framerunner.runs.run_folder import RunFolder, left_lines, warn, write_outcome
+from framerunner.runs.run_folder import RunFolder, left_lines, write_outcome
+from framerunner.terminal import warn
 from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import INTERRUPTED
 from vision.types import Image
@@ -34,12 +35,7 @@ class FlightSettings:
 
     plan: FlightPlan  # with a mission
     real_time: RealTimeSettings | None  # None: simulated in this process, in lockstep
-    out: Path  # folder of all runs
-    record: bool = False  # write an MCAP file too
-    video: bool = False  # write a video in lockstep too
-    monitor: bool = False  # open the Game Monitor
-    wait_for_viewer: bool = False  # until a browser shows the Game Monitor that is opened
-    monitor_link: str | None = None  # where a monitor that is open already listens for the simulated drone
+    output: OutputSettings
 
 
 async def fly_once(settings: FlightSettings) -> int:
@@ -53,15 +49,15 @@ async def fly_once(settings: FlightSettings) -> int:
         CameraError: the camera gives no image.
         SettingError: the simulator or the monitor cannot be started.
     """
-    if settings.real_time is None or not settings.monitor:
-        return await _fly_and_judge(settings, settings.monitor_link)
+    if settings.real_time is None or not settings.output.monitor:
+        return await _fly_and_judge(settings, settings.output.monitor_link)
     from framerunner.child_process import MonitorProcess
 
     # The simulator that is started has a referee; a running drone may have none.
     judges, hosts = settings.real_time.drone_url is not None, _camera_hosts(settings.real_time)
-    async with MonitorProcess(settings.plan.scenario, settings.out, hosts, judges=judges) as monitor:
+    async with MonitorProcess(settings.plan.scenario, settings.output.out, hosts, judges=judges) as monitor:
         await monitor.opened()
-        if settings.wait_for_viewer:
+        if settings.output.wait_for_viewer:
             await monitor.viewed()
         real_time = replace(settings.real_time, monitor_socket=monitor.operator_socket)
         code = await _fly_and_judge(replace(settings, real_time=real_time), monitor.link)
@@ -79,7 +75,7 @@ def _camera_hosts(settings: RealTimeSettings) -> tuple[str, ...]:
 
 async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> int:
     plan = settings.plan
-    folder = RunFolder(settings.out, plan.scenario.name)
+    folder = RunFolder(settings.output.out, plan.scenario.name)
     try:
         folder.write_plan(plan.scenario, plan.chart)
         if plan.calibration is not None:
@@ -139,7 +135,7 @@ def _why(error: BaseException) -> str:
 
 
 def _recording(settings: FlightSettings, folder: RunFolder) -> AbstractContextManager[FlightRecording | None]:
-    if not settings.record:
+    if not settings.output.record:
         return nullcontext()
     from framerunner.recording.mcap_writer import FlightRecording
 
@@ -155,7 +151,7 @@ async def _fly_in_lockstep(settings: FlightSettings, records: RunRecords) -> Fin
     with closing(video), LockstepProgress(plan.limit_s) as progress:
 
         def keep(time_us: int, image: Image) -> None:
-            if settings.video:
+            if settings.output.video:
                 video.write(image)
             records.see_image(time_us, image)
 

@@ -20,19 +20,19 @@ from typing import Any
 import cv2
 
 from framerunner.child_process import end_with_standard_input, limit_resources
+from framerunner.errors import UserError
 from framerunner.files.text_file import TextError, read_text
 from framerunner.flying.navigation_reporter import navigation_json
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
-from framerunner.recording.events import RecordingError
 from framerunner.recording.open_recording import recorded_flight
+from framerunner.runs.run_files import RunFiles
 from offboard.app import Moment
 from offboard.chart.spec import enter_state
 from offboard.engine import DONE, TransitionTaken
 from offboard.mission import Mission, MissionError, load_mission, mermaid
 from offboard.navigation.view import NavigationView
-from offboard.pilot_file import PilotFile, read_pilot
-from scenarios.loader import load_scenario
-from scenarios.models import COLOURS, Scenario, ScenarioError
+from offboard.pilot_file import PilotSource, find_pilot
+from scenarios.models import COLOURS, Scenario
 from vision.types import Detection, Detections
 
 RECORDING = "recording.json"
@@ -54,39 +54,38 @@ Clock = Callable[[int], float]
 def main() -> int:
     """Read the run that the command line names; on failure the last line on standard error is the reason."""
     folder, target = Path(sys.argv[1]), Path(sys.argv[2])
-    pilot_file = Path(sys.argv[3]) if len(sys.argv) > 3 else None
     end_with_standard_input(lambda: shutil.rmtree(target, ignore_errors=True))
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)
     cv2.setNumThreads(1)  # each has a stack, and the flight that is shown live needs the processors
     limit_resources(MEMORY_BYTES, MAX_READ_S)
     try:
-        pilot = None if pilot_file is None else read_pilot(pilot_file)
+        pilot = find_pilot(sys.argv[3]) if len(sys.argv) > 3 else None
         os.chdir(folder.parent)  # so that no message shows the path of the runs
         read_run(Path(folder.name), target, pilot)
     except MemoryError:
         print(f"it needs more than {MEMORY_BYTES >> 20} MB of memory; it must be damaged", file=sys.stderr)
         return 2
-    except (RecordingError, ScenarioError, MissionError, OSError) as error:
+    except (UserError, OSError) as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         return 2
     return 0
 
 
-def read_run(folder: Path, target: Path, pilot: PilotFile | None = None) -> None:
+def read_run(folder: Path, target: Path, pilot: PilotSource | None = None) -> None:
     """Write a run as the monitor's replay reads it.
 
     Args:
         folder: of the run.
         target: folder for `recording.json`, a file with all images, and their places in it.
-        pilot: a contestant's file that the monitor was started with; its names may be used.
+        pilot: the one that the monitor was started with; its names may be used.
 
     Raises:
         RecordingError: there is nothing to show, or it is damaged.
     """
-    scenario_file = folder / "scenario.yaml"
-    scenario = load_scenario(scenario_file) if scenario_file.is_file() else None
-    mission, source = _load_mission(folder / "mission.yaml", pilot)
+    files = RunFiles(folder)
+    scenario = files.load_scenario()
+    mission, source = _load_mission(files.mission, pilot)
     with (target / IMAGES).open("w+b") as file:
         with recorded_flight(folder, pilot) as recorded:
             flight = collect(recorded, ImageFile(file))
@@ -96,7 +95,7 @@ def read_run(folder: Path, target: Path, pilot: PilotFile | None = None) -> None
         (target / RECORDING).write_text(text, encoding="utf-8")
 
 
-def _load_mission(path: Path, pilot: PilotFile | None) -> tuple[Mission | None, str]:
+def _load_mission(path: Path, pilot: PilotSource | None) -> tuple[Mission | None, str]:
     """A mission and the text of its file; None if there is none that loads with no other Python file."""
     try:
         return load_mission(path, pilot), read_text(path)

@@ -20,6 +20,7 @@ from typing import Any
 
 from framerunner.monitor.ports import RunError, RunInfo, RunNotReadError
 from framerunner.monitoring.read_run import IMAGES, RECORDING, SPANS
+from framerunner.runs import run_files
 from scenarios.result import MAX_RESULT_BYTES, FlightResult
 
 KEPT_RUNS = 6
@@ -30,8 +31,8 @@ _MAX_FAILURES = 100
 _MAX_NAME = 80
 _MAX_READ_S = 300.0
 _MAX_STDERR_BYTES = 100_000
-_SIGNS = ("result.json", "flight.mcap", "flight.tlog")
-_FILES = (*_SIGNS, "scenario.yaml", "mission.yaml", "video.avi")
+_SIGNS = (run_files.RESULT, run_files.RECORDING, run_files.LOG)
+_FILES = (*_SIGNS, run_files.SCENARIO, run_files.MISSION, run_files.VIDEO)
 _STAMP = re.compile(r"\d{8}-\d{6}")
 
 Mark = tuple[int, ...]
@@ -74,13 +75,13 @@ class RunFolders:
     Args:
         path: of the folder.
         session: a second folder, whose flights are kept until the program ends; None: there is none.
-        pilot: a contestant's file that the user named; missions that need it can be shown.
+        pilot: a contestant's file that the user named, or a pilot's name; missions that need it can be shown.
     """
 
-    def __init__(self, path: Path, session: Path | None = None, pilot: Path | None = None) -> None:
+    def __init__(self, path: Path, session: Path | None = None, pilot: str | None = None) -> None:
         self.path = path
         self._session = session
-        self._pilot = None if pilot is None else pilot.absolute()
+        self._pilot = pilot
         self._lock = threading.Lock()
         self._seen: dict[str, _Seen] = {}
         self._unpacked: OrderedDict[str, _Unpacked] = OrderedDict()
@@ -204,7 +205,7 @@ def _mark(folder: Path) -> Mark:
 def _info(folder: Path) -> RunInfo:
     name = folder.name
     try:
-        result = _result(folder / "result.json")
+        result = _result(folder / run_files.RESULT)
     except (OSError, ValueError, RecursionError):
         return RunInfo(name, "", "", UNREADABLE, None, _started("", name))
     stamp = _STAMP.match(name)
@@ -295,14 +296,14 @@ class Readers:
                 process.kill()
 
 
-def _unpack(folder: Path, mark: Mark, readers: Readers, pilot: Path | None = None) -> _Unpacked:
+def _unpack(folder: Path, mark: Mark, readers: Readers, pilot: str | None = None) -> _Unpacked:
     """Read a run in a separate process; RunError if it cannot be shown."""
     linked = [name for name in _FILES if (folder / name).is_symlink()]
     if linked:
         raise RunError(f"run '{folder.name}': its {linked[0]} is a link; linked files are not shown")
     target = TemporaryDirectory(prefix="framerunner-run-", ignore_cleanup_errors=True)
     command = [sys.executable, "-m", "framerunner.monitoring.read_run", str(folder.absolute()), target.name]
-    command += [] if pilot is None else [str(pilot)]
+    command += [] if pilot is None else [pilot]
     try:
         code, printed = readers.run(command)
     except OSError:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from framerunner.preflight.run import PreflightReport
-from framerunner.runs.run_folder import warn
+from framerunner.terminal import warn
 from framerunner.wire.operator_messages import CardSection, Row
 from offboard.safety.check import Outcome
 

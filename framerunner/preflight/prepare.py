@@ -26,7 +26,7 @@ PAGE_HINT = "on the monitor's page Operator hold Go, Land lands, then Stop motor
 
 def check_operator(hardware: HardwareSettings, *, has_page: bool) -> None:
     """Raise SettingError if a go is needed and nobody can give it."""
-    if hardware.needs_go and not hardware.dry_run and not has_terminal() and not has_page:
+    if hardware.needs_go and not has_terminal() and not has_page:
         raise SettingError(
             "a real drone is armed only by an operator's key or page, and there is no terminal: start it in "
             "one, or add --monitor; --yes flies without an operator, --simulated says that it is a simulation"
@@ -75,7 +75,7 @@ def new_operator(hardware: HardwareSettings, *, has_page: bool) -> Operator:
     """
     check_operator(hardware, has_page=has_page)
     hints = ([HINT] if has_terminal() else []) + ([PAGE_HINT] if has_page else [])
-    return Operator(needs_go=hardware.needs_go and not hardware.dry_run, hint="; ".join(hints))
+    return Operator(needs_go=hardware.needs_go, hint="; ".join(hints))
 
 
 async def prepare(
@@ -108,7 +108,7 @@ async def prepare(
     print("checks before arming, some ten seconds:", file=sys.stderr, flush=True)
     report = await run_preflight(plan, checks)
     tell(report)
-    safety = SafetyRules(hardware.abort, operator, hardware.hold_s)
+    safety = SafetyRules(hardware.on_abort, operator, hardware.hold_s)
     card = make_card(
         plan,
         checks,

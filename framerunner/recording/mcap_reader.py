@@ -38,6 +38,7 @@ from framerunner.recording.schemas import (
     SETPOINT,
     TELEMETRY,
 )
+from framerunner.runs.run_files import RESULT
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
@@ -112,7 +113,7 @@ class McapRecording:
 
     def _attached_result(self) -> FlightResult | None:
         for each in self._reader.iter_attachments():
-            if each.name == "result.json":
+            if each.name == RESULT:
                 try:
                     return FlightResult.parse(each.data)
                 except ResultError as error:

@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, Writer
 from framerunner.files.text_file import read_text
 from framerunner.recording import messages, schemas
 from framerunner.recording.events import RecordingError
+from framerunner.runs import run_files
 from offboard.app import Moment
 from offboard.mission import Mission
 from offboard.navigation.view import NavigationView
@@ -133,7 +134,7 @@ class FlightRecording:
             began_us = self._first_us - round(track_time_s[0] * 1e6)
             self._cross_frames(result, began_us)
             self._log(end_us, "referee", result.reason)
-        self._attach("result.json", "application/json", result.text(), end_us)
+        self._attach(run_files.RESULT, "application/json", result.text(), end_us)
 
     def close(self) -> None:
         """Finish the file, or remove it if nothing was recorded; a second call does nothing."""
@@ -155,10 +156,10 @@ class FlightRecording:
         self._writer.start(library=f"framerunner {version}")
         about = {"version": version, "scenario": self._scenario.name, "mission": mission.name}
         self._writer.add_metadata(METADATA, {**about, "seed": "" if seed is None else str(seed)})
-        self._attach("scenario.yaml", "application/yaml", dump_yaml(self._scenario), 0)
-        self._attach("mission.yaml", "application/yaml", read_text(mission.path), 0)
+        self._attach(run_files.SCENARIO, "application/yaml", dump_yaml(self._scenario), 0)
+        self._attach(run_files.MISSION, "application/yaml", read_text(mission.path), 0)
         if isinstance(mission.pilot, PilotFile):
-            self._attach("pilot.py", "text/x-python", mission.pilot.text, 0)
+            self._attach(run_files.PILOT, "text/x-python", mission.pilot.text, 0)
         register = self._writer.register_schema
         ids = {name: register(name, "jsonschema", text) for name, text in schemas.schema_texts().items()}
         for topic, name in schemas.TOPICS.items():

@@ -6,6 +6,7 @@ Arena axes (x forward, y left, z up) are also Foxglove's world axes.
 from __future__ import annotations
 
 from base64 import b64encode
+from dataclasses import asdict
 from itertools import pairwise
 from math import cos, isfinite, sin
 from typing import Any
@@ -108,14 +109,7 @@ def _transform(time_us: int, frames: tuple[str, str], translation_m: Vec3, rotat
 
 def setpoint(moment: Moment) -> Message:
     """The mission's command at a tick."""
-    command = moment.command
-    return {
-        "timestamp": time_of(moment.state.time_us),
-        "forward_m_s": command.forward_m_s,
-        "left_m_s": command.left_m_s,
-        "up_m_s": command.up_m_s,
-        "yaw_rate_rad_s": command.yaw_rate_rad_s,
-    }
+    return {"timestamp": time_of(moment.state.time_us), **asdict(moment.command)}
 
 
 def detections(seen: Detections, time_us: int) -> Message:

@@ -9,11 +9,12 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from framerunner.recording.events import Recorded, RecordingError
+from framerunner.runs.run_files import RunFiles
 from offboard.app import INTERRUPTED
 from offboard.mission import MissionError, load_mission
 from offboard.pilot_file import PilotSource
 from scenarios.loader import load_scenario
-from scenarios.result import MAX_RESULT_BYTES, FlightResult, ResultError
+from scenarios.result import FlightResult, ResultError
 
 if TYPE_CHECKING:
     from framerunner.recording.mcap_reader import McapRecording
@@ -41,21 +42,21 @@ def recorded_flight(path: Path, pilot: PilotSource | None = None) -> Iterator[Re
         return
     if not path.is_dir():
         raise RecordingError(f"replay '{path}': does not exist; name a run folder or an .mcap file")
-    result = _read_result(path)
-    recording, log = path / "flight.mcap", path / "flight.tlog"
+    files = RunFiles(path)
+    result = _read_result(files)
     # A real-time flight whose program was killed has no result, and its recording is incomplete.
-    was_killed = result is None and log.is_file()
-    if recording.is_file() and not (was_killed and _is_incomplete(recording)):
-        with _mcap(recording) as recorded:
+    was_killed = result is None and files.tlog.is_file()
+    if files.recording.is_file() and not (was_killed and _is_incomplete(files.recording)):
+        with _mcap(files.recording) as recorded:
             yield recorded
-    elif result is not None and result.state_sha256 and (path / "mission.yaml").is_file():
+    elif result is not None and result.state_sha256 and files.mission.is_file():
         with TemporaryDirectory(prefix="framerunner-replay-") as folder:
-            file = Path(folder) / "flight.mcap"
-            _fly_again(path, result, file, pilot)
-            with _mcap(file) as recorded:
+            again = RunFiles(Path(folder)).recording
+            _fly_again(files, result, again, pilot)
+            with _mcap(again) as recorded:
                 yield recorded
-    elif log.is_file():
-        yield _tlog(path, result)
+    elif files.tlog.is_file():
+        yield _tlog(files, result)
     elif result is not None:
         raise RecordingError(
             f"replay '{path}': holds a result, but neither recording nor log; fly it again with --record"
@@ -64,17 +65,12 @@ def recorded_flight(path: Path, pilot: PilotSource | None = None) -> Iterator[Re
         raise RecordingError(f"replay '{path}': holds no flight; name a folder that `framerunner fly` left")
 
 
-def _read_result(folder: Path) -> FlightResult | None:
-    """Read a run folder's `result.json`; None if it has none."""
-    path = folder / "result.json"
-    if not path.is_file():
-        return None
+def _read_result(files: RunFiles) -> FlightResult | None:
     try:
-        with path.open("rb") as file:
-            return FlightResult.parse(file.read(MAX_RESULT_BYTES + 1))
+        return files.load_result()
     except (OSError, ResultError) as error:
         reason = " ".join(str(error).split())
-        raise RecordingError(f"replay '{path}': damaged: {reason:.120}") from None
+        raise RecordingError(f"replay '{files.result}': damaged: {reason:.120}") from None
 
 
 # Reading and writing MCAP needs an extra, which flights and their logs do not.
@@ -94,46 +90,43 @@ def _mcap(path: Path) -> closing[McapRecording]:
     return closing(McapRecording(path))
 
 
-def _tlog(path: Path, result: FlightResult | None) -> Recorded:
+def _tlog(files: RunFiles, result: FlightResult | None) -> Recorded:
     from rich.console import Console
 
     from framerunner.recording.tlog_reader import TlogRecording
 
-    scenario_file = path / "scenario.yaml"
-    scenario = load_scenario(scenario_file) if scenario_file.is_file() else None
-    with Console(stderr=True).status("reading flight.tlog"):
-        return TlogRecording(path, scenario, result)
+    scenario = files.load_scenario()
+    with Console(stderr=True).status(f"reading {files.tlog.name}"):
+        return TlogRecording(files, scenario, result)
 
 
-def _fly_again(folder: Path, result: FlightResult, path: Path, pilot: PilotSource | None) -> None:
+def _fly_again(files: RunFiles, result: FlightResult, path: Path, pilot: PilotSource | None) -> None:
     """Fly the lockstep flight of a run folder again and record it; it must be the same to the last bit."""
-    from framerunner.camera_calibration.calibration_file import load_calibration
     from framerunner.flying.display import LockstepProgress
     from framerunner.flying.lockstep import fly_lockstep
     from framerunner.flying.plan import FlightPlan
     from framerunner.recording.mcap_writer import FlightRecording
 
+    folder = files.path
     if result.ended == "aborted" and INTERRUPTED in result.reason:
         raise RecordingError(
             f"replay '{folder}': the flight was stopped by hand, which no other flight repeats; "
             "fly with --record to keep such flights"
         )
-    scenario = load_scenario(folder / "scenario.yaml")
+    scenario = load_scenario(files.scenario)
     try:
-        mission = load_mission(folder / "mission.yaml", pilot)
+        mission = load_mission(files.mission, pilot)
     except MissionError as error:
         first = str(error).split("\n", maxsplit=1)[0]
-        todo = "; name its Python file with --pilot" if (folder / "pilot.py").exists() and not pilot else ""
+        todo = "; name its Python file with --pilot" if files.pilot.exists() and not pilot else ""
         raise RecordingError(f"replay '{folder}': its mission cannot be flown again: {first}{todo}") from None
     seed = result.seed
     if seed is None:
         raise RecordingError(f"replay '{folder}': result.json has no seed; fly it again with --record")
-    calibration_file = folder / "calibration.yaml"
-    calibration = load_calibration(calibration_file) if calibration_file.is_file() else None
     with FlightRecording(path, scenario, mission, seed) as recording:
         with LockstepProgress(scenario.try_limit_s) as progress:
             observers = (recording.see, progress.see)
-            plan = FlightPlan(scenario, mission, seed, calibration=calibration)
+            plan = FlightPlan(scenario, mission, seed, calibration=files.load_calibration())
             flown = fly_lockstep(plan, observers=observers, on_image=recording.see_image)
         if flown.outcome.interrupted:
             raise KeyboardInterrupt

@@ -10,13 +10,13 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from framerunner.flying.display import moment_table, place_in_words
+from framerunner.flying.display import MomentLines, moment_table
 from framerunner.recording.events import Crossed, Recorded, time_of_event
+from framerunner.terminal import say
 from offboard.app import Moment
 from sitl.video import VideoServer
 
 _REFRESH_S = 0.1
-_LINE_S = 10.0
 _AHEAD_S = 0.005  # events due within this are shown now
 
 
@@ -29,8 +29,7 @@ class ReplayDisplay:
         self._live: Live | None = None
         self._shown_s = 0.0
         self._crossed: list[str] = []
-        self._line_state = ""
-        self._line_s = 0.0
+        self._lines = MomentLines()
 
     def __enter__(self) -> ReplayDisplay:
         if self._console.is_terminal:
@@ -45,28 +44,18 @@ class ReplayDisplay:
     def cross(self, crossed: Crossed) -> None:
         """Count a crossing."""
         self._crossed.append(crossed.colour)
-        self._line_state = ""  # makes the next moment print its line
 
     def see(self, moment: Moment) -> None:
         """Show a tick of the flight."""
-        crossed = ", ".join(self._crossed) or "none"
         if self._live is None:
-            self._print_line(moment, crossed)
+            self._lines.show(moment, self._crossed, also=str(self._crossed))  # a line at each crossing
         elif monotonic() - self._shown_s >= _REFRESH_S:
             self._shown_s = monotonic()
-            self._live.update(self._table(moment, crossed), refresh=True)
+            self._live.update(self._table(moment), refresh=True)
 
-    def _print_line(self, moment: Moment, crossed: str) -> None:
-        time_s = moment.flight_time_s
-        if moment.mission_state == self._line_state and time_s - self._line_s < _LINE_S:
-            return
-        self._line_state, self._line_s = moment.mission_state, time_s
-        line = f"{time_s:6.1f} s  {moment.mission_state:22s} {place_in_words(moment)}  crossed: {crossed}"
-        print(line, file=sys.stderr, flush=True)
-
-    def _table(self, moment: Moment, crossed: str) -> Table:
+    def _table(self, moment: Moment) -> Table:
         table = moment_table(self._title, moment, f"{moment.flight_time_s:.1f} s")
-        table.add_row("crossed", crossed)
+        table.add_row("crossed", ", ".join(self._crossed) or "none")
         return table
 
 
@@ -84,7 +73,7 @@ async def replay(recorded: Recorded, speed: float, video: VideoServer | None) ->
     """
     if video is not None:
         await video.start()
-        print(f"video: {video.url}  (stream: {video.url}video)", file=sys.stderr, flush=True)
+        say(f"video: {video.url}  (stream: {video.url}video)")
     try:
         with ReplayDisplay(recorded.title) as display:
             pace = _Pace(speed)

@@ -13,6 +13,7 @@ import cv2
 from framerunner.flying.plan import FlightPlan
 from framerunner.geometry.axes import Alignment, Pose
 from framerunner.recording.events import Crossed, Event, RecordedImage, RecordingError, time_of_event
+from framerunner.runs.run_files import RunFiles
 from framerunner.wire.dialect import Message, is_vehicle, mavlink
 from framerunner.wire.px4_modes import OFFBOARD, px4_name
 from framerunner.wire.vehicle_telemetry import AttitudeReport, PositionReport, VehicleTelemetry
@@ -39,7 +40,7 @@ class TlogRecording:
     camera's rate.
 
     Args:
-        folder: of the flight.
+        files: of the flight.
         scenario: what was flown; if None, positions are relative to the start.
         result: None if the flight left none.
 
@@ -47,14 +48,14 @@ class TlogRecording:
         RecordingError: the log holds no telemetry.
     """
 
-    def __init__(self, folder: Path, scenario: Scenario | None, result: FlightResult | None) -> None:
-        self.title = folder.name
+    def __init__(self, files: RunFiles, scenario: Scenario | None, result: FlightResult | None) -> None:
+        self.title = files.path.name
         self.result = result
-        self._video = folder / "video.avi"
+        self._video = files.video
         self._rate_hz = 10.0 if scenario is None else scenario.camera.rate_hz
-        self._moments = _read_moments(folder / "flight.tlog", _start(scenario))
+        self._moments = _read_moments(files.tlog, _start(scenario))
         if not self._moments:
-            raise RecordingError(f"replay '{folder}': flight.tlog holds no position; nothing can be shown")
+            raise RecordingError(f"replay '{files.path}': its log holds no position; nothing can be shown")
         times_s = {} if result is None else result.times_s
         began_us = motors_on_us(self._moments)
         crossings = [Crossed(began_us + ceil(at_s * 1e6), colour) for colour, at_s in times_s.items()]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime
@@ -14,7 +13,9 @@ from framerunner.errors import SettingError, write_advice
 from framerunner.extras import install_advice, is_installed
 from framerunner.files.text_file import replace_file
 from framerunner.runs import PlotError
+from framerunner.runs.run_files import RunFiles
 from framerunner.runs.track import Track
+from framerunner.terminal import warn
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import dump_yaml
@@ -27,7 +28,7 @@ UNFINISHED = "the program was ended in flight"
 _RESERVED_BYTES = 1 << 16  # more than a result has
 
 
-class RunFolder:
+class RunFolder(RunFiles):
     """`<out>/<time>-<scenario>/`, made when a flight begins.
 
     Args:
@@ -60,19 +61,8 @@ class RunFolder:
             raise SettingError(
                 f"--out {out}: cannot be written to ({error.strerror}); choose another"
             ) from None
-        self.path = path
-        self.result = path / "result.json"
+        super().__init__(path)
         self._part = self.result.with_suffix(".part")
-        self.track = path / "track.png"
-        self.tlog = path / "flight.tlog"
-        self.video = path / "video.avi"
-        self.unfinished = path / "unfinished.json"
-        self.hang_report = path / "hang.txt"
-        self.scenario = path / "scenario.yaml"
-        self.mission = path / "mission.yaml"
-        self.pilot = path / "pilot.py"
-        self.calibration = path / "calibration.yaml"
-        self.recording = path / "flight.mcap"
 
     def write_plan(self, scenario: Scenario, mission: Mission) -> None:
         """Write what is to be flown, so that the flight can be judged, replayed and flown again.
@@ -161,12 +151,6 @@ def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: F
     _try(folder.result, lambda: folder.write_result(result))
     _try(folder.track, plot)
     return folder.result.exists()
-
-
-def warn(problem: str) -> None:
-    """Print a problem on standard error; nothing if it is empty."""
-    if problem:
-        print(f"warning: {problem}", file=sys.stderr, flush=True)
 
 
 def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite
 
 from framerunner.geometry.vectors import Vec3
 from offboard.app import Moment
+from offboard.engine import TransitionTaken
 from offboard.navigation.frames.frame_estimate import FrameEstimate
 
 
@@ -111,3 +113,56 @@ class TrackRecorder:
             began_us = self._time_us[0] if self._time_us else 0
         time_s = [(time_us - began_us) / 1e6 for time_us in self._time_us]
         return Track(time_s, self._x, self._y, self._z, self._mission_state, self._estimates)
+
+
+@dataclass(frozen=True, slots=True)
+class StateSpan:
+    """A time in which a state was active; vehicle time, microseconds."""
+
+    state: str  # full id of the leaf
+    from_us: int
+    to_us: int
+
+
+class ChartRecord:
+    """Sees a flight tick by tick, as an observer.
+
+    Attributes:
+        counts: how often each transition was taken, by id; see `offboard.chart.spec.transition_id`.
+        taken: all transitions, in order.
+    """
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.taken: list[TransitionTaken] = []
+        self._spans: list[StateSpan] = []
+        self._state = ""
+        self._since_us = 0
+        self._last_us = 0
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        time_us = self._last_us = moment.state.time_us
+        taken = moment.transition
+        if taken is None and moment.mission_state == self._state:
+            return
+        if taken is not None:
+            self.taken.append(taken)
+            self.counts.update(taken.ids)
+        if self._state:
+            self._spans.append(StateSpan(self._state, self._since_us, time_us))
+        self._state, self._since_us = moment.mission_state, time_us
+
+    def rename(self, ids: Mapping[str, str]) -> None:
+        """After a change of the chart: keep the counts of transitions that are still there, by new ids."""
+        self.counts = Counter({ids[name]: count for name, count in self.counts.items() if name in ids})
+
+    def ended(self, since: int = 0) -> tuple[StateSpan, ...]:
+        """The times of states that were left, in order, without the first `since` of them."""
+        return tuple(self._spans[since:])
+
+    def spans(self) -> tuple[StateSpan, ...]:
+        """The time line of states until now, the present one last."""
+        if not self._state:
+            return ()
+        return (*self._spans, StateSpan(self._state, self._since_us, self._last_us))

@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import cv2
+import numpy as np
+from rich import box
 from rich.console import Console
 from rich.progress import track
+from rich.table import Table
 
 from framerunner.errors import SettingError
+from framerunner.terminal import table_console
 from framerunner.vision_evaluation.labelled_images import Disturbance, LabelledImage, labelled_images
 from framerunner.vision_evaluation.scores import (
-    ANGLES_DEG,
-    DISTANCES_M,
     RATED_ANGLE_DEG,
+    RATED_DISTANCE_M,
+    ErrorRow,
     Scores,
     detect_all,
-    rated,
-    row_of,
-    rows_by,
 )
-from framerunner.vision_evaluation.terminal import print_scores
 from framerunner.wire.finite_json import finite
 from scenarios.random_scenarios import Level
 from vision.detectors import DetectorMaker
 
+_ERRORS = ("distance", "95 %", "bearing", "tilt", "95 %", "first right", "corners / std", "> 4 std")
 REPORT, PICTURE, LABELS = "vision.json", "vision.png", "labels.json"
 
 
@@ -127,19 +128,63 @@ def _make_folder(path: Path) -> None:
 
 
 def _as_json(settings: VisionSettings, scores: Scores) -> dict[str, object]:
-    samples = rated(scores.samples)
-    near = [s for s in scores.samples if s.angle_deg < RATED_ANGLE_DEG]
-    by_distance = rows_by(scores.kinds, near, lambda sample: sample.distance_m, DISTANCES_M)
-    by_angle = rows_by(scores.kinds, samples, lambda sample: sample.angle_deg, ANGLES_DEG)
-    total = [row_of(kind, 0.0, 0.0, [s for s in samples if s.kind == kind]) for kind in scores.kinds]
     return {
         "level": settings.level.name,
         "images": scores.images,
         "seed": settings.seed,
         "disturbance": asdict(settings.disturbance),
-        "detectors": [asdict(row) for row in total],
-        "by_distance_m": [asdict(row) for row in by_distance],
-        "by_angle_deg": [asdict(row) for row in by_angle],
+        "detectors": [asdict(row) for row in scores.in_sum()],
+        "by_distance_m": [asdict(row) for row in scores.by_distance()],
+        "by_angle_deg": [asdict(row) for row in scores.by_angle()],
         "false_alarms": scores.false_alarms,
         "median_ms": {kind: sorted(times)[len(times) // 2] for kind, times in scores.times_ms.items()},
     }
+
+
+def print_scores(scores: Scores, title: str) -> None:
+    """Print rates and errors of the detectors to standard output."""
+    console = table_console(130)
+    console.print(f"{title}: {scores.images} images", markup=False)
+    console.print(
+        f"wholly in view, up to {RATED_DISTANCE_M:g} m and {RATED_ANGLE_DEG:g}° off the normal", markup=False
+    )
+    console.print(_table("detector", [(row.kind, row) for row in scores.in_sum()]))
+    for what, unit, rows in (("distance", " m", scores.by_distance()), ("angle", "°", scores.by_angle())):
+        named = [(f"{row.kind}  {row.low:g} to {row.high:g}{unit}", row) for row in rows]
+        console.print(_table(f"by {what}", named))
+    for kind in scores.kinds:
+        times_ms = np.percentile(scores.times_ms[kind], (50, 95))
+        console.print(
+            f"{kind}: {scores.false_alarms[kind]} false alarms, "
+            f"{times_ms[0]:.2f} ms an image (95 %: {times_ms[1]:.2f} ms)",
+            markup=False,
+        )
+
+
+def _table(title: str, rows: Sequence[tuple[str, ErrorRow]]) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column(title, no_wrap=True)
+    for column in ("frames", "found", *_ERRORS):
+        table.add_column(column, justify="right")
+    for name, row in rows:
+        if row.frames:
+            table.add_row(name, str(row.frames), *_cells(row))
+    return table
+
+
+def _cells(row: ErrorRow) -> list[str]:
+    return [
+        _cell(row.found, 100.0, ".1f", " %"),
+        _cell(row.distance_median, 100.0, ".2f", " %"),
+        _cell(row.distance_p95, 100.0, ".1f", " %"),
+        _cell(row.bearing_median_deg, 1.0, ".2f", "°"),
+        _cell(row.tilt_median_deg, 1.0, ".1f", "°"),
+        _cell(row.tilt_p95_deg, 1.0, ".1f", "°"),
+        _cell(row.first_is_right, 100.0, ".0f", " %"),
+        _cell(row.deviation_rms, 1.0, ".2f", ""),
+        _cell(row.outliers, 100.0, ".2f", " %"),
+    ]
+
+
+def _cell(number: float | None, factor: float, form: str, unit: str) -> str:
+    return "-" if number is None else f"{factor * number:{form}}{unit}"

@@ -15,16 +15,7 @@ from matplotlib.figure import Figure
 
 from framerunner.runs.plots import save_figure
 from framerunner.vision_evaluation.labelled_images import LabelledImage
-from framerunner.vision_evaluation.scores import (
-    ANGLES_DEG,
-    DISTANCES_M,
-    RATED_ANGLE_DEG,
-    ErrorRow,
-    Scores,
-    detector_of,
-    rated,
-    rows_by,
-)
+from framerunner.vision_evaluation.scores import ErrorRow, Scores, detector_of
 
 _STYLES = {"boxes": ("#ee7733", "--", "boxes (the paper's)"), "frames": ("#332288", "-", "frames")}
 _CURVES: tuple[tuple[str, Callable[[ErrorRow], float | None]], ...] = (
@@ -46,10 +37,7 @@ def save_picture(
     figure = Figure(figsize=(12, 9.5), layout="constrained")
     figure.suptitle(f"{title}: {scores.images} images", fontsize=13)
     axes = figure.subplots(3, 3)
-    near = [s for s in scores.samples if s.angle_deg < RATED_ANGLE_DEG]
-    by_distance = rows_by(scores.kinds, near, lambda sample: sample.distance_m, DISTANCES_M)
-    by_angle = rows_by(scores.kinds, rated(scores.samples), lambda sample: sample.angle_deg, ANGLES_DEG)
-    ranges = ((by_distance, "distance (m)"), (by_angle, "angle off the normal (°)"))
+    ranges = ((scores.by_distance(), "distance (m)"), (scores.by_angle(), "angle off the normal (°)"))
     for row, (rows, label) in zip(axes, ranges, strict=False):
         for axis, (what, value) in zip(row, _CURVES, strict=True):
             _draw(axis, rows, what, value)

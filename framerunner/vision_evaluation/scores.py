@@ -69,6 +69,20 @@ class Scores:
                 self.false_alarms[kind] = self.false_alarms.get(kind, 0) + false_alarms
                 self.times_ms.setdefault(kind, []).append(time_ms)
 
+    def in_sum(self) -> list[ErrorRow]:
+        """A row of each kind over all samples that are rated."""
+        samples = rated(self.samples)
+        return [row_of(kind, 0.0, 0.0, [s for s in samples if s.kind == kind]) for kind in self.kinds]
+
+    def by_distance(self) -> list[ErrorRow]:
+        """The samples of each kind by ranges of the distance."""
+        near = [s for s in self.samples if s.angle_deg < RATED_ANGLE_DEG]
+        return rows_by(self.kinds, near, lambda sample: sample.distance_m, DISTANCES_M)
+
+    def by_angle(self) -> list[ErrorRow]:
+        """Those that are rated by ranges of the angle."""
+        return rows_by(self.kinds, rated(self.samples), lambda sample: sample.angle_deg, ANGLES_DEG)
+
     def leave_out_unused(self) -> None:
         """Forget of a detector of others what it never gives, boxes or frames, unless it gives neither."""
         used = {*KINDS, *(s.kind for s in self.samples if s.found)}

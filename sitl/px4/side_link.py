@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 from firmware_py.mavlink.camera.messages import stream_information
 from framerunner.vehicle.measurements import BatteryState
-from framerunner.wire.dialect import Message, degrees_e7, mavlink, whole
+from framerunner.wire.dialect import Message, degrees_e7, device_heartbeat, mavlink, whole
 from framerunner.wire.framing import PacketReader, packed
 from framerunner.wire.px4_modes import px4_name
 from framerunner.wire.transports.sockets import connect_udp
@@ -59,7 +59,7 @@ class SideLink:
             self._send(_battery_status(battery), self._battery)
         time_us = simulation.time_us
         if time_us // PERIOD_US % _SECOND == 0:
-            self._send(_camera_heartbeat(self._mode), self._camera)
+            self._send(device_heartbeat(mavlink.MAV_TYPE_CAMERA, self._mode), self._camera)
             if self._lacks_origin(simulation):
                 self._send(_origin(simulation, self._system_id), self._simulator)
         if self._output is not None:
@@ -108,18 +108,6 @@ class SideLink:
 
     def _send(self, message: Message, sender: mavlink.MAVLink) -> None:
         self._socket.write(packed(message, sender))
-
-
-def _camera_heartbeat(custom_mode: int) -> Message:
-    """HEARTBEAT with the vehicle's mode, as some programs take any component's for the vehicle's."""
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_CAMERA,
-        mavlink.MAV_AUTOPILOT_INVALID,
-        mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
-        custom_mode,
-        mavlink.MAV_STATE_ACTIVE,
-        3,
-    )
 
 
 def _origin(simulation: Px4Simulation, system_id: int) -> Message:

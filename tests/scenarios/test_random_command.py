@@ -41,7 +41,7 @@ def test_help_shows_how(capsys):
         (["scenario", "random", "--seed", "1"], "--level"),
         (["scenario", "random", "--level", "clam", "--seed", "1"], "did you mean calm?"),
         ([*DRAW, "1", "--out", "no/such/folder/a.yaml"], "--out no/such/folder/a.yaml: cannot be written"),
-        ([*DRAW, "1", "--out", "."], "--out .: cannot be written (Is a directory)"),
+        ([*DRAW, "1", "--out", "."], ". is there already"),
     ],
 )
 def test_bad_input_is_one_line(tmp_path, monkeypatch, capsys, arguments, said):

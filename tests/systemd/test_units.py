@@ -9,8 +9,15 @@ from pathlib import Path
 import pytest
 
 from framerunner.cli import build_app
-from framerunner.commands.options.hardware import SERVICE_VARIABLE, HardwareOptions, hardware_of
+from framerunner.commands.options.hardware import (
+    HARDWARE_RULES,
+    SERVICE_VARIABLE,
+    given_hardware,
+    hardware_of,
+)
+from framerunner.commands.options.rules import check_rules
 from framerunner.errors import SettingError
+from framerunner.preflight.settings import HardwareSettings
 
 FOLDER = Path(__file__).parents[2] / "systemd"
 PROGRAM = "/opt/framerunner/.venv/bin/framerunner"
@@ -77,15 +84,16 @@ def test_units_have_few_rights(name):
 
 @pytest.mark.parametrize(
     ("options", "option"),
-    [(HardwareOptions(yes=True), "--yes"), (HardwareOptions(simulated=True), "--simulated")],
+    [(HardwareSettings(yes=True), "--yes"), (HardwareSettings(simulated=True), "--simulated")],
 )
 def test_a_service_never_flies_without_an_operator(monkeypatch, options, option):
     monkeypatch.delenv(SERVICE_VARIABLE, raising=False)
-    hardware_of(options, "udpin://127.0.0.1:14540")
+    drone = {"drone": "udpin://127.0.0.1:14540"}
+    check_rules(HARDWARE_RULES, given_hardware(options) | drone)
     monkeypatch.setenv(SERVICE_VARIABLE, "1")
     with pytest.raises(SettingError, match=f"{option}: a service never flies without"):
-        hardware_of(options, "udpin://127.0.0.1:14540")
-    assert hardware_of(HardwareOptions(), "udpin://127.0.0.1:14540").needs_go
+        check_rules(HARDWARE_RULES, given_hardware(options) | drone)
+    assert hardware_of(HardwareSettings(), "udpin://127.0.0.1:14540").needs_go
 
 
 @pytest.mark.parametrize("name", [each for each in UNITS if "camera" not in each])

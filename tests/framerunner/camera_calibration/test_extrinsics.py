@@ -9,8 +9,8 @@ import pytest
 from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.camera_calibration.live_mounting import Watched
 from framerunner.camera_calibration.mounting_report import MountingSearch, finish
+from framerunner.cli import run as command_line
 from framerunner.commands.camera import extrinsics
-from framerunner.commands.fly import fly
 from framerunner.errors import UserError
 from framerunner.flying.plan import FlightPlan
 from framerunner.geometry.rotations import quaternion_from_euler
@@ -67,8 +67,10 @@ def test_a_recorded_flight_gives_the_mounting(tmp_path: Path, capsys: pytest.Cap
     camera = scenario.camera
     file = tmp_path / "camera.yaml"
     save_calibration(Calibration.ideal(camera.width_px, camera.height_px, camera.focal_px), file)
-    what = {"mission": str(tmp_path / "turns.yaml"), "out": tmp_path / "runs", "calibration": file}
-    fly(str(tmp_path / "tilted.yaml"), lockstep=True, **what)  # read again, it is flown again: not recorded
+    files = ("--mission", tmp_path / "turns.yaml", "--out", tmp_path / "runs", "--calibration", file)
+    command_line(
+        ["fly", str(tmp_path / "tilted.yaml"), "--lockstep", *map(str, files)]
+    )  # flown again when it is read
     (run,) = (tmp_path / "runs").iterdir()
     assert extrinsics(run, calibration=file) == 0
     assert "written to" in capsys.readouterr().err

@@ -305,7 +305,7 @@ def test_a_mission_that_computes_without_end_is_ended(tmp_path, kind):
     pilot = tmp_path / "slow.py"
     pilot.write_text(FOREVER, encoding="utf-8")
     text = HOVER.replace("imu.z > 1", "answer > 1")
-    with page(pilot=pilot, processor_s=1.0) as browser:
+    with page(pilot=str(pilot), processor_s=1.0) as browser:
         if kind == "start":
             browser.answer(kind, text=text, speed=None)
             text = browser.until("ended")["text"]

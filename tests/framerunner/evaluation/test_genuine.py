@@ -16,8 +16,8 @@ from framerunner import instances
 from framerunner.cli import run
 from framerunner.errors import SettingError
 from framerunner.evaluation import runner
-from framerunner.evaluation.genuine_flight import interrupted_once
 from framerunner.evaluation.plan import plan_files
+from framerunner.evaluation.runner import interrupted_once
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.instances import claimed_instance
 from offboard.mission import load_mission

@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 from framerunner.cli import build_app
+from framerunner.evaluation.backends import Pool
+from framerunner.evaluation.evaluate import EvaluationSettings
 from framerunner.evaluation.plan import plan_level
-from framerunner.evaluation.report import Page, picked_for_plots, replay_command, write_report
+from framerunner.evaluation.report import picked_for_plots, replay_command, write_report
 from framerunner.evaluation.rows import COLUMNS, csv_text
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import open_folder
@@ -50,14 +52,23 @@ class Elements(HTMLParser):
             assert self.open.pop() == tag
 
 
-def report(path, rows, **values):
+def report(path, rows, title="level calm", command="framerunner evaluate"):
     plan = plan_level("calm", 1, 6, load_mission("frame_challenge"))
     with open_folder(path, plan.identity) as folder:
         for scenario, row in zip(plan.scenarios, rows, strict=False):
             folder.keep(scenario, row.model_copy(update={"scenario": scenario.name}))
         drawn = []
-        page = Page("level calm", "frame_challenge", None, "framerunner evaluate", summarise(rows), None)
-        write_report(folder, replace(page, **values), lambda done, total: drawn.append((done, total)))
+        settings = EvaluationSettings(
+            plan=replace(plan, title=title),
+            pool=Pool(),
+            out=path,
+            again=False,
+            against=None,
+            mission="frame_challenge",
+            pilot=None,
+            command=command,
+        )
+        write_report(folder, settings, summarise(rows), None, lambda *counts: drawn.append(counts))
         return (path / "report.html").read_text(encoding="utf-8"), drawn
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from framerunner.cli import run
 from framerunner.film import film_file as film_file_module
-from framerunner.film.film_file import FilmError, Mp4File, film_file
+from framerunner.film.film_file import FilmError, FilmFile, film_file
 from tests.framerunner.recording.logs import write_log
 
 
@@ -154,7 +154,7 @@ def test_an_interrupted_film_leaves_no_file(tmp_path):
     path.write_bytes(b"the one before")
 
     def film_and_interrupt():
-        with film_file(path, lambda part: Mp4File(part, (320, 180), 10.0, "libx264")) as film:
+        with film_file(path, lambda part: FilmFile(part, "libx264", (320, 180), 10.0)) as film:
             film.add(np.zeros((180, 320, 3), np.uint8))
             raise KeyboardInterrupt
 
@@ -167,7 +167,7 @@ def test_an_interrupted_film_leaves_no_file(tmp_path):
 def test_a_folder_that_cannot_be_written_is_refused_in_one_line(recorded_folder, tmp_path):
     with (
         pytest.raises(FilmError, match="cannot write"),
-        film_file(tmp_path / "no" / "a.mp4", lambda part: Mp4File(part, (320, 180), 10.0, "libx264")),
+        film_file(tmp_path / "no" / "a.mp4", lambda part: FilmFile(part, "libx264", (320, 180), 10.0)),
     ):
         pass
 

@@ -10,7 +10,7 @@ import pytest
 from framerunner.flying.lockstep import lockstep_flight
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.run_control import RunControl
-from framerunner.runs.chart_record import ChartRecord
+from framerunner.runs.track import ChartRecord
 from offboard.app import INTERRUPTED
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario

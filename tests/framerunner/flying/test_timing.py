@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from framerunner.flying.timing import flight_timing
+from framerunner.flying.real_time import flight_timing
 
 
 def timing(ticks=(2000, 0), oldest_s=0.11, missed=None, factor=1.0, fused=True, repeats=True):

@@ -109,7 +109,7 @@ async def test_a_flight_that_armed_leaves_a_result_whatever_error_ended_it(
     monkeypatch.setattr(run, "fly_in_real_time", fly)
     plan = FlightPlan(load_scenario("empty"), load_mission("hover"))
     with pytest.raises(type(error)):
-        await run.fly_once(run.FlightSettings(plan, RealTimeSettings(), tmp_path))
+        await run.fly_once(run.FlightSettings(plan, RealTimeSettings(), run.OutputSettings(out=tmp_path)))
     results = [json.loads(path.read_text(encoding="utf-8")) for path in tmp_path.glob("*/result.json")]
     assert [(each["reason"], each["cause"]) for each in results] == (
         [(f"aborted ({why})", why)] if why else []
