@@ -23,7 +23,7 @@ _OWN_TIME = re.compile(r"^Time: ", re.MULTILINE)
 _DIAGRAM = re.compile(r"^```mermaid\n.*?^```\n", re.MULTILINE | re.DOTALL)
 _OPTION = re.compile(r"(?<!`)--[a-z][a-z-]*")
 _FIELD_COMMENT = re.compile(r"^    (\w+): [^#\n]*# (.+)$", re.MULTILINE)
-# `make docs` names the folder with Mermaid's script if it could be had; without it, diagrams are shown as text.
+# `make docs` names the folder with Mermaid's script if it could be had; without it, diagrams are texts.
 _MERMAID = os.environ.get("FRAMERUNNER_MERMAID", "")
 _DRAWS = (Path(_MERMAID) / "mermaid.min.js").is_file()
 _DIAGRAM_NOTE = "\n*A diagram in the language of Mermaid, which GitHub and <https://mermaid.live> draw.*\n"
