@@ -10,10 +10,9 @@ from math import isfinite
 from typing import Literal
 
 from offboard.abort import FlightAbort
-from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
+from offboard.drone import Drone, DroneError, DroneState, LimitedCommand, VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
-from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError
-from offboard.limits import CONTEST, CommandLimits
+from offboard.limits import CONTEST, STILL, CommandLimits
 from offboard.mission import Mission
 from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.view import NavigationView
@@ -25,10 +24,11 @@ from vision.types import Detections
 
 INTERRUPTED = "interrupted"
 MICROSECONDS = 1_000_000
-STILL = VelocityCommand()
 NAVIGATION_US = 200_000  # vehicle time between two views of the navigator's map
 CAMERA_WAIT_US = 4 * MICROSECONDS  # for which a mission with a map hovers when there are no images
 REST_US = 3 * MICROSECONDS  # time to fall onto the base, and for telemetry to show the drone at rest
+NO_COMMAND = LimitedCommand(STILL)
+MAX_STEP_US = 200_000  # counted between two ticks
 GO_LIMIT_US = 600 * MICROSECONDS  # vehicle time for which an operator's go is waited for
 
 
@@ -38,8 +38,8 @@ class Moment:
 
     Attributes:
         remark: in a pause, why the mission did not continue when the pilot last gave the drone back;
-            otherwise how the mission's command was changed to keep the drone in its box, or that it hovers
-            because there are no images; empty if it flies as commanded.
+            otherwise how box and caps have limited the mission's command, or that it hovers because there are
+            no images; empty if it flies as commanded.
         navigation: the navigator's map and plan, renewed five times a second; None without a navigator.
     """
 
@@ -86,7 +86,6 @@ async def fly_mission(
     *,
     limit_s: float = 180.0,
     observer: Observer | None = None,
-    box: Box | None = None,
     limits: CommandLimits = CONTEST,
     surroundings: Surroundings | None = None,
     before_tick: TickHook | None = None,
@@ -104,8 +103,7 @@ async def fly_mission(
         mission: checked.
         limit_s: vehicle time from motors on, seconds.
         observer: called at every tick; must be quick.
-        box: keeps the drone inside, whatever the mission commands; None: it may fly anywhere.
-        limits: of the mission's commands.
+        limits: of the mission's commands, with which it plans; the drone limits what it is sent by itself.
         surroundings: what is known of the arena; a mission with `vision: frames` needs it.
         before_tick: see `TickHook`; None costs nothing.
         safety: how the flight ends if it is aborted, and the operator who gives the go and may stop it.
@@ -114,10 +112,9 @@ async def fly_mission(
         DroneError: the drone cannot be reached or is not ready.
         CameraLostError: the camera gives no image at the start.
     """
-    keeper = None if box is None else KeepInBox(box)
     engine = MissionEngine(mission, surroundings=surroundings, limits=limits)
     flight = _Flight(
-        drone, perception, engine, limit_s, observer, keeper=keeper, before_tick=before_tick, safety=safety
+        drone, perception, engine, limit_s, observer, limits=limits, before_tick=before_tick, safety=safety
     )
     try:
         await drone.connect()
@@ -140,7 +137,7 @@ class _Flight:
         limit_s: float,
         observer: Observer | None,
         *,
-        keeper: KeepInBox | None,
+        limits: CommandLimits,
         before_tick: TickHook | None,
         safety: SafetyRules,
     ) -> None:
@@ -151,7 +148,7 @@ class _Flight:
         self._engine = engine
         self._limit_us = round(limit_s * MICROSECONDS)
         self._observer = observer
-        self._keeper = keeper
+        self._limits = limits
         self._before_tick = before_tick
         self._flying = False
         self._motors_requested = False
@@ -161,6 +158,7 @@ class _Flight:
         self._now_us = 0
         self._ticks = 0
         self._sent: VelocityCommand | None = None
+        self._kept_in_box_us = self._commanded_us = 0
         self._paused = False
         self._silent_us: int | None = None
         self._pauses = 0
@@ -186,7 +184,7 @@ class _Flight:
         try:
             await self._wait_for_go()
             timed_out = await self._fly()
-        except (DroneError, CameraLostError, MissionRunError, OutsideBoxError) as error:
+        except (DroneError, CameraLostError, MissionRunError) as error:
             return await self._stop("aborted", str(error))
         except asyncio.CancelledError:
             _uncancel()  # the outcome reports it
@@ -234,7 +232,7 @@ class _Flight:
                     minutes = GO_LIMIT_US / MICROSECONDS / 60
                     raise DroneError(f"no go within {minutes:g} min; the checks are too old, so start again")
                 self._remark = f"{GO_WORDS}: {operator.hint}"
-                self._observe(state, STILL, self._perception.latest(state.time_us))
+                self._observe(state, NO_COMMAND, self._perception.latest(state.time_us))
         finally:
             self._remark = ""
             await _close(ticks)
@@ -271,24 +269,23 @@ class _Flight:
         command = self._engine.tick(imu, detections, state.time_us, state, images=images, sent=self._sent)
         if self._engine.has_navigator:
             self._perception.space_images(self._engine.image_period_s)
-        command = self._kept_in_box(command, state)
         motors_on = self._engine.pilot.cmd.on
-        switches = motors_on != self._flying
         self._motors_requested = self._motors_requested or motors_on
-        if switches:  # this takes seconds; observers get the reason before
-            self._observe(state, command, detections)
-        if motors_on and not self._flying:
+        self._sent = None
+        if motors_on and self._flying:
+            limited = self._command(command, state)
+            self._sent = limited.command
+        else:
+            limited = LimitedCommand(self._limits.limited(command))
+        self._observe(state, limited, detections)
+        if motors_on and not self._flying:  # this takes seconds; observers have the reason already
             await self._drone.motors_on(confirmed=not self._engine.has_navigator)
             self._flying = True
             self._started_us = None  # counts from the next tick, the first with motors on
+            self._command(command, state)
         elif self._flying and not motors_on:
             await self._stop_motors()
-        if self._flying:
-            self._drone.command(command)
-        self._sent = command if self._flying and not switches else None  # none since the last tick
         self._ticks += 1
-        if not switches:
-            self._observe(state, command, detections)
 
     def _hover(self, state: DroneState, error: CameraSilentError) -> None:
         """Let the mission wait for an image, if it can: what is on a map stays known meanwhile."""
@@ -301,27 +298,33 @@ class _Flight:
             raise error
         self._remark = f"hovers: no image for {error.age_s:.1f} s"
         self._engine.pause(state.time_us)
-        self._sent = STILL
-        self._drone.command(STILL)
+        limited = self._command(STILL, state)
+        self._sent = limited.command
         self._ticks += 1
-        self._observe(state, STILL, Detections())
+        self._observe(state, limited, Detections())
 
-    def _observe(self, state: DroneState, command: VelocityCommand, detections: Detections) -> None:
+    def _command(self, command: VelocityCommand, state: DroneState) -> LimitedCommand:
+        """Let the drone fly a command, as far as its limits allow."""
+        limited = self._drone.command(command)
+        if limited.kept_in_box:
+            self._kept_in_box_us += min(state.time_us - self._commanded_us, MAX_STEP_US)
+        self._commanded_us = state.time_us
+        return limited
+
+    def _observe(self, state: DroneState, limited: LimitedCommand, detections: Detections) -> None:
         if self._observer is None:
             return
-        engine, flight_time_s, remark = self._engine, self._flight_time_s(), self._remark
-        if self._flying and not self._paused and self._silent_us is None:
-            remark = "" if self._keeper is None else self._keeper.remark
+        engine = self._engine
         self._observer(
             Moment(
                 state,
-                command,
+                limited.command,
                 detections,
                 mission_state=engine.state,
-                flight_time_s=flight_time_s,
+                flight_time_s=self._flight_time_s(),
                 transition=engine.transition,
                 paused=self._paused,
-                remark=remark,
+                remark="; ".join(filter(None, (self._remark, limited.remark))),
                 navigation=self._navigation_at(state.time_us),
             )
         )
@@ -332,17 +335,6 @@ class _Flight:
         if made_us is None or time_us - made_us >= NAVIGATION_US:
             self._navigation, self._navigation_us = self._engine.navigation, time_us
         return self._navigation
-
-    def _kept_in_box(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
-        """The command limited to the box; the first change in a flight is logged."""
-        keeper = self._keeper
-        if keeper is None or not self._flying:
-            return command
-        first = not keeper.limited_us
-        kept = keeper.limit(command, state)
-        if first and keeper.remark:
-            logger.warning("%s (x %.1f, y %.1f, z %.1f m)", keeper.remark, state.x, state.y, state.z)
-        return kept
 
     async def _update_pause(self, state: DroneState) -> bool:
         """Start, continue or end a pause; True if the mission waits in this tick."""
@@ -372,7 +364,7 @@ class _Flight:
             logger.warning("the mission does not continue: %s", self._remark)
             await self._drone.refuse()
         self._ticks += 1
-        self._observe(state, STILL, detections)
+        self._observe(state, NO_COMMAND, detections)
         return True
 
     def _update_time(self, time_us: int) -> bool:
@@ -441,7 +433,7 @@ class _Flight:
                 logger.warning("the flight is aborted: %s; SPACE lands, then K stops the motors", reason)
 
             def see(state: DroneState) -> None:
-                self._observe(state, STILL, Detections())
+                self._observe(state, NO_COMMAND, Detections())
 
             more = await FlightAbort(self._drone, self._safety, see).bring_down()
             reason = f"{reason}; {more}" if more else reason
@@ -449,7 +441,7 @@ class _Flight:
 
     def _outcome(self, ended: Literal["finished", "timed out", "aborted"], reason: str) -> MissionEnd:
         state, flight_time_s = self._engine.state, self._flight_time_s()
-        kept_s = 0.0 if self._keeper is None else self._keeper.limited_us / MICROSECONDS
+        kept_s = self._kept_in_box_us / MICROSECONDS
         return MissionEnd(ended, reason, state, flight_time_s, self._ticks, self._pauses, kept_s)
 
     def _flight_time_s(self) -> float:

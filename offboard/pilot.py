@@ -19,7 +19,7 @@ from pydantic.config import JsonDict
 from framerunner.errors import UserError
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import VelocityCommand
-from offboard.limits import CONTEST, CommandLimits, clamped
+from offboard.limits import CONTEST, CommandLimits
 from scenarios.models import COLOURS, Colour
 from vision.types import Detection, Detections
 
@@ -235,22 +235,21 @@ class Pilot:
         cmd.rot_z = command.yaw_rate_rad_s
 
 
-def velocity_command(cmd: Command, limits: CommandLimits = CONTEST) -> VelocityCommand:
-    """The command as it may be flown: each rate within the limits.
+def velocity_command(cmd: Command) -> VelocityCommand:
+    """The command as a velocity, not limited yet.
 
-    An infinite rate becomes the limit, as in the paper's stabiliser: its navigator commands infinite speed
-    ahead when it loses a frame while shifting, and then flies 1 m/s forward. That is a known fault of that
-    navigator, reproduced here.
+    A rate may be infinite, and is then limited as in the paper's stabiliser: its navigator commands infinite
+    speed ahead when it loses a frame while shifting, and then flies 1 m/s forward. That is a known fault of
+    that navigator, reproduced here.
 
     Raises:
         PilotError: a rate is no number.
     """
-    forward_m_s, left_m_s = limits.level(_number("vel_x", cmd.vel_x), _number("vel_y", cmd.vel_y))
     return VelocityCommand(
-        forward_m_s,
-        left_m_s,
-        clamped(_number("vel_z", cmd.vel_z), limits.down_m_s, limits.up_m_s),
-        clamped(_number("rot_z", cmd.rot_z), limits.yaw_rate_rad_s, limits.yaw_rate_rad_s),
+        _number("vel_x", cmd.vel_x),
+        _number("vel_y", cmd.vel_y),
+        _number("vel_z", cmd.vel_z),
+        _number("rot_z", cmd.rot_z),
     )
 
 

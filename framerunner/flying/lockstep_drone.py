@@ -27,9 +27,9 @@ from framerunner.geometry.axes import Alignment, Pose
 from framerunner.geometry.rotations import normalized, quaternion_from_euler
 from framerunner.geometry.vectors import Vec3
 from offboard.arming import Arming
-from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityCommand
+from offboard.limits import STILL, VelocityLimits
 from offboard.link.gimbal_feed import GimbalAttitude
-from offboard.safety.caps import CapKeeper
 from scenarios.models import TrueState
 from sitl.payload.gimbal import SimulatedGimbal
 from sitl.simulation import Simulation
@@ -93,7 +93,7 @@ class LockstepDrone:
         observers: called with the true state of every control tick.
         telemetry_delay_us: see `TELEMETRY_DELAY_US`; ValueError if not below the 50 ms between ticks.
         response: the vehicle answers late; None: as its autopilot does.
-        caps: applied to each command; None: there are none.
+        limits: of each command that is sent; None: there are none.
     """
 
     gone = ""
@@ -106,7 +106,7 @@ class LockstepDrone:
         observers: Sequence[TruthObserver] = (),
         telemetry_delay_us: int = TELEMETRY_DELAY_US,
         response: LateResponse | None = None,
-        caps: CapKeeper | None = None,
+        limits: VelocityLimits | None = None,
     ) -> None:
         if not 0 <= telemetry_delay_us < TICK_US:
             raise ValueError(f"telemetry_delay_us {telemetry_delay_us}: must be from 0 to below {TICK_US}")
@@ -116,7 +116,7 @@ class LockstepDrone:
         self._observers = tuple(observers)
         self._delay_us = telemetry_delay_us
         self._response = response
-        self._caps = caps
+        self._limits = limits or VelocityLimits()
         self._latest: DroneState | None = None
         self._alignment: Alignment | None = None
         self._heartbeat_us = 0
@@ -243,11 +243,13 @@ class LockstepDrone:
 
     refuse = hold  # no pilot takes this drone, so none gives it back
 
-    def command(self, command: VelocityCommand) -> None:
+    def command(self, command: VelocityCommand) -> LimitedCommand:
         """Set the velocity to fly from now on. Without motors on it is ignored."""
         if not self._commanding:
-            return
-        self._send(command if self._caps is None else self._caps.limit(command, self._latest))
+            return LimitedCommand(STILL)
+        limited = self._limits.limit(command, self._latest)
+        self._send(limited.command)
+        return limited
 
     async def close(self) -> None:
         """Stop commanding."""

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from framerunner.flying.response import Response
 from framerunner.vehicle.airframe import Airframe, load_airframe
-from offboard.keep_in_box import Box, flight_box
-from offboard.limits import CONTEST, CommandLimits
+from offboard.limits import CONTEST, Box, Caps, CommandLimits, VelocityLimits, flight_box
 from offboard.navigation.surroundings import Surroundings
-from offboard.safety.caps import Caps
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Camera, Scenario, start_position
 from scenarios.part import Part
@@ -135,6 +133,12 @@ class FlightPlan:
         if self.mission is None or self.mission.mission_class == "contest":
             return CONTEST
         return self.drone_limits or airframe_limits(self.airframe)
+
+    def velocity_limits(self) -> VelocityLimits:
+        """What limits the velocities of one flight; an agent's are limited by its actions, and by caps."""
+        if self.mission is None:
+            return VelocityLimits(caps=self.caps)
+        return VelocityLimits(self.command_limits, self.box, self.caps)
 
     @property
     def corrects_commands(self) -> bool:

@@ -13,7 +13,7 @@ from math import hypot, pi, remainder
 
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
-from offboard.limits import CONTEST, CommandLimits, clamped
+from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.control.late_following import (
     GATE_TURN_M,
     MAX_CORRECTION_M_S,
@@ -246,8 +246,9 @@ class PathFollower:
         (forward, left, up), turn = self._inverse.command(now, (before, soon, later), closing, off_rad)
         if self._turn_rad_s is not None:
             turn = self._turn_rad_s
-        command = self._limited(forward, left, up, turn + YAW_GAIN_PER_S * off_rad)
-        turn_sent = self._limited(0.0, 0.0, 0.0, turn).yaw_rate_rad_s
+        limits = self._limits
+        command = limits.limited(VelocityCommand(forward, left, up, turn + YAW_GAIN_PER_S * off_rad))
+        turn_sent = limits.limited(VelocityCommand(yaw_rate_rad_s=turn)).yaw_rate_rad_s
         self._inverse.sent(command.up_m_s, turn_sent, step_s)
         return command
 
@@ -297,7 +298,7 @@ class PathFollower:
         self.progress_s = max(late.before(dead_s)[0], 0.0)
         command = late.command(path, state, prediction, self.response)
         self.error_m = late.error_m
-        return self._limited(*command)
+        return self._limits.limited(VelocityCommand(*command))
 
     def _errors(self, state: DroneState, now_s: float) -> tuple[Vec3, Vec3]:
         """From the drone to the path: position and velocity, both when the drone's were measured."""
@@ -330,15 +331,6 @@ class PathFollower:
             ),
             yaw_rate_rad_s=rate * turn,
             yaw_acceleration_rad_s2=square * motion.yaw_acceleration_rad_s2 + change_per_s * turn,
-        )
-
-    def _limited(self, forward: float, left: float, up: float, yaw_rate: float) -> VelocityCommand:
-        """The command within the limits: an axis at its limit leaves the others as they are."""
-        limits = self._limits
-        return VelocityCommand(
-            *limits.level(forward, left),
-            clamped(up, limits.down_m_s, limits.up_m_s),
-            clamped(yaw_rate, limits.yaw_rate_rad_s, limits.yaw_rate_rad_s),
         )
 
 

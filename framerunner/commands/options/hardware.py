@@ -14,7 +14,7 @@ from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from framerunner.preflight.settings import HardwareSettings
-    from offboard.safety.caps import Caps
+    from offboard.limits import Caps
     from scenarios.models import Scenario
 
 
@@ -72,7 +72,7 @@ SERVICE_VARIABLE = "FRAMERUNNER_SERVICE"
 
 def caps_of(options: HardwareOptions, drone: str | None) -> Caps | None:
     """The caps of a flight; None for a simulated drone without a given one. Raises SettingError."""
-    from offboard.safety.caps import Caps
+    from offboard.limits import Caps
 
     check_range("--max-speed", options.max_speed, 0.1, 20.0)
     check_range("--max-height", options.max_height, 0.3, 100.0)
