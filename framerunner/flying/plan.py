@@ -95,12 +95,12 @@ class FlightPlan:
     @property
     def surroundings(self) -> Surroundings:
         """What a navigator knows before the flight: all but the layout."""
-        layout, envelope_m, camera = self.layout, self.airframe.envelope_m, self.camera
+        layout, camera = self.layout, self.camera
         if not layout.frames:
-            return Surroundings(layout.arena, layout.base, camera, envelope_m)
+            return Surroundings(layout.arena, layout.base, camera)
         frame = layout.frames[0]  # all are of one size, which the rules tell
         size_m = (frame.outer_width_m, frame.outer_height_m)
-        return Surroundings(layout.arena, layout.base, camera, envelope_m, size_m, frame.bar_m)
+        return Surroundings(layout.arena, layout.base, camera, size_m, frame.bar_m)
 
     @property
     def camera(self) -> Camera:

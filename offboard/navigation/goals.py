@@ -8,8 +8,11 @@ from math import inf
 from framerunner.geometry.vectors import Vec3
 from offboard.limits import CommandLimits
 from offboard.response import Response
-from scenarios.models import Base
+from scenarios.models import Base, Frame
 
+FRAME_WIDTH_M: float = Frame.model_fields["outer_width_m"].default  # of all frames, bars included
+FRAME_HEIGHT_M: float = Frame.model_fields["outer_height_m"].default
+FRAME_THICKNESS_M = 0.02
 HEADROOM = 0.92
 """Share of a limit that a path uses; the rest is for corrections."""
 BOLD_HEADROOM = 0.98
@@ -29,40 +32,27 @@ class Gate:
 
     Attributes:
         centre_m: of the opening, arena axes.
-        yaw_rad: heading of its normal.
-        direction: 1 to cross it along its normal only, -1 against it only, 0 from either side.
+        yaw_rad: heading of its normal; it may be crossed from either side.
     """
 
     centre_m: Vec3
     yaw_rad: float
-    direction: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A place to fly to.
+    """A place to fly to and to stop at.
 
     Attributes:
         position_m: arena axes.
         yaw_rad: the heading there; None for any.
-        stop: whether to stop there or to fly past; the last goal is always a stop.
     """
 
     position_m: Vec3
     yaw_rad: float | None = None
-    stop: bool = True
 
 
 Goal = Gate | Point
-
-
-@dataclass(frozen=True, slots=True)
-class FrameSize:
-    """Measures of all frames, metres."""
-
-    width_m: float = 0.42
-    height_m: float = 0.22
-    thickness_m: float = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +63,11 @@ class Obstacles:
         frames: all frames known, with those to cross.
         columns_m: what reaches from the floor to the ceiling, as discs in plan: x, y, radius.
         base: the cube of take-off and landing.
-        floor_m: height of the floor.
     """
 
     frames: tuple[Gate, ...] = ()
     columns_m: tuple[Vec3, ...] = ()
     base: Base | None = None
-    floor_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

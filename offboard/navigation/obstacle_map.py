@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
-from math import ceil, hypot
+from math import hypot
 from typing import Final
 
 import numpy as np
@@ -44,15 +43,14 @@ class ObstacleMap:
     Attributes:
         x_m: centres of the cells along x, arena axes.
         y_m: along y.
-        changes: how many updates have changed which cells are occupied.
+        occupied: which cells are, shape (cells x, cells y).
     """
 
     def __init__(self, camera: CameraModel, arena: Arena) -> None:
         self._camera = camera
         self._cell_m, self.x_m, self.y_m = floor_cells(arena)
-        self.changes = 0
         self._log_odds = np.zeros((self.x_m.size, self.y_m.size))
-        self._occupied = np.zeros(self._log_odds.shape, dtype=bool)
+        self.occupied: Bools = np.zeros(self._log_odds.shape, dtype=bool)
         self._columns_m: tuple[Vec3, ...] = ()
 
     def update(self, position_m: Vec3, attitude_arena: Quaternion, edges: Sequence[ObstacleEdge]) -> None:
@@ -70,20 +68,9 @@ class ObstacleMap:
         self._log_odds += _OCCUPIED * occupied + _FREE * (free & (occupied == 0.0))
         np.clip(self._log_odds, _LEAST, _MOST, out=self._log_odds)
         now = self._log_odds >= _THRESHOLD
-        if (now != self._occupied).any():
-            self._occupied = now
+        if (now != self.occupied).any():
+            self.occupied = now
             self._columns_m = self._discs()
-            self.changes += 1
-
-    def occupied(self, inflate_m: float = 0.0) -> Bools:
-        """Which cells are at most a distance from an obstacle in plan: shape (cells x, cells y)."""
-        reach = ceil(inflate_m / self._cell_m - 1e-9)
-        padded = np.pad(self._occupied, reach)
-        result = self._occupied.copy()
-        for i, j in product(range(2 * reach + 1), repeat=2):
-            if hypot(i - reach, j - reach) * self._cell_m <= inflate_m + 1e-9:
-                result |= padded[i : i + result.shape[0], j : j + result.shape[1]]
-        return result
 
     def columns_m(self) -> tuple[Vec3, ...]:
         """Discs in plan that cover all occupied cells: x, y, radius; in a fixed order."""
@@ -135,7 +122,7 @@ class ObstacleMap:
 
     def _discs(self) -> tuple[Vec3, ...]:
         squares: dict[tuple[int, int], list[tuple[int, int]]] = {}
-        for i, j in np.argwhere(self._occupied).tolist():
+        for i, j in np.argwhere(self.occupied).tolist():
             squares.setdefault((i // _DISC_CELLS, j // _DISC_CELLS), []).append((i, j))
         discs = []
         for cells in squares.values():

@@ -98,7 +98,7 @@ class Search:
         self._start = start
         self._style = style
         self._clearance = Clearance(obstacles, arena, style)
-        self._connector = Connector(style, obstacles.floor_m)
+        self._connector = Connector(style)
         self._legs = LegFinder(self._clearance, self._connector, style)
         self._found: _Route | Refusal | None = None
         self._running = self._run(() if previous is None else previous.crossings)

@@ -9,15 +9,15 @@ from math import pi
 import numpy as np
 import numpy.typing as npt
 
+from offboard.limits import FLOOR_M
 from offboard.navigation.goals import FlightStyle
-from offboard.navigation.planner.legs import Array, LegLimits, Legs, Motions, rotate, solve
+from offboard.navigation.planner.legs import Array, Legs, fastest_legs
 
 LOOK_REACH_M = 0.5  # shorter legs to a gate are flown with the heading along them
 NO_TURN_RAD = 0.1  # a smaller turn takes no time of its own
 DESCENT_GAIN_PER_S2 = 1.5
-"""A descent to a height that brakes with this times the height above 0.15 m is nowhere faster than the height
-above 0.15 m over 1.1 s, to which the app limits it: v^2 / 2a <= h for v = (z - 0.15) / 1.1."""
-FLOOR_M = 0.15
+"""A descent to a height that brakes with this times the height above the box's floor is nowhere faster than
+the box allows: v^2 / 2a <= h for v = h / 1.1 s, which is `REACTION_S` and `BRAKE_HEIGHT_S`."""
 _LEAST_DESCENT_M_S2 = 0.2
 
 
@@ -66,12 +66,10 @@ class Connector:
 
     Args:
         style: how boldly to fly.
-        floor_m: height of the floor.
     """
 
-    def __init__(self, style: FlightStyle, floor_m: float) -> None:
+    def __init__(self, style: FlightStyle) -> None:
         self._style = style
-        self._floor_m = floor_m
         self._speeds: Array = np.array([style.axis_speed_m_s, style.axis_speed_m_s, style.climb_speed_m_s])
         self._accelerations: Array = np.array(
             [style.acceleration_m_s2, style.acceleration_m_s2, style.climb_acceleration_m_s2]
@@ -79,25 +77,14 @@ class Connector:
 
     def legs(self, starts: Ends, ends: Ends) -> Legs:
         """The fastest legs, each from one start to the end of the same index."""
-        motions, cosines, sines = self._motions(starts, ends)
-        return Legs(starts.places_m, cosines, sines, motions, motions.phases_s())
-
-    def times(self, starts: Ends, ends: Ends) -> Array:
-        """How long the fastest legs take, shape (n,)."""
-        return self._motions(starts, ends)[0].durations_s
-
-    def _motions(self, starts: Ends, ends: Ends) -> tuple[Motions, Array, Array]:
-        way = ends.places_m - starts.places_m
-        turn = self._headings(way, starts.yaws_rad, ends)
-        c, s = np.cos(turn), np.sin(turn)
-        motions = solve(
-            rotate(way, c, -s),
-            rotate(starts.velocities_m_s, c, -s),
-            rotate(ends.velocities_m_s, c, -s),
-            self._limits(starts.places_m[:, 2], ends.places_m[:, 2]),
-            self._turn_times(starts.yaws_rad, ends),
+        return fastest_legs(
+            (starts.places_m, ends.places_m),
+            (starts.velocities_m_s, ends.velocities_m_s),
+            self._headings(ends.places_m - starts.places_m, starts.yaws_rad, ends),
+            speed_m_s=self._speeds,
+            limit=self._acceleration_limits(starts.places_m[:, 2], ends.places_m[:, 2]),
+            least_s=self._turn_times(starts.yaws_rad, ends),
         )
-        return motions, c, s
 
     def _headings(self, way: Array, yaw_before: Array, ends: Ends) -> Array:
         """Headings of the legs' axes; where they may differ from the direction, both axes are used."""
@@ -121,13 +108,13 @@ class Connector:
         needed = turn / self._style.yaw_rate_rad_s + self._style.turn_smoothing_s - ends.turns_s
         return np.maximum(np.where(turn > NO_TURN_RAD, needed, 0.0), 0.0)
 
-    def _limits(self, before_m: Array, after_m: Array) -> LegLimits:
-        """Limits of the axes: descents brake early enough for the app's floor."""
+    def _acceleration_limits(self, before_m: Array, after_m: Array) -> Array:
+        """Of each leg's axes, shape (n, 3): descents brake early enough for the box's floor."""
         acceleration = np.tile(self._accelerations, (len(before_m), 1))
-        gentle = DESCENT_GAIN_PER_S2 * (after_m - self._floor_m - FLOOR_M)
+        gentle = DESCENT_GAIN_PER_S2 * (after_m - FLOOR_M)
         gentle = np.clip(gentle, _LEAST_DESCENT_M_S2, acceleration[:, 2])
         acceleration[:, 2] = np.where(after_m < before_m, gentle, acceleration[:, 2])
-        return LegLimits(self._speeds, acceleration)
+        return acceleration
 
 
 def wrap(angle: Array) -> Array:

@@ -9,6 +9,7 @@ sampling). All functions take many legs at once: arrays of shape (..., 3), with 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -21,14 +22,6 @@ _SHORTEST_S = 0.02
 _TINY = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class LegLimits:
-    """Limits of a leg's axes; arrays of shape (3,) or (..., 3)."""
-
-    speed_m_s: Array
-    acceleration_m_s2: Array
-
-
 def rotate(vectors: Array, cosine: Array | float, sine: Array | float) -> Array:
     """Vectors of shape (..., 3), turned about the vertical."""
     x, y = vectors[..., 0], vectors[..., 1]
@@ -38,19 +31,31 @@ def rotate(vectors: Array, cosine: Array | float, sine: Array | float) -> Array:
     return turned
 
 
-def solve(offset_m: Array, before_m_s: Array, after_m_s: Array, limits: LegLimits, least_s: Array) -> Motions:
-    """The fastest motions that keep the limits; if none keep them, those that exceed them least.
+def fastest_legs(
+    places_m: tuple[Array, Array],
+    velocities_m_s: tuple[Array, Array],
+    turns_rad: Array,
+    *,
+    speed_m_s: Array,
+    limit: Array,
+    least_s: Array,
+) -> Legs:
+    """The fastest legs that keep the limits; if none keep them, those that exceed them least.
 
     Args:
-        offset_m: from start to end, shape (n, 3).
-        before_m_s: velocity at the start.
-        after_m_s: velocity at the end.
-        limits: of each axis.
-        least_s: motions may not be shorter than this, shape (n,).
+        places_m: of the starts and the ends, arena axes, shape (n, 3) each.
+        velocities_m_s: there, likewise.
+        turns_rad: headings of the legs' axes, shape (n,).
+        speed_m_s: limit of each axis, shape (3,).
+        limit: of the acceleration of each axis, m/s^2, shape (n, 3).
+        least_s: legs may not be shorter than this, shape (n,).
     """
-    caps = _speeds(before_m_s, after_m_s, limits)
-    limit = np.broadcast_to(limits.acceleration_m_s2, offset_m.shape)
-    fastest = _fastest(offset_m, before_m_s, after_m_s, limits)
+    c, s = np.cos(turns_rad), np.sin(turns_rad)
+    offset_m = rotate(places_m[1] - places_m[0], c, -s)
+    before_m_s, after_m_s = (rotate(velocity, c, -s) for velocity in velocities_m_s)
+    # Speed limits, raised where a leg starts or ends faster.
+    caps = np.maximum(speed_m_s, np.maximum(np.abs(before_m_s), np.abs(after_m_s)))
+    fastest = _fastest(offset_m, before_m_s, after_m_s, caps, limit)
     times = np.maximum(np.maximum(fastest.max(axis=1), least_s), _SHORTEST_S)
     a = _accelerations(offset_m, before_m_s, after_m_s, caps, times[:, None])
     late = (np.abs(a) > limit * _TOLERANCE).any(axis=1)
@@ -65,7 +70,8 @@ def solve(offset_m: Array, before_m_s: Array, after_m_s: Array, limits: LegLimit
         )
         a = _accelerations(offset_m, before_m_s, after_m_s, caps, times[:, None])
     a = np.where(np.isfinite(a), a, 0.0)
-    return Motions(times, before_m_s, after_m_s, a, caps, (np.abs(a) / limit).max(axis=1))
+    strains = (np.abs(a) / limit).max(axis=1)
+    return Legs(places_m[0], c, s, times, before_m_s, after_m_s, a, caps, strains)
 
 
 def _stretched(
@@ -82,15 +88,8 @@ def _stretched(
     return shortest
 
 
-def _speeds(before: Array, after: Array, limits: LegLimits) -> Array:
-    """Speed limits, raised where a leg starts or ends faster."""
-    return np.maximum(limits.speed_m_s, np.maximum(np.abs(before), np.abs(after)))
-
-
-def _fastest(offset: Array, before: Array, after: Array, limits: LegLimits) -> Array:
-    """The shortest time of each axis by itself."""
-    a = limits.acceleration_m_s2
-    cap = _speeds(before, after, limits)
+def _fastest(offset: Array, before: Array, after: Array, cap: Array, a: Array) -> Array:
+    """The shortest time of each axis by itself, with a highest speed and an acceleration."""
     ramp = 0.5 * (before + after) * np.abs(after - before) / a  # distance of a change of speed without a peak
     sign = np.where(offset >= ramp, 1.0, -1.0)
     peak = np.sqrt(np.maximum(0.5 * (before * before + after * after) + sign * a * offset, 0.0))
@@ -118,38 +117,6 @@ def _accelerations(offset: Array, before: Array, after: Array, cap: Array, time:
     with_cruise = ((top - before) ** 2 + (top - after) ** 2) / np.maximum(2.0 * room, _TINY)
     with_cruise = np.where(room > _TINY, with_cruise, np.inf) * np.where(a >= 0.0, 1.0, -1.0)
     return np.where(np.abs(peak) > cap + _TINY, with_cruise, a)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Motions:
-    """Motions in axes of their own, many at once.
-
-    Attributes:
-        durations_s: shape (n,).
-        before_m_s: speeds at the start, shape (n, 3).
-        after_m_s: speeds at the end.
-        accelerations_m_s2: of the first phase.
-        caps_m_s: highest speeds.
-        strains: the highest acceleration as a multiple of the limit, shape (n,).
-    """
-
-    durations_s: Array
-    before_m_s: Array
-    after_m_s: Array
-    accelerations_m_s2: Array
-    caps_m_s: Array
-    strains: Array
-
-    def phases_s(self) -> Array:
-        """Durations of the three phases, shape (3, n, 3)."""
-        a, before, after = self.accelerations_m_s2, self.before_m_s, self.after_m_s
-        time = self.durations_s[:, None]
-        top = np.clip(0.5 * (before + after + a * time), -self.caps_m_s, self.caps_m_s)
-        size = np.maximum(np.abs(a), _TINY)
-        moving = np.abs(a) > 1e-7
-        first = np.where(moving, np.abs(top - before) / size, 0.0)
-        third = np.where(moving, np.abs(after - top) / size, 0.0)
-        return np.stack((first, np.maximum(time - first - third, 0.0), third))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -183,7 +150,7 @@ class Leg:
         return self.start_m + rotate(moved, c, s), rotate(velocity, c, s), rotate(acceleration, c, s)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Legs:
     """Legs, many at once.
 
@@ -191,39 +158,56 @@ class Legs:
         starts_m: arena axes, shape (n, 3).
         cosines: of the headings of their axes, shape (n,).
         sines: of these headings.
-        motions: in these axes.
-        phases_s: of the motions, shape (3, n, 3).
+        durations_s: shape (n,).
+        before_m_s: speeds at the start, in these axes, shape (n, 3).
+        after_m_s: speeds at the end.
+        accelerations_m_s2: of the first phase.
+        caps_m_s: highest speeds.
+        strains: the highest acceleration as a multiple of the limit, shape (n,).
     """
 
     starts_m: Array
     cosines: Array
     sines: Array
-    motions: Motions
-    phases_s: Array
+    durations_s: Array
+    before_m_s: Array
+    after_m_s: Array
+    accelerations_m_s2: Array
+    caps_m_s: Array
+    strains: Array
 
     def __len__(self) -> int:
         return len(self.starts_m)
 
     def __getitem__(self, index: int) -> Leg:
         """One of them."""
-        motions = self.motions
         return Leg(
             self.starts_m[index],
             (float(self.cosines[index]), float(self.sines[index])),
-            motions.before_m_s[index],
-            motions.accelerations_m_s2[index],
+            self.before_m_s[index],
+            self.accelerations_m_s2[index],
             self.phases_s[:, index],
-            float(motions.durations_s[index]),
+            float(self.durations_s[index]),
         )
+
+    @cached_property
+    def phases_s(self) -> Array:
+        """Durations of the three phases, shape (3, n, 3)."""
+        a, before, after = self.accelerations_m_s2, self.before_m_s, self.after_m_s
+        time = self.durations_s[:, None]
+        top = np.clip(0.5 * (before + after + a * time), -self.caps_m_s, self.caps_m_s)
+        size = np.maximum(np.abs(a), _TINY)
+        moving = np.abs(a) > 1e-7
+        first = np.where(moving, np.abs(top - before) / size, 0.0)
+        third = np.where(moving, np.abs(after - top) / size, 0.0)
+        return np.stack((first, np.maximum(time - first - third, 0.0), third))
 
     def positions(self, shares: Array) -> Array:
         """Positions at shares of each leg's duration, shape (n, shares, 3)."""
-        motions = self.motions
-        times = motions.durations_s[:, None, None] * shares[None, :, None]
         moved, _ = _moved(
-            times,
-            speeds=motions.before_m_s[:, None],
-            a=motions.accelerations_m_s2[:, None],
+            self.durations_s[:, None, None] * shares[None, :, None],
+            speeds=self.before_m_s[:, None],
+            a=self.accelerations_m_s2[:, None],
             phases=self.phases_s[:, :, None],
         )
         return self.starts_m[:, None] + rotate(moved, self.cosines[:, None], self.sines[:, None])

@@ -13,7 +13,6 @@ from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel, CameraPose
 from offboard.navigation.search.floor_points import COLUMN_PX, FloorPoints
 from offboard.navigation.search.frame_visibility import (
-    BEST_QUALITY,
     HEADINGS,
     Floats,
     FrameVisibility,
@@ -91,11 +90,6 @@ class Coverage:
         means = block_means(self._cells())
         flat: Floats = means.reshape(HEADINGS, -1)
         return flat
-
-    def in_plan(self) -> Floats:
-        """Share seen over all heights and headings, 0 to 1, for pictures: shape (cells x, cells y)."""
-        means: Floats = self._cells().mean(axis=(0, 3)) / np.float32(BEST_QUALITY)
-        return means
 
     def _is_new(self, position_m: Vec3, yaw_rad: float) -> bool:
         if self._last is not None:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.goals import FRAME_HEIGHT_M, FRAME_WIDTH_M
 from scenarios.models import Arena
 
 Floats = npt.NDArray[np.float32]
@@ -19,8 +20,6 @@ HEADINGS: Final = 8  # of a frame's normal, over half a turn: both sides of a fr
 BEST_QUALITY: Final = 0.98  # of any view: no place is ever certain to be empty
 _CELL_M: Final = 0.5
 _MOST_CELLS: Final = 20  # along one axis; a larger arena has larger cells
-_HALF_WIDTH_M: Final = 0.21  # of a frame, bars included
-_HALF_HEIGHT_M: Final = 0.11
 _Point = tuple[float, float]
 _NEAR: Final[_Point] = (3.0, BEST_QUALITY)  # metres, and quality of a view from there
 _FAR: Final[_Point] = (6.0, 0.85 * BEST_QUALITY)
@@ -91,8 +90,8 @@ class FrameVisibility:
 
     def in_view(self, ahead: Floats, left: Floats, up: Floats, margin_m: float) -> Bools:
         """Whether a frame is wholly in the image, with a margin to its edges; metres in the camera's axes."""
-        side = np.abs(left) + np.float32(_HALF_WIDTH_M + margin_m)
-        height = np.abs(up) + np.float32(_HALF_HEIGHT_M + margin_m)
+        side = np.abs(left) + np.float32(FRAME_WIDTH_M / 2 + margin_m)
+        height = np.abs(up) + np.float32(FRAME_HEIGHT_M / 2 + margin_m)
         seen: Bools = (side <= ahead * self._right) & (height <= ahead * self._up)
         return seen
 

@@ -10,10 +10,9 @@ from typing import Final
 from framerunner.geometry.rotations import to_world
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.goals import FRAME_HEIGHT_M, FRAME_WIDTH_M
 from vision.types import Detection, Detections
 
-_HEIGHT_M: Final = 0.22  # of a frame, bars included
-_WIDTH_M: Final = 0.42
 _SPARE: Final = 1.3  # a frame may be this much farther away than its size in the image says
 _SPARE_M: Final = 0.5
 _KEPT_IMAGES: Final = 150  # a glimpse is forgotten after so many further images
@@ -75,6 +74,6 @@ class Glimpses:
         left, up = -(box.e + box.w) / 2 / focal_px, (box.n + box.s) / 2 / focal_px
         x, y, z = to_world(pose.rotation, 1.0, left, up)
         length = hypot(x, y, z)
-        size = max((box.n - box.s) / _HEIGHT_M, (box.e - box.w) / _WIDTH_M, 1.0)
+        size = max((box.n - box.s) / FRAME_HEIGHT_M, (box.e - box.w) / FRAME_WIDTH_M, 1.0)
         farthest_m = _SPARE * focal_px / size + _SPARE_M
         return LineOfSight(pose.position_m, (x / length, y / length, z / length), farthest_m=farthest_m)

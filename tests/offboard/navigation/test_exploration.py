@@ -156,10 +156,10 @@ def test_nothing_behind_an_obstacle_counts_as_seen():
     edges = tuple(ObstacleEdge(float(column), 80.0, cut=False) for column in range(-160, 160, 4))
     clear.update((-4.0, 0.0, 1.0), quaternion_from_yaw(0.0))
     hidden.update((-4.0, 0.0, 1.0), quaternion_from_yaw(0.0), edges)  # its lower end is 2 m ahead
-    x_m = clear.coverage.grid.x_m
-    assert clear.coverage.in_plan()[x_m > -1.5].max() > 0.5
-    assert hidden.coverage.in_plan()[x_m > -1.5].max() == 0.0
-    assert hidden.coverage.in_plan()[x_m < -2.0].max() > 0.0
+    x_m = clear.coverage.grid.blocks().centres()[0]
+    assert clear.coverage.blocks()[:, x_m > -1.0].max() > 0.5
+    assert hidden.coverage.blocks()[:, x_m > -1.0].max() == 0.0
+    assert hidden.coverage.blocks()[:, x_m < -2.0].max() > 0.0
 
 
 def test_searches_repeat_to_the_last_bit():
