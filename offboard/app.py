@@ -14,8 +14,7 @@ from offboard.drone import Drone, DroneError, DroneState, LimitedCommand, Veloci
 from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
 from offboard.limits import CONTEST, STILL, CommandLimits
 from offboard.mission import Mission
-from offboard.navigation.surroundings import Surroundings
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import NavigationView, Surroundings
 from offboard.perception import CameraLostError, CameraSilentError, Perception
 from offboard.pilot import Imu
 from offboard.safety.operator import GO_WORDS

@@ -21,8 +21,7 @@ from offboard.chart.spec import Action, Leaf, enter_state, state_path
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
-from offboard.navigation.surroundings import Surroundings
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import NavigationView, Surroundings
 from offboard.observation import ChartNow, check_change, guards_now, read_values, values_now
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
 from offboard.pilot_file import PilotFile, in_words, is_interrupt, place_in

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 from framerunner.flying.response import Response
 from framerunner.vehicle.airframe import Airframe, load_airframe
 from offboard.limits import CONTEST, Box, Caps, CommandLimits, VelocityLimits, flight_box
-from offboard.navigation.surroundings import Surroundings
+from offboard.navigation.view import Surroundings
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Camera, Scenario, start_position
 from scenarios.part import Part

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from math import cos, dist, hypot, inf, pi, remainder, sin
 
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import Point
 from offboard.navigation.path import Crossing, Path
+from offboard.navigation.view import FrameEstimate
 
 COMMIT_M = 0.3  # before the opening; from there the path is not planned again
 COMMIT_ACROSS_M = 0.06  # if the drone is no farther beside the opening's axis

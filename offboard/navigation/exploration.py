@@ -14,11 +14,17 @@ from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import FlightStyle
 from offboard.navigation.search.coverage import Coverage
-from offboard.navigation.search.frame_visibility import Bools, Floats, FrameVisibility, view_qualities
-from offboard.navigation.search.glimpses import LineOfSight
-from offboard.navigation.search.likelihood import Likelihood
+from offboard.navigation.search.frame_visibility import (
+    YAWS,
+    Bools,
+    Doubles,
+    Floats,
+    FrameVisibility,
+    view_qualities,
+    view_table,
+)
+from offboard.navigation.search.likelihood import Likelihood, LineOfSight
 from offboard.navigation.search.obstruction import Obstruction, WaysRound
-from offboard.navigation.search.view_table import YAWS, Doubles, view_table
 from scenarios.models import Arena
 from vision.types import ObstacleEdge
 

@@ -27,12 +27,12 @@ from offboard.navigation.control.loop_inverse import (
     SPREAD_S,
     LoopInverse,
     Own,
+    OwnMotion,
     axes_of,
     level_of,
     thrust_of,
     tilts_of,
 )
-from offboard.navigation.control.own_motion import OwnMotion
 from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path
 from offboard.response import Prediction, Response

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.geometry.vectors import Quaternion, Vec3
-from offboard.navigation.camera_model import CameraModel, CameraPose
-from offboard.navigation.search.floor_points import COLUMN_PX, Doubles, FloorPoints
+from offboard.navigation.camera_model import COLUMN_PX, CameraModel, CameraPose, Doubles, FloorPoints
 from scenarios.models import Arena
 from vision.types import ObstacleEdge
 

@@ -11,16 +11,14 @@ from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.exploration import Explorer, Pace, Viewpoint
-from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.frames.frame_map import FrameMap
 from offboard.navigation.goals import FlightStyle, Gate, Obstacles
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
 from offboard.navigation.pose_history import DronePose, PoseHistory
-from offboard.navigation.search.glimpses import Glimpses
-from offboard.navigation.search.viewed_space import ViewedSpace
-from offboard.navigation.seen_space import SeenSpace
-from offboard.navigation.surroundings import Surroundings
+from offboard.navigation.search.likelihood import Glimpses
+from offboard.navigation.seen_space import SeenSpace, ViewedSpace
+from offboard.navigation.view import FrameEstimate, Surroundings
 from scenarios.models import COLOURS
 from vision.types import Detections
 

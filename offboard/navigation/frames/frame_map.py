@@ -11,8 +11,6 @@ from math import cos, hypot, sin
 import numpy as np
 
 from offboard.navigation.camera_model import CameraModel, CameraPose
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.frames.frame_filter import load_filters
 from offboard.navigation.frames.frame_measurement import (
     HALF_HEIGHT_M,
     HALF_WIDTH_M,
@@ -22,10 +20,11 @@ from offboard.navigation.frames.frame_measurement import (
     solutions,
     view_of,
 )
-from offboard.navigation.frames.frame_track import GATES, Fit, FrameTrack
+from offboard.navigation.frames.frame_track import GATES, Fit, FrameTrack, load_filters
 from offboard.navigation.frames.lookalikes import Lookalikes
 from offboard.navigation.pose_history import DronePose
-from offboard.navigation.search.glimpses import LineOfSight
+from offboard.navigation.search.likelihood import LineOfSight
+from offboard.navigation.view import FrameEstimate
 from scenarios.models import Arena
 from vision.types import Detections, ObstacleEdge
 

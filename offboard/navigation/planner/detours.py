@@ -11,8 +11,7 @@ import numpy as np
 
 from offboard.navigation.goals import FlightStyle
 from offboard.navigation.planner.clearance import Clearance, Mask
-from offboard.navigation.planner.connect import DESCENT_GAIN_PER_S2, Connector, Ends
-from offboard.navigation.planner.legs import Array, Leg, Legs
+from offboard.navigation.planner.legs import DESCENT_GAIN_PER_S2, Array, Connector, Ends, Leg, Legs
 from offboard.navigation.planner.passages import Passages, lengths
 from offboard.navigation.planner.route import Pass, place
 

@@ -13,8 +13,7 @@ import numpy.typing as npt
 from offboard.navigation.goals import PRESENT_SHARE, FlightStyle, Gate, Goal, Motion, Point, Refusal
 from offboard.navigation.path import Crossing
 from offboard.navigation.planner.clearance import Clearance
-from offboard.navigation.planner.connect import Connector, Ends
-from offboard.navigation.planner.legs import Array
+from offboard.navigation.planner.legs import Array, Connector, Ends
 
 SPEED_SHARES = (1.0, 0.7, 0.4)  # of the crossing speed, to choose from
 LEAST_STRAIGHT_M = 0.22  # before and behind an opening: the drone's box is clear of the bars there

@@ -10,8 +10,7 @@ import numpy as np
 
 from framerunner.geometry.rotations import yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
-from offboard.navigation.camera_model import CameraModel, CameraPose
-from offboard.navigation.search.floor_points import COLUMN_PX, FloorPoints
+from offboard.navigation.camera_model import COLUMN_PX, CameraModel, CameraPose, FloorPoints
 from offboard.navigation.search.frame_visibility import (
     HEADINGS,
     Floats,

@@ -10,7 +10,7 @@ import pytest
 from framerunner.geometry.rotations import quaternion_from_yaw
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.exploration import Explorer, Viewpoint
-from offboard.navigation.search.glimpses import Glimpses, LineOfSight
+from offboard.navigation.search.likelihood import Glimpses, LineOfSight
 from scenarios.models import Arena, Camera, Frame, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
 from vision.types import Detection, Detections, ObstacleEdge

@@ -11,10 +11,9 @@ import pytest
 
 from framerunner.geometry.rotations import quaternion_from_euler, rotation, to_world
 from offboard.drone import DroneState
-from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import CONTEST
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
-from offboard.navigation.surroundings import Surroundings
+from offboard.navigation.view import FrameEstimate, Surroundings
 from offboard.navigation.world_model import WorldModel
 from scenarios.gimbal import Gimbal
 from scenarios.imaging.effects import CameraEffects

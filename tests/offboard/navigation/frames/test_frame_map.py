@@ -5,9 +5,9 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.frames.frame_filter import half_turn
-from offboard.navigation.search.glimpses import LineOfSight
+from offboard.navigation.frames.frame_track import half_turn
+from offboard.navigation.search.likelihood import LineOfSight
+from offboard.navigation.view import FrameEstimate
 from scenarios.models import Frame
 from tests.offboard.navigation.sightings import Flight, frame_at
 
