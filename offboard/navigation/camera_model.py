@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import tan
-from typing import Final, Self
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -110,8 +110,7 @@ _FLATTEST: Final = 0.02  # slope of a line of sight; in flatter ones nothing is 
 _LOWEST_M: Final = 0.05  # the camera is taken to be at least this high
 
 
-@dataclass(frozen=True, slots=True)
-class FloorPoints:
+class FloorPoints(NamedTuple):
     """Points of the floor in pixels of an image, in plan from the camera; one element each.
 
     Attributes:
@@ -142,4 +141,4 @@ class FloorPoints:
 
     def chosen(self, which: Bools) -> FloorPoints:
         """Some of the points."""
-        return FloorPoints(self.ux[which], self.uy[which], self.range_m[which], self.error_m[which])
+        return FloorPoints(*(values[which] for values in self))

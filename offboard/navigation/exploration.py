@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from framerunner.geometry.axes import Pose
-from framerunner.geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import FlightStyle
 from offboard.navigation.search.coverage import Coverage
@@ -26,7 +26,6 @@ from offboard.navigation.search.frame_visibility import (
 from offboard.navigation.search.likelihood import Likelihood, LineOfSight
 from offboard.navigation.search.obstruction import Obstruction, WaysRound
 from scenarios.models import Arena
-from vision.types import ObstacleEdge
 
 _START_S: Final = 0.4  # lost when speeding up
 _PATH_SHARE: Final = 0.9  # of the highest speed of a path: what it is flown with at most, on the average
@@ -92,18 +91,6 @@ class Explorer:
         self._visits = np.zeros((len(self._table.places_m), len(YAWS)))
         self._last: Viewpoint | None = None
         self._obstruction: Obstruction | None = None  # None without obstacles
-
-    def update(
-        self, position_m: Vec3, attitude_arena: Quaternion, obstacle_edges: Sequence[ObstacleEdge] = ()
-    ) -> None:
-        """Take in an image, whatever it showed.
-
-        Args:
-            position_m: of the drone's centre when the image was exposed, arena axes.
-            attitude_arena: body FLU to arena.
-            obstacle_edges: where obstacles stand; nothing behind them counts as seen.
-        """
-        self.coverage.update(position_m, attitude_arena, obstacle_edges)
 
     def next_viewpoint(
         self,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass, field
-from math import acos, hypot
+from math import acos, dist, hypot, remainder, tau
 from typing import Generic, TypeVar
 
-from framerunner.geometry.rotations import interpolated, multiply
+from framerunner.geometry.rotations import interpolated, multiply, yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
@@ -41,6 +41,24 @@ class DronePose:
     attitude_arena: Quaternion
     position_std_m: float = POSITION_STD_M
     attitude_std_rad: float = ATTITUDE_STD_RAD
+
+
+class PoseChange:
+    """Tells when the drone's pose is a new one: moved or turned by more than some thresholds."""
+
+    def __init__(self, moved_m: float, turned_rad: float) -> None:
+        self._moved_m, self._turned_rad = moved_m, turned_rad
+        self._last: tuple[Vec3, float] | None = None
+
+    def is_new(self, position_m: Vec3, attitude_arena: Quaternion) -> bool:
+        """Whether a pose differs from the last one that was new."""
+        yaw_rad = yaw_of(attitude_arena)
+        if self._last is not None:
+            moved_m, turned_rad = dist(position_m, self._last[0]), remainder(yaw_rad - self._last[1], tau)
+            if moved_m < self._moved_m and abs(turned_rad) < self._turned_rad:
+                return False
+        self._last = (position_m, yaw_rad)
+        return True
 
 
 Value = TypeVar("Value")

@@ -6,16 +6,16 @@ frame at its height would have been seen.
 
 from __future__ import annotations
 
-from math import hypot, remainder, tau
+from math import hypot
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from framerunner.geometry.rotations import yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import COLUMN_PX, CameraModel, CameraPose, FloorPoints
 from offboard.navigation.obstacle_map import floor_cells
+from offboard.navigation.pose_history import PoseChange
 from scenarios.models import Arena, Base
 from vision.types import ObstacleEdge
 
@@ -54,7 +54,7 @@ class SeenSpace:
         self._camera = camera
         self._cell_m, self._x_m, self._y_m = floor_cells(arena)
         self._free: Bools = np.zeros((self._x_m.size, self._y_m.size), dtype=bool)
-        self._last: tuple[Vec3, float] | None = None
+        self._change = PoseChange(_MOVED_M, _TURNED_RAD)
         self._waiting: list[tuple[Vec3, CameraPose, Doubles | None]] = []
         reach = np.arange(-int(ROOM_M / self._cell_m), int(ROOM_M / self._cell_m) + 1)
         i, j = (offsets.ravel() for offsets in np.meshgrid(reach, reach, indexing="ij"))
@@ -78,7 +78,7 @@ class SeenSpace:
             edges: the lower ends of obstacles, in every eighth column of the image that shows one.
         """
         self.has_obstacles = self.has_obstacles or bool(edges)
-        if not self._is_new(position_m, yaw_of(attitude_arena)):
+        if not self._change.is_new(position_m, attitude_arena):
             return
         pose = self._camera.pose(position_m, attitude_arena)
         limits_m = self._limits_m(pose, edges) if edges else None
@@ -144,15 +144,6 @@ class SeenSpace:
             if all(hypot(x - each[0], y - each[1]) > each[2] for each in self.suspects_m):
                 return (x, y, places_m[place][2])
         return None
-
-    def _is_new(self, position_m: Vec3, yaw_rad: float) -> bool:
-        if self._last is not None:
-            (x, y, z), last_yaw_rad = self._last
-            moved_m = hypot(position_m[0] - x, position_m[1] - y, position_m[2] - z)
-            if moved_m < _MOVED_M and abs(remainder(yaw_rad - last_yaw_rad, tau)) < _TURNED_RAD:
-                return False
-        self._last = (position_m, yaw_rad)
-        return True
 
     def _limits_m(self, pose: CameraPose, edges: tuple[ObstacleEdge, ...]) -> Doubles:
         """How far each column of the image is free; not farther than the columns beside it.

@@ -79,7 +79,7 @@ class WorldModel:
         self._map.observe(image, pose, self._poses_of_rows(image, pose))
         self._obstacle_map.update(position_m, attitude, image.obstacle_edges)
         self.seen_space.update(position_m, attitude, image.obstacle_edges)
-        self._explorer.update(position_m, attitude, image.obstacle_edges)
+        self._explorer.coverage.update(position_m, attitude, image.obstacle_edges)
         known = [colour for colour in COLOURS if self._map.best(colour) is not None]
         self.viewed_space.update(self._camera.pose(position_m, attitude))
         others = any(frame.colour not in COLOURS for frame in self._map.frames())

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import pi
+from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -241,8 +243,7 @@ the box allows: v^2 / 2a <= h for v = h / 1.1 s, which is `REACTION_S` and `BRAK
 _LEAST_DESCENT_M_S2 = 0.2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ends:
+class Ends(NamedTuple):
     """Where legs start or end.
 
     Attributes:
@@ -261,24 +262,12 @@ class Ends:
 
     def take(self, rows: npt.NDArray[np.intp]) -> Ends:
         """Some of them."""
-        return Ends(
-            self.places_m[rows],
-            self.velocities_m_s[rows],
-            self.yaws_rad[rows],
-            self.turns_s[rows],
-            self.at_gates[rows],
-        )
+        return Ends(*map(itemgetter(rows), self))
 
     @staticmethod
     def joined(parts: Sequence[Ends]) -> Ends:
         """All of several, in their order."""
-        return Ends(
-            np.concatenate([part.places_m for part in parts]),
-            np.concatenate([part.velocities_m_s for part in parts]),
-            np.concatenate([part.yaws_rad for part in parts]),
-            np.concatenate([part.turns_s for part in parts]),
-            np.concatenate([part.at_gates for part in parts]),
-        )
+        return Ends(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 class Connector:
