@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
-from math import degrees, isfinite, pi, radians
+from math import degrees, pi, radians
 from struct import Struct
 
 from firmware_py.autopilot import Autopilot
@@ -176,8 +176,7 @@ class LockstepDrone:
                 raise DroneError("link lost: the vehicle's clock stands still")
             self._advance(lost_us)
         self._pass(self._delay_us)
-        vx, vy, vz = state.velocity_arena_m_s
-        if not isfinite(state.x + state.y + state.z + state.yaw + vx + vy + vz + sum(state.attitude_arena)):
+        if not state.is_finite:
             raise DroneError("the vehicle's position, velocity or attitude is not finite")
         if self._commanding and self._arming.is_overdue(state.time_us):
             raise _not_shown("arming", self._mode, self._arming, self._autopilot)

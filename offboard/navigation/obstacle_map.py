@@ -43,6 +43,7 @@ class ObstacleMap:
         x_m: centres of the cells along x, arena axes.
         y_m: along y.
         occupied: which cells are, shape (cells x, cells y).
+        columns_m: discs in plan that cover all occupied cells: x, y, radius; in a fixed order.
     """
 
     def __init__(self, camera: CameraModel, arena: Arena) -> None:
@@ -50,7 +51,7 @@ class ObstacleMap:
         self._cell_m, self.x_m, self.y_m = floor_cells(arena)
         self._log_odds = np.zeros((self.x_m.size, self.y_m.size))
         self.occupied: Bools = np.zeros(self._log_odds.shape, dtype=bool)
-        self._columns_m: tuple[Vec3, ...] = ()
+        self.columns_m: tuple[Vec3, ...] = ()
 
     def update(self, position_m: Vec3, attitude_arena: Quaternion, edges: Sequence[ObstacleEdge]) -> None:
         """Take in what an image showed of obstacles, which may be nothing.
@@ -60,7 +61,7 @@ class ObstacleMap:
             attitude_arena: body FLU to arena.
             edges: the lower ends of obstacles, in every eighth column of the image that shows one.
         """
-        if not edges and not self._columns_m:
+        if not edges and not self.columns_m:
             return
         pose = self._camera.pose(position_m, attitude_arena)
         occupied, free = self._evidence(pose, edges)
@@ -69,11 +70,7 @@ class ObstacleMap:
         now = self._log_odds >= _THRESHOLD
         if (now != self.occupied).any():
             self.occupied = now
-            self._columns_m = self._discs()
-
-    def columns_m(self) -> tuple[Vec3, ...]:
-        """Discs in plan that cover all occupied cells: x, y, radius; in a fixed order."""
-        return self._columns_m
+            self.columns_m = self._discs()
 
     def _ends(self, pose: CameraPose, edges: Sequence[ObstacleEdge]) -> FloorPoints:
         """Where obstacles stand, as far as that is known."""

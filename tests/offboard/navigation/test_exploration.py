@@ -7,9 +7,10 @@ from math import cos, hypot, pi, radians, remainder, sin, tau
 
 import pytest
 
+from framerunner.geometry.axes import Pose
 from framerunner.geometry.rotations import quaternion_from_yaw
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.exploration import Explorer, Viewpoint
+from offboard.navigation.exploration import Explorer
 from offboard.navigation.search.likelihood import Glimpses, LineOfSight
 from scenarios.models import Arena, Camera, Frame, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
@@ -47,7 +48,7 @@ class Search:
     explorer: Explorer = field(default_factory=lambda: Explorer(CAMERA, Arena()))
     time_s: float = 0.0
     images: dict[str, int] = field(default_factory=dict)
-    viewpoints: list[Viewpoint] = field(default_factory=list)
+    viewpoints: list[Pose] = field(default_factory=list)
 
     @classmethod
     def of(cls, scenario: Scenario):

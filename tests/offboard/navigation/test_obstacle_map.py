@@ -56,7 +56,7 @@ def test_posts_are_mapped_where_they_stand_and_nothing_else_is():
         at = (obstacle_map.x_m[x], obstacle_map.y_m[y])
         assert min(hypot(at[0] - px, at[1] - py) - radius for px, py, radius in posts) < 0.2
     for post_x, post_y, radius_m in posts:
-        discs = obstacle_map.columns_m()
+        discs = obstacle_map.columns_m
         assert min(hypot(x - post_x, y - post_y) - radius for x, y, radius in discs) < radius_m
 
 
@@ -66,7 +66,7 @@ def test_discs_cover_all_that_is_occupied():
         corner = max(
             min(
                 hypot(obstacle_map.x_m[x] + dx - cx, obstacle_map.y_m[y] + dy - cy) - radius
-                for cx, cy, radius in obstacle_map.columns_m()
+                for cx, cy, radius in obstacle_map.columns_m
             )
             for dx in (-0.05, 0.05)
             for dy in (-0.05, 0.05)
@@ -86,7 +86,7 @@ def test_an_end_below_the_image_says_nothing():
     for _ in range(10):
         obstacle_map.update((0.0, 0.0, 1.0), quaternion_from_yaw(0.0), cut)
     assert not obstacle_map.occupied.any()
-    assert obstacle_map.columns_m() == ()
+    assert obstacle_map.columns_m == ()
 
 
 def test_far_ends_need_more_views_than_near_ones():
@@ -114,6 +114,6 @@ def test_the_attitude_is_taken_into_account():
     obstacle_map = ObstacleMap(CAMERA, Arena())
     for _ in range(3):
         obstacle_map.update((0.0, 0.0, 1.0), quaternion_from_euler(0.0, 0.4, pi / 2), edges)  # nose down
-    [(x, y, _)] = obstacle_map.columns_m()
+    [(x, y, _)] = obstacle_map.columns_m
     assert x == pytest.approx(0.0, abs=0.1)
     assert y == pytest.approx(1.0 / np.tan(0.4), abs=0.15)
