@@ -12,10 +12,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import cos, hypot, inf, sin
+from math import hypot, inf
 
 from framerunner.errors import SettingError
-from framerunner.geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import Clip, DroneError, DroneState, LimitedCommand, LimitName, VelocityCommand
 from scenarios.models import Scenario
 
@@ -284,12 +284,7 @@ def confine(command: VelocityCommand, state: DroneState, box: Box) -> tuple[Velo
     Returns:
         The command to fly, and the sides that limited it, such as "x 6.0 m"; the same object and "" if none.
     """
-    c, s = cos(state.yaw), sin(state.yaw)
-    wanted = (
-        c * command.forward_m_s - s * command.left_m_s,
-        s * command.forward_m_s + c * command.left_m_s,
-        command.up_m_s,
-    )
+    wanted = (*turned(command.forward_m_s, command.left_m_s, state.yaw), command.up_m_s)
     low, high = _sides(box, state)
     at, speed = (state.x, state.y, state.z), state.velocity_arena_m_s
     reaction_s = REACTION_S + state.position_age_s
@@ -307,8 +302,9 @@ def confine(command: VelocityCommand, state: DroneState, box: Box) -> tuple[Velo
         kept.append(limited)
     if not sides:
         return command, ""
-    x, y, up = kept
-    return replace(command, forward_m_s=c * x + s * y, left_m_s=c * y - s * x, up_m_s=up), ", ".join(sides)
+    forward_m_s, left_m_s = turned(kept[0], kept[1], -state.yaw)
+    inside = replace(command, forward_m_s=forward_m_s, left_m_s=left_m_s, up_m_s=kept[2])
+    return inside, ", ".join(sides)
 
 
 def _sides(box: Box, state: DroneState) -> tuple[Vec3, Vec3]:

@@ -9,7 +9,7 @@ up and yaw rate to the left.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, isfinite, isnan, sin, sqrt
+from math import isfinite, isnan, sqrt
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,7 +17,7 @@ from pydantic import Field
 from pydantic.config import JsonDict
 
 from framerunner.errors import UserError
-from framerunner.geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
 from scenarios.models import COLOURS, Colour
@@ -174,9 +174,8 @@ class Pilot:
         x_m_s, y_m_s, up_m_s = (x - imu.x) / 2, (y - imu.y) / 2, (z - imu.z) / 2
         speed = sqrt(x_m_s**2 + y_m_s**2 + up_m_s**2)
         scale = FLY_M_S / speed if speed > FLY_M_S else 1.0
-        cos_yaw, sin_yaw = cos(imu.yaw), sin(imu.yaw)
-        cmd.vel_x = scale * (cos_yaw * x_m_s + sin_yaw * y_m_s)
-        cmd.vel_y = scale * (cos_yaw * y_m_s - sin_yaw * x_m_s)
+        forward_m_s, left_m_s = turned(x_m_s, y_m_s, -imu.yaw)
+        cmd.vel_x, cmd.vel_y = scale * forward_m_s, scale * left_m_s
         cmd.vel_z = scale * up_m_s
 
     def look_to_frame(self) -> None:

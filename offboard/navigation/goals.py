@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import inf
+from dataclasses import dataclass, fields, replace
+from math import inf, isfinite
 
 from framerunner.geometry.vectors import Vec3
 from offboard.limits import CommandLimits
@@ -210,35 +210,22 @@ def style_of(limits: CommandLimits) -> FlightStyle:
     def between(contest: float, bolder: float) -> float:
         return contest + share * (bolder - contest)
 
+    values = {each.name: getattr(CONTEST, each.name) for each in fields(FlightStyle)}
+    mixed = {name: between(value, getattr(_OPEN, name)) for name, value in values.items() if isfinite(value)}
+    style = replace(CONTEST, **mixed)
     command_share = between(COMMAND_SHARE, BOLD_COMMAND_SHARE)
-    usual, bold = CONTEST, _OPEN
-    axis_speed_m_s = between(usual.axis_speed_m_s, bold.axis_speed_m_s)
-    path_speed_m_s = between(usual.path_speed_m_s, bold.path_speed_m_s)
-    yaw_rate_rad_s = between(usual.yaw_rate_rad_s, bold.yaw_rate_rad_s)
-    crossing_speed_m_s = between(usual.crossing_speed_m_s, bold.crossing_speed_m_s)
     headroom = between(HEADROOM, BOLD_HEADROOM)
     return replace(
-        usual,
-        axis_speed_m_s=min(axis_speed_m_s, headroom * axis_m_s),
-        climb_speed_m_s=min(usual.climb_speed_m_s, HEADROOM * climb_m_s),
-        path_speed_m_s=min(path_speed_m_s, headroom * limits.level_m_s),
-        yaw_rate_rad_s=min(yaw_rate_rad_s, TURN_SHARE * limits.yaw_rate_rad_s),
-        acceleration_m_s2=between(usual.acceleration_m_s2, bold.acceleration_m_s2),
-        climb_acceleration_m_s2=between(usual.climb_acceleration_m_s2, bold.climb_acceleration_m_s2),
+        style,
+        axis_speed_m_s=min(style.axis_speed_m_s, headroom * axis_m_s),
+        climb_speed_m_s=min(style.climb_speed_m_s, HEADROOM * climb_m_s),
+        path_speed_m_s=min(style.path_speed_m_s, headroom * limits.level_m_s),
+        yaw_rate_rad_s=min(style.yaw_rate_rad_s, TURN_SHARE * limits.yaw_rate_rad_s),
         command_m_s=command_share * axis_m_s,
         level_command_m_s=command_share * limits.level_m_s,
         climb_command_m_s=COMMAND_SHARE * climb_m_s,
-        crossing_speed_m_s=min(crossing_speed_m_s, HEADROOM * axis_m_s),
-        crossing_gain_m_s2=bold.crossing_gain_m_s2 if share > 0.0 else usual.crossing_gain_m_s2,
-        straight_before_m=between(usual.straight_before_m, bold.straight_before_m),
-        straight_after_m=between(usual.straight_after_m, bold.straight_after_m),
-        smoothing_s=between(usual.smoothing_s, bold.smoothing_s),
-        look_offset_rad=between(usual.look_offset_rad, bold.look_offset_rad),
-        replan_s=between(usual.replan_s, bold.replan_s),
-        look_again_m=between(usual.look_again_m, bold.look_again_m),
-        look_braking_m=between(usual.look_braking_m, bold.look_braking_m),
-        arrived_m=between(usual.arrived_m, bold.arrived_m),
-        arrived_m_s=between(usual.arrived_m_s, bold.arrived_m_s),
+        crossing_speed_m_s=min(style.crossing_speed_m_s, HEADROOM * axis_m_s),
+        crossing_gain_m_s2=_OPEN.crossing_gain_m_s2 if share > 0.0 else CONTEST.crossing_gain_m_s2,
         looks_ahead=share < 1.0,
     )
 
@@ -253,6 +240,25 @@ class Motion:
     yaw_rate_rad_s: float = 0.0
     acceleration_m_s2: Vec3 = (0.0, 0.0, 0.0)
     yaw_acceleration_rad_s2: float = 0.0
+
+    def paced(self, rate: float, change_per_s: float) -> Motion:
+        """The same motion if time goes at another rate, which changes."""
+        if rate == 1.0 and change_per_s == 0.0:
+            return self
+        (vx, vy, vz), (ax, ay, az) = self.velocity_m_s, self.acceleration_m_s2
+        square, turn, more = rate * rate, self.yaw_rate_rad_s, change_per_s
+        return Motion(
+            self.position_m,
+            (rate * vx, rate * vy, rate * vz),
+            self.yaw_rad,
+            rate * turn,
+            (
+                square * ax + change_per_s * vx,
+                square * ay + change_per_s * vy,
+                square * az + change_per_s * vz,
+            ),
+            square * self.yaw_acceleration_rad_s2 + change_per_s * turn,
+        )
 
 
 @dataclass(frozen=True, slots=True)

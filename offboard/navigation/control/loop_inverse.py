@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan2, cos, hypot, sin, sqrt
 
-from framerunner.geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import DroneState
 from offboard.navigation.goals import Motion
 
@@ -230,12 +230,12 @@ def tilts_of(thrust: Vec3) -> Level:
 
 def acceleration_in_plan(state: DroneState, up_m_s2: float) -> Level:
     """The simulated drone's acceleration by its tilt and drag, arena axes; upwards it has the one given."""
-    c, s = axes = axes_of(state.yaw)
+    axes = axes_of(state.yaw)
     thrust = thrust_of(state)
     drag = _drag(level_of(state.velocity_arena_m_s, axes), thrust)
     lift = (GRAVITY_M_S2 + up_m_s2 - drag[2]) / max(thrust[2], LEAST_UPRIGHT)
     forward, left = lift * thrust[0] + drag[0], lift * thrust[1] + drag[1]
-    return c * forward - s * left, s * forward + c * left
+    return turned(forward, left, state.yaw)
 
 
 def axes_of(heading_rad: float) -> tuple[float, float]:
