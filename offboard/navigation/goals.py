@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from math import inf, isfinite
+from typing import Any
 
 from framerunner.geometry.vectors import Vec3
 from offboard.limits import CommandLimits
@@ -211,7 +212,8 @@ def style_of(limits: CommandLimits) -> FlightStyle:
         return contest + share * (bolder - contest)
 
     values = {each.name: getattr(CONTEST, each.name) for each in fields(FlightStyle)}
-    mixed = {name: between(value, getattr(_OPEN, name)) for name, value in values.items() if isfinite(value)}
+    finite = {name: value for name, value in values.items() if isfinite(value)}
+    mixed: dict[str, Any] = {name: between(value, getattr(_OPEN, name)) for name, value in finite.items()}
     style = replace(CONTEST, **mixed)
     command_share = between(COMMAND_SHARE, BOLD_COMMAND_SHARE)
     headroom = between(HEADROOM, BOLD_HEADROOM)
@@ -246,7 +248,7 @@ class Motion:
         if rate == 1.0 and change_per_s == 0.0:
             return self
         (vx, vy, vz), (ax, ay, az) = self.velocity_m_s, self.acceleration_m_s2
-        square, turn, more = rate * rate, self.yaw_rate_rad_s, change_per_s
+        square, turn = rate * rate, self.yaw_rate_rad_s
         return Motion(
             self.position_m,
             (rate * vx, rate * vy, rate * vz),
