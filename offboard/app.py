@@ -10,13 +10,11 @@ from math import isfinite
 from typing import Literal
 
 from offboard.abort import FlightAbort
-from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
+from offboard.drone import Drone, DroneError, DroneState, LimitedCommand, VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
-from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError
-from offboard.limits import CONTEST, CommandLimits
+from offboard.limits import CONTEST, STILL, CommandLimits
 from offboard.mission import Mission
-from offboard.navigation.surroundings import Surroundings
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import NavigationView, Surroundings
 from offboard.perception import CameraLostError, CameraSilentError, Perception
 from offboard.pilot import Imu
 from offboard.safety.operator import GO_WORDS
@@ -25,10 +23,11 @@ from vision.types import Detections
 
 INTERRUPTED = "interrupted"
 MICROSECONDS = 1_000_000
-STILL = VelocityCommand()
 NAVIGATION_US = 200_000  # vehicle time between two views of the navigator's map
 CAMERA_WAIT_US = 4 * MICROSECONDS  # for which a mission with a map hovers when there are no images
 REST_US = 3 * MICROSECONDS  # time to fall onto the base, and for telemetry to show the drone at rest
+NO_COMMAND = LimitedCommand(STILL)
+MAX_STEP_US = 200_000  # counted between two ticks
 GO_LIMIT_US = 600 * MICROSECONDS  # vehicle time for which an operator's go is waited for
 
 
@@ -38,8 +37,8 @@ class Moment:
 
     Attributes:
         remark: in a pause, why the mission did not continue when the pilot last gave the drone back;
-            otherwise how the mission's command was changed to keep the drone in its box, or that it hovers
-            because there are no images; empty if it flies as commanded.
+            otherwise how box and caps have limited the mission's command, or that it hovers because there are
+            no images; empty if it flies as commanded.
         navigation: the navigator's map and plan, renewed five times a second; None without a navigator.
     """
 
@@ -86,7 +85,6 @@ async def fly_mission(
     *,
     limit_s: float = 180.0,
     observer: Observer | None = None,
-    box: Box | None = None,
     limits: CommandLimits = CONTEST,
     surroundings: Surroundings | None = None,
     before_tick: TickHook | None = None,
@@ -104,8 +102,7 @@ async def fly_mission(
         mission: checked.
         limit_s: vehicle time from motors on, seconds.
         observer: called at every tick; must be quick.
-        box: keeps the drone inside, whatever the mission commands; None: it may fly anywhere.
-        limits: of the mission's commands.
+        limits: of the mission's commands, with which it plans; the drone limits what it is sent by itself.
         surroundings: what is known of the arena; a mission with `vision: frames` needs it.
         before_tick: see `TickHook`; None costs nothing.
         safety: how the flight ends if it is aborted, and the operator who gives the go and may stop it.
@@ -114,10 +111,9 @@ async def fly_mission(
         DroneError: the drone cannot be reached or is not ready.
         CameraLostError: the camera gives no image at the start.
     """
-    keeper = None if box is None else KeepInBox(box)
     engine = MissionEngine(mission, surroundings=surroundings, limits=limits)
     flight = _Flight(
-        drone, perception, engine, limit_s, observer, keeper=keeper, before_tick=before_tick, safety=safety
+        drone, perception, engine, limit_s, observer, limits=limits, before_tick=before_tick, safety=safety
     )
     try:
         await drone.connect()
@@ -129,48 +125,38 @@ async def fly_mission(
         await drone.close()
 
 
+@dataclass(slots=True)
 class _Flight:
-    """One flight in progress."""
+    """One flight in progress; the first fields are as for `fly_mission`."""
 
-    def __init__(
-        self,
-        drone: Drone,
-        perception: Perception,
-        engine: MissionEngine,
-        limit_s: float,
-        observer: Observer | None,
-        *,
-        keeper: KeepInBox | None,
-        before_tick: TickHook | None,
-        safety: SafetyRules,
-    ) -> None:
-        self._safety = safety
-        self._operator = safety.operator
-        self._drone = drone
-        self._perception = perception
-        self._engine = engine
-        self._limit_us = round(limit_s * MICROSECONDS)
-        self._observer = observer
-        self._keeper = keeper
-        self._before_tick = before_tick
-        self._flying = False
-        self._motors_requested = False
-        self._landed = False
-        self._first_us: int | None = None
-        self._started_us: int | None = None
-        self._now_us = 0
-        self._ticks = 0
-        self._sent: VelocityCommand | None = None
-        self._paused = False
-        self._silent_us: int | None = None
-        self._pauses = 0
-        self._remark = ""
-        self._navigation: NavigationView | None = None
-        self._navigation_us: int | None = None
+    drone: Drone
+    perception: Perception
+    engine: MissionEngine
+    limit_s: float
+    observer: Observer | None
+    limits: CommandLimits
+    before_tick: TickHook | None
+    safety: SafetyRules
+    flying: bool = False
+    motors_requested: bool = False
+    landed: bool = False
+    first_us: int | None = None
+    started_us: int | None = None
+    now_us: int = 0
+    ticks: int = 0
+    sent: VelocityCommand | None = None
+    kept_in_box_us: int = 0
+    commanded_us: int = 0
+    paused: bool = False
+    silent_us: int | None = None
+    pauses: int = 0
+    remark: str = ""
+    navigation: NavigationView | None = None
+    navigation_us: int | None = None
 
     async def run(self) -> MissionEnd:
         """Fly until the flight ends, for whatever reason."""
-        operator, task = self._operator, asyncio.current_task()
+        operator, task = self.safety.operator, asyncio.current_task()
         if operator is None or task is None:
             return await self._run()
         operator.on_first_stop(task.cancel)
@@ -186,7 +172,7 @@ class _Flight:
         try:
             await self._wait_for_go()
             timed_out = await self._fly()
-        except (DroneError, CameraLostError, MissionRunError, OutsideBoxError) as error:
+        except (DroneError, CameraLostError, MissionRunError) as error:
             return await self._stop("aborted", str(error))
         except asyncio.CancelledError:
             _uncancel()  # the outcome reports it
@@ -195,7 +181,7 @@ class _Flight:
             await self._stop("aborted", "unexpected error")
             raise
         if timed_out:
-            return await self._stop("timed out", f"not finished within {self._limit_us / MICROSECONDS:g} s")
+            return await self._stop("timed out", f"not finished within {self.limit_s:g} s")
         try:
             await self._observe_rest()
         except asyncio.CancelledError:  # what was flown is not lost; the motors are off already
@@ -206,12 +192,12 @@ class _Flight:
     @property
     def _interruption(self) -> str:
         """Who has cancelled the flight."""
-        operator = self._operator
+        operator = self.safety.operator
         return operator.stop_words if operator is not None and operator.stops else INTERRUPTED
 
     async def _wait_for_go(self) -> None:
         """Wait for the operator's go, while link and camera are watched."""
-        operator = self._operator
+        operator = self.safety.operator
         if operator is None:
             return
         operator.ask_for_go()
@@ -219,11 +205,11 @@ class _Flight:
             operator.phase = "flying"
             return
         operator.phase = "waiting"
-        ticks, began_us = self._drone.ticks(), None
+        ticks, began_us = self.drone.ticks(), None
         try:
             async for state in ticks:
-                if self._before_tick is not None:
-                    await self._before_tick(self._engine, state)
+                if self.before_tick is not None:
+                    await self.before_tick(self.engine, state)
                 if state.armed:
                     raise DroneError("the vehicle was armed by others while it waited for the go; disarm it")
                 if operator.has_go:
@@ -233,23 +219,23 @@ class _Flight:
                 if state.time_us - began_us > GO_LIMIT_US:
                     minutes = GO_LIMIT_US / MICROSECONDS / 60
                     raise DroneError(f"no go within {minutes:g} min; the checks are too old, so start again")
-                self._remark = f"{GO_WORDS}: {operator.hint}"
-                self._observe(state, STILL, self._perception.latest(state.time_us))
+                self.remark = f"{GO_WORDS}: {operator.hint}"
+                self._observe(state, NO_COMMAND, self.perception.latest(state.time_us))
         finally:
-            self._remark = ""
+            self.remark = ""
             await _close(ticks)
 
     async def _fly(self) -> bool:
         """Tick until the mission is finished; True if the time limit ended before."""
-        ticks = self._drone.ticks()
+        ticks = self.drone.ticks()
         try:
             async for state in ticks:
-                if self._before_tick is not None:
-                    await self._before_tick(self._engine, state)
+                if self.before_tick is not None:
+                    await self.before_tick(self.engine, state)
                 if self._update_time(state.time_us):
                     return True
                 await self._tick(state)
-                if self._engine.finished:
+                if self.engine.finished:
                     await self._stop_motors()
                     return False
         finally:
@@ -257,102 +243,96 @@ class _Flight:
         raise DroneError("the drone's ticks ended")
 
     async def _tick(self, state: DroneState) -> None:
-        if self._flying and (self._paused or not state.offboard) and await self._update_pause(state):
+        if self.flying and (self.paused or not state.offboard) and await self._update_pause(state):
             return
         try:
-            detections = self._perception.latest(state.time_us)
+            detections = self.perception.latest(state.time_us)
         except CameraSilentError as error:
             self._hover(state, error)
             return
-        if self._silent_us is not None:
-            self._silent_us, self._remark = None, ""
-        images = self._perception.take() if self._engine.has_navigator else ()
+        if self.silent_us is not None:
+            self.silent_us, self.remark = None, ""
+        images = self.perception.take() if self.engine.has_navigator else ()
         imu = Imu(state.x, state.y, state.z, state.yaw)
-        command = self._engine.tick(imu, detections, state.time_us, state, images=images, sent=self._sent)
-        if self._engine.has_navigator:
-            self._perception.space_images(self._engine.image_period_s)
-        command = self._kept_in_box(command, state)
-        motors_on = self._engine.pilot.cmd.on
-        switches = motors_on != self._flying
-        self._motors_requested = self._motors_requested or motors_on
-        if switches:  # this takes seconds; observers get the reason before
-            self._observe(state, command, detections)
-        if motors_on and not self._flying:
-            await self._drone.motors_on(confirmed=not self._engine.has_navigator)
-            self._flying = True
-            self._started_us = None  # counts from the next tick, the first with motors on
-        elif self._flying and not motors_on:
+        command = self.engine.tick(imu, detections, state.time_us, state, images=images, sent=self.sent)
+        if self.engine.has_navigator:
+            self.perception.space_images(self.engine.image_period_s)
+        motors_on = self.engine.pilot.cmd.on
+        self.motors_requested = self.motors_requested or motors_on
+        self.sent = None
+        if motors_on and self.flying:
+            limited = self._command(command, state)
+            self.sent = limited.command
+        else:
+            limited = LimitedCommand(self.limits.limited(command))
+        self._observe(state, limited, detections)
+        if motors_on and not self.flying:  # this takes seconds; observers have the reason already
+            await self.drone.motors_on(confirmed=not self.engine.has_navigator)
+            self.flying = True
+            self.started_us = None  # counts from the next tick, the first with motors on
+            self._command(command, state)
+        elif self.flying and not motors_on:
             await self._stop_motors()
-        if self._flying:
-            self._drone.command(command)
-        self._sent = command if self._flying and not switches else None  # none since the last tick
-        self._ticks += 1
-        if not switches:
-            self._observe(state, command, detections)
+        self.ticks += 1
 
     def _hover(self, state: DroneState, error: CameraSilentError) -> None:
         """Let the mission wait for an image, if it can: what is on a map stays known meanwhile."""
-        if not (self._flying and self._engine.has_navigator):
+        if not (self.flying and self.engine.has_navigator):
             raise error
-        if self._silent_us is None:
-            self._silent_us = state.time_us
+        if self.silent_us is None:
+            self.silent_us = state.time_us
             logger.warning("%s; the drone hovers", error)
-        if state.time_us - self._silent_us > CAMERA_WAIT_US:
+        if state.time_us - self.silent_us > CAMERA_WAIT_US:
             raise error
-        self._remark = f"hovers: no image for {error.age_s:.1f} s"
-        self._engine.pause(state.time_us)
-        self._sent = STILL
-        self._drone.command(STILL)
-        self._ticks += 1
-        self._observe(state, STILL, Detections())
+        self.remark = f"hovers: no image for {error.age_s:.1f} s"
+        self.engine.pause(state.time_us)
+        limited = self._command(STILL, state)
+        self.sent = limited.command
+        self.ticks += 1
+        self._observe(state, limited, Detections())
 
-    def _observe(self, state: DroneState, command: VelocityCommand, detections: Detections) -> None:
-        if self._observer is None:
+    def _command(self, command: VelocityCommand, state: DroneState) -> LimitedCommand:
+        """Let the drone fly a command, as far as its limits allow."""
+        limited = self.drone.command(command)
+        if limited.kept_in_box:
+            self.kept_in_box_us += min(state.time_us - self.commanded_us, MAX_STEP_US)
+        self.commanded_us = state.time_us
+        return limited
+
+    def _observe(self, state: DroneState, limited: LimitedCommand, detections: Detections) -> None:
+        if self.observer is None:
             return
-        engine, flight_time_s, remark = self._engine, self._flight_time_s(), self._remark
-        if self._flying and not self._paused and self._silent_us is None:
-            remark = "" if self._keeper is None else self._keeper.remark
-        self._observer(
+        engine = self.engine
+        self.observer(
             Moment(
                 state,
-                command,
+                limited.command,
                 detections,
                 mission_state=engine.state,
-                flight_time_s=flight_time_s,
+                flight_time_s=self._flight_time_s(),
                 transition=engine.transition,
-                paused=self._paused,
-                remark=remark,
+                paused=self.paused,
+                remark="; ".join(filter(None, (self.remark, limited.remark))),
                 navigation=self._navigation_at(state.time_us),
             )
         )
 
     def _navigation_at(self, time_us: int) -> NavigationView | None:
         """The navigator's map and plan, at most `NAVIGATION_US` old."""
-        made_us = self._navigation_us
+        made_us = self.navigation_us
         if made_us is None or time_us - made_us >= NAVIGATION_US:
-            self._navigation, self._navigation_us = self._engine.navigation, time_us
-        return self._navigation
-
-    def _kept_in_box(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
-        """The command limited to the box; the first change in a flight is logged."""
-        keeper = self._keeper
-        if keeper is None or not self._flying:
-            return command
-        first = not keeper.limited_us
-        kept = keeper.limit(command, state)
-        if first and keeper.remark:
-            logger.warning("%s (x %.1f, y %.1f, z %.1f m)", keeper.remark, state.x, state.y, state.z)
-        return kept
+            self.navigation, self.navigation_us = self.engine.navigation, time_us
+        return self.navigation
 
     async def _update_pause(self, state: DroneState) -> bool:
         """Start, continue or end a pause; True if the mission waits in this tick."""
-        if not self._paused:
-            self._paused = True
-            self._pauses += 1
-            self._remark = ""
+        if not self.paused:
+            self.paused = True
+            self.pauses += 1
+            self.remark = ""
             logger.info("paused: the pilot has the sticks (%s)", state.mode)
-        self._engine.pause(state.time_us)
-        self._sent = None
+        self.engine.pause(state.time_us)
+        self.sent = None
         if not state.armed:
             raise DroneError(
                 "the pilot landed and stopped the motors"
@@ -360,66 +340,66 @@ class _Flight:
                 else "the motors were stopped in the air while the pilot had the sticks"
             )
         try:
-            detections, camera_problem = self._perception.latest(state.time_us), ""
+            detections, camera_problem = self.perception.latest(state.time_us), ""
         except CameraLostError as error:  # a pilot can fly without it, and it may return
             detections, camera_problem = Detections(), str(error)
         if state.offboard:
-            self._remark = _why_not_continued(state) or camera_problem
-            if not self._remark:
-                self._paused = False
+            self.remark = _why_not_continued(state) or camera_problem
+            if not self.remark:
+                self.paused = False
                 logger.info("the pilot gave the drone back: the mission continues")
                 return False
-            logger.warning("the mission does not continue: %s", self._remark)
-            await self._drone.refuse()
-        self._ticks += 1
-        self._observe(state, STILL, detections)
+            logger.warning("the mission does not continue: %s", self.remark)
+            await self.drone.refuse()
+        self.ticks += 1
+        self._observe(state, NO_COMMAND, detections)
         return True
 
     def _update_time(self, time_us: int) -> bool:
         """Note the time; True past the limit, which counts from motors on; before, from the first tick."""
-        self._now_us = time_us
-        if self._first_us is None:
-            self._first_us = time_us
-        if self._flying and self._started_us is None:
-            self._started_us = time_us
-        since_us = self._first_us if self._started_us is None else self._started_us
-        return time_us - since_us > self._limit_us
+        self.now_us = time_us
+        if self.first_us is None:
+            self.first_us = time_us
+        if self.flying and self.started_us is None:
+            self.started_us = time_us
+        since_us = self.first_us if self.started_us is None else self.started_us
+        return time_us - since_us > round(self.limit_s * MICROSECONDS)
 
     async def _stop_motors(self) -> None:
         """Motors off or, if the mission says so or ends with motors on, land."""
-        if not self._flying:
+        if not self.flying:
             return
-        cmd = self._engine.pilot.cmd
-        self._flying = False
+        cmd = self.engine.pilot.cmd
+        self.flying = False
         if cmd.land or cmd.on:
-            await self._drone.land()
-            self._landed = True
+            await self.drone.land()
+            self.landed = True
         else:
-            await self._drone.motors_off()
+            await self.drone.motors_off()
 
     async def _observe_rest(self) -> None:
         """Observe for a while after motors off, for the records and for a referee that uses telemetry.
 
         A landing takes many seconds, in which no tick is observed; the time counts from its end.
         """
-        ticks = self._drone.ticks()
-        end_us = None if self._landed else self._now_us + REST_US
+        ticks = self.drone.ticks()
+        end_us = None if self.landed else self.now_us + REST_US
         try:
             async for state in ticks:
-                if self._before_tick is not None:
-                    await self._before_tick(self._engine, state)
+                if self.before_tick is not None:
+                    await self.before_tick(self.engine, state)
                 if end_us is None:
                     end_us = state.time_us + REST_US
-                if self._observer is not None:
-                    since_us = state.time_us if self._started_us is None else self._started_us
-                    self._observer(
+                if self.observer is not None:
+                    since_us = state.time_us if self.started_us is None else self.started_us
+                    self.observer(
                         Moment(
                             state,
                             STILL,
                             Detections(),
-                            mission_state=self._engine.state,
+                            mission_state=self.engine.state,
                             flight_time_s=(state.time_us - since_us) / MICROSECONDS,
-                            navigation=self._navigation,
+                            navigation=self.navigation,
                         )
                     )
                 if state.time_us >= end_us:
@@ -431,29 +411,29 @@ class _Flight:
 
     async def _stop(self, ended: Literal["timed out", "aborted"], reason: str) -> MissionEnd:
         """Stop commanding, and hold or land."""
-        if gone := self._drone.gone:
+        if gone := self.drone.gone:
             logger.warning("the flight ends: %s", gone)
             return self._outcome("aborted", gone)
-        if self._motors_requested:
-            self._flying = False
-            operator = self._operator
+        if self.motors_requested:
+            self.flying = False
+            operator = self.safety.operator
             if operator is not None and operator.needs_go and not operator.stops:
                 logger.warning("the flight is aborted: %s; SPACE lands, then K stops the motors", reason)
 
             def see(state: DroneState) -> None:
-                self._observe(state, STILL, Detections())
+                self._observe(state, NO_COMMAND, Detections())
 
-            more = await FlightAbort(self._drone, self._safety, see).bring_down()
+            more = await FlightAbort(self.drone, self.safety, see).bring_down()
             reason = f"{reason}; {more}" if more else reason
         return self._outcome(ended, reason)
 
     def _outcome(self, ended: Literal["finished", "timed out", "aborted"], reason: str) -> MissionEnd:
-        state, flight_time_s = self._engine.state, self._flight_time_s()
-        kept_s = 0.0 if self._keeper is None else self._keeper.limited_us / MICROSECONDS
-        return MissionEnd(ended, reason, state, flight_time_s, self._ticks, self._pauses, kept_s)
+        state, flight_time_s = self.engine.state, self._flight_time_s()
+        kept_s = self.kept_in_box_us / MICROSECONDS
+        return MissionEnd(ended, reason, state, flight_time_s, self.ticks, self.pauses, kept_s)
 
     def _flight_time_s(self) -> float:
-        return 0.0 if self._started_us is None else (self._now_us - self._started_us) / MICROSECONDS
+        return 0.0 if self.started_us is None else (self.now_us - self.started_us) / MICROSECONDS
 
 
 def _why_not_continued(state: DroneState) -> str:

@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from enum import Enum
 from math import isfinite, isnan
-from typing import Protocol
+from typing import Literal, Protocol
 
 from framerunner.errors import UserError
 from framerunner.geometry.vectors import Quaternion
@@ -72,6 +72,42 @@ class VelocityCommand:
         return not isnan(self.forward_m_s + self.left_m_s + self.up_m_s + self.yaw_rate_rad_s)
 
 
+LimitName = Literal["class", "box", "cap"]
+
+
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """What a limit has changed in a command.
+
+    Attributes:
+        limit: that of the mission's class, the box, or a cap on a drone that may be real.
+        quantity: such as "level speed".
+        words: what was changed and why, for people.
+    """
+
+    limit: LimitName
+    quantity: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class LimitedCommand:
+    """A command within all limits, and what they have changed in it, in their order."""
+
+    command: VelocityCommand
+    clips: tuple[Clip, ...] = ()
+
+    @property
+    def kept_in_box(self) -> bool:
+        """Whether the box has changed it."""
+        return any(clip.limit == "box" for clip in self.clips)
+
+    @property
+    def remark(self) -> str:
+        """What the box and the caps have changed, for people; empty if nothing."""
+        return "; ".join(dict.fromkeys(clip.words for clip in self.clips if clip.limit != "class"))
+
+
 class Drone(Protocol):
     """A vehicle. All coroutines raise `DroneError` with a reason when the vehicle does not comply.
 
@@ -135,8 +171,16 @@ class Drone(Protocol):
     async def refuse(self) -> None:
         """Let the vehicle that a pilot gave back hold, and wait until it is given back again."""
 
-    def command(self, command: VelocityCommand) -> None:
-        """Set the velocity to fly from now on. Never blocks."""
+    def command(self, command: VelocityCommand) -> LimitedCommand:
+        """Set the velocity to fly from now on. Never blocks.
+
+        Returns:
+            The velocity that is sent, by the adapter's `VelocityLimits`; zero if none is flown now.
+
+        Raises:
+            OutsideBoxError: the drone has left its box and does not come back.
+        """
+        ...
 
     async def close(self) -> None:
         """Release the vehicle."""

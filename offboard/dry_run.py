@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from dataclasses import replace
 
-from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityCommand
 from offboard.mavsdk_drone import MavsdkDrone
 
 
@@ -55,10 +55,12 @@ class DryRunDrone(MavsdkDrone):
     async def refuse(self) -> None:
         """Nobody gives the vehicle back."""
 
-    def command(self, command: VelocityCommand) -> None:
+    def command(self, command: VelocityCommand) -> LimitedCommand:
         """Send the setpoint that would be flown."""
+        limited = self._limits.limit(command, self._latest)
         if self._runs:
-            self._send(command if self._caps is None else self._caps.limit(command, self._latest))
+            self._send(limited.command)
+        return limited
 
     async def close(self) -> None:
         """Leave offboard and close."""

@@ -21,8 +21,7 @@ from offboard.chart.spec import Action, Leaf, enter_state, state_path
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
-from offboard.navigation.surroundings import Surroundings
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import NavigationView, Surroundings
 from offboard.observation import ChartNow, check_change, guards_now, read_values, values_now
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
 from offboard.pilot_file import PilotFile, in_words, is_interrupt, place_in
@@ -82,7 +81,7 @@ class MissionEngine:
         pilot: by default a new one of the mission's class.
         surroundings: what is known of the arena before the flight; a mission with `vision: frames` needs it.
         quiet_ticks: do not send the chart the ticks that change nothing.
-        limits: of the commands.
+        limits: of the commands, with which it plans.
 
     Attributes:
         state: full id of the present state, such as "red.turning"; empty before the first tick.
@@ -103,7 +102,6 @@ class MissionEngine:
         self.mission = mission
         self.pilot = mission.new_pilot() if pilot is None else pilot
         self.pilot.limits = limits
-        self._limits = limits
         self._states = _fast_states(mission)
         self._quiet_ticks = quiet_ticks
         self._navigator = _new_navigator(mission, surroundings, limits)
@@ -157,7 +155,8 @@ class MissionEngine:
             sent: the command that it has had since the last tick; None if it had none, or it is not known.
 
         Returns:
-            The velocity to fly from now on, within the limits. `pilot.cmd.on` says whether motors must run.
+            The velocity that the mission wants from now on, not limited yet; `pilot.cmd.on` says whether the
+            motors must run.
 
         Raises:
             MissionRunError: a value that is not finite, a clock that runs backwards, an error in the chart.
@@ -183,7 +182,7 @@ class MissionEngine:
                 self._paused_us is not None and self._resume(self._present, self._paused_us, time_us)
             ):
                 self._step(self._present, time_us)
-            return velocity_command(pilot.cmd, self._limits)
+            return velocity_command(pilot.cmd)
         except PilotError as error:
             raise self._error(str(error)) from None
         except MissionRunError:

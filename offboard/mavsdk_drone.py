@@ -15,8 +15,8 @@ from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
 from framerunner.geometry.axes import Alignment, Pose
 from framerunner.wire.transports.urls import parse_url
-from offboard.drone import DroneError, DroneState, ResponsePrior, VelocityCommand
-from offboard.keep_in_box import Box, confine
+from offboard.drone import DroneError, DroneState, LimitedCommand, ResponsePrior, VelocityCommand
+from offboard.limits import STILL, VelocityLimits
 from offboard.link.autopilots import open_dialect
 from offboard.link.companion import Companion
 from offboard.link.connections import check_is_free, new_mavsdk, open_connections
@@ -38,7 +38,6 @@ from offboard.link.ticks import (
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
-from offboard.safety.caps import CapKeeper, Caps
 from offboard.safety.rules import AbortAction
 
 STAND_STILL_S = 0.5  # wall time without a tick after which a velocity of zero is sent
@@ -71,9 +70,8 @@ class MavsdkDrone:
         connect_limit_s: wall time to find the vehicle.
         ready_limit_s: wall time until it can be armed; None: the autopilot's usual one.
         guard: ends a hung app; closed here only if it was not given.
-        box: commands that were corrected here do not leave it; None: there is none.
+        limits: of each command that is sent; None: there are none.
         corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
-        caps: no command exceeds them, and none leads out of the box; None: there are none.
         system_id: of the vehicle that was checked, by MAVLink; no other one is flown. None: any.
         when_hung: what is requested for a vehicle in offboard when this app hangs.
 
@@ -92,9 +90,8 @@ class MavsdkDrone:
         connect_limit_s: float = 10.0,
         ready_limit_s: float | None = None,
         guard: ProcessGuard | None = None,
-        box: Box | None = None,
+        limits: VelocityLimits | None = None,
         corrects: bool = True,
-        caps: Caps | None = None,
         system_id: int | None = None,
         when_hung: AbortAction = "hold",
     ) -> None:
@@ -128,8 +125,7 @@ class MavsdkDrone:
         self._watchdog = Watchdog(self._stand_still, self._stop_from_watchdog, self._guard)
         self._when_hung, self._asked_when_hung = when_hung, "stopped sending"
         self._shared_with: list[str] = []
-        self._box = box
-        self._caps = None if caps is None else CapKeeper(caps, box)
+        self._limits = limits or VelocityLimits()
 
     def record_to(self, path: Path) -> None:
         """Record all MAVLink traffic as a tlog from `connect` to `close`."""
@@ -185,7 +181,8 @@ class MavsdkDrone:
                 component.announce(system_id)
         self._telemetry = TelemetryAsync(system)
         self._direct = MavlinkDirectAsync(system)
-        room_m = inf if self._box is None else self._box.high_m[2] - self._start_arena.position_m[2]
+        box = self._limits.box
+        room_m = inf if box is None else box.high_m[2] - self._start_arena.position_m[2]
         steps = self._ticks.steps
         self._dialect = new = await open_dialect(system, self._direct, self._feed, room_m, stepped=steps)
         self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct), new.kind.numbered_modes)
@@ -387,21 +384,19 @@ class MavsdkDrone:
             "setpoints have ended, so the vehicle's failsafe for that has to act"
         )
 
-    def command(self, command: VelocityCommand) -> None:
+    def command(self, command: VelocityCommand) -> LimitedCommand:
         """Set the velocity to fly; ignored without motors on, or while a pilot has the vehicle."""
         latest = self._latest
         if not self._commanding:
-            return
+            return LimitedCommand(STILL)
         if self._pilot_has_it:
             if latest is None or not latest.offboard:
-                return
+                return LimitedCommand(STILL)
             self._pilot_has_it = False
             self._tracker.reset()  # the vehicle was moved by others
-        if latest is not None and self._corrects:
-            command = self._tracker.correct(command, latest)
-            if self._box is not None:
-                command, _ = confine(command, latest, self._box)
-        self._send(command if self._caps is None else self._caps.limit(command, latest))
+        limited = self._limits.limit(command, latest, self._tracker.correct if self._corrects else None)
+        self._send(limited.command)
+        return limited
 
     async def close(self) -> None:
         """End all commanding, let a disarmed vehicle hold and, without a companion, disconnect."""

@@ -9,7 +9,7 @@ up and yaw rate to the left.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, isfinite, isnan, sin, sqrt
+from math import isfinite, isnan, sqrt
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,9 +17,9 @@ from pydantic import Field
 from pydantic.config import JsonDict
 
 from framerunner.errors import UserError
-from framerunner.geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import VelocityCommand
-from offboard.limits import CONTEST, CommandLimits, clamped
+from offboard.limits import CONTEST, CommandLimits
 from scenarios.models import COLOURS, Colour
 from vision.types import Detection, Detections
 
@@ -174,9 +174,8 @@ class Pilot:
         x_m_s, y_m_s, up_m_s = (x - imu.x) / 2, (y - imu.y) / 2, (z - imu.z) / 2
         speed = sqrt(x_m_s**2 + y_m_s**2 + up_m_s**2)
         scale = FLY_M_S / speed if speed > FLY_M_S else 1.0
-        cos_yaw, sin_yaw = cos(imu.yaw), sin(imu.yaw)
-        cmd.vel_x = scale * (cos_yaw * x_m_s + sin_yaw * y_m_s)
-        cmd.vel_y = scale * (cos_yaw * y_m_s - sin_yaw * x_m_s)
+        forward_m_s, left_m_s = turned(x_m_s, y_m_s, -imu.yaw)
+        cmd.vel_x, cmd.vel_y = scale * forward_m_s, scale * left_m_s
         cmd.vel_z = scale * up_m_s
 
     def look_to_frame(self) -> None:
@@ -235,22 +234,21 @@ class Pilot:
         cmd.rot_z = command.yaw_rate_rad_s
 
 
-def velocity_command(cmd: Command, limits: CommandLimits = CONTEST) -> VelocityCommand:
-    """The command as it may be flown: each rate within the limits.
+def velocity_command(cmd: Command) -> VelocityCommand:
+    """The command as a velocity, not limited yet.
 
-    An infinite rate becomes the limit, as in the paper's stabiliser: its navigator commands infinite speed
-    ahead when it loses a frame while shifting, and then flies 1 m/s forward. That is a known fault of that
-    navigator, reproduced here.
+    A rate may be infinite, and is then limited as in the paper's stabiliser: its navigator commands infinite
+    speed ahead when it loses a frame while shifting, and then flies 1 m/s forward. That is a known fault of
+    that navigator, reproduced here.
 
     Raises:
         PilotError: a rate is no number.
     """
-    forward_m_s, left_m_s = limits.level(_number("vel_x", cmd.vel_x), _number("vel_y", cmd.vel_y))
     return VelocityCommand(
-        forward_m_s,
-        left_m_s,
-        clamped(_number("vel_z", cmd.vel_z), limits.down_m_s, limits.up_m_s),
-        clamped(_number("rot_z", cmd.rot_z), limits.yaw_rate_rad_s, limits.yaw_rate_rad_s),
+        _number("vel_x", cmd.vel_x),
+        _number("vel_y", cmd.vel_y),
+        _number("vel_z", cmd.vel_z),
+        _number("rot_z", cmd.rot_z),
     )
 
 

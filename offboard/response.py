@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import cos, exp, pi, remainder, sin
+from math import exp, pi, remainder
 
 import numpy as np
 from numpy.typing import NDArray
 
-from framerunner.geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import DroneState, ResponsePrior, VelocityCommand
 from offboard.second_lag import LAG_S as OWN_LAG_S
 from offboard.second_lag import SecondLag
@@ -339,8 +339,7 @@ class ResponseEstimate:
             return (slow.share * x + rest_x, slow.share * y + rest_y, up)
         if not self._turning:
             return (x, y, up)
-        c, s = cos(self._yaw), sin(self._yaw)
-        return (c * forward - s * left, s * forward + c * left, up)
+        return (*turned(forward, left, self._yaw), up)
 
     def predict(self) -> Prediction:
         """What the vehicle will do by the commands of all ticks so far."""
@@ -378,15 +377,12 @@ class ResponseEstimate:
 
 def _in_all_axes(command: VelocityCommand, yaw_rad: float) -> tuple[float, ...]:
     forward, left = command.forward_m_s, command.left_m_s
-    c, s = cos(yaw_rad), sin(yaw_rad)
-    x, y = c * forward - s * left, s * forward + c * left
-    return (x, y, forward, left, command.up_m_s, command.yaw_rate_rad_s)
+    return (*turned(forward, left, yaw_rad), forward, left, command.up_m_s, command.yaw_rate_rad_s)
 
 
 def _measured(state: DroneState, turn_rate_rad_s: float) -> tuple[float, ...]:
     x, y, up = state.velocity_arena_m_s
-    c, s = cos(state.yaw), sin(state.yaw)
-    return (x, y, c * x + s * y, c * y - s * x, up, turn_rate_rad_s)
+    return (x, y, *turned(x, y, -state.yaw), up, turn_rate_rad_s)
 
 
 def _vector(values: Array) -> Vec3:

@@ -29,7 +29,7 @@ from offboard.navigation.exploration import Explorer
 from offboard.navigation.frames.frame_map import FrameMap
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.pose_history import PoseHistory
-from offboard.navigation.search.glimpses import Glimpses
+from offboard.navigation.search.likelihood import Glimpses
 from scenarios.loader import load_scenario
 from scenarios.random_scenarios import load_level
 from sitl.sensors.suite import load_suite

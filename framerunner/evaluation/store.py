@@ -21,7 +21,7 @@ from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
 from framerunner.files.text_file import replace_file
 from framerunner.runs.track import Track
-from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.view import FrameEstimate
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 

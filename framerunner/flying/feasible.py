@@ -65,7 +65,7 @@ def feasible_path(plan: FlightPlan, mission_class: MissionClass) -> Path | Refus
     return plan_path(
         Motion((x_m, y_m, z_m), yaw_rad=yaw_rad),
         [*gates, Point((base.x_m, base.y_m, stop_m))],
-        obstacles=Obstacles((*gates, *decoys), columns, base, plan.lift_m),
+        obstacles=Obstacles((*gates, *decoys), columns, base),
         arena=scenario.arena,
         style=_style(plan, mission_class),
     )

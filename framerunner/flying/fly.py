@@ -85,7 +85,6 @@ async def fly(
         plan.chart,
         limit_s=plan.limit_s,
         observer=observe,
-        box=plan.box,
         limits=plan.command_limits,
         surroundings=plan.surroundings,
         before_tick=before_tick,

@@ -25,7 +25,6 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import LateResponse
 from offboard.app import Observer, TickHook
 from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraSilentError, ImageChoice
-from offboard.safety.caps import CapKeeper
 from offboard.safety.rules import SIMULATED, SafetyRules
 from scenarios.models import Scenario, TrueState
 from scenarios.result import FaultFacts, RefereeReport
@@ -122,7 +121,7 @@ class LockstepVehicle:
             plan.start_pose,
             observers=(*observers, self.perception.follow),
             response=None if plan.response is None else LateResponse(plan.response, plan.seed or 0),
-            caps=None if plan.caps is None else CapKeeper(plan.caps, plan.box),
+            limits=plan.velocity_limits(),
         )
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
-from math import degrees, isfinite, pi, radians
+from math import degrees, pi, radians
 from struct import Struct
 
 from firmware_py.autopilot import Autopilot
@@ -26,9 +26,9 @@ from framerunner.geometry.axes import Alignment, Pose
 from framerunner.geometry.rotations import normalized, quaternion_from_euler
 from framerunner.geometry.vectors import Vec3
 from offboard.arming import Arming
-from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityCommand
+from offboard.limits import STILL, VelocityLimits
 from offboard.link.gimbal import GimbalAttitude
-from offboard.safety.caps import CapKeeper
 from scenarios.models import TrueState
 from sitl.faults.link import LinkFault, Way
 from sitl.payload.gimbal import SimulatedGimbal
@@ -95,7 +95,7 @@ class LockstepDrone:
         observers: called with the true state of every control tick.
         telemetry_delay_us: see `TELEMETRY_DELAY_US`; ValueError if not below the 50 ms between ticks.
         response: the vehicle answers late; None: as its autopilot does.
-        caps: applied to each command; None: there are none.
+        limits: of each command that is sent; None: there are none.
     """
 
     gone = ""
@@ -108,7 +108,7 @@ class LockstepDrone:
         observers: Sequence[TruthObserver] = (),
         telemetry_delay_us: int = TELEMETRY_DELAY_US,
         response: LateResponse | None = None,
-        caps: CapKeeper | None = None,
+        limits: VelocityLimits | None = None,
     ) -> None:
         if not 0 <= telemetry_delay_us < TICK_US:
             raise ValueError(f"telemetry_delay_us {telemetry_delay_us}: must be from 0 to below {TICK_US}")
@@ -118,7 +118,7 @@ class LockstepDrone:
         self._observers = tuple(observers)
         self._delay_us = telemetry_delay_us
         self._response = response
-        self._caps = caps
+        self._limits = limits or VelocityLimits()
         self._latest: DroneState | None = None
         self._alignment: Alignment | None = None
         self._heartbeat_us = 0
@@ -178,8 +178,7 @@ class LockstepDrone:
                 raise DroneError("link lost: the vehicle's clock stands still")
             self._advance(lost_us)
         self._pass(self._delay_us)
-        vx, vy, vz = state.velocity_arena_m_s
-        if not isfinite(state.x + state.y + state.z + state.yaw + vx + vy + vz + sum(state.attitude_arena)):
+        if not state.is_finite:
             raise DroneError("the vehicle's position, velocity or attitude is not finite")
         if self._commanding and self._arming.is_overdue(state.time_us):
             raise _not_shown("arming", self._mode, self._arming, self._autopilot)
@@ -245,11 +244,13 @@ class LockstepDrone:
 
     refuse = hold  # no pilot takes this drone, so none gives it back
 
-    def command(self, command: VelocityCommand) -> None:
+    def command(self, command: VelocityCommand) -> LimitedCommand:
         """Set the velocity to fly from now on. Without motors on it is ignored."""
         if not self._commanding:
-            return
-        self._send(command if self._caps is None else self._caps.limit(command, self._latest))
+            return LimitedCommand(STILL)
+        limited = self._limits.limit(command, self._latest)
+        self._send(limited.command)
+        return limited
 
     async def close(self) -> None:
         """Stop commanding."""

@@ -7,8 +7,7 @@ from math import isfinite
 from typing import Any
 
 from offboard.app import Moment
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import FrameEstimate, NavigationView
 
 PERIOD_US = 500_000  # of vehicle time between two documents
 MAX_FRAMES = 24  # of a map: with the path some 1.5 kB compressed

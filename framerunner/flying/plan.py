@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from framerunner.flying.response import Response
 from framerunner.vehicle.airframe import Airframe, load_airframe
-from offboard.keep_in_box import Box, flight_box
-from offboard.limits import CONTEST, CommandLimits
-from offboard.navigation.surroundings import Surroundings
-from offboard.safety.caps import Caps
+from offboard.limits import CONTEST, Box, Caps, CommandLimits, VelocityLimits, flight_box
+from offboard.navigation.view import Surroundings
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Camera, Scenario, start_position
 from scenarios.part import Part
@@ -97,12 +95,12 @@ class FlightPlan:
     @property
     def surroundings(self) -> Surroundings:
         """What a navigator knows before the flight: all but the layout."""
-        layout, envelope_m, camera = self.layout, self.airframe.envelope_m, self.camera
+        layout, camera = self.layout, self.camera
         if not layout.frames:
-            return Surroundings(layout.arena, layout.base, camera, envelope_m)
+            return Surroundings(layout.arena, layout.base, camera)
         frame = layout.frames[0]  # all are of one size, which the rules tell
         size_m = (frame.outer_width_m, frame.outer_height_m)
-        return Surroundings(layout.arena, layout.base, camera, envelope_m, size_m, frame.bar_m)
+        return Surroundings(layout.arena, layout.base, camera, size_m, frame.bar_m)
 
     @property
     def camera(self) -> Camera:
@@ -135,6 +133,12 @@ class FlightPlan:
         if self.mission is None or self.mission.mission_class == "contest":
             return CONTEST
         return self.drone_limits or airframe_limits(self.airframe)
+
+    def velocity_limits(self) -> VelocityLimits:
+        """What limits the velocities of one flight; an agent's are limited by its actions, and by caps."""
+        if self.mission is None:
+            return VelocityLimits(caps=self.caps)
+        return VelocityLimits(self.command_limits, self.box, self.caps)
 
     @property
     def corrects_commands(self) -> bool:

@@ -271,9 +271,8 @@ class _RealTimeFlight:
             vehicle.drone_url,
             start_arena=plan.start_pose,
             guard=guard,
-            box=plan.box,
+            limits=plan.velocity_limits(),
             corrects=plan.corrects_commands,
-            caps=plan.caps,
             system_id=system_id,
             when_hung=safety.abort,
         )

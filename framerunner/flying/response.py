@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import cos, exp, sin, tau
+from math import cos, exp, tau
 from random import Random
 
-from framerunner.geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.vectors import ZERO3, Vec3, turned
 
 WANDER_PERIODS_S = (8.0, 15.0)
 """Between these, each of the two sine waves of the height has its period."""
@@ -72,8 +72,7 @@ class LateResponse:
             time_us: vehicle time now.
         """
         forward, right, down = velocity_level_m_s
-        c, s = cos(yaw_rad), sin(yaw_rad)
-        velocity_ned_m_s = (c * forward - s * right, s * forward + c * right, down)
+        velocity_ned_m_s = (*turned(forward, right, yaw_rad), down)
         self._waiting.append((time_us + self._dead_us, velocity_ned_m_s, yaw_rate_rad_s))
 
     def step(self, yaw_rad: float, time_us: int, *, airborne: bool) -> tuple[Vec3, float]:
@@ -92,8 +91,7 @@ class LateResponse:
         if airborne:
             time_s = time_us * 1e-6
             down += sum([m_s * cos(rate * time_s + phase) for m_s, rate, phase in self._waves])
-        c, s = cos(yaw_rad), sin(yaw_rad)
-        return (c * north + s * east, c * east - s * north, down), turn
+        return (*turned(north, east, -yaw_rad), down), turn
 
     def reset(self) -> None:
         """Forget all commands: commanding has ended."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import nan
+from math import cos, nan, sin
 
 Vec3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -10,3 +10,13 @@ Quaternion = tuple[float, float, float, float]
 
 NAN3: Vec3 = (nan, nan, nan)
 ZERO3: Vec3 = (0.0, 0.0, 0.0)
+
+
+def turned(x: float, y: float, angle_rad: float) -> tuple[float, float]:
+    """A vector in plan, turned from its first axis towards the second one.
+
+    By a heading, a vector of level axes becomes one of the axes that the heading is in; by the heading's
+    negative, back.
+    """
+    c, s = cos(angle_rad), sin(angle_rad)
+    return c * x - s * y, s * x + c * y

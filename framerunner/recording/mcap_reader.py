@@ -42,8 +42,7 @@ from framerunner.runs.run_files import RESULT
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import FrameEstimate, NavigationView
 from scenarios.result import FlightResult, ResultError
 from vision.jpeg import JPEG_START, MAX_PIXELS, ImageError, jpeg_structure
 from vision.types import Detection, Detections, Image

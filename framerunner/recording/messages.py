@@ -17,8 +17,7 @@ from framerunner.geometry.vectors import Quaternion, Vec3
 from framerunner.vehicle.airframe import load_airframe
 from offboard.app import Moment
 from offboard.drone import DroneState
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import FrameEstimate, NavigationView
 from scenarios.imaging.effects import Lens
 from scenarios.models import COLOURS, Arena, Scenario
 from sitl.solids import frame_solids

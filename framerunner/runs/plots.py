@@ -22,7 +22,7 @@ from matplotlib.ticker import MaxNLocator
 from framerunner.geometry.vectors import Vec3
 from framerunner.runs import PlotError, check_plot_format
 from framerunner.runs.track import Track
-from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.view import FrameEstimate
 from scenarios.models import Frame, Scenario, UprightFrame, start_position
 from scenarios.result import FlightResult
 

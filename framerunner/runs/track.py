@@ -11,7 +11,7 @@ from math import isfinite
 from framerunner.geometry.vectors import Vec3
 from offboard.app import Moment
 from offboard.engine import TransitionTaken
-from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.view import FrameEstimate
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from collections import deque
 from dataclasses import dataclass
 from math import cos, exp, hypot, pi, remainder, sin
 
-from framerunner.geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import DroneState, VelocityCommand
 
 MODEL_LAG_S = 0.15  # as of the simulated drone
@@ -131,7 +131,7 @@ class CommandTracker:
         return self._sent
 
     def _measure_lags(self, sent: VelocityCommand, model: _Model, state: DroneState, step_s: float) -> None:
-        commanded = (*_turned(sent.forward_m_s, sent.left_m_s, state.yaw), sent.up_m_s, sent.yaw_rate_rad_s)
+        commanded = (*turned(sent.forward_m_s, sent.left_m_s, state.yaw), sent.up_m_s, sent.yaw_rate_rad_s)
         measured = (*state.velocity_arena_m_s, model.measured_yaw_rate_rad_s)
         for lag, command, speed in zip(self._lags, commanded, measured, strict=True):
             lag.update(command, speed, step_s)
@@ -141,7 +141,7 @@ def _advance(model: _Model, commanded: VelocityCommand, state: DroneState, step_
     """Fly the model by the command of the last step, at most MAX_OFFSET_M away from the vehicle."""
     speed_m_s = hypot(commanded.forward_m_s, commanded.left_m_s, commanded.up_m_s)
     model.recent_speed_m_s = max(speed_m_s, exp(-step_s / SPEED_MEMORY_S) * model.recent_speed_m_s)
-    wanted_x, wanted_y = _turned(commanded.forward_m_s, commanded.left_m_s, state.yaw)
+    wanted_x, wanted_y = turned(commanded.forward_m_s, commanded.left_m_s, state.yaw)
     x_m, velocity_x = _lag_step(model.velocity_m_s[0], wanted_x, step_s)
     y_m, velocity_y = _lag_step(model.velocity_m_s[1], wanted_y, step_s)
     z_m, velocity_z = _lag_step(model.velocity_m_s[2], commanded.up_m_s, step_s)
@@ -167,11 +167,6 @@ def _lag_step(speed: float, wanted: float, step_s: float) -> tuple[float, float]
     return wanted * step_s + (speed - wanted) * MODEL_LAG_S * (1.0 - kept), wanted + kept * (speed - wanted)
 
 
-def _turned(forward: float, left: float, yaw_rad: float) -> tuple[float, float]:
-    c, s = cos(yaw_rad), sin(yaw_rad)
-    return c * forward - s * left, s * forward + c * left
-
-
 def _forget_across(
     offset_m: tuple[float, float], commanded_m_s: tuple[float, float], yaw_rad: float, kept: float
 ) -> tuple[float, float]:
@@ -183,7 +178,7 @@ def _forget_across(
     speed_m_s = hypot(*commanded_m_s)
     if speed_m_s < HOVER_M_S:
         return offset_m
-    along_x, along_y = _turned(commanded_m_s[0] / speed_m_s, commanded_m_s[1] / speed_m_s, yaw_rad)
+    along_x, along_y = turned(commanded_m_s[0] / speed_m_s, commanded_m_s[1] / speed_m_s, yaw_rad)
     along_m = offset_m[0] * along_x + offset_m[1] * along_y
     return (
         along_m * along_x + kept * (offset_m[0] - along_m * along_x),
@@ -194,7 +189,7 @@ def _forget_across(
 def _corrected(
     command: VelocityCommand, model: _Model, lags_s: list[float], state: DroneState
 ) -> VelocityCommand:
-    wanted_x, wanted_y = _turned(command.forward_m_s, command.left_m_s, state.yaw)
+    wanted_x, wanted_y = turned(command.forward_m_s, command.left_m_s, state.yaw)
     x_s, y_s, up_s, yaw_s = lags_s
     level_s = max(x_s, y_s)
     add = [

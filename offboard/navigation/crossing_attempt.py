@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, dist, hypot, inf, pi, remainder, sin
 
-from framerunner.geometry.vectors import Vec3
-from offboard.navigation.frames.frame_estimate import FrameEstimate
+from framerunner.geometry.vectors import Vec3, turned
 from offboard.navigation.goals import Point
 from offboard.navigation.path import Crossing, Path
+from offboard.navigation.view import FrameEstimate
 
 COMMIT_M = 0.3  # before the opening; from there the path is not planned again
 COMMIT_ACROSS_M = 0.06  # if the drone is no farther beside the opening's axis
@@ -79,8 +79,7 @@ class CrossingAttempt:
     def _move(self, aim: Crossing, position_m: Vec3, opening_m: tuple[float, float], now_s: float) -> None:
         (x, y, z), heading = aim.gate.centre_m, aim.heading_rad
         dx, dy, dz = position_m[0] - x, position_m[1] - y, position_m[2] - z
-        along_m = cos(heading) * dx + sin(heading) * dy
-        left_m = cos(heading) * dy - sin(heading) * dx
+        along_m, left_m = turned(dx, dy, -heading)
         if along_m >= 0.0 > self._along_m > -inf and not self.passed:
             self.passed = abs(left_m) < opening_m[0] / 2 and abs(dz) < opening_m[1] / 2
             self._refuse(f"passed its plane {hypot(left_m, dz):.2f} m from its centre")

@@ -10,17 +10,22 @@ from typing import Final
 import numpy as np
 
 from framerunner.geometry.axes import Pose
-from framerunner.geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import FlightStyle
 from offboard.navigation.search.coverage import Coverage
-from offboard.navigation.search.frame_visibility import Bools, Floats, FrameVisibility, view_qualities
-from offboard.navigation.search.glimpses import LineOfSight
-from offboard.navigation.search.likelihood import Likelihood
+from offboard.navigation.search.frame_visibility import (
+    YAWS,
+    Bools,
+    Doubles,
+    Floats,
+    FrameVisibility,
+    view_qualities,
+    view_table,
+)
+from offboard.navigation.search.likelihood import Likelihood, LineOfSight
 from offboard.navigation.search.obstruction import Obstruction, WaysRound
-from offboard.navigation.search.view_table import YAWS, Doubles, view_table
 from scenarios.models import Arena
-from vision.types import ObstacleEdge
 
 _START_S: Final = 0.4  # lost when speeding up
 _PATH_SHARE: Final = 0.9  # of the highest speed of a path: what it is flown with at most, on the average
@@ -53,14 +58,6 @@ class Pace:
         return Pace(speed_m_s, Pace().climb_m_s, style.yaw_rate_rad_s)
 
 
-@dataclass(frozen=True, slots=True)
-class Viewpoint:
-    """Where to fly and look next, turning on the way."""
-
-    position_m: Vec3  # drone's centre, arena axes
-    yaw_rad: float  # -pi..pi; the turn is at most half a circle
-
-
 class Explorer:
     """Remembers what has been seen and chooses the next view. The same calls give the same answers.
 
@@ -84,20 +81,8 @@ class Explorer:
         self._table = view_table(camera, arena)
         self._likelihood = Likelihood(self._blocks)
         self._visits = np.zeros((len(self._table.places_m), len(YAWS)))
-        self._last: Viewpoint | None = None
+        self._last: Pose | None = None
         self._obstruction: Obstruction | None = None  # None without obstacles
-
-    def update(
-        self, position_m: Vec3, attitude_arena: Quaternion, obstacle_edges: Sequence[ObstacleEdge] = ()
-    ) -> None:
-        """Take in an image, whatever it showed.
-
-        Args:
-            position_m: of the drone's centre when the image was exposed, arena axes.
-            attitude_arena: body FLU to arena.
-            obstacle_edges: where obstacles stand; nothing behind them counts as seen.
-        """
-        self.coverage.update(position_m, attitude_arena, obstacle_edges)
 
     def next_viewpoint(
         self,
@@ -108,7 +93,7 @@ class Explorer:
         columns_m: Sequence[Vec3] = (),
         *,
         from_here: bool = True,
-    ) -> Viewpoint:
+    ) -> Pose:
         """Choose the view with the largest gain for its time, counting what is seen on the way.
 
         Ask again about twice a second, also before the drone is there.
@@ -122,7 +107,8 @@ class Explorer:
             from_here: the drone flies from there, so the choice is remembered; False: it only will be there.
 
         Returns:
-            The viewpoint. The drone can turn where it is, so there is always one.
+            The viewpoint: where to fly and look next, turning on the way by half a circle at most. The drone
+            can turn where it is, so there is always one.
         """
         if from_here:
             self._visits[self._table.nearest(position_m, yaw_rad)] += 1.0
@@ -159,19 +145,19 @@ class Explorer:
             self._obstruction = Obstruction(self._table.grounds_m, self.coverage.grid, self._blocks)
         self._obstruction.place(columns_m)
 
-    def _near(self, here: Pose) -> list[Viewpoint]:
+    def _near(self, here: Pose) -> list[Pose]:
         """The last choice, and views from where the drone is and from below and above."""
         x, y, z = here.position_m
         heights_m = [each for each in self._table.heights_m if abs(each - z) > _OTHER_HEIGHT_M]
         turned = [
-            Viewpoint((x, y, height_m), remainder(here.yaw_rad + turn, tau))
+            Pose((x, y, height_m), remainder(here.yaw_rad + turn, tau))
             for height_m in (z, *heights_m)
             for turn in _TURNS
             if turn != 0.0 or height_m != z
         ]
         return turned if self._last is None else [self._last, *turned]
 
-    def _far(self, here: Pose, around: WaysRound | None, unseen: _Unseen) -> list[Viewpoint]:
+    def _far(self, here: Pose, around: WaysRound | None, unseen: _Unseen) -> list[Pose]:
         """The best view from each of the table's best places, roughly."""
         table, obstruction = self._table, self._obstruction
         gains = table.gains(unseen.seen, unseen.weights, None if obstruction is None else obstruction.clear)
@@ -189,7 +175,7 @@ class Explorer:
         headings = np.argmax(scores, axis=1)
         best = np.take_along_axis(scores, headings[:, None], axis=1)[:, 0]
         chosen = np.argsort(-best, kind="stable")[:_FAR_PLACES].tolist()
-        return [Viewpoint(table.place(index), YAWS[headings[index]]) for index in chosen]
+        return [Pose(table.place(index), YAWS[headings[index]]) for index in chosen]
 
     def _scores(self, here: Pose, ways: Sequence[_Way], unseen: _Unseen) -> list[float]:
         """Gain of each view and of those on the way to it, for its time."""
@@ -262,12 +248,12 @@ class _Unseen:
 class _Way:
     """How to get to a viewpoint."""
 
-    viewpoint: Viewpoint
+    viewpoint: Pose
     level_m: float  # distance in plan, round obstacles; infinite if there is no way
     straight: bool  # nothing is in the way
 
 
-def _ways(here: Pose, around: WaysRound | None, viewpoints: Sequence[Viewpoint]) -> list[_Way]:
+def _ways(here: Pose, around: WaysRound | None, viewpoints: Sequence[Pose]) -> list[_Way]:
     """How to get to viewpoints; those that cannot be reached are left out."""
     x, y, _ = here.position_m
     level_m = [hypot(each.position_m[0] - x, each.position_m[1] - y) for each in viewpoints]
@@ -300,7 +286,7 @@ def _on_the_way(here: Pose, way: _Way, time_s: float, pace: Pace) -> Pose:
     """The pose some time after leaving for a viewpoint; on a way round obstacles, that at its end."""
     viewpoint = way.viewpoint
     if not way.straight:
-        return Pose(viewpoint.position_m, viewpoint.yaw_rad)
+        return viewpoint
     fly_s = _fly_s(here, way, pace)
     share = min(max(time_s - _START_S, 0.0) / fly_s, 1.0) if fly_s > _NO_FLIGHT_S else 1.0
     (x, y, z), (to_x, to_y, to_z) = here.position_m, viewpoint.position_m
@@ -309,6 +295,6 @@ def _on_the_way(here: Pose, way: _Way, time_s: float, pace: Pace) -> Pose:
     return Pose(place_m, here.yaw_rad + copysign(min(abs(turn_rad), pace.turn_rad_s * time_s), turn_rad))
 
 
-def _is_clear(viewpoint: Viewpoint, blocked: Sequence[tuple[float, float, float]]) -> bool:
+def _is_clear(viewpoint: Pose, blocked: Sequence[tuple[float, float, float]]) -> bool:
     x, y, _ = viewpoint.position_m
     return all(hypot(x - bx, y - by) >= radius_m for bx, by, radius_m in blocked)

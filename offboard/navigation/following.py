@@ -13,7 +13,7 @@ from math import hypot, pi, remainder
 
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
-from offboard.limits import CONTEST, CommandLimits, clamped
+from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.control.late_following import (
     GATE_TURN_M,
     MAX_CORRECTION_M_S,
@@ -27,12 +27,12 @@ from offboard.navigation.control.loop_inverse import (
     SPREAD_S,
     LoopInverse,
     Own,
+    OwnMotion,
     axes_of,
     level_of,
     thrust_of,
     tilts_of,
 )
-from offboard.navigation.control.own_motion import OwnMotion
 from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path
 from offboard.response import Prediction, Response
@@ -146,7 +146,9 @@ class PathFollower:
         """
         before_s, self._own_s = self._own_s, now_s
         step_s = 0.0 if before_s is None else now_s - before_s
-        up_m_s2 = self._slowed(self._past[-1][1]).acceleration_m_s2[2] if self._past else 0.0
+        up_m_s2 = (
+            self._past[-1][1].paced(self._rate, self._rate_change).acceleration_m_s2[2] if self._past else 0.0
+        )
         self._own.update(state, up_m_s2)
         turned_rad = remainder(state.yaw - self._own_yaw_rad, 2 * pi)
         self._own_yaw_rad = state.yaw
@@ -246,8 +248,9 @@ class PathFollower:
         (forward, left, up), turn = self._inverse.command(now, (before, soon, later), closing, off_rad)
         if self._turn_rad_s is not None:
             turn = self._turn_rad_s
-        command = self._limited(forward, left, up, turn + YAW_GAIN_PER_S * off_rad)
-        turn_sent = self._limited(0.0, 0.0, 0.0, turn).yaw_rate_rad_s
+        limits = self._limits
+        command = limits.limited(VelocityCommand(forward, left, up, turn + YAW_GAIN_PER_S * off_rad))
+        turn_sent = limits.limited(VelocityCommand(yaw_rate_rad_s=turn)).yaw_rate_rad_s
         self._inverse.sent(command.up_m_s, turn_sent, step_s)
         return command
 
@@ -275,7 +278,7 @@ class PathFollower:
 
     def _motion_in(self, path: Path, state: DroneState, time_s: float) -> Motion:
         """The motion in a time from now, as its time goes, with the heading that the drone will have."""
-        motion = self._slowed(path.at(self.progress_s + self._rate * time_s))
+        motion = path.at(self.progress_s + self._rate * time_s).paced(self._rate, self._rate_change)
         turn_rad_s = self._turn_rad_s
         if turn_rad_s is None:
             return motion
@@ -297,13 +300,13 @@ class PathFollower:
         self.progress_s = max(late.before(dead_s)[0], 0.0)
         command = late.command(path, state, prediction, self.response)
         self.error_m = late.error_m
-        return self._limited(*command)
+        return self._limits.limited(VelocityCommand(*command))
 
     def _errors(self, state: DroneState, now_s: float) -> tuple[Vec3, Vec3]:
         """From the drone to the path: position and velocity, both when the drone's were measured."""
         at_s = now_s - state.position_age_s
         later_s, later = self._past[-1]
-        position, velocity = later.position_m, self._slowed(later).velocity_m_s
+        position, velocity = later.position_m, later.paced(self._rate, self._rate_change).velocity_m_s
         for before_s, before in reversed(self._past):
             if before_s <= at_s:
                 if later_s > before_s:
@@ -312,34 +315,6 @@ class PathFollower:
                 break
             later_s, later = before_s, before
         return _minus(position, (state.x, state.y, state.z)), _minus(velocity, state.velocity_arena_m_s)
-
-    def _slowed(self, motion: Motion) -> Motion:
-        """A motion of the path, as its time goes now."""
-        rate, change_per_s = self._rate, self._rate_change
-        if rate == 1.0 and change_per_s == 0.0:
-            return motion
-        (vx, vy, vz), (ax, ay, az) = motion.velocity_m_s, motion.acceleration_m_s2
-        square, turn = rate * rate, motion.yaw_rate_rad_s
-        return replace(
-            motion,
-            velocity_m_s=(rate * vx, rate * vy, rate * vz),
-            acceleration_m_s2=(
-                square * ax + change_per_s * vx,
-                square * ay + change_per_s * vy,
-                square * az + change_per_s * vz,
-            ),
-            yaw_rate_rad_s=rate * turn,
-            yaw_acceleration_rad_s2=square * motion.yaw_acceleration_rad_s2 + change_per_s * turn,
-        )
-
-    def _limited(self, forward: float, left: float, up: float, yaw_rate: float) -> VelocityCommand:
-        """The command within the limits: an axis at its limit leaves the others as they are."""
-        limits = self._limits
-        return VelocityCommand(
-            *limits.level(forward, left),
-            clamped(up, limits.down_m_s, limits.up_m_s),
-            clamped(yaw_rate, limits.yaw_rate_rad_s, limits.yaw_rate_rad_s),
-        )
 
 
 def _between(a: Vec3, b: Vec3, share: float) -> Vec3:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import inf
+from dataclasses import dataclass, fields, replace
+from math import inf, isfinite
+from typing import Any
 
 from framerunner.geometry.vectors import Vec3
 from offboard.limits import CommandLimits
 from offboard.response import Response
-from scenarios.models import Base
+from scenarios.models import Base, Frame
 
+FRAME_WIDTH_M: float = Frame.model_fields["outer_width_m"].default  # of all frames, bars included
+FRAME_HEIGHT_M: float = Frame.model_fields["outer_height_m"].default
+FRAME_THICKNESS_M = 0.02
 HEADROOM = 0.92
 """Share of a limit that a path uses; the rest is for corrections."""
 BOLD_HEADROOM = 0.98
@@ -29,40 +33,27 @@ class Gate:
 
     Attributes:
         centre_m: of the opening, arena axes.
-        yaw_rad: heading of its normal.
-        direction: 1 to cross it along its normal only, -1 against it only, 0 from either side.
+        yaw_rad: heading of its normal; it may be crossed from either side.
     """
 
     centre_m: Vec3
     yaw_rad: float
-    direction: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A place to fly to.
+    """A place to fly to and to stop at.
 
     Attributes:
         position_m: arena axes.
         yaw_rad: the heading there; None for any.
-        stop: whether to stop there or to fly past; the last goal is always a stop.
     """
 
     position_m: Vec3
     yaw_rad: float | None = None
-    stop: bool = True
 
 
 Goal = Gate | Point
-
-
-@dataclass(frozen=True, slots=True)
-class FrameSize:
-    """Measures of all frames, metres."""
-
-    width_m: float = 0.42
-    height_m: float = 0.22
-    thickness_m: float = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +64,11 @@ class Obstacles:
         frames: all frames known, with those to cross.
         columns_m: what reaches from the floor to the ceiling, as discs in plan: x, y, radius.
         base: the cube of take-off and landing.
-        floor_m: height of the floor.
     """
 
     frames: tuple[Gate, ...] = ()
     columns_m: tuple[Vec3, ...] = ()
     base: Base | None = None
-    floor_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,35 +211,23 @@ def style_of(limits: CommandLimits) -> FlightStyle:
     def between(contest: float, bolder: float) -> float:
         return contest + share * (bolder - contest)
 
+    values = {each.name: getattr(CONTEST, each.name) for each in fields(FlightStyle)}
+    finite = {name: value for name, value in values.items() if isfinite(value)}
+    mixed: dict[str, Any] = {name: between(value, getattr(_OPEN, name)) for name, value in finite.items()}
+    style = replace(CONTEST, **mixed)
     command_share = between(COMMAND_SHARE, BOLD_COMMAND_SHARE)
-    usual, bold = CONTEST, _OPEN
-    axis_speed_m_s = between(usual.axis_speed_m_s, bold.axis_speed_m_s)
-    path_speed_m_s = between(usual.path_speed_m_s, bold.path_speed_m_s)
-    yaw_rate_rad_s = between(usual.yaw_rate_rad_s, bold.yaw_rate_rad_s)
-    crossing_speed_m_s = between(usual.crossing_speed_m_s, bold.crossing_speed_m_s)
     headroom = between(HEADROOM, BOLD_HEADROOM)
     return replace(
-        usual,
-        axis_speed_m_s=min(axis_speed_m_s, headroom * axis_m_s),
-        climb_speed_m_s=min(usual.climb_speed_m_s, HEADROOM * climb_m_s),
-        path_speed_m_s=min(path_speed_m_s, headroom * limits.level_m_s),
-        yaw_rate_rad_s=min(yaw_rate_rad_s, TURN_SHARE * limits.yaw_rate_rad_s),
-        acceleration_m_s2=between(usual.acceleration_m_s2, bold.acceleration_m_s2),
-        climb_acceleration_m_s2=between(usual.climb_acceleration_m_s2, bold.climb_acceleration_m_s2),
+        style,
+        axis_speed_m_s=min(style.axis_speed_m_s, headroom * axis_m_s),
+        climb_speed_m_s=min(style.climb_speed_m_s, HEADROOM * climb_m_s),
+        path_speed_m_s=min(style.path_speed_m_s, headroom * limits.level_m_s),
+        yaw_rate_rad_s=min(style.yaw_rate_rad_s, TURN_SHARE * limits.yaw_rate_rad_s),
         command_m_s=command_share * axis_m_s,
         level_command_m_s=command_share * limits.level_m_s,
         climb_command_m_s=COMMAND_SHARE * climb_m_s,
-        crossing_speed_m_s=min(crossing_speed_m_s, HEADROOM * axis_m_s),
-        crossing_gain_m_s2=bold.crossing_gain_m_s2 if share > 0.0 else usual.crossing_gain_m_s2,
-        straight_before_m=between(usual.straight_before_m, bold.straight_before_m),
-        straight_after_m=between(usual.straight_after_m, bold.straight_after_m),
-        smoothing_s=between(usual.smoothing_s, bold.smoothing_s),
-        look_offset_rad=between(usual.look_offset_rad, bold.look_offset_rad),
-        replan_s=between(usual.replan_s, bold.replan_s),
-        look_again_m=between(usual.look_again_m, bold.look_again_m),
-        look_braking_m=between(usual.look_braking_m, bold.look_braking_m),
-        arrived_m=between(usual.arrived_m, bold.arrived_m),
-        arrived_m_s=between(usual.arrived_m_s, bold.arrived_m_s),
+        crossing_speed_m_s=min(style.crossing_speed_m_s, HEADROOM * axis_m_s),
+        crossing_gain_m_s2=_OPEN.crossing_gain_m_s2 if share > 0.0 else CONTEST.crossing_gain_m_s2,
         looks_ahead=share < 1.0,
     )
 
@@ -265,6 +242,25 @@ class Motion:
     yaw_rate_rad_s: float = 0.0
     acceleration_m_s2: Vec3 = (0.0, 0.0, 0.0)
     yaw_acceleration_rad_s2: float = 0.0
+
+    def paced(self, rate: float, change_per_s: float) -> Motion:
+        """The same motion if time goes at another rate, which changes."""
+        if rate == 1.0 and change_per_s == 0.0:
+            return self
+        (vx, vy, vz), (ax, ay, az) = self.velocity_m_s, self.acceleration_m_s2
+        square, turn = rate * rate, self.yaw_rate_rad_s
+        return Motion(
+            self.position_m,
+            (rate * vx, rate * vy, rate * vz),
+            self.yaw_rad,
+            rate * turn,
+            (
+                square * ax + change_per_s * vx,
+                square * ay + change_per_s * vy,
+                square * az + change_per_s * vz,
+            ),
+            square * self.yaw_acceleration_rad_s2 + change_per_s * turn,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,7 @@ from offboard.navigation.crossing_attempt import CrossingAttempt
 from offboard.navigation.goals import Goal, Point, style_of
 from offboard.navigation.path_flight import STILL, PathFlight, position_now
 from offboard.navigation.search.looking_places import LookingPlaces
-from offboard.navigation.surroundings import Surroundings
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import NavigationView, Surroundings
 from offboard.navigation.world_model import WorldModel
 from scenarios.models import COLOURS
 from vision.types import Detections

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
-from math import ceil, hypot
+from math import hypot
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from framerunner.geometry.vectors import Quaternion, Vec3
-from offboard.navigation.camera_model import CameraModel, CameraPose
-from offboard.navigation.search.floor_points import COLUMN_PX, Doubles, FloorPoints
+from offboard.navigation.camera_model import COLUMN_PX, CameraModel, CameraPose, Doubles, FloorPoints
 from scenarios.models import Arena
 from vision.types import ObstacleEdge
 
@@ -44,16 +42,16 @@ class ObstacleMap:
     Attributes:
         x_m: centres of the cells along x, arena axes.
         y_m: along y.
-        changes: how many updates have changed which cells are occupied.
+        occupied: which cells are, shape (cells x, cells y).
+        columns_m: discs in plan that cover all occupied cells: x, y, radius; in a fixed order.
     """
 
     def __init__(self, camera: CameraModel, arena: Arena) -> None:
         self._camera = camera
         self._cell_m, self.x_m, self.y_m = floor_cells(arena)
-        self.changes = 0
         self._log_odds = np.zeros((self.x_m.size, self.y_m.size))
-        self._occupied = np.zeros(self._log_odds.shape, dtype=bool)
-        self._columns_m: tuple[Vec3, ...] = ()
+        self.occupied: Bools = np.zeros(self._log_odds.shape, dtype=bool)
+        self.columns_m: tuple[Vec3, ...] = ()
 
     def update(self, position_m: Vec3, attitude_arena: Quaternion, edges: Sequence[ObstacleEdge]) -> None:
         """Take in what an image showed of obstacles, which may be nothing.
@@ -63,31 +61,16 @@ class ObstacleMap:
             attitude_arena: body FLU to arena.
             edges: the lower ends of obstacles, in every eighth column of the image that shows one.
         """
-        if not edges and not self._columns_m:
+        if not edges and not self.columns_m:
             return
         pose = self._camera.pose(position_m, attitude_arena)
         occupied, free = self._evidence(pose, edges)
         self._log_odds += _OCCUPIED * occupied + _FREE * (free & (occupied == 0.0))
         np.clip(self._log_odds, _LEAST, _MOST, out=self._log_odds)
         now = self._log_odds >= _THRESHOLD
-        if (now != self._occupied).any():
-            self._occupied = now
-            self._columns_m = self._discs()
-            self.changes += 1
-
-    def occupied(self, inflate_m: float = 0.0) -> Bools:
-        """Which cells are at most a distance from an obstacle in plan: shape (cells x, cells y)."""
-        reach = ceil(inflate_m / self._cell_m - 1e-9)
-        padded = np.pad(self._occupied, reach)
-        result = self._occupied.copy()
-        for i, j in product(range(2 * reach + 1), repeat=2):
-            if hypot(i - reach, j - reach) * self._cell_m <= inflate_m + 1e-9:
-                result |= padded[i : i + result.shape[0], j : j + result.shape[1]]
-        return result
-
-    def columns_m(self) -> tuple[Vec3, ...]:
-        """Discs in plan that cover all occupied cells: x, y, radius; in a fixed order."""
-        return self._columns_m
+        if (now != self.occupied).any():
+            self.occupied = now
+            self.columns_m = self._discs()
 
     def _ends(self, pose: CameraPose, edges: Sequence[ObstacleEdge]) -> FloorPoints:
         """Where obstacles stand, as far as that is known."""
@@ -135,7 +118,7 @@ class ObstacleMap:
 
     def _discs(self) -> tuple[Vec3, ...]:
         squares: dict[tuple[int, int], list[tuple[int, int]]] = {}
-        for i, j in np.argwhere(self._occupied).tolist():
+        for i, j in np.argwhere(self.occupied).tolist():
             squares.setdefault((i // _DISC_CELLS, j // _DISC_CELLS), []).append((i, j))
         discs = []
         for cells in squares.values():

@@ -21,8 +21,7 @@ from offboard.navigation.planner.clearance import SAME_FRAME_M
 from offboard.navigation.planner.passages import load_graphs
 from offboard.navigation.planning import Search, obstructed
 from offboard.navigation.search.lookout import Lookout, turn_to
-from offboard.navigation.search.viewed_space import ViewedSpace
-from offboard.navigation.seen_space import SeenSpace
+from offboard.navigation.seen_space import SeenSpace, ViewedSpace
 from offboard.response import Prediction, ResponseEstimate
 from scenarios.models import Arena
 

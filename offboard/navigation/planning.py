@@ -16,9 +16,8 @@ from framerunner.geometry.vectors import Vec3
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Crossing, Path
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M, SAME_FRAME_M, Clearance, frame_reach_m
-from offboard.navigation.planner.connect import Connector
 from offboard.navigation.planner.detours import MOST_WORK, LegFinder, Step, Steps, open_ended
-from offboard.navigation.planner.legs import Array, Leg
+from offboard.navigation.planner.legs import Array, Connector, Leg
 from offboard.navigation.planner.route import BLOCKED_S, Pass, RouteFinder, place
 from offboard.navigation.planner.timing import Stretch, headings, run_in, sample, slowed
 from scenarios.models import Arena
@@ -98,7 +97,7 @@ class Search:
         self._start = start
         self._style = style
         self._clearance = Clearance(obstacles, arena, style)
-        self._connector = Connector(style, obstacles.floor_m)
+        self._connector = Connector(style)
         self._legs = LegFinder(self._clearance, self._connector, style)
         self._found: _Route | Refusal | None = None
         self._running = self._run(() if previous is None else previous.crossings)

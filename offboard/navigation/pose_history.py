@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass, field
-from math import acos, hypot
+from math import acos, dist, hypot, remainder, tau
 from typing import Generic, TypeVar
 
-from framerunner.geometry.rotations import interpolated, multiply
+from framerunner.geometry.rotations import interpolated, multiply, yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
@@ -41,6 +41,24 @@ class DronePose:
     attitude_arena: Quaternion
     position_std_m: float = POSITION_STD_M
     attitude_std_rad: float = ATTITUDE_STD_RAD
+
+
+class PoseChange:
+    """Tells when the drone's pose is a new one: moved or turned by more than some thresholds."""
+
+    def __init__(self, moved_m: float, turned_rad: float) -> None:
+        self._moved_m, self._turned_rad = moved_m, turned_rad
+        self._last: tuple[Vec3, float] | None = None
+
+    def is_new(self, position_m: Vec3, attitude_arena: Quaternion) -> bool:
+        """Whether a pose differs from the last one that was new."""
+        yaw_rad = yaw_of(attitude_arena)
+        if self._last is not None:
+            moved_m, turned_rad = dist(position_m, self._last[0]), remainder(yaw_rad - self._last[1], tau)
+            if moved_m < self._moved_m and abs(turned_rad) < self._turned_rad:
+                return False
+        self._last = (position_m, yaw_rad)
+        return True
 
 
 Value = TypeVar("Value")
@@ -79,8 +97,7 @@ class PoseHistory:
     """
 
     def __init__(self, camera: CameraModel | None = None) -> None:
-        self._camera = camera if camera is not None and camera.on_gimbal else None
-        self._turned = camera if camera is not None and camera.mounting is not None else None
+        self._camera = camera
         self._camera_attitudes: _Samples[Quaternion] = _Samples()
         self._positions: _Samples[tuple[Vec3, Vec3]] = _Samples()  # metres; velocity, metres a second
         self._attitudes: _Samples[Quaternion] = _Samples()
@@ -90,7 +107,7 @@ class PoseHistory:
         position_us = state.time_us - round(state.position_age_s * 1e6)
         self._positions.add(position_us, ((state.x, state.y, state.z), state.velocity_arena_m_s))
         self._attitudes.add(state.time_us, state.attitude_arena)
-        if self._camera is not None and state.camera_attitude_arena is not None:
+        if state.camera_attitude_arena is not None:
             self._camera_attitudes.add(state.time_us, state.camera_attitude_arena)
 
     def at(self, time_us: int) -> DronePose | None:
@@ -99,17 +116,17 @@ class PoseHistory:
         attitude = self._attitude_at(self._attitudes, time_us)
         if position is None or attitude is None:
             return None
-        if self._camera is not None:
+        (place_m, place_std_m), camera, looking = position, self._camera, attitude
+        if camera is not None and camera.on_gimbal:
             turned = self._attitude_at(self._camera_attitudes, time_us)
             if turned is None:
                 return None
-            carrier_m = self._camera.carrier(position[0], attitude[0], turned[0])
-            return DronePose(time_us, carrier_m, turned[0], position[1], turned[1])
-        if (camera := self._turned) is not None and camera.mounting is not None:
-            looking = multiply(attitude[0], camera.mounting)
-            carrier_m = camera.carrier(position[0], attitude[0], looking)
-            return DronePose(time_us, carrier_m, looking, position[1], attitude[1])
-        return DronePose(time_us, position[0], attitude[0], position[1], attitude[1])
+            looking = turned
+        elif camera is not None and camera.mounting is not None:
+            looking = multiply(attitude[0], camera.mounting), attitude[1]
+        if camera is not None and looking is not attitude:
+            place_m = camera.carrier(place_m, attitude[0], looking[0])
+        return DronePose(time_us, place_m, looking[0], place_std_m, looking[1])
 
     def _position_at(self, time_us: int) -> tuple[Vec3, float] | None:
         """Position and its standard deviation, metres: a cubic Hermite spline, straight lines at the ends."""

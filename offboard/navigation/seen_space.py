@@ -1,19 +1,22 @@
-"""Which parts of the arena, in plan, were seen to be free: a drone that knows obstacles flies only there."""
+"""Which parts of the arena, in plan, were seen to be free, and which places were in view of the camera.
+
+A drone that knows obstacles flies only where it has seen that nothing stands; where a place was in view, a
+frame at its height would have been seen.
+"""
 
 from __future__ import annotations
 
-from math import hypot, remainder, tau
+from math import hypot
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from framerunner.geometry.rotations import yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
-from offboard.navigation.camera_model import CameraModel, CameraPose
+from offboard.navigation.camera_model import COLUMN_PX, CameraModel, CameraPose, FloorPoints
 from offboard.navigation.obstacle_map import floor_cells
-from offboard.navigation.search.floor_points import COLUMN_PX, FloorPoints
-from scenarios.models import Arena
+from offboard.navigation.pose_history import PoseChange
+from scenarios.models import Arena, Base
 from vision.types import ObstacleEdge
 
 Bools = npt.NDArray[np.bool_]
@@ -51,7 +54,7 @@ class SeenSpace:
         self._camera = camera
         self._cell_m, self._x_m, self._y_m = floor_cells(arena)
         self._free: Bools = np.zeros((self._x_m.size, self._y_m.size), dtype=bool)
-        self._last: tuple[Vec3, float] | None = None
+        self._change = PoseChange(_MOVED_M, _TURNED_RAD)
         self._waiting: list[tuple[Vec3, CameraPose, Doubles | None]] = []
         reach = np.arange(-int(ROOM_M / self._cell_m), int(ROOM_M / self._cell_m) + 1)
         i, j = (offsets.ravel() for offsets in np.meshgrid(reach, reach, indexing="ij"))
@@ -75,7 +78,7 @@ class SeenSpace:
             edges: the lower ends of obstacles, in every eighth column of the image that shows one.
         """
         self.has_obstacles = self.has_obstacles or bool(edges)
-        if not self._is_new(position_m, yaw_of(attitude_arena)):
+        if not self._change.is_new(position_m, attitude_arena):
             return
         pose = self._camera.pose(position_m, attitude_arena)
         limits_m = self._limits_m(pose, edges) if edges else None
@@ -142,15 +145,6 @@ class SeenSpace:
                 return (x, y, places_m[place][2])
         return None
 
-    def _is_new(self, position_m: Vec3, yaw_rad: float) -> bool:
-        if self._last is not None:
-            (x, y, z), last_yaw_rad = self._last
-            moved_m = hypot(position_m[0] - x, position_m[1] - y, position_m[2] - z)
-            if moved_m < _MOVED_M and abs(remainder(yaw_rad - last_yaw_rad, tau)) < _TURNED_RAD:
-                return False
-        self._last = (position_m, yaw_rad)
-        return True
-
     def _limits_m(self, pose: CameraPose, edges: tuple[ObstacleEdge, ...]) -> Doubles:
         """How far each column of the image is free; not farther than the columns beside it.
 
@@ -171,3 +165,78 @@ class SeenSpace:
         padded = np.pad(limits_m, 1, mode="edge")
         narrowest: Doubles = np.minimum(np.minimum(padded[:-2], padded[2:]), limits_m)
         return narrowest
+
+
+_KEPT: Final = 256  # views
+_VIEW_MOVED_M: Final = 0.15  # a view from a pose nearer than this and _VIEW_TURNED to the last one is skipped
+_VIEW_TURNED: Final = 0.1  # likewise, of any part of the rotation matrix
+_VIEWED_M: Final = 4.5  # a frame farther away may be too small to be seen
+_BASE_M: Final = 0.8  # from the base in plan there is room for take-off and landing
+_ABOVE_M: Final = 0.15  # above and below a place, that must be in view with it: a frame there
+_FLOWN_M: Final = 0.3  # from where the camera was, along each axis: there is nothing
+_NEAR_M: Final = 0.6  # from the drone in plan; nearer places cannot come into view
+
+
+class ViewedSpace:
+    """Remembers the camera's poses, and tells which places were in view from one of them.
+
+    Attributes:
+        needed: there may be frames that are not on the map; else all places are as good as viewed.
+    """
+
+    def __init__(self, camera: CameraModel, base: Base) -> None:
+        self._base = base
+        self._right = camera.half_width_px / camera.focal_px
+        self._up = camera.half_height_px / camera.focal_px
+        self._positions: Doubles = np.zeros((_KEPT, 3))
+        self._rotations: Doubles = np.zeros((_KEPT, 9))
+        self._count = -1  # views that are kept, less one; after the last one there is the latest
+        self.needed = True
+        self._excused: list[Vec3] = []
+
+    def update(self, pose: CameraPose) -> None:
+        """Take in an image from a pose."""
+        row = (self._count + 1) % _KEPT
+        self._positions[row], self._rotations[row] = pose.position_m, pose.rotation
+        last = self._count % _KEPT
+        moved = np.abs(self._positions[last] - pose.position_m).max() > _VIEW_MOVED_M
+        if self._count < 0 or moved or np.abs(self._rotations[last] - pose.rotation).max() > _VIEW_TURNED:
+            self._count += 1
+
+    def is_viewed(self, place_m: Vec3) -> bool:
+        """Whether a place was in view, or is excused."""
+        return bool(self._are_viewed(np.array([place_m]))[0])
+
+    def first_unviewed(self, places_m: list[Vec3], from_m: Vec3) -> Vec3 | None:
+        """The first of some places that was not in view; those near the drone in plan are left out."""
+        if not self.needed or self._count < 0:
+            return None
+        x, y, _ = from_m
+        base = self._base
+        far = [
+            place
+            for place in places_m
+            if hypot(place[0] - x, place[1] - y) > _NEAR_M
+            and hypot(place[0] - base.x_m, place[1] - base.y_m) > _BASE_M
+        ]
+        if not far:
+            return None
+        viewed = self._are_viewed(np.array(far))
+        return None if viewed.all() else far[int(viewed.argmin())]
+
+    def excuse(self, place_m: Vec3) -> None:
+        """Take a place as viewed that cannot be brought into view."""
+        self._excused.append(place_m)
+
+    def _are_viewed(self, places_m: Doubles) -> Bools:
+        """Likewise of several, shape (n, 3)."""
+        views = min(self._count + 2, _KEPT)
+        offsets = places_m[:, None] - self._positions[:views]
+        axes = self._rotations[:views].reshape(views, 3, 3)
+        ahead, left, up = np.moveaxis(np.einsum("pvi,vij->pvj", offsets, axes), 2, 0)
+        shown = (np.abs(left) < ahead * self._right) & (np.abs(up) + _ABOVE_M < ahead * self._up)
+        flown = (np.abs(offsets) < _FLOWN_M).all(axis=2)
+        viewed: Bools = (flown | (shown & (ahead < _VIEWED_M))).any(axis=1)
+        for excused in self._excused:
+            viewed |= np.linalg.norm(places_m - np.array(excused), axis=1) < _NEAR_M
+        return viewed

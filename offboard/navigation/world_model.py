@@ -7,20 +7,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot
 
+from framerunner.geometry.axes import Pose
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.exploration import Explorer, Pace, Viewpoint
-from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.exploration import Explorer, Pace
 from offboard.navigation.frames.frame_map import FrameMap
 from offboard.navigation.goals import FlightStyle, Gate, Obstacles
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
 from offboard.navigation.pose_history import DronePose, PoseHistory
-from offboard.navigation.search.glimpses import Glimpses
-from offboard.navigation.search.viewed_space import ViewedSpace
-from offboard.navigation.seen_space import SeenSpace
-from offboard.navigation.surroundings import Surroundings
+from offboard.navigation.search.likelihood import Glimpses
+from offboard.navigation.seen_space import SeenSpace, ViewedSpace
+from offboard.navigation.view import FrameEstimate, Surroundings
 from scenarios.models import COLOURS
 from vision.types import Detections
 
@@ -81,10 +80,10 @@ class WorldModel:
         self._map.observe(image, pose, self._poses_of_rows(image, pose))
         self._obstacle_map.update(position_m, attitude, image.obstacle_edges)
         self.seen_space.update(position_m, attitude, image.obstacle_edges)
-        self._explorer.update(position_m, attitude, image.obstacle_edges)
+        self._explorer.coverage.update(position_m, attitude, image.obstacle_edges)
         known = [colour for colour in COLOURS if self._map.best(colour) is not None]
         self.viewed_space.update(self._camera.pose(position_m, attitude))
-        others = any(frame.colour not in COLOURS for frame in self._map.frames())
+        others = any(frame.colour not in COLOURS for frame in self._map.frames)
         self.viewed_space.needed = others or len(known) < len(COLOURS)
         self._glimpses.update(position_m, attitude, image, known, self._map.is_lookalike)
 
@@ -107,7 +106,7 @@ class WorldModel:
     @property
     def frames(self) -> tuple[FrameEstimate, ...]:
         """All frames on the map."""
-        return self._map.frames()
+        return self._map.frames
 
     def gate_of(self, frame: FrameEstimate) -> Gate:
         """A frame as a path crosses it: in the arena, also while it seems to be outside, seen from afar."""
@@ -125,17 +124,17 @@ class WorldModel:
     def obstacles(self) -> Obstacles:
         """All that a path must keep clear of; of each colour of the task only the frame known best."""
         if self._frames is None:
-            seen = [frame for frame in self._map.frames() if frame.colour not in COLOURS]
+            seen = [frame for frame in self._map.frames if frame.colour not in COLOURS]
             seen += [best for best in map(self._map.best, COLOURS) if best is not None]
             self._frames = tuple(map(self.gate_of, seen))
         return Obstacles(self._frames, self._columns_m(), self._surroundings.base)
 
-    def next_viewpoint(self, position_m: Vec3, yaw_rad: float, *, from_here: bool = True) -> Viewpoint:
+    def next_viewpoint(self, position_m: Vec3, yaw_rad: float, *, from_here: bool = True) -> Pose:
         """Where to look next for frames that are not on the map; see `Explorer.next_viewpoint`."""
         return self._explorer.next_viewpoint(
             position_m,
             yaw_rad,
-            [frame.position_m for frame in self._map.frames()],
+            [frame.position_m for frame in self._map.frames],
             self._glimpses.lines(),
             self._columns_m(),
             from_here=from_here,
@@ -147,7 +146,7 @@ class WorldModel:
 
     def _columns_m(self) -> tuple[Vec3, ...]:
         """What stands on the floor; where the drone took off, there is room for it."""
-        columns_m = self._obstacle_map.columns_m() + self.seen_space.suspects_m
+        columns_m = self._obstacle_map.columns_m + self.seen_space.suspects_m
         start_m = self._start_m
         if start_m is None:
             return columns_m

@@ -10,7 +10,7 @@ from math import hypot
 
 from framerunner.geometry.axes import Alignment
 from framerunner.geometry.vectors import Vec3
-from offboard.keep_in_box import Box
+from offboard.limits import Box
 
 BEYOND_BOX_M = 0.3
 """How far outside the box the fence is: as far as the app still counts as kept in."""

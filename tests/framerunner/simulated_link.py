@@ -24,7 +24,7 @@ from firmware_py.offboard_requests import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flying.plan import FlightPlan
 from offboard.app import MissionEnd, Moment, fly_mission
-from offboard.keep_in_box import Box
+from offboard.limits import CONTEST, Box, Caps, VelocityLimits
 from offboard.link.px4 import Px4Dialect
 from offboard.link.telemetry import TelemetryFeed
 from offboard.link.ticks import Requester, TickSource
@@ -32,7 +32,6 @@ from offboard.link.watchdog import LIMITS
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
 from offboard.perception import CameraPerception
-from offboard.safety.caps import Caps
 from offboard.safety.rules import SIMULATED, AbortAction, SafetyRules
 from scenarios.models import Scenario, TrueState
 from sitl.camera import CameraFeed
@@ -312,13 +311,12 @@ class LinkedDrone(MavsdkDrone):
         self,
         vehicle: LinkedVehicle,
         scenario: Scenario,
-        box: Box | None,
-        caps: Caps | None,
+        limits: VelocityLimits,
         when_hung: AbortAction,
     ):
         start = FlightPlan(scenario).start_pose
         url = "udpin://127.0.0.1:14540"
-        super().__init__(url, start_arena=start, box=box, caps=caps, when_hung=when_hung)
+        super().__init__(url, start_arena=start, limits=limits, when_hung=when_hung)
         self._vehicle = vehicle
         self._feed = TelemetryFeed(vehicle.time_s)
         self._ticks = TickSource(self._feed)
@@ -468,9 +466,9 @@ def fly_over(
     moments: list[Moment] = []
 
     async def fly() -> MissionEnd:
-        kept_in = box if boxed else None
+        limits = VelocityLimits(CONTEST, box if boxed else None, caps)
         vehicle.app = asyncio.current_task()
-        drone = LinkedDrone(vehicle, scenario, kept_in, caps, safety.abort)
+        drone = LinkedDrone(vehicle, scenario, limits, safety.abort)
         perception = CameraPerception(_Camera(vehicle))
         return await fly_mission(
             drone,
@@ -478,7 +476,6 @@ def fly_over(
             mission,
             limit_s=scenario.try_limit_s,
             observer=moments.append,
-            box=kept_in,
             safety=safety,
         )
 

@@ -8,7 +8,8 @@ from itertools import pairwise, product
 from math import atan2, ceil, cos, exp, floor, hypot, pi, remainder, sin
 from textwrap import dedent
 
-from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityCommand
+from offboard.limits import CONTEST, VelocityLimits
 from offboard.mission import load_mission
 from vision.detector import measure
 from vision.types import NOT_SEEN, Detection, Detections
@@ -47,6 +48,7 @@ class KinematicDrone:
     lag_s: float = 0.7  # of the paper's own stabiliser, roughly
     faults: dict[int, Exception] = field(default_factory=dict)
     calls: list[str] = field(default_factory=list)
+    limits: VelocityLimits = field(default_factory=lambda: VelocityLimits(CONTEST))
 
     def __post_init__(self) -> None:
         self.z = self.base_m
@@ -54,6 +56,7 @@ class KinematicDrone:
         self.rates = [0.0, 0.0, 0.0, 0.0]
         self.pitch = self.roll = 0.0  # nose down, left side down: it tilts to accelerate and against drag
         self.command_now = VelocityCommand()
+        self.latest: DroneState | None = None
         self.armed = False
         self.confirmed: bool | None = None  # as `motors_on` was last asked
         self.commands: list[VelocityCommand] = []
@@ -105,9 +108,11 @@ class KinematicDrone:
     async def close(self) -> None:
         self.calls.append("close")
 
-    def command(self, command: VelocityCommand) -> None:
-        self.commands.append(command)
-        self.command_now = command
+    def command(self, command: VelocityCommand) -> LimitedCommand:
+        limited = self.limits.limit(command, self.latest)
+        self.commands.append(limited.command)
+        self.command_now = limited.command
+        return limited
 
     async def ticks(self) -> AsyncIterator[DroneState]:
         tick = 0
@@ -118,7 +123,7 @@ class KinematicDrone:
             if tick in self.faults:
                 raise self.faults[tick]
             self.path.append((self.x, self.y, self.z))
-            yield DroneState(
+            self.latest = DroneState(
                 *(self.time_us, self.x, self.y, self.z, self.yaw),
                 velocity_arena_m_s=self._velocity(),
                 armed=self.armed,
@@ -126,6 +131,7 @@ class KinematicDrone:
                 mode=self.pilot_mode or "OFFBOARD",
                 landed=self.landed,
             )
+            yield self.latest
 
     def _velocity(self) -> tuple[float, float, float]:
         if self.pilot_mode:

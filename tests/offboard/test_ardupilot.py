@@ -10,7 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from offboard.drone import DroneError, VelocityCommand
-from offboard.keep_in_box import Box
+from offboard.limits import Box, VelocityLimits
 from offboard.mavsdk_drone import MavsdkDrone
 from tests.free_ports import free_port
 from tests.offboard.udp_arducopter import BRAKE, GUIDED, LOITER, UdpArduCopter
@@ -77,7 +77,7 @@ async def test_a_climb_on_the_ground_is_a_take_off_and_velocities_follow_in_the_
 
 async def test_a_take_off_stays_below_the_ceiling(copter):
     low = Box((-5.0, -5.0, 0.0), (5.0, 5.0, START[2] + 0.6), START[:2])
-    async with connected(copter, box=low) as drone:
+    async with connected(copter, limits=VelocityLimits(box=low)) as drone:
         await drone.motors_on()
         await fly(drone, drone.ticks(), UP, lambda state: not state.landed)
         assert copter.takeoffs == [pytest.approx(0.42)]

@@ -8,6 +8,7 @@ import pytest
 
 from offboard.app import Moment, fly_mission
 from offboard.engine import MissionEngine
+from offboard.limits import CONTEST
 from offboard.mission import load_mission
 from offboard.pilot import Imu
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone, Target, crossings
@@ -97,9 +98,10 @@ async def test_the_quiet_way_flies_exactly_as_the_whole_chart():
     for moment in moments:
         state = moment.state
         imu = Imu(state.x, state.y, state.z, state.yaw)
-        expected = (moment.command, moment.mission_state)
-        assert (quiet.tick(imu, moment.detections, state.time_us), quiet.state) == expected
-        assert (whole.tick(imu, moment.detections, state.time_us), whole.state) == expected
+        command = quiet.tick(imu, moment.detections, state.time_us)
+        assert whole.tick(imu, moment.detections, state.time_us) == command
+        assert CONTEST.limited(command) == moment.command
+        assert quiet.state == whole.state == moment.mission_state
     assert quiet.finished
     assert whole.finished
 

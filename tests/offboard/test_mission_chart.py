@@ -10,6 +10,7 @@ from statemachine.io.validation import validate_document
 from offboard.chart.native import native_document
 from offboard.drone import VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
+from offboard.limits import CONTEST
 from offboard.mission import list_missions, load_mission
 from offboard.pilot import Imu
 from vision.types import Detection, Detections
@@ -40,7 +41,7 @@ class Driver:
 
     def tick(self, imu=AWAY, cam=Detections(), after_s=0.05):  # noqa: B008 - immutable
         self.time_us += round(after_s * 1e6)
-        self.command = self.engine.tick(imu, cam, self.time_us)
+        self.command = CONTEST.limited(self.engine.tick(imu, cam, self.time_us))
         return self.engine.state
 
     def to(self, state):

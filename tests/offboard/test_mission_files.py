@@ -13,7 +13,7 @@ import pytest
 
 from offboard.drone import VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError
-from offboard.limits import CommandLimits
+from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import MissionError, list_missions, load_mission, mermaid
 from offboard.pilot import Imu, Pilot
 from offboard.pilot_file import read_pilot
@@ -89,7 +89,7 @@ def test_numbers_in_the_file_are_limited_in_the_class_contest_only(tmp_path):
     assert load(tmp_path, f"class: open\n{fast}").mission_class == "open"
 
 
-def test_the_engine_limits_commands_and_tells_the_pilot_the_limits(tmp_path):
+def test_a_mission_flies_within_the_limits_of_its_class_and_can_read_them(tmp_path):
     text = MINIMAL.replace(
         "- hover", "- cmd.vel_x = 3 * limits.forward_m_s\n      - cmd.vel_y = -9\n      - cmd.vel_z = -9"
     )
@@ -98,13 +98,13 @@ def test_the_engine_limits_commands_and_tells_the_pilot_the_limits(tmp_path):
     engine = MissionEngine(mission, limits=limits)
     assert engine.pilot.limits is limits
     engine.tick(Imu(), Detections(), 0)
-    sent = engine.tick(Imu(), Detections(), 50_000)
+    sent = limits.limited(engine.tick(Imu(), Detections(), 50_000))
     assert hypot(sent.forward_m_s, sent.left_m_s) == pytest.approx(2.0)
     assert sent.left_m_s / sent.forward_m_s == pytest.approx(-1.5 / 2.0)
     assert (sent.up_m_s, sent.yaw_rate_rad_s) == (-0.7, 1.2)
     contest = MissionEngine(mission)
     contest.tick(Imu(), Detections(), 0)
-    assert contest.tick(Imu(), Detections(), 50_000) == VelocityCommand(1.0, -1.0, -1.0, 1.0)
+    assert CONTEST.limited(contest.tick(Imu(), Detections(), 50_000)) == VelocityCommand(1.0, -1.0, -1.0, 1.0)
 
 
 def test_the_minimal_mission_is_fine(tmp_path):
@@ -328,7 +328,7 @@ class Acrobat(Pilot):
 
 def test_a_subclass_adds_primitives(tmp_path):
     engine = MissionEngine(load(tmp_path, MINIMAL.replace("- hover", "- spin"), Acrobat))
-    assert engine.tick(Imu(), Detections(), 0).yaw_rate_rad_s == 1.0
+    assert CONTEST.limited(engine.tick(Imu(), Detections(), 0)).yaw_rate_rad_s == 1.0
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from framerunner.commands.options.rules import Given, Rule, for_each, given_in, 
 from framerunner.preflight.settings import DRY_RUN_S, HardwareSettings
 
 if TYPE_CHECKING:
-    from offboard.safety.caps import Caps
+    from offboard.limits import Caps
     from scenarios.models import Scenario
 
 
@@ -47,7 +47,7 @@ def given_hardware(options: HardwareSettings) -> Given:
 
 def caps_of(options: HardwareSettings, drone: str | None) -> Caps | None:
     """The caps of a flight; None for a simulated drone without a given one. Raises SettingError."""
-    from offboard.safety.caps import Caps
+    from offboard.limits import Caps
 
     check_range("--max-speed", options.max_speed, 0.1, 20.0)
     check_range("--max-height", options.max_height, 0.3, 100.0)

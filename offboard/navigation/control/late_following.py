@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from math import cos, hypot, pi, remainder, sin, sqrt
 
-from framerunner.geometry.vectors import Vec3
+from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import DroneState
 from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path
@@ -151,26 +151,12 @@ class LateFollower:
             own_s, first = response.own_lag_s, response.level_lag_s / _SOON_S
             x += own_s * (now[0] + first * (soon[0] - now[0]))
             y += own_s * (now[1] + first * (soon[1] - now[1]))
-        x, y = x + add[0], y + add[1]
-        c, s = cos(yaw_rad), sin(yaw_rad)
-        return c * x + s * y, c * y - s * x
+        return turned(x + add[0], y + add[1], -yaw_rad)
 
     def _reference(self, path: Path, before_s: float) -> Motion:
         """The motion that was commanded some time ago, or will be."""
-        at_s, (rate, change) = self.before(before_s)
-        motion = path.at(at_s)
-        velocity = motion.velocity_m_s
-        vx, vy, vz = velocity
-        ax, ay, az = motion.acceleration_m_s2
-        square = rate * rate
-        return Motion(
-            motion.position_m,
-            (rate * vx, rate * vy, rate * vz),
-            motion.yaw_rad,
-            rate * motion.yaw_rate_rad_s,
-            (square * ax + change * vx, square * ay + change * vy, square * az + change * vz),
-            square * motion.yaw_acceleration_rad_s2 + change * motion.yaw_rate_rad_s,
-        )
+        at_s, pace = self.before(before_s)
+        return path.at(at_s).paced(*pace)
 
 
 def _change(motion: Motion, *, turning: bool) -> tuple[float, float]:

@@ -11,8 +11,6 @@ from math import cos, hypot, sin
 import numpy as np
 
 from offboard.navigation.camera_model import CameraModel, CameraPose
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.frames.frame_filter import load_filters
 from offboard.navigation.frames.frame_measurement import (
     HALF_HEIGHT_M,
     HALF_WIDTH_M,
@@ -22,10 +20,11 @@ from offboard.navigation.frames.frame_measurement import (
     solutions,
     view_of,
 )
-from offboard.navigation.frames.frame_track import GATES, Fit, FrameTrack
+from offboard.navigation.frames.frame_track import GATES, Fit, FrameTrack, load_filters
 from offboard.navigation.frames.lookalikes import Lookalikes
 from offboard.navigation.pose_history import DronePose
-from offboard.navigation.search.glimpses import LineOfSight
+from offboard.navigation.search.likelihood import LineOfSight
+from offboard.navigation.view import FrameEstimate
 from scenarios.models import Arena
 from vision.types import Detections, ObstacleEdge
 
@@ -49,6 +48,9 @@ class FrameMap:
     Args:
         camera: of the drone.
         arena: frames are in it.
+
+    Attributes:
+        frames: all that were seen, of every colour, in the order in which they were found.
     """
 
     def __init__(self, camera: CameraModel, arena: Arena) -> None:
@@ -57,7 +59,7 @@ class FrameMap:
         self._prior = Prior.of(arena)
         self._tracks: list[FrameTrack] = []
         self._lookalikes = Lookalikes()
-        self._frames: tuple[FrameEstimate, ...] = ()
+        self.frames: tuple[FrameEstimate, ...] = ()
         self._best: dict[str, FrameEstimate] = {}  # by colour
         self._largest_m = hypot(arena.length_x_m, arena.width_y_m)
         self._time_us = -1
@@ -66,10 +68,6 @@ class FrameMap:
     def best(self, colour: str) -> FrameEstimate | None:
         """The frame of a colour; the one best known if there are several, None if there is none."""
         return self._best.get(colour)
-
-    def frames(self) -> tuple[FrameEstimate, ...]:
-        """All frames seen, of every colour, in the order in which they were found."""
-        return self._frames
 
     def is_lookalike(self, colour: str, line: LineOfSight) -> bool:
         """Whether what is seen in a direction looks like a frame of a colour, and is known to be none."""
@@ -130,10 +128,10 @@ class FrameMap:
     def _estimate(self) -> None:
         """Note what is known of each frame now: it is asked for far more often than images come."""
         tracks = [track for track in self._tracks if track.is_inside(self._arena)]
-        self._frames = tuple(track.estimate() for track in tracks)
+        self.frames = tuple(track.estimate() for track in tracks)
         self._best = {}
         best: dict[str, FrameTrack] = {}
-        for track, estimate in zip(tracks, self._frames, strict=True):
+        for track, estimate in zip(tracks, self.frames, strict=True):
             other = best.get(track.colour)
             if other is None or track.rank > other.rank:
                 best[track.colour], self._best[track.colour] = track, estimate

@@ -15,14 +15,15 @@ import numpy as np
 import numpy.typing as npt
 
 from offboard.navigation.camera_model import NEAREST_M, CameraModel, CameraPose
+from offboard.navigation.goals import FRAME_HEIGHT_M, FRAME_WIDTH_M
 from offboard.navigation.pose_history import DronePose
-from scenarios.models import Arena, Frame
+from scenarios.models import Arena
 from vision.types import FrameCorner, FrameSighting
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 
-HALF_WIDTH_M: float = Frame.model_fields["outer_width_m"].default / 2
-HALF_HEIGHT_M: float = Frame.model_fields["outer_height_m"].default / 2
+HALF_WIDTH_M = FRAME_WIDTH_M / 2
+HALF_HEIGHT_M = FRAME_HEIGHT_M / 2
 # To the right and up: upper left, upper right, lower right, lower left as seen.
 _CORNERS_M = (
     (-HALF_WIDTH_M, HALF_HEIGHT_M),

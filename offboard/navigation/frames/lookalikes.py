@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -117,8 +117,7 @@ class Lookalikes:
         return any(each.is_at(eye_m, direction) for each in self._found if each.colour == colour)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sightings:
+class _Sightings(NamedTuple):
     """Sightings of whole outlines.
 
     Attributes:
@@ -135,18 +134,11 @@ class _Sightings:
 
     def some(self, chosen: Mask) -> _Sightings:
         """Those where a mask is true."""
-        return _Sightings(
-            self.eyes_m[chosen], self.directions[chosen], self.away_m[chosen], self.stds[chosen]
-        )
+        return _Sightings(*(values[chosen] for values in self))
 
     def with_one(self, other: _Sightings) -> _Sightings:
         """With one more, the last; the oldest of too many are forgotten."""
-        return _Sightings(
-            np.concatenate((self.eyes_m, other.eyes_m))[-KEPT:],
-            np.concatenate((self.directions, other.directions))[-KEPT:],
-            np.concatenate((self.away_m, other.away_m))[-KEPT:],
-            np.concatenate((self.stds, other.stds))[-KEPT:],
-        )
+        return _Sightings(*(np.concatenate(pair)[-KEPT:] for pair in zip(self, other, strict=True)))
 
     def is_new(self, other: _Sightings) -> bool:
         """Whether one is from elsewhere, or in another direction, than each of these."""

@@ -8,7 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.goals import FlightStyle, FrameSize, Gate, Obstacles
+from offboard.navigation.goals import (
+    FRAME_HEIGHT_M,
+    FRAME_THICKNESS_M,
+    FRAME_WIDTH_M,
+    FlightStyle,
+    Gate,
+    Obstacles,
+)
 from offboard.navigation.planner.legs import Array
 from scenarios.models import Arena
 
@@ -18,7 +25,6 @@ DRONE_HALF_HEIGHT_M = 0.0225
 TILTED_M = 0.05  # how much farther down and up its box reaches while it tilts in a turn
 SAME_FRAME_M = 0.4  # a gate and a frame whose centres are nearer are the same
 MIDDLE_M = 0.01  # a drone that is nearer to an opening's middle plane may leave it on either side
-_FRAME = FrameSize()
 
 _SPARE_M = 0.03  # how much farther than needed a detour passes
 _ROUNDING_M = 1e-6
@@ -40,9 +46,8 @@ class Clearance:
     def __init__(self, obstacles: Obstacles, arena: Arena, style: FlightStyle) -> None:
         margin_m = style.side_margin_m
         x_m, y_m = arena.length_x_m / 2 - margin_m, arena.width_y_m / 2 - margin_m
-        floor_m = obstacles.floor_m
-        self.low_m: Array = np.array([-x_m, -y_m, floor_m + style.floor_margin_m])
-        self.high_m: Array = np.array([x_m, y_m, floor_m + arena.height_m - margin_m])
+        self.low_m: Array = np.array([-x_m, -y_m, style.floor_margin_m])
+        self.high_m: Array = np.array([x_m, y_m, arena.height_m - margin_m])
         level_m = DRONE_RADIUS_M + style.bar_margin_m
         upright_m = DRONE_HALF_HEIGHT_M + TILTED_M + style.bar_margin_m
         half_m = _frame_half_m(style)
@@ -53,8 +58,9 @@ class Clearance:
         if obstacles.base is not None:
             base, side_m = obstacles.base, obstacles.base.edge_m / 2 + level_m
             self.base = len(rows)
-            middle_m = floor_m + base.top_m / 2
-            rows.append((base.x_m, base.y_m, middle_m, 1.0, 0.0, side_m, side_m, base.top_m / 2 + upright_m))
+            rows.append(
+                (base.x_m, base.y_m, base.top_m / 2, 1.0, 0.0, side_m, side_m, base.top_m / 2 + upright_m)
+            )
         self.boxes = len(rows)
         self._rows: Array = np.array(rows).reshape(-1, 8)
         self._columns: Array = np.array(obstacles.columns_m).reshape(-1, 3)
@@ -152,7 +158,7 @@ class Clearance:
         """
         frames = self.boxes - (self.base >= 0)
         offsets = self.offsets(point_m[None])[0, :frames]
-        half_m = (DRONE_HALF_LENGTH_M + _FRAME.thickness_m / 2, _FRAME.width_m / 2, _FRAME.height_m / 2)
+        half_m = (DRONE_HALF_LENGTH_M + FRAME_THICKNESS_M / 2, FRAME_WIDTH_M / 2, FRAME_HEIGHT_M / 2)
         inside = (np.abs(offsets) < half_m).all(axis=1)
         if not inside.any():
             return None
@@ -206,7 +212,7 @@ def _frame_half_m(style: FlightStyle) -> Vec3:
     level_m = DRONE_RADIUS_M + style.bar_margin_m
     upright_m = DRONE_HALF_HEIGHT_M + TILTED_M + style.bar_margin_m
     return (
-        _FRAME.thickness_m / 2 + level_m,
-        _FRAME.width_m / 2 + level_m,
-        _FRAME.height_m / 2 + upright_m,
+        FRAME_THICKNESS_M / 2 + level_m,
+        FRAME_WIDTH_M / 2 + level_m,
+        FRAME_HEIGHT_M / 2 + upright_m,
     )

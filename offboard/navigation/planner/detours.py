@@ -11,8 +11,7 @@ import numpy as np
 
 from offboard.navigation.goals import FlightStyle
 from offboard.navigation.planner.clearance import Clearance, Mask
-from offboard.navigation.planner.connect import DESCENT_GAIN_PER_S2, Connector, Ends
-from offboard.navigation.planner.legs import Array, Leg, Legs
+from offboard.navigation.planner.legs import DESCENT_GAIN_PER_S2, Array, Connector, Ends, Leg, Legs
 from offboard.navigation.planner.passages import Passages, lengths
 from offboard.navigation.planner.route import Pass, place
 
@@ -87,11 +86,11 @@ class LegFinder:
     def clear_leg(self, before: Pass, after: Pass) -> Leg | None:
         """The direct leg; None if it is blocked or not possible."""
         legs = self.direct([(before, after)])
-        return legs[0] if legs.motions.strains[0] <= _STRAIN and self._blocked(legs)[0] is None else None
+        return legs[0] if legs.strains[0] <= _STRAIN and self._blocked(legs)[0] is None else None
 
     def _between(self, before: Pass, after: Pass, depth: int) -> Seeking:
         legs = self.direct([(before, after)])
-        if legs.motions.strains[0] > _STRAIN:
+        if legs.strains[0] > _STRAIN:
             return None
         blocked = self._blocked(legs)[0]
         yield
@@ -107,8 +106,8 @@ class LegFinder:
         if ways:
             legs = self.direct([(before, way) for way in ways] + [(way, after) for way in ways])
             n = len(ways)
-            times = legs.motions.durations_s[:n] + legs.motions.durations_s[n:]
-            possible = np.maximum(legs.motions.strains[:n], legs.motions.strains[n:]) <= _STRAIN
+            times = legs.durations_s[:n] + legs.durations_s[n:]
+            possible = np.maximum(legs.strains[:n], legs.strains[n:]) <= _STRAIN
             hits = self._blocked(legs)
             yield
             clear = [i for i in range(n) if possible[i] and hits[i] is None and hits[n + i] is None]
@@ -162,7 +161,7 @@ class LegFinder:
                 chain.append(place(place_m, speed, _turned(before, after, part)))
             chain.append(after)
             legs = self.direct(list(pairwise(chain)))
-            if legs.motions.strains.max() <= _STRAIN:
+            if legs.strains.max() <= _STRAIN:
                 hits = self._blocked(legs)
                 yield
                 if not any(hits):
@@ -190,7 +189,7 @@ class LegFinder:
 
     def _blocked(self, legs: Legs) -> list[_Blocked | None]:
         """Where each leg is deepest in an obstacle; None if it is clear."""
-        steps = int(float(legs.motions.durations_s.max()) / _STEP_S)
+        steps = int(float(legs.durations_s.max()) / _STEP_S)
         shares = np.linspace(0.0, 1.0, min(max(steps, _FEWEST), _MOST) + 1)
         positions = legs.positions(shares)
         depths = self._clearance.depths(positions.reshape(-1, 3)).reshape(len(legs), len(shares), -1)

@@ -8,10 +8,18 @@ sampling). All functions take many legs at once: arrays of shape (..., 3), with 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from offboard.limits import FLOOR_M
+from offboard.navigation.goals import FlightStyle
 
 Array = npt.NDArray[np.float64]
 
@@ -19,14 +27,6 @@ _STRETCHES = np.array([1.02, 1.05, 1.1, 1.16, 1.24, 1.35, 1.5, 1.7, 2.0, 2.5, 3.
 _TOLERANCE = 1.005  # of the acceleration, for rounding
 _SHORTEST_S = 0.02
 _TINY = 1e-9
-
-
-@dataclass(frozen=True, slots=True)
-class LegLimits:
-    """Limits of a leg's axes; arrays of shape (3,) or (..., 3)."""
-
-    speed_m_s: Array
-    acceleration_m_s2: Array
 
 
 def rotate(vectors: Array, cosine: Array | float, sine: Array | float) -> Array:
@@ -38,19 +38,31 @@ def rotate(vectors: Array, cosine: Array | float, sine: Array | float) -> Array:
     return turned
 
 
-def solve(offset_m: Array, before_m_s: Array, after_m_s: Array, limits: LegLimits, least_s: Array) -> Motions:
-    """The fastest motions that keep the limits; if none keep them, those that exceed them least.
+def fastest_legs(
+    places_m: tuple[Array, Array],
+    velocities_m_s: tuple[Array, Array],
+    turns_rad: Array,
+    *,
+    speed_m_s: Array,
+    limit: Array,
+    least_s: Array,
+) -> Legs:
+    """The fastest legs that keep the limits; if none keep them, those that exceed them least.
 
     Args:
-        offset_m: from start to end, shape (n, 3).
-        before_m_s: velocity at the start.
-        after_m_s: velocity at the end.
-        limits: of each axis.
-        least_s: motions may not be shorter than this, shape (n,).
+        places_m: of the starts and the ends, arena axes, shape (n, 3) each.
+        velocities_m_s: there, likewise.
+        turns_rad: headings of the legs' axes, shape (n,).
+        speed_m_s: limit of each axis, shape (3,).
+        limit: of the acceleration of each axis, m/s^2, shape (n, 3).
+        least_s: legs may not be shorter than this, shape (n,).
     """
-    caps = _speeds(before_m_s, after_m_s, limits)
-    limit = np.broadcast_to(limits.acceleration_m_s2, offset_m.shape)
-    fastest = _fastest(offset_m, before_m_s, after_m_s, limits)
+    c, s = np.cos(turns_rad), np.sin(turns_rad)
+    offset_m = rotate(places_m[1] - places_m[0], c, -s)
+    before_m_s, after_m_s = (rotate(velocity, c, -s) for velocity in velocities_m_s)
+    # Speed limits, raised where a leg starts or ends faster.
+    caps = np.maximum(speed_m_s, np.maximum(np.abs(before_m_s), np.abs(after_m_s)))
+    fastest = _fastest(offset_m, before_m_s, after_m_s, caps, limit)
     times = np.maximum(np.maximum(fastest.max(axis=1), least_s), _SHORTEST_S)
     a = _accelerations(offset_m, before_m_s, after_m_s, caps, times[:, None])
     late = (np.abs(a) > limit * _TOLERANCE).any(axis=1)
@@ -65,7 +77,8 @@ def solve(offset_m: Array, before_m_s: Array, after_m_s: Array, limits: LegLimit
         )
         a = _accelerations(offset_m, before_m_s, after_m_s, caps, times[:, None])
     a = np.where(np.isfinite(a), a, 0.0)
-    return Motions(times, before_m_s, after_m_s, a, caps, (np.abs(a) / limit).max(axis=1))
+    strains = (np.abs(a) / limit).max(axis=1)
+    return Legs(places_m[0], c, s, times, before_m_s, after_m_s, a, caps, strains)
 
 
 def _stretched(
@@ -82,15 +95,8 @@ def _stretched(
     return shortest
 
 
-def _speeds(before: Array, after: Array, limits: LegLimits) -> Array:
-    """Speed limits, raised where a leg starts or ends faster."""
-    return np.maximum(limits.speed_m_s, np.maximum(np.abs(before), np.abs(after)))
-
-
-def _fastest(offset: Array, before: Array, after: Array, limits: LegLimits) -> Array:
-    """The shortest time of each axis by itself."""
-    a = limits.acceleration_m_s2
-    cap = _speeds(before, after, limits)
+def _fastest(offset: Array, before: Array, after: Array, cap: Array, a: Array) -> Array:
+    """The shortest time of each axis by itself, with a highest speed and an acceleration."""
     ramp = 0.5 * (before + after) * np.abs(after - before) / a  # distance of a change of speed without a peak
     sign = np.where(offset >= ramp, 1.0, -1.0)
     peak = np.sqrt(np.maximum(0.5 * (before * before + after * after) + sign * a * offset, 0.0))
@@ -118,38 +124,6 @@ def _accelerations(offset: Array, before: Array, after: Array, cap: Array, time:
     with_cruise = ((top - before) ** 2 + (top - after) ** 2) / np.maximum(2.0 * room, _TINY)
     with_cruise = np.where(room > _TINY, with_cruise, np.inf) * np.where(a >= 0.0, 1.0, -1.0)
     return np.where(np.abs(peak) > cap + _TINY, with_cruise, a)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Motions:
-    """Motions in axes of their own, many at once.
-
-    Attributes:
-        durations_s: shape (n,).
-        before_m_s: speeds at the start, shape (n, 3).
-        after_m_s: speeds at the end.
-        accelerations_m_s2: of the first phase.
-        caps_m_s: highest speeds.
-        strains: the highest acceleration as a multiple of the limit, shape (n,).
-    """
-
-    durations_s: Array
-    before_m_s: Array
-    after_m_s: Array
-    accelerations_m_s2: Array
-    caps_m_s: Array
-    strains: Array
-
-    def phases_s(self) -> Array:
-        """Durations of the three phases, shape (3, n, 3)."""
-        a, before, after = self.accelerations_m_s2, self.before_m_s, self.after_m_s
-        time = self.durations_s[:, None]
-        top = np.clip(0.5 * (before + after + a * time), -self.caps_m_s, self.caps_m_s)
-        size = np.maximum(np.abs(a), _TINY)
-        moving = np.abs(a) > 1e-7
-        first = np.where(moving, np.abs(top - before) / size, 0.0)
-        third = np.where(moving, np.abs(after - top) / size, 0.0)
-        return np.stack((first, np.maximum(time - first - third, 0.0), third))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -183,7 +157,7 @@ class Leg:
         return self.start_m + rotate(moved, c, s), rotate(velocity, c, s), rotate(acceleration, c, s)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Legs:
     """Legs, many at once.
 
@@ -191,39 +165,56 @@ class Legs:
         starts_m: arena axes, shape (n, 3).
         cosines: of the headings of their axes, shape (n,).
         sines: of these headings.
-        motions: in these axes.
-        phases_s: of the motions, shape (3, n, 3).
+        durations_s: shape (n,).
+        before_m_s: speeds at the start, in these axes, shape (n, 3).
+        after_m_s: speeds at the end.
+        accelerations_m_s2: of the first phase.
+        caps_m_s: highest speeds.
+        strains: the highest acceleration as a multiple of the limit, shape (n,).
     """
 
     starts_m: Array
     cosines: Array
     sines: Array
-    motions: Motions
-    phases_s: Array
+    durations_s: Array
+    before_m_s: Array
+    after_m_s: Array
+    accelerations_m_s2: Array
+    caps_m_s: Array
+    strains: Array
 
     def __len__(self) -> int:
         return len(self.starts_m)
 
     def __getitem__(self, index: int) -> Leg:
         """One of them."""
-        motions = self.motions
         return Leg(
             self.starts_m[index],
             (float(self.cosines[index]), float(self.sines[index])),
-            motions.before_m_s[index],
-            motions.accelerations_m_s2[index],
+            self.before_m_s[index],
+            self.accelerations_m_s2[index],
             self.phases_s[:, index],
-            float(motions.durations_s[index]),
+            float(self.durations_s[index]),
         )
+
+    @cached_property
+    def phases_s(self) -> Array:
+        """Durations of the three phases, shape (3, n, 3)."""
+        a, before, after = self.accelerations_m_s2, self.before_m_s, self.after_m_s
+        time = self.durations_s[:, None]
+        top = np.clip(0.5 * (before + after + a * time), -self.caps_m_s, self.caps_m_s)
+        size = np.maximum(np.abs(a), _TINY)
+        moving = np.abs(a) > 1e-7
+        first = np.where(moving, np.abs(top - before) / size, 0.0)
+        third = np.where(moving, np.abs(after - top) / size, 0.0)
+        return np.stack((first, np.maximum(time - first - third, 0.0), third))
 
     def positions(self, shares: Array) -> Array:
         """Positions at shares of each leg's duration, shape (n, shares, 3)."""
-        motions = self.motions
-        times = motions.durations_s[:, None, None] * shares[None, :, None]
         moved, _ = _moved(
-            times,
-            speeds=motions.before_m_s[:, None],
-            a=motions.accelerations_m_s2[:, None],
+            self.durations_s[:, None, None] * shares[None, :, None],
+            speeds=self.before_m_s[:, None],
+            a=self.accelerations_m_s2[:, None],
             phases=self.phases_s[:, :, None],
         )
         return self.starts_m[:, None] + rotate(moved, self.cosines[:, None], self.sines[:, None])
@@ -242,3 +233,100 @@ def _moved(times: Array, speeds: Array, a: Array, phases: Array) -> tuple[Array,
         + (cruise - 0.5 * a * in_third) * in_third
     )
     return moved, speeds + a * (in_first - in_third)
+
+
+LOOK_REACH_M = 0.5  # shorter legs to a gate are flown with the heading along them
+NO_TURN_RAD = 0.1  # a smaller turn takes no time of its own
+DESCENT_GAIN_PER_S2 = 1.5
+"""A descent to a height that brakes with this times the height above the box's floor is nowhere faster than
+the box allows: v^2 / 2a <= h for v = h / 1.1 s, which is `REACTION_S` and `BRAKE_HEIGHT_S`."""
+_LEAST_DESCENT_M_S2 = 0.2
+
+
+class Ends(NamedTuple):
+    """Where legs start or end.
+
+    Attributes:
+        places_m: arena axes, shape (n, 3).
+        velocities_m_s: shape (n, 3).
+        yaws_rad: headings, NaN for any, shape (n,).
+        turns_s: how long after a leg's end a turn to its heading may still last, shape (n,).
+        at_gates: there a gate is entered, which is looked at before, shape (n,).
+    """
+
+    places_m: Array
+    velocities_m_s: Array
+    yaws_rad: Array
+    turns_s: Array
+    at_gates: npt.NDArray[np.bool_]
+
+    def take(self, rows: npt.NDArray[np.intp]) -> Ends:
+        """Some of them."""
+        return Ends(*map(itemgetter(rows), self))
+
+    @staticmethod
+    def joined(parts: Sequence[Ends]) -> Ends:
+        """All of several, in their order."""
+        return Ends(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+class Connector:
+    """Makes legs; obstacles are left out.
+
+    Args:
+        style: how boldly to fly.
+    """
+
+    def __init__(self, style: FlightStyle) -> None:
+        self._style = style
+        self._speeds: Array = np.array([style.axis_speed_m_s, style.axis_speed_m_s, style.climb_speed_m_s])
+        self._accelerations: Array = np.array(
+            [style.acceleration_m_s2, style.acceleration_m_s2, style.climb_acceleration_m_s2]
+        )
+
+    def legs(self, starts: Ends, ends: Ends) -> Legs:
+        """The fastest legs, each from one start to the end of the same index."""
+        return fastest_legs(
+            (starts.places_m, ends.places_m),
+            (starts.velocities_m_s, ends.velocities_m_s),
+            self._headings(ends.places_m - starts.places_m, starts.yaws_rad, ends),
+            speed_m_s=self._speeds,
+            limit=self._acceleration_limits(starts.places_m[:, 2], ends.places_m[:, 2]),
+            least_s=self._turn_times(starts.yaws_rad, ends),
+        )
+
+    def _headings(self, way: Array, yaw_before: Array, ends: Ends) -> Array:
+        """Headings of the legs' axes; where they may differ from the direction, both axes are used."""
+        limit, yaw_after = self._style.look_offset_rad, ends.yaws_rad
+        bearing = np.arctan2(way[:, 1], way[:, 0])
+        reach = np.hypot(way[:, 0], way[:, 1])
+        aside = np.where(np.isnan(yaw_before), 0.0, wrap(yaw_before - bearing))
+        side = np.where(np.abs(aside) > NO_TURN_RAD, aside, wrap(yaw_after - bearing))
+        looking = np.copysign(limit, side) * np.clip(reach - LOOK_REACH_M, 0.0, 1.0)
+        quarter = np.floor(aside / (pi / 2)) * (pi / 2) + pi / 4
+        if not limit:
+            quarter = np.round(aside / (pi / 2)) * (pi / 2)
+        offset = np.where(ends.at_gates, looking, np.where(np.isnan(yaw_after), quarter, 0.0))
+        upright = np.where(np.isnan(yaw_before), 0.0, yaw_before)
+        turn: Array = np.where(reach > 1e-6, bearing + offset, upright)
+        return turn
+
+    def _turn_times(self, yaw_before: Array, ends: Ends) -> Array:
+        """Times that turns need within legs; none where a heading is free or the turn small."""
+        turn = np.abs(wrap(ends.yaws_rad - yaw_before))
+        needed = turn / self._style.yaw_rate_rad_s + self._style.turn_smoothing_s - ends.turns_s
+        return np.maximum(np.where(turn > NO_TURN_RAD, needed, 0.0), 0.0)
+
+    def _acceleration_limits(self, before_m: Array, after_m: Array) -> Array:
+        """Of each leg's axes, shape (n, 3): descents brake early enough for the box's floor."""
+        acceleration = np.tile(self._accelerations, (len(before_m), 1))
+        gentle = DESCENT_GAIN_PER_S2 * (after_m - FLOOR_M)
+        gentle = np.clip(gentle, _LEAST_DESCENT_M_S2, acceleration[:, 2])
+        acceleration[:, 2] = np.where(after_m < before_m, gentle, acceleration[:, 2])
+        return acceleration
+
+
+def wrap(angle: Array) -> Array:
+    """Angles between -pi and pi."""
+    wrapped: Array = (angle + pi) % (2 * pi) - pi
+    return wrapped

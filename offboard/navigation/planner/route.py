@@ -13,8 +13,7 @@ import numpy.typing as npt
 from offboard.navigation.goals import PRESENT_SHARE, FlightStyle, Gate, Goal, Motion, Point, Refusal
 from offboard.navigation.path import Crossing
 from offboard.navigation.planner.clearance import Clearance
-from offboard.navigation.planner.connect import Connector, Ends
-from offboard.navigation.planner.legs import Array
+from offboard.navigation.planner.legs import Array, Connector, Ends
 
 SPEED_SHARES = (1.0, 0.7, 0.4)  # of the crossing speed, to choose from
 LEAST_STRAIGHT_M = 0.22  # before and behind an opening: the drone's box is clear of the bars there
@@ -71,12 +70,10 @@ class Pass:
         return float(self.entries.yaws_rad[0])
 
 
-def place(
-    position_m: Array, velocity_m_s: Array, yaw_rad: float, goal: Goal | None = None, turn_s: float = 0.0
-) -> Pass:
+def place(position_m: Array, velocity_m_s: Array, yaw_rad: float, goal: Goal | None = None) -> Pass:
     """A pass at one place with one velocity."""
     at_gate = np.zeros(1, dtype=bool)
-    ends = Ends(position_m[None], velocity_m_s[None], np.array([yaw_rad]), np.array([turn_s]), at_gate)
+    ends = Ends(position_m[None], velocity_m_s[None], np.array([yaw_rad]), np.zeros(1), at_gate)
     return Pass(goal, ends, ends, np.zeros(1), np.zeros(1))
 
 
@@ -118,9 +115,9 @@ class RouteFinder:
         self._stages = [place(at, speed, start.yaw_rad)]
         openings = self._openings([goal for goal in goals if isinstance(goal, Gate)])
         for index, goal in enumerate(goals):
-            following = goals[index + 1] if index + 1 < len(goals) else None
             if isinstance(goal, Point):
-                self._stages.append(self._past_point(goal, following))
+                yaw = nan if goal.yaw_rad is None else goal.yaw_rad
+                self._stages.append(place(np.array(goal.position_m), np.zeros(3), yaw, goal))
                 continue
             ways = self._through_gate(goal, openings.pop(0), start if index == 0 else None, previous)
             if ways is None:
@@ -129,8 +126,8 @@ class RouteFinder:
         for before, after in pairwise(self._stages):
             m, n = len(before.inner_s), len(after.inner_s)
             rows, columns = np.repeat(np.arange(m), n), np.tile(np.arange(n), m)
-            times = self._connector.times(before.exits.take(rows), after.entries.take(columns))
-            self._leg_s.append(times.reshape(m, n))
+            legs = self._connector.legs(before.exits.take(rows), after.entries.take(columns))
+            self._leg_s.append(legs.durations_s.reshape(m, n))
         return None
 
     def best(self) -> tuple[list[Pass], list[int], list[float]]:
@@ -187,12 +184,12 @@ class RouteFinder:
         blocked = (depths > 0.0).any(axis=-1)
         rooms = np.where(blocked.any(axis=-1), blocked.argmax(axis=-1), _ROOM_STEPS) * _ROOM_STEP_M
         found: list[list[_Opening]] = []
-        for index, gate in enumerate(gates):
+        for index in range(len(gates)):
             sides: list[_Opening] = []
-            for side, sign in ((0, 1), (1, -1)):
+            for side in (0, 1):
                 row = 2 * index + side
                 before_m, after_m = float(rooms[index, 1 - side]), float(rooms[index, side])
-                if gate.direction != -sign and min(before_m, after_m) >= LEAST_STRAIGHT_M:
+                if min(before_m, after_m) >= LEAST_STRAIGHT_M:
                     sides.append(_Opening(centres[row], normals[row], float(yaws[row]), before_m, after_m))
             found.append(sides)
         return found
@@ -241,24 +238,6 @@ class RouteFinder:
     def _top_speed(self, room_m: float) -> float:
         """The speed from which there is room to brake."""
         return max(sqrt(2.0 * self._style.acceleration_m_s2 * max(room_m, 0.0)), LEAST_CROSSING_M_S)
-
-    def _past_point(self, point: Point, following: Goal | None) -> Pass:
-        """At rest, or past it towards the next goal at each speed."""
-        yaw = nan if point.yaw_rad is None else point.yaw_rad
-        position = np.array(point.position_m)
-        if point.stop or following is None:
-            return place(position, np.zeros(3), yaw, point)
-        target = following.centre_m if isinstance(following, Gate) else following.position_m
-        to_next = np.array(target) - position
-        from_last = position - self._stages[-1].exits.places_m.mean(axis=0)
-        chord = to_next / (np.linalg.norm(to_next) + 1e-9) + from_last / (np.linalg.norm(from_last) + 1e-9)
-        chord[2] = 0.0
-        chord *= self._style.axis_speed_m_s / max(float(np.linalg.norm(chord)), 1.0)
-        velocities = np.array([share * chord for share in (*SPEED_SHARES, 0.0)])
-        n = len(velocities)
-        yaws, turns_s = np.full(n, yaw), np.full(n, BLOCKED_S)  # it need not have turned there
-        ends = Ends(np.tile(position, (n, 1)), velocities, yaws, turns_s, np.zeros(n, dtype=bool))
-        return Pass(point, ends, ends, np.zeros(n), np.zeros(n))
 
 
 def _same_way(gate: Gate, yaw_rad: float, previous: Sequence[Crossing]) -> bool | None:

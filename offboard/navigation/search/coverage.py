@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, remainder, tau
 from typing import Final
 
 import numpy as np
 
-from framerunner.geometry.rotations import yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
-from offboard.navigation.camera_model import CameraModel, CameraPose
-from offboard.navigation.search.floor_points import COLUMN_PX, FloorPoints
+from offboard.navigation.camera_model import COLUMN_PX, CameraModel, CameraPose, FloorPoints
+from offboard.navigation.pose_history import PoseChange
 from offboard.navigation.search.frame_visibility import (
-    BEST_QUALITY,
     HEADINGS,
     Floats,
     FrameVisibility,
@@ -44,7 +41,7 @@ class Coverage:
         self._visibility = FrameVisibility(camera)
         self._centres = self.grid.centres()
         self._seen = np.zeros((HEADINGS, self._centres[0].size), dtype=np.float32)
-        self._last: tuple[Vec3, float] | None = None
+        self._change = PoseChange(_MOVED_M, _TURNED_RAD)
         self._waiting: list[tuple[CameraPose, Sequence[ObstacleEdge]]] = []
         self._is_asked = False
 
@@ -61,7 +58,7 @@ class Coverage:
             attitude_arena: body FLU to arena.
             obstacle_edges: where obstacles stand; nothing behind them counts as seen.
         """
-        if self._is_new(position_m, yaw_of(attitude_arena)):
+        if self._change.is_new(position_m, attitude_arena):
             self._waiting.append((self._camera.pose(position_m, attitude_arena), obstacle_edges))
             if self._is_asked and len(self._waiting) > _MOST_WAITING:
                 self._add(*self._waiting.pop(0))
@@ -91,20 +88,6 @@ class Coverage:
         means = block_means(self._cells())
         flat: Floats = means.reshape(HEADINGS, -1)
         return flat
-
-    def in_plan(self) -> Floats:
-        """Share seen over all heights and headings, 0 to 1, for pictures: shape (cells x, cells y)."""
-        means: Floats = self._cells().mean(axis=(0, 3)) / np.float32(BEST_QUALITY)
-        return means
-
-    def _is_new(self, position_m: Vec3, yaw_rad: float) -> bool:
-        if self._last is not None:
-            (x, y, z), last_yaw_rad = self._last
-            moved_m = hypot(position_m[0] - x, position_m[1] - y, position_m[2] - z)
-            if moved_m < _MOVED_M and abs(remainder(yaw_rad - last_yaw_rad, tau)) < _TURNED_RAD:
-                return False
-        self._last = (position_m, yaw_rad)
-        return True
 
     def _in_view(self, pose: CameraPose) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
         """Indices of the cells in which a frame is wholly in the image."""

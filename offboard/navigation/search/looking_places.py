@@ -8,10 +8,10 @@ from math import atan2, cos, pi, sin
 import numpy as np
 
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import FlightStyle, Obstacles, Point
 from offboard.navigation.planner.clearance import Clearance
 from offboard.navigation.planner.legs import Array
+from offboard.navigation.view import FrameEstimate
 from scenarios.models import Arena
 
 BEFORE_M = (1.0, 0.85, 0.7, 0.55, 0.45)  # from a frame that is to be crossed; the first that is free

@@ -8,7 +8,7 @@ from typing import Final
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.navigation.goals import FlightStyle
-from offboard.navigation.search.viewed_space import ViewedSpace
+from offboard.navigation.seen_space import ViewedSpace
 from scenarios.models import Arena
 
 _SLOPE: Final = 0.35  # height above or below, for its distance, at which a place is well in view

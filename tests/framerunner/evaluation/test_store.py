@@ -10,7 +10,7 @@ from framerunner.evaluation.plan import plan_level
 from framerunner.evaluation.store import FLIGHTS, open_folder, read_folder
 from framerunner.runs.track import Track
 from offboard.mission import load_mission
-from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.view import FrameEstimate
 from scenarios.loader import load_scenario
 from tests.framerunner.evaluation.flights import made_row
 

@@ -14,9 +14,9 @@ from firmware_py.status import FlightMode
 from framerunner.flying.plan import FlightPlan
 from framerunner.preflight.keys import KeyReader
 from framerunner.wire.operator_messages import PageMessage
+from offboard.limits import Caps
 from offboard.mission import load_mission
 from offboard.pilot import Pilot
-from offboard.safety.caps import Caps
 from offboard.safety.failsafes import failsafe_rows
 from offboard.safety.fence import flight_fence
 from offboard.safety.operator import Operator

@@ -9,8 +9,7 @@ from framerunner.runs.track import Track
 from offboard.app import MissionEnd, Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.mission import load_mission
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import FrameEstimate, NavigationView
 from scenarios.loader import load_scenario
 from scenarios.result import RefereeReport
 from tests.framerunner.evaluation.flights import short_scenario

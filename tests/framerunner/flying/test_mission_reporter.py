@@ -16,8 +16,7 @@ from offboard.app import Moment, fly_mission
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import MissionEngine, TransitionTaken
 from offboard.mission import load_mission, mermaid
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import FrameEstimate, NavigationView
 from offboard.pilot import Imu
 from scenarios.result import FlightResult
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone

@@ -5,7 +5,7 @@ import pickle
 import pytest
 
 from framerunner.flying.plan import FlightPlan
-from offboard.keep_in_box import flight_box
+from offboard.limits import flight_box
 from scenarios.loader import load_scenario
 from scenarios.models import Pole
 

@@ -17,8 +17,7 @@ from framerunner.wire.mission_tunnel import DOCUMENT_TYPE
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.mission import load_mission, mermaid
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import FrameEstimate, NavigationView
 from scenarios.loader import load_scenario
 from tests.chromium import Complaints, until
 from tests.framerunner.monitor.page_server import JPEG, fake_monitor

@@ -20,8 +20,7 @@ from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
 from offboard.mission import load_mission
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import FrameEstimate, NavigationView
 from scenarios.loader import load_scenario
 from vision.types import Detections
 

@@ -4,8 +4,8 @@ import pytest
 
 from framerunner.flying.plan import FlightPlan
 from framerunner.preflight import link as preflight_link
+from offboard.limits import Caps
 from offboard.mission import load_mission
-from offboard.safety.caps import Caps
 from scenarios.loader import load_scenario
 from tests.framerunner.preflight.bench import BenchLink
 

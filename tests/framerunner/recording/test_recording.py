@@ -26,8 +26,7 @@ from framerunner.recording.schemas import TOPICS, schema_texts
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.mission import load_mission
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import FrameEstimate, NavigationView
 from scenarios.loader import load_scenario, parse_scenario
 from scenarios.result import FlightResult
 from tests.framerunner.recording.conftest import record

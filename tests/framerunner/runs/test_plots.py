@@ -10,7 +10,7 @@ from matplotlib.patches import Ellipse
 from framerunner.runs import PlotError
 from framerunner.runs.plots import STATE_COLOURS, draw_scenario, draw_track, save_figure
 from framerunner.runs.track import Track
-from offboard.navigation.frames.frame_estimate import FrameEstimate
+from offboard.navigation.view import FrameEstimate
 from scenarios.loader import load_scenario
 from scenarios.models import Arena, Base, Frame, Scenario, Start
 from scenarios.result import FlightResult

@@ -11,8 +11,7 @@ from framerunner.runs.recorder import FlightRecorder, RecordingCamera, VideoFile
 from framerunner.runs.track import TrackRecorder
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import FrameEstimate, NavigationView
 from tests.disk import disk_that_takes
 from vision.types import CameraFrame, Detections
 

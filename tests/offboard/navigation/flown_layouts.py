@@ -14,7 +14,7 @@ from framerunner.flying.response import Response
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
-from offboard.keep_in_box import KeepInBox
+from offboard.limits import VelocityLimits
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import CONTEST, FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
 from offboard.navigation.path import Path
@@ -163,7 +163,7 @@ def fly(
     """
     flight = FlightPlan(layout.scenario, response=response)
     vehicle = LockstepVehicle(flight)
-    drone, keeper = vehicle.drone, KeepInBox(flight.box)
+    drone, limits, kept_in_box = vehicle.drone, VelocityLimits(box=flight.box), 0
     follower, estimate, sent = PathFollower(), ResponseEstimate(), None
     asyncio.run(drone.ready())
     asyncio.run(drone.motors_on())
@@ -179,7 +179,8 @@ def fly(
         estimate.update(state, sent)
         answers = follower.response = estimate.response
         prediction = estimate.predict() if answers.late else None
-        sent = keeper.limit(follower.command(path, state, now_s, prediction), state)
+        limited = limits.limit(follower.command(path, state, now_s, prediction), state)
+        sent, kept_in_box = limited.command, kept_in_box + limited.kept_in_box
         drone.command(sent)
         farthest_m = max(farthest_m, follower.error_m)
         if now_s - planned_s >= replan_s and follower.progress_s < path.duration_s - 1.0:
@@ -191,7 +192,7 @@ def fly(
         state = drone.next_state()
     asyncio.run(drone.motors_off())
     drone.settle()
-    return vehicle.simulation.referee.report(), farthest_m, keeper.limited_us / 1e6
+    return vehicle.simulation.referee.report(), farthest_m, kept_in_box * 0.05
 
 
 def goals_left(goals: list[Goal], path: Path, time_s: float) -> list[Goal]:

@@ -1,9 +1,9 @@
 """Why an attempt to cross a frame is given up."""
 
 from offboard.navigation.crossing_attempt import CrossingAttempt
-from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import Gate
 from offboard.navigation.path import Crossing
+from offboard.navigation.view import FrameEstimate
 
 OPENING_M = (0.38, 0.18)
 UNSURE = FrameEstimate("red", (2.0, 0.0, 1.0), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 3, 0)

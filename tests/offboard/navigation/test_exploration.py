@@ -7,10 +7,11 @@ from math import cos, hypot, pi, radians, remainder, sin, tau
 
 import pytest
 
+from framerunner.geometry.axes import Pose
 from framerunner.geometry.rotations import quaternion_from_yaw
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.exploration import Explorer, Viewpoint
-from offboard.navigation.search.glimpses import Glimpses, LineOfSight
+from offboard.navigation.exploration import Explorer
+from offboard.navigation.search.likelihood import Glimpses, LineOfSight
 from scenarios.models import Arena, Camera, Frame, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
 from vision.types import Detection, Detections, ObstacleEdge
@@ -47,7 +48,7 @@ class Search:
     explorer: Explorer = field(default_factory=lambda: Explorer(CAMERA, Arena()))
     time_s: float = 0.0
     images: dict[str, int] = field(default_factory=dict)
-    viewpoints: list[Viewpoint] = field(default_factory=list)
+    viewpoints: list[Pose] = field(default_factory=list)
 
     @classmethod
     def of(cls, scenario: Scenario):
@@ -64,7 +65,7 @@ class Search:
             for frame in self.frames:
                 if recognised(frame, self.position_m, self.yaw_rad):
                     self.images[frame.colour] = self.images.get(frame.colour, 0) + 1
-            self.explorer.update(self.position_m, quaternion_from_yaw(self.yaw_rad))
+            self.explorer.coverage.update(self.position_m, quaternion_from_yaw(self.yaw_rad))
             if ticks % 5 == 0:
                 known = [frame.position_arena_m for frame in self.found()]
                 self.viewpoints.append(self.explorer.next_viewpoint(self.position_m, self.yaw_rad, known))
@@ -112,7 +113,7 @@ def test_what_is_not_there_is_looked_for_in_ever_new_places():
 
 def test_the_drone_turns_at_once_and_away_from_what_it_saw():
     explorer = Explorer(CAMERA, Arena())
-    explorer.update((0.0, 0.0, 0.5), quaternion_from_yaw(0.0))
+    explorer.coverage.update((0.0, 0.0, 0.5), quaternion_from_yaw(0.0))
     first = explorer.next_viewpoint((0.0, 0.0, 0.5), 0.0)
     assert abs(first.yaw_rad) > 0.5
     assert hypot(*first.position_m[:2]) < 3.0
@@ -120,7 +121,7 @@ def test_the_drone_turns_at_once_and_away_from_what_it_saw():
 
 def test_a_viewpoint_that_cannot_be_reached_is_followed_by_others():
     explorer, here_m = Explorer(CAMERA, Arena()), (-4.0, -4.0, 0.5)
-    explorer.update(here_m, quaternion_from_yaw(0.0))
+    explorer.coverage.update(here_m, quaternion_from_yaw(0.0))
     places = []
     for _ in range(40):
         places.append(explorer.next_viewpoint(here_m, 0.0).position_m)
@@ -130,7 +131,7 @@ def test_a_viewpoint_that_cannot_be_reached_is_followed_by_others():
 
 def test_a_line_of_sight_is_looked_along_first():
     explorer = Explorer(CAMERA, Arena())
-    explorer.update((0.0, 0.0, 1.0), quaternion_from_yaw(0.0))
+    explorer.coverage.update((0.0, 0.0, 1.0), quaternion_from_yaw(0.0))
     for bearing in (2.0, -2.0):
         hint = LineOfSight((0.08, 0.0, 1.0), (cos(bearing), sin(bearing), 0.0))
         viewpoint = explorer.next_viewpoint((0.0, 0.0, 1.0), 0.0, hints=[hint])
@@ -143,7 +144,7 @@ def test_viewpoints_keep_clear_of_obstacles_and_turning_is_always_possible():
     for _ in range(40):
         viewpoint = search.explorer.next_viewpoint(search.position_m, search.yaw_rad, columns_m=[post])
         assert hypot(viewpoint.position_m[0] - 2.0, viewpoint.position_m[1]) >= 1.5
-        search.explorer.update(search.position_m, quaternion_from_yaw(search.yaw_rad))
+        search.explorer.coverage.update(search.position_m, quaternion_from_yaw(search.yaw_rad))
         search.step(viewpoint)
     everywhere = (0.0, 0.0, 20.0)
     blocked = search.explorer.next_viewpoint(search.position_m, 0.0, columns_m=[everywhere])
@@ -154,12 +155,12 @@ def test_viewpoints_keep_clear_of_obstacles_and_turning_is_always_possible():
 def test_nothing_behind_an_obstacle_counts_as_seen():
     clear, hidden = Explorer(CAMERA, Arena()), Explorer(CAMERA, Arena())
     edges = tuple(ObstacleEdge(float(column), 80.0, cut=False) for column in range(-160, 160, 4))
-    clear.update((-4.0, 0.0, 1.0), quaternion_from_yaw(0.0))
-    hidden.update((-4.0, 0.0, 1.0), quaternion_from_yaw(0.0), edges)  # its lower end is 2 m ahead
-    x_m = clear.coverage.grid.x_m
-    assert clear.coverage.in_plan()[x_m > -1.5].max() > 0.5
-    assert hidden.coverage.in_plan()[x_m > -1.5].max() == 0.0
-    assert hidden.coverage.in_plan()[x_m < -2.0].max() > 0.0
+    clear.coverage.update((-4.0, 0.0, 1.0), quaternion_from_yaw(0.0))
+    hidden.coverage.update((-4.0, 0.0, 1.0), quaternion_from_yaw(0.0), edges)  # its lower end is 2 m ahead
+    x_m = clear.coverage.grid.blocks().centres()[0]
+    assert clear.coverage.blocks()[:, x_m > -1.0].max() > 0.5
+    assert hidden.coverage.blocks()[:, x_m > -1.0].max() == 0.0
+    assert hidden.coverage.blocks()[:, x_m < -2.0].max() > 0.0
 
 
 def test_searches_repeat_to_the_last_bit():
@@ -178,7 +179,7 @@ def test_a_wall_is_not_looked_through_but_flown_round():
         for y in range(-4, 5):
             for yaw in (1.5, 2.3, 3.1, -2.3, -1.5):  # all but eastwards
                 for z in (0.6, 1.5, 2.7):
-                    explorer.update((float(x), float(y), z), quaternion_from_yaw(yaw))
+                    explorer.coverage.update((float(x), float(y), z), quaternion_from_yaw(yaw))
     open_view = explorer.next_viewpoint((-1.0, -3.0, 1.5), 0.0)
     walled_view = explorer.next_viewpoint((-1.0, -3.0, 1.5), 0.0, columns_m=wall)
     assert open_view.position_m[1] < 0.0

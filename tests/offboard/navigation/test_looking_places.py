@@ -6,9 +6,9 @@ from math import cos, dist, hypot, pi, remainder, sin
 
 import pytest
 
-from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import CONTEST, Gate, Obstacles
 from offboard.navigation.search.looking_places import LookingPlaces
+from offboard.navigation.view import FrameEstimate
 from scenarios.models import Arena
 
 PLACES = LookingPlaces(Arena(), CONTEST)

@@ -12,8 +12,7 @@ from framerunner.geometry.vectors import ZERO3
 from framerunner.vehicle.airframe import load_airframe
 from offboard.drone import DroneState
 from offboard.navigation.control import loop_inverse
-from offboard.navigation.control.loop_inverse import HOLD_S, LoopInverse, Own
-from offboard.navigation.control.own_motion import OwnMotion
+from offboard.navigation.control.loop_inverse import HOLD_S, LoopInverse, Own, OwnMotion
 from offboard.navigation.goals import Motion
 
 TICK_S = 0.05

@@ -8,9 +8,9 @@ from framerunner.flying.plan import FlightPlan
 from offboard.drone import DroneState
 from offboard.mission import load_mission
 from offboard.navigation import path_flight
-from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import Gate, Refusal
 from offboard.navigation.navigator import Navigator
+from offboard.navigation.view import FrameEstimate
 from offboard.navigation.world_model import WorldModel
 from scenarios.random_scenarios import load_level, random_scenario
 from tests.offboard.navigation.flown_layouts import flown

@@ -14,8 +14,7 @@ from offboard.navigation import path_flight
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import CONTEST, Gate, Obstacles, Point
 from offboard.navigation.path_flight import TICK_WORK, PathFlight
-from offboard.navigation.search.viewed_space import ViewedSpace
-from offboard.navigation.seen_space import SeenSpace
+from offboard.navigation.seen_space import SeenSpace, ViewedSpace
 from scenarios.models import Arena, Base, Camera
 from tests.offboard.navigation.flown_layouts import flown
 from tests.offboard.navigation.test_obstacle_map import edges_of

@@ -11,10 +11,9 @@ import pytest
 
 from framerunner.geometry.rotations import quaternion_from_euler, rotation, to_world
 from offboard.drone import DroneState
-from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.goals import CONTEST
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
-from offboard.navigation.surroundings import Surroundings
+from offboard.navigation.view import FrameEstimate, Surroundings
 from offboard.navigation.world_model import WorldModel
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Arena, Base, Camera, Gimbal
@@ -60,7 +59,7 @@ def test_a_camera_on_a_gimbal_gives_the_place_of_what_it_looks_at():
         return Detections(time_us=time_us, frames=() if found is None else (found,))
 
     def place_of_red(camera: Camera, image_of: Callable[[int], Detections]) -> float:
-        surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), camera, (0.25, 0.25, 0.1))
+        surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), camera)
         world = WorldModel(surroundings, CONTEST)
         for tick in TICKS:
             due = [us for us in IMAGES_US if us // TICK_US == tick - 2]
@@ -77,7 +76,7 @@ IMAGES_US = range(1_030_000, 2_900_000, 100_000)  # exposed between ticks
 
 def red_after(ticks: Iterable[tuple[DroneState, list[Detections]]]) -> FrameEstimate | None:
     """What is known of red after these ticks."""
-    surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera(), (0.25, 0.25, 0.1))
+    surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera())
     world = WorldModel(surroundings, CONTEST)
     for at, images in ticks:
         world.observe(at, images)
@@ -132,7 +131,7 @@ def test_images_are_used_once_whatever_their_number() -> None:
 
 
 def test_what_seems_to_stand_at_the_start_leaves_room_for_the_drone() -> None:
-    surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera(), (0.25, 0.25, 0.1))
+    surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera())
     world = WorldModel(surroundings, CONTEST)
     start = state(1_000_000)
     world.observe(start, [])
@@ -145,7 +144,7 @@ def test_what_seems_to_stand_at_the_start_leaves_room_for_the_drone() -> None:
 
 
 def test_frame_that_seems_to_be_above_the_ceiling_is_crossed_below_it():
-    surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera(), (0.25, 0.25, 0.1))
+    surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera())
     frame = FrameEstimate("red", (5.3, 0.0, 4.4), 0.5, (0.5, 0.5, 0.5), 0.1, True, False, 1, 0)
     gate = WorldModel(surroundings, CONTEST).gate_of(frame)
     assert gate.centre_m == pytest.approx((5.0, 0.0, 3.89))
@@ -159,7 +158,7 @@ def rolled_error_m(readout_s: float) -> float:
         readout_s: of the shutter, as the navigator knows it.
     """
     camera = Camera(effects=CameraEffects(readout_s=readout_s))
-    surroundings = Surroundings(Arena(), Base(), camera, (0.25, 0.25, 0.1))
+    surroundings = Surroundings(Arena(), Base(), camera)
     world = WorldModel(surroundings, CONTEST)
     frame = frame_at(2.0, 0.3, 2.4, 0.2)  # high in the image, where rows are read early
 

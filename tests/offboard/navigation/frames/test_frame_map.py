@@ -5,9 +5,9 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 
-from offboard.navigation.frames.frame_estimate import FrameEstimate
-from offboard.navigation.frames.frame_filter import half_turn
-from offboard.navigation.search.glimpses import LineOfSight
+from offboard.navigation.frames.frame_track import half_turn
+from offboard.navigation.search.likelihood import LineOfSight
+from offboard.navigation.view import FrameEstimate
 from scenarios.models import Frame
 from tests.offboard.navigation.sightings import Flight, frame_at
 
@@ -24,7 +24,7 @@ def test_approach_makes_a_frame_certain_and_right(angle_deg: float) -> None:
     frame = frame_at(1.0, 2.0, 1.4, 2.6)
     flight = Flight(seed=angle_deg + 100)
     flight.approach(frame, radians(angle_deg), 4.0, 1.0)
-    (estimate,) = flight.map.frames()
+    (estimate,) = flight.map.frames
     assert estimate.certain
     assert not estimate.ambiguous
     position_m, yaw_rad = errors(estimate, frame)
@@ -99,7 +99,7 @@ def test_two_frames_in_line_and_one_partly_seen_are_kept_apart() -> None:
     flight = Flight(3)
     flight.approach(near, pi, 3.0, 0.5, (far,))
     red, green = flight.map.best("red"), flight.map.best("green")
-    assert len(flight.map.frames()) == 2
+    assert len(flight.map.frames) == 2
     assert errors(red, near)[0] < 0.015
     assert errors(green, far)[0] < 0.06
     # So near that only a part of it is in the image, what is seen still counts.
@@ -115,7 +115,7 @@ def test_two_frames_of_one_colour_are_two() -> None:
     flight = Flight(4)
     for step in range(20):
         flight.look(frames, (-3.5 + step * 0.1, 0.0, 1.4), 0.0)
-    found = sorted(flight.map.frames(), key=lambda estimate: -estimate.position_m[1])
+    found = sorted(flight.map.frames, key=lambda estimate: -estimate.position_m[1])
     assert len(found) == 2
     for estimate, frame in zip(found, frames, strict=True):
         assert errors(estimate, frame)[0] < 0.05
@@ -133,7 +133,7 @@ def test_ghost_is_forgotten_and_a_hidden_frame_is_not() -> None:
     flight.look([frame, before], (-1.6, 0.0, 1.5), 0.0)
     for step in range(30):  # the blue frame hides the green one
         flight.look([before], (-1.5, 0.01 * step, 1.5), 0.0)
-    assert {estimate.colour for estimate in flight.map.frames()} == {"green", "blue"}
+    assert {estimate.colour for estimate in flight.map.frames} == {"green", "blue"}
 
 
 def test_wrong_start_is_corrected_by_the_images() -> None:
@@ -142,7 +142,7 @@ def test_wrong_start_is_corrected_by_the_images() -> None:
     flight.approach(wrong, 0.4, 2.5, 2.0)
     assert errors(flight.map.best("red"), wrong)[0] < 0.03
     flight.approach(truth, -0.5, 2.5, 1.0)
-    (estimate,) = flight.map.frames()
+    (estimate,) = flight.map.frames
     position_m, yaw_rad = errors(estimate, truth)
     assert position_m < 0.015
     assert yaw_rad < radians(2.0)
@@ -158,7 +158,7 @@ def test_certain_frame_replaces_one_that_was_seen_badly_beside_it() -> None:
     assert not believed.certain
     flight.approach(truth, pi, 2.0, 1.0)
     flight.look([], (-1.0, 0.0, 1.5), 0.5)  # an image that should show it
-    (estimate,) = flight.map.frames()
+    (estimate,) = flight.map.frames
     assert estimate.certain
     assert errors(estimate, truth)[0] < 0.015
 
@@ -167,7 +167,7 @@ def test_frame_far_outside_the_arena_is_none() -> None:
     flight = Flight()
     for step in range(5):
         flight.look([frame_at(6.5, 0.0, 1.5, 0.0)], (4.0 + 0.1 * step, 0.0, 1.5), 0.0)
-    assert flight.map.frames() == ()
+    assert flight.map.frames == ()
 
 
 def test_frame_that_seems_to_be_outside_is_on_the_map_when_it_is_seen_inside() -> None:
@@ -178,7 +178,7 @@ def test_frame_that_seems_to_be_outside_is_on_the_map_when_it_is_seen_inside() -
     assert flight.map.best("red") is None
     for step in range(8):
         flight.look([frame_at(4.9, 0.0, 1.5, 0.0)], (2.8 + 0.1 * step, 0.0, 1.5), 0.0)
-    (estimate,) = flight.map.frames()
+    (estimate,) = flight.map.frames
     assert estimate == flight.map.best("red")
     assert errors(estimate, frame_at(4.9, 0.0, 1.5, 0.0))[0] < 0.1
 
@@ -199,7 +199,7 @@ def test_outline_that_is_partly_hidden_does_not_replace_a_known_frame() -> None:
         )
         bearing = 0.5 + 0.02 * step
         flight.look([seen], (1.5 * cos(bearing), 1.5 * sin(bearing), 1.5), bearing + pi)
-    (estimate,) = flight.map.frames()
+    (estimate,) = flight.map.frames
     assert errors(estimate, frame)[0] < 0.015
 
 
@@ -211,7 +211,7 @@ def test_frame_seen_once_is_forgotten_and_one_seen_often_is_kept() -> None:
         flight.look([known], (1.0, -0.5, 1.5), 0.0)
     for _ in range(60):
         flight.look([], (-1.0, 0.0, 1.5), pi)
-    assert [estimate.colour for estimate in flight.map.frames()] == ["green"]
+    assert [estimate.colour for estimate in flight.map.frames] == ["green"]
 
 
 def picture(size: float, x: float, y: float, z: float, yaw: float) -> Frame:
@@ -229,7 +229,7 @@ def test_a_picture_of_another_size_is_no_frame(size: float, heading_deg: int) ->
         along_m = 0.1 * step
         place = (1.0 + along_m * cos(radians(heading_deg)), along_m * sin(radians(heading_deg)), 1.5)
         flight.look([on_wall], place, 0.0)
-    assert flight.map.frames() == ()
+    assert flight.map.frames == ()
     ahead = LineOfSight((0.0, 0.5, 2.0), (1.0, 0.0, 0.0))
     aside = LineOfSight((0.0, 2.0, 2.0), (1.0, 0.0, 0.0))
     assert [flight.map.is_lookalike("red", line) for line in (ahead, aside)] == [True, False]
@@ -241,7 +241,7 @@ def test_a_frame_before_a_picture_of_its_colour_stays_on_the_map() -> None:
     flight = Flight()
     for step in range(35):
         flight.look([on_wall, frame], (0.02 * step, -2.0 + 0.1 * step, 1.5), 0.1)
-    (estimate,) = flight.map.frames()
+    (estimate,) = flight.map.frames
     position_m, _ = errors(estimate, frame)
     assert position_m < 0.1
 

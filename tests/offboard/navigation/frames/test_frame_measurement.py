@@ -8,8 +8,8 @@ import pytest
 
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.frames.frame_filter import half_turn
 from offboard.navigation.frames.frame_measurement import Prior, View, predicted, solutions, view_of
+from offboard.navigation.frames.frame_track import half_turn
 from offboard.navigation.pose_history import DronePose
 from scenarios.models import Arena
 from tests.offboard.navigation.sightings import CAMERA, corners_px, frame_at, sighting

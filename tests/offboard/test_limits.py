@@ -1,17 +1,28 @@
-"""The box that no mission leads the drone out of."""
+"""What limits a velocity: the class, the box that no mission leads the drone out of, and the caps."""
 
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import cos, hypot, inf, nan, pi, sin
 from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from framerunner.errors import SettingError
 from offboard.app import fly_mission
-from offboard.drone import DroneState, VelocityCommand
-from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError, confine, flight_box, outside
+from offboard.drone import DroneState, LimitedCommand, VelocityCommand
+from offboard.limits import (
+    CONTEST,
+    Box,
+    Caps,
+    CommandLimits,
+    OutsideBoxError,
+    VelocityLimits,
+    confine,
+    flight_box,
+    outside,
+)
 from offboard.mavsdk_drone import MavsdkDrone
 from scenarios.loader import load_scenario
 from tests.offboard.fakes import KinematicDrone, NoCamera, runaway
@@ -97,39 +108,42 @@ class Lagging:
 @pytest.mark.parametrize(("lag_s", "delay_ticks"), [(0.3, 1), (0.3, 8), (0.6, 4), (0.6, 8)])
 @pytest.mark.parametrize("way", [(1, 0, 0), (0, -1, 0), (0.7, 0.7, 0), (0, 0, 1), (0, 0, -1)])
 def test_a_vehicle_told_to_fly_on_for_ever_stays_inside(lag_s, delay_ticks, way):
-    vehicle, keeper = Lagging(lag_s, delay_ticks), KeepInBox(BOX)
+    vehicle, limits, kept_in = Lagging(lag_s, delay_ticks), VelocityLimits(box=BOX), 0
+    limited = LimitedCommand(VelocityCommand())
     for tick in range(600):
         at = state(*vehicle.place, 0.0, tuple(vehicle.velocity), 50_000 * tick)
-        vehicle.step(in_arena(keeper.limit(VelocityCommand(*map(float, way)), at), 0.0))
+        limited = limits.limit(VelocityCommand(*map(float, way)), at)
+        kept_in += limited.kept_in_box
+        vehicle.step(in_arena(limited.command, 0.0))
         assert outside(BOX, state(*vehicle.place)) < 0.005, vehicle.place
-    assert keeper.remark.startswith("kept in the box: ")
-    assert keeper.limited_us > 5_000_000
+    assert limited.remark.startswith("kept in the box: ")
+    assert kept_in > 100
 
 
 def test_a_position_that_is_old_is_no_place_to_fly_by():
-    keeper = KeepInBox(BOX)
-    assert keeper.limit(VelocityCommand(0.5), state(age_s=0.6)) == VelocityCommand()
-    assert keeper.remark == "stopped: the position is 0.6 s old"
-    assert keeper.limit(VelocityCommand(0.5), state(age_s=0.1)) == VelocityCommand(0.5)
-    assert not keeper.remark
+    limits = VelocityLimits(box=BOX)
+    stopped = limits.limit(VelocityCommand(0.5), state(age_s=0.6))
+    assert (stopped.command, stopped.kept_in_box) == (VelocityCommand(), True)
+    assert stopped.remark == "stopped: the position is 0.6 s old"
+    assert limits.limit(VelocityCommand(0.5), state(age_s=0.1)) == LimitedCommand(VelocityCommand(0.5))
 
 
 def test_a_drone_that_does_not_come_back_is_given_up_and_one_that_does_is_not():
-    keeper = KeepInBox(BOX)
+    limits = VelocityLimits(box=BOX)
     for tick in range(100):
-        keeper.limit(VelocityCommand(), state(x=9.0 - 0.02 * tick, time_us=50_000 * tick))
-    keeper.limit(VelocityCommand(), state(x=7.0, time_us=5_000_000))
-    keeper.limit(VelocityCommand(), state(x=9.0, time_us=7_900_000))
+        limits.limit(VelocityCommand(), state(x=9.0 - 0.02 * tick, time_us=50_000 * tick))
+    limits.limit(VelocityCommand(), state(x=7.0, time_us=5_000_000))
+    limits.limit(VelocityCommand(), state(x=9.0, time_us=7_900_000))
     with pytest.raises(OutsideBoxError, match=r"3\.0 m outside its box and does not come back: x 9\.0"):
-        keeper.limit(VelocityCommand(), state(x=9.0, time_us=8_050_000))
+        limits.limit(VelocityCommand(), state(x=9.0, time_us=8_050_000))
 
 
 @pytest.mark.parametrize("velocity", [(1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)])
 async def test_a_mission_that_runs_away_is_kept_in_and_told_of(tmp_path, velocity):
     mission = runaway(tmp_path, velocity)
-    drone, moments = KinematicDrone(0.0, 0.0, 0.5), []
-    box = Box(BOX.low_m, BOX.high_m, (-4.0, -4.0))
-    outcome = await fly_mission(drone, NoCamera(), mission, limit_s=30.0, observer=moments.append, box=box)
+    box, moments = Box(BOX.low_m, BOX.high_m, (-4.0, -4.0)), []
+    drone = KinematicDrone(0.0, 0.0, 0.5, limits=VelocityLimits(CONTEST, box))
+    outcome = await fly_mission(drone, NoCamera(), mission, limit_s=30.0, observer=moments.append)
     assert (outcome.ended, drone.calls[-2:]) == ("timed out", ["hold", "close"])
     assert outcome.kept_in_box_s > 5.0
     assert moments[-1].remark.startswith("kept in the box: ")
@@ -139,10 +153,10 @@ async def test_a_mission_that_runs_away_is_kept_in_and_told_of(tmp_path, velocit
 
 async def test_a_drone_carried_off_ends_in_hold(tmp_path):
     mission = runaway(tmp_path, (0, 0, 0))
-    drone = KinematicDrone(0.0, 0.0, 0.5)
-    drone.x = 8.0  # and does not fly back, however it is told to
-    drone.command = drone.commands.append
-    outcome = await fly_mission(drone, NoCamera(), mission, limit_s=30.0, box=BOX)
+    drone = KinematicDrone(0.0, 0.0, 0.5, limits=VelocityLimits(CONTEST, BOX))
+    drone.x = 8.0
+    drone._move = lambda dt_s: None  # does not fly back, however it is told to
+    outcome = await fly_mission(drone, NoCamera(), mission, limit_s=30.0)
     assert outcome.ended == "aborted"
     assert "2.0 m outside its box and does not come back" in outcome.reason
     assert drone.calls[-2:] == ["hold", "close"]
@@ -150,7 +164,7 @@ async def test_a_drone_carried_off_ends_in_hold(tmp_path):
 
 
 def test_what_the_adapter_adds_to_a_command_does_not_lead_out_either():
-    drone, sent = MavsdkDrone("udpin://127.0.0.1:14540", box=BOX), []
+    drone, sent = MavsdkDrone("udpin://127.0.0.1:14540", limits=VelocityLimits(CONTEST, BOX)), []
     drone._commanding, drone._dialect = True, SimpleNamespace(send=sent.append)
     drone._tracker = SimpleNamespace(correct=lambda command, state: VelocityCommand(up_m_s=0.7))
     for z in (3.0, 4.9, 5.5):
@@ -160,9 +174,89 @@ def test_what_the_adapter_adds_to_a_command_does_not_lead_out_either():
 
 
 def test_a_mission_that_corrects_its_own_commands_has_them_sent_unchanged():
-    drone, sent = MavsdkDrone("udpin://127.0.0.1:14540", box=BOX, corrects=False), []
+    limits, sent = VelocityLimits(CONTEST, BOX), []
+    drone = MavsdkDrone("udpin://127.0.0.1:14540", limits=limits, corrects=False)
     drone._commanding, drone._dialect = True, SimpleNamespace(send=sent.append)
     drone._tracker = SimpleNamespace(correct=lambda command, state: VelocityCommand(up_m_s=0.7))
     drone._latest = state(z=3.0)
     drone.command(VelocityCommand(forward_m_s=0.5))
     assert sent == [VelocityCommand(forward_m_s=0.5)]
+
+
+CAPS = Caps(level_m_s=1.0, vertical_m_s=0.5, yaw_rate_rad_s=1.5, height_m=2.0)
+SPEEDS = st.floats(-100.0, 100.0) | st.sampled_from([inf, -inf, nan])
+
+
+@given(SPEEDS, SPEEDS, SPEEDS, SPEEDS)
+def test_no_command_exceeds_the_caps(forward, left, up, rate):
+    command = VelocityLimits(caps=CAPS).limit(VelocityCommand(forward, left, up, rate), None).command
+    assert hypot(command.forward_m_s, command.left_m_s) <= 1.0 + 1e-9
+    assert abs(command.up_m_s) <= 0.5
+    assert abs(command.yaw_rate_rad_s) <= 1.5
+
+
+def test_the_direction_of_a_capped_speed_stays():
+    command = VelocityLimits(caps=CAPS).limit(VelocityCommand(6.0, 8.0, 0.1, 0.2), None).command
+    assert (command.forward_m_s, command.left_m_s) == pytest.approx((0.6, 0.8))
+    assert (command.up_m_s, command.yaw_rate_rad_s) == (0.1, 0.2)
+
+
+def test_a_command_that_nothing_limits_is_the_same_object():
+    command = VelocityCommand(0.5, 0.5, 0.5, 1.0)
+    limited = VelocityLimits(CONTEST, BOX, CAPS).limit(command, state())
+    assert limited.command is command
+    assert not limited.clips
+
+
+def test_each_cap_is_logged_once_and_named_in_each_command(caplog):
+    limits = VelocityLimits(caps=CAPS)
+    for _ in range(3):
+        limited = limits.limit(VelocityCommand(6.0, 0.0, 2.0), None)
+    assert [(clip.limit, clip.quantity) for clip in limited.clips] == [
+        ("cap", "level speed"),
+        ("cap", "vertical speed"),
+    ]
+    assert limited.remark == "6.00 m/s level commanded, 1 flown; 2.00 m/s upwards commanded, 0.5 flown"
+    assert len(caplog.records) == 2
+
+
+def test_class_and_box_are_told_apart_and_the_class_is_not_remarked_on(caplog):
+    limited = VelocityLimits(CONTEST, BOX).limit(VelocityCommand(inf, 0.2, 0.0, -3.0), state(x=5.9))
+    assert [(clip.limit, clip.quantity) for clip in limited.clips] == [
+        ("class", "level speed"),
+        ("class", "yaw rate"),
+        ("box", "place"),
+    ]
+    assert limited.command.forward_m_s < 0.2
+    assert (limited.command.left_m_s, limited.command.yaw_rate_rad_s) == (0.2, -1.0)
+    assert limited.remark == "kept in the box: x 6.0 m"
+    assert [record.message for record in caplog.records] == [f"{limited.remark} (x 5.9, y 0.0, z 2.0 m)"]
+
+
+def test_a_level_velocity_of_the_open_class_is_shortened_as_a_whole():
+    limits = CommandLimits(forward_m_s=3.0, left_m_s=4.0, level_m_s=2.5)
+    assert limits.limited(VelocityCommand(inf, inf)) == VelocityCommand(1.5, 2.0)
+
+
+def test_the_height_counts_from_the_start_and_never_above_the_ceiling():
+    assert CAPS.box(BOX, 0.5).high_m[2] == 2.5
+    assert Caps(height_m=50.0).box(BOX, 0.5).high_m[2] == 5.0
+    assert Caps().box(BOX, 0.5) is BOX
+
+
+def test_no_climb_at_the_cap():
+    limits = VelocityLimits(None, CAPS.box(BOX, 0.5), CAPS)
+    assert limits.limit(VelocityCommand(up_m_s=0.4), state(z=2.5)).command.up_m_s == pytest.approx(0.0)
+
+
+def test_the_way_back_into_the_box_is_capped_too():
+    slow = Caps(level_m_s=0.2, vertical_m_s=0.1)
+    back = VelocityLimits(None, BOX, slow).limit(VelocityCommand(), state(9.0, 9.0, 9.0)).command
+    assert hypot(back.forward_m_s, back.left_m_s) == pytest.approx(0.2)
+    assert (back.forward_m_s < 0, back.left_m_s < 0, back.up_m_s) == (True, True, -0.1)
+
+
+def test_a_cap_that_leaves_no_room_is_refused():
+    low = Box((-5.0, -5.0, 1.0), (5.0, 5.0, 4.0), (0.0, 0.0))
+    with pytest.raises(SettingError, match="--max-height"):
+        Caps(height_m=0.3).box(low, 0.5)
