@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from framerunner.errors import UserError
 from offboard.chart.described import unit_of
 from offboard.chart.expressions import Evaluate, names_in
-from offboard.chart.spec import RESUME, THEN, Leaf, State, Transition, transition_id
+from offboard.chart.spec import RESUME, THEN, State, transition_id
+from offboard.chart.table import Guarded
 from offboard.pilot_file import is_interrupt
 
 if TYPE_CHECKING:
@@ -75,15 +76,17 @@ class ChartNow:
     values: tuple[ValueNow, ...] = ()
 
 
-def guards_now(leaf: Leaf, guards: Sequence[Evaluate], pilot: Pilot) -> tuple[GuardNow, ...]:
-    """The present truth of a leaf's guards, which are compiled in the order of its transitions."""
-    rows = zip(leaf.transition_ids, leaf.transitions, guards, strict=True)
-    return tuple(GuardNow(name, each.to, each.when, _truth(guard, pilot)) for name, each, guard in rows)
+def guards_now(transitions: Sequence[Guarded], pilot: Pilot) -> tuple[GuardNow, ...]:
+    """The present truth of the guards of an active state."""
+    return tuple(
+        GuardNow(each.transition.id, each.transition.to, each.transition.when, _truth(each.holds, pilot))
+        for each in transitions
+    )
 
 
-def values_now(transitions: Sequence[Transition], pilot: Pilot) -> tuple[ValueNow, ...]:
-    """The present values of all names in the guards of transitions."""
-    names = dict.fromkeys(name for each in transitions for name in names_in(each.when))
+def values_now(transitions: Sequence[Guarded], pilot: Pilot) -> tuple[ValueNow, ...]:
+    """The present values of all names in the guards of an active state."""
+    names = dict.fromkeys(name for each in transitions for name in names_in(each.transition.when))
     return tuple(
         ValueNow(name, value, unit_of(type(pilot), name)) for name, value in read_values(names, pilot)
     )

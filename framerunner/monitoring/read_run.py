@@ -26,7 +26,7 @@ from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.events import RecordingError
 from framerunner.recording.open_recording import recorded_flight
 from offboard.app import Moment
-from offboard.chart.spec import enter_state
+from offboard.chart.spec import state_path
 from offboard.engine import DONE, TransitionTaken
 from offboard.mission import Mission, MissionError, load_mission, mermaid
 from offboard.navigation.view import NavigationView
@@ -248,7 +248,7 @@ def _guard(mission: Mission | None, source: str, target: str) -> str:
     leaf = None if mission is None else mission.leaves.get(source)
     if leaf is None:
         return ""
-    guards = {each.when for each in leaf.transitions if target == each.to or target.startswith(f"{each.to}.")}
+    guards = {each.when for each in leaf.transitions if each.to in state_path(target)}
     return guards.pop() if len(guards) == 1 else ""
 
 
@@ -257,11 +257,9 @@ def _ids(mission: Mission | None, taken: TransitionTaken) -> tuple[str, ...]:
     leaf = None if mission is None else mission.leaves.get(taken.source)
     if mission is None or leaf is None:
         return ()
-    found = []
-    for name, each in zip(leaf.transition_ids, leaf.transitions, strict=True):
-        arrived, followed = enter_state(mission.states, each.to)
-        if arrived == taken.target and taken.when in (each.when, DONE):
-            found.append((name, *followed))
+    likely = [each for each in leaf.transitions if taken.when in (each.when, DONE)]
+    passages = [mission.table.passage(taken.source, each) for each in likely]
+    found = [each.ids for each in passages if each.leaf == taken.target]
     return found[0] if len(found) == 1 else ()
 
 

@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 from framerunner.files.yaml_text import Place, Scalar
 from offboard.authoring.document import Document
 from offboard.authoring.outline import Event, Span, StateOutline, TransitionOutline
-from offboard.chart.check import is_finish
-from offboard.chart.spec import MissionFile, State, Transition, all_states
+from offboard.chart.spec import MissionFile, State, Transition, all_states, is_finish
 
 SETTINGS = ("name", "description", "class", "vision", "detector", "extends")
 
