@@ -7,11 +7,11 @@ holds is taken, and otherwise `during` is done; `offboard.chart.table` says what
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING
 
 from framerunner.errors import UserError
+from framerunner.wire.mission_report import Plain, TransitionTaken
 from offboard.chart.expressions import names_in
 from offboard.chart.spec import RESUME, Transition, state_path
 from offboard.chart.table import Row
@@ -34,27 +34,6 @@ DONE = "done"
 
 class MissionRunError(UserError):
     """The mission cannot continue; the message is one line with the state and the reason."""
-
-
-@dataclass(frozen=True, slots=True)
-class TransitionTaken:
-    """A change of state, and why.
-
-    Attributes:
-        when: the guard that held; "" for a transition without one, "done" if a superstate was finished,
-            "resume" after a pause.
-        values: each name of the guard that held with its value then, such as ("frame.d", 0.44), in the order
-            of the guard; a name that could not be read is left out.
-        ids: the transition, and then each `then` that it led to; see `offboard.chart.spec.transition_id`.
-    """
-
-    source: str  # full id of the leaf that was left
-    target: str  # full id of the present state; if a superstate was finished, the state after it
-    when: str
-    values: tuple[tuple[str, object], ...]
-    time_us: int  # vehicle time
-    seconds_in_source: float  # vehicle time without pauses
-    ids: tuple[str, ...] = ()
 
 
 class MissionEngine:
@@ -253,7 +232,7 @@ class MissionEngine:
         return True
 
     def _take(
-        self, transition: Transition, values: tuple[tuple[str, object], ...], when: str, time_us: int
+        self, transition: Transition, values: tuple[tuple[str, Plain], ...], when: str, time_us: int
     ) -> None:
         """Take a transition, and record it with its guard and the values that the guard read."""
         source, seconds = self.state, (time_us - self._entered_us) / 1e6

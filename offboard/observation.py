@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from framerunner.errors import UserError
+from framerunner.wire.mission_report import GuardNow, Plain, ValueNow, plain_value, rounded
 from offboard.chart.described import unit_of
 from offboard.chart.expressions import Evaluate, names_in
 from offboard.chart.spec import RESUME, THEN, State, transition_id
@@ -23,38 +24,6 @@ if TYPE_CHECKING:
 
 class ChangeRefusedError(UserError):
     """A changed chart cannot take over; the message is one line that says why."""
-
-
-@dataclass(frozen=True, slots=True)
-class GuardNow:
-    """A transition out of the active states, and whether its guard holds.
-
-    Attributes:
-        id: of the transition, see `offboard.chart.spec.transition_id`.
-        to: full id of its target.
-        when: its guard; "" for a transition without one.
-        holds: None if the guard cannot be evaluated now.
-    """
-
-    id: str
-    to: str
-    when: str
-    holds: bool | None
-
-
-@dataclass(frozen=True, slots=True)
-class ValueNow:
-    """A value that a guard reads.
-
-    Attributes:
-        name: as the guard has it, such as "frame.d".
-        value: of any type with a contestant's pilot.
-        unit: such as "m"; "" if it has none or none is known.
-    """
-
-    name: str
-    value: object
-    unit: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,11 +57,12 @@ def values_now(transitions: Sequence[Guarded], pilot: Pilot) -> tuple[ValueNow, 
     """The present values of all names in the guards of an active state."""
     names = dict.fromkeys(name for each in transitions for name in names_in(each.transition.when))
     return tuple(
-        ValueNow(name, value, unit_of(type(pilot), name)) for name, value in read_values(names, pilot)
+        ValueNow(name, rounded(value), unit_of(type(pilot), name))
+        for name, value in read_values(names, pilot)
     )
 
 
-def read_values(names: Sequence[str] | dict[str, None], pilot: Pilot) -> tuple[tuple[str, object], ...]:
+def read_values(names: Sequence[str] | dict[str, None], pilot: Pilot) -> tuple[tuple[str, Plain], ...]:
     """The present values of dotted names; one that cannot be read is left out."""
     found = []
     for name in names:
@@ -100,11 +70,10 @@ def read_values(names: Sequence[str] | dict[str, None], pilot: Pilot) -> tuple[t
         try:
             for part in name.split("."):
                 value = getattr(value, part)
+            found.append((name, plain_value(value)))
         except BaseException as error:  # of a value that the guard itself did not read
             if is_interrupt(error):
                 raise
-            continue
-        found.append((name, value))
     return tuple(found)
 
 

@@ -13,6 +13,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from math import cos, isfinite, pi, sin
 from pathlib import Path
 from typing import Any
@@ -21,13 +22,15 @@ import cv2
 
 from framerunner.child_process import end_with_standard_input, limit_resources
 from framerunner.files.text_file import TextError, read_text
-from framerunner.flying.navigation_reporter import navigation_json
+from framerunner.flying.navigation_reporter import map_document
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.events import RecordingError
 from framerunner.recording.open_recording import recorded_flight
+from framerunner.wire.finite_json import finite
+from framerunner.wire.mission_report import TransitionTaken
 from offboard.app import Moment
 from offboard.chart.spec import state_path
-from offboard.engine import DONE, TransitionTaken
+from offboard.engine import DONE
 from offboard.mission import Mission, MissionError, load_mission, mermaid
 from offboard.navigation.view import NavigationView
 from offboard.pilot_file import PilotFile, read_pilot
@@ -203,7 +206,7 @@ def _maps(moments: Sequence[Moment], clock: Clock) -> list[Json]:
         view = moment.navigation
         if view is not None and view is not last:
             last = view
-            content = navigation_json(view)
+            content = map_document(view).as_json()
             if not found or {**content, "t": found[-1]["t"]} != found[-1]:
                 found.append({**content, "t": clock(moment.state.time_us)})
     return found
@@ -227,18 +230,8 @@ def _transitions(flight: CollectedFlight, clock: Clock, mission: Mission | None)
         if taken is None:
             when = _guard(mission, state, moment.mission_state)
             taken = TransitionTaken(state, moment.mission_state, when, (), now_us, (now_us - since_us) / 1e6)
-        ids = taken.ids or _ids(mission, taken)
-        found.append(
-            {
-                "time_s": clock(now_us),
-                "from": taken.source[:_MAX_TEXT],
-                "to": taken.target[:_MAX_TEXT],
-                "when": taken.when[:_MAX_TEXT],
-                "values": [[name[:_MAX_TEXT], _plain(value)] for name, value in taken.values],
-                "seconds": round(taken.seconds_in_source, 3),
-                "ids": [name[:_MAX_TEXT] for name in ids],
-            }
-        )
+        taken = replace(taken, ids=taken.ids or _ids(mission, taken))
+        found.append({"time_s": clock(now_us), **finite(taken.as_json())})
         state, since_us = moment.mission_state, now_us
     return found
 
@@ -261,12 +254,6 @@ def _ids(mission: Mission | None, taken: TransitionTaken) -> tuple[str, ...]:
     passages = [mission.table.passage(taken.source, each) for each in likely]
     found = [each.ids for each in passages if each.leaf == taken.target]
     return found[0] if len(found) == 1 else ()
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    return value if value is None or isinstance(value, bool | int) else str(value)[:_MAX_TEXT]
 
 
 def _rounded(*values: float) -> list[float | None]:

@@ -38,9 +38,9 @@ from framerunner.recording.schemas import (
     SETPOINT,
     TELEMETRY,
 )
+from framerunner.wire.mission_report import Plain, TransitionTaken, plain_value
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
-from offboard.engine import TransitionTaken
 from offboard.navigation.frames.frame_estimate import FrameEstimate
 from offboard.navigation.view import NavigationView
 from scenarios.result import FlightResult, ResultError
@@ -251,9 +251,9 @@ def _transition(time_us: int, message: Json) -> TransitionTaken | None:
     )
 
 
-def _value(message: Json) -> object:
+def _value(message: Json) -> Plain:
     """A guard's value; None for a number that was not finite."""
-    return next((message[kind] for kind in ("number", "flag", "text") if kind in message), None)
+    return plain_value(next((message[kind] for kind in ("number", "flag", "text") if kind in message), None))
 
 
 def _detections(message: Json) -> Detections:

@@ -6,8 +6,9 @@ from math import inf
 
 import pytest
 
+from framerunner.wire.mission_report import TransitionTaken
 from offboard.drone import VelocityCommand
-from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
+from offboard.engine import MissionEngine, MissionRunError
 from offboard.mission import load_mission
 from offboard.pilot import Imu
 from vision.types import Detection, Detections
