@@ -329,7 +329,7 @@ def _draw(state: State, indent: str, lines: list[str]) -> None:
         label = f" : {order}{guard}{done}" if order or guard or done else ""
         lines.append(f"{indent}{state.id} --> {transition.to}{label}")
     if state.then:
-        lines.append(f"{indent}{state.id} --> {state.then}")
+        lines.append(f"{indent}{state.id} --> {state.then.to}")
     if state.resume and not state.resume.to.startswith(f"{state.id}."):
         lines.append(f"{indent}{state.id} --> {state.resume.to} : after a pause")
 

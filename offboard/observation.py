@@ -13,7 +13,7 @@ from framerunner.errors import UserError
 from framerunner.wire.mission_report import GuardNow, Plain, ValueNow, plain_value, rounded
 from offboard.chart.described import unit_of
 from offboard.chart.expressions import Evaluate, names_in
-from offboard.chart.spec import RESUME, THEN, State, transition_id
+from offboard.chart.spec import State
 from offboard.chart.table import Guarded
 from offboard.pilot_file import is_interrupt
 
@@ -119,26 +119,23 @@ def carried_ids(old: Mission, new: Mission) -> dict[str, str]:
 
 
 def _carried(old: State, new: State) -> dict[str, str]:
-    free = dict(enumerate(new.transitions, 1))
-    numbers: dict[int, int] = {}
-    before = list(enumerate(old.transitions, 1))
-    for number, each in before:
-        same = (n for n, one in free.items() if (one.to, one.when) == (each.to, each.when))
-        if (match := next(same, None)) is not None:
-            numbers[number] = match
-            del free[match]
-    for number, each in before:
-        if number in numbers:
-            continue
-        near = sorted(free, key=lambda n: abs(n - number))
-        if (match := next((n for n in near if free[n].to == each.to), None)) is not None:
-            numbers[number] = match
-            del free[match]
-    found = {transition_id(old.id, number): transition_id(new.id, match) for number, match in numbers.items()}
-    if old.then and new.then:
-        found[transition_id(old.id, THEN)] = transition_id(new.id, THEN)
-    if old.resume and new.resume:
-        found[transition_id(old.id, RESUME)] = transition_id(new.id, RESUME)
+    found: dict[str, str] = {}
+    free = list(new.transitions)
+    for each in old.transitions:
+        same = next((one for one in free if (one.to, one.when) == (each.to, each.when)), None)
+        if same is not None:
+            found[each.id] = same.id
+            free.remove(same)
+    for number, each in enumerate(old.transitions):
+        near = [(abs(at - number), at) for at, one in enumerate(new.transitions) if one in free]
+        near = [(away, at) for away, at in near if new.transitions[at].to == each.to]
+        if near and each.id not in found:
+            match = new.transitions[min(near)[1]]
+            found[each.id] = match.id
+            free.remove(match)
+    for one, other in ((old.then, new.then), (old.resume, new.resume)):
+        if one is not None and other is not None:
+            found[one.id] = other.id
     return found
 
 

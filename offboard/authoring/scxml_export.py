@@ -69,7 +69,7 @@ def _add_state(parent: ET.Element, state: State, by_leaf: dict[str, Leaf]) -> No
             _add_actions(_add(element, name), actions)
     if state.states:
         if state.then:
-            _add(element, "transition", event=f"done.state.{state.id}", target=state.then)
+            _add(element, "transition", event=f"done.state.{state.id}", target=state.then.to)
         for child in state.states:
             _add_state(element, child, by_leaf)
     elif not state.final:

@@ -215,7 +215,7 @@ def _successors(states: dict[str, State], by_leaf: dict[str, Leaf], *, pauses: b
             targets.append(leaf.resume.to)
         outer = states.get(leaf_id.rpartition(".")[0])
         if states[leaf_id].final and outer is not None and outer.then:
-            targets.append(outer.then)
+            targets.append(outer.then.to)
         found[leaf_id] = [entry_of(states, target) for target in targets]
     return found
 

@@ -11,9 +11,10 @@ it, then as a full id.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 from framerunner.files.yaml_text import Place
 from offboard.chart.messages import Message
@@ -28,6 +29,8 @@ MAX_PARTS = 20_000
 MAX_CHARACTERS = 100_000
 """Of the expressions of all states, counted likewise."""
 THEN, RESUME = "then", "resume"
+Event = Literal["tick", "done", "resume"]
+"""When a transition is looked at: at every tick, when a final state is reached (`then`), after a pause."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +68,7 @@ class State:
     initial: str = ""  # the state a superstate starts in
     initial_place: Place = field(default=NOWHERE, compare=False, repr=False)
     final: bool = False
-    then: str = ""  # the target of a superstate when one of its final states is reached
-    then_place: Place = field(default=NOWHERE, compare=False, repr=False)
+    then: Transition | None = None  # of a superstate, taken when one of its final states is reached
     use: str = ""  # the template whose states it takes; empty after expansion
     resume: Transition | None = None  # where the mission continues after a pause; None: where it was
     enter: tuple[Action, ...] = ()
@@ -79,6 +81,15 @@ class State:
     def name(self) -> str:
         """Last part of the id."""
         return self.id.rpartition(".")[2]
+
+    def outgoing(self) -> Iterator[tuple[Event, int, Transition]]:
+        """All its transitions: event, order of priority among those of the event, and transition."""
+        for order, transition in enumerate(self.transitions):
+            yield "tick", order, transition
+        if self.then is not None:
+            yield "done", 0, self.then
+        if self.resume is not None:
+            yield "resume", 0, self.resume
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,11 +316,10 @@ def _resolved(state: State, ids: set[str], problems: ProblemList) -> State:
         to = target(transition.to, transition.place, what)
         return replace(transition, to=to, id=transition_id(state.id, which))
 
-    resume = state.resume
     return replace(
         state,
-        resume=resume and with_target(resume, RESUME, "'resume'"),
-        then=target(state.then, state.then_place, "'then'") if state.then else "",
+        resume=state.resume and with_target(state.resume, RESUME, "'resume'"),
+        then=state.then and with_target(state.then, THEN, "'then'"),
         transitions=tuple(
             with_target(each, number, Message("target.what"))
             for number, each in enumerate(state.transitions, 1)

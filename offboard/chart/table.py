@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 from offboard.chart.expressions import Evaluate, compile_value
 from offboard.chart.spec import (
-    THEN,
     Action,
     MissionFile,
     Transition,
@@ -22,7 +21,6 @@ from offboard.chart.spec import (
     is_finish,
     leaves,
     state_path,
-    transition_id,
 )
 from offboard.pilot import Pilot
 
@@ -109,8 +107,8 @@ class Table:
             outer = states.get(leaf.rpartition(".")[0])
             if not states[leaf].final or outer is None or not outer.then or len(ids) > len(states):
                 return Passage(tuple(map(_act, actions)), leaf, tuple(ids))
-            ids.append(transition_id(outer.id, THEN))
-            source, target, between = outer.id, outer.then, ()
+            ids.append(outer.then.id)
+            source, target, between = outer.id, outer.then.to, ()
 
 
 def _act(action: Action) -> Act:
