@@ -120,13 +120,14 @@ class _Reader:
             self._problems.add(node.place, Message("state.no_lines", state=name))
             return State(place, name)
         self._check_keys(node, keys, Message("what.state", state=name))
+        then = self._text(node, "then")
         return State(
             place=place,
             id=name,
             initial=self._text(node, "initial"),
             initial_place=_value_place(node, "initial"),
             final=self._flag(node, "final"),
-            then=self._then(node),
+            then=Transition(_value_place(node, "then"), then) if then else None,
             use=self._text(node, "use"),
             resume=self._resume(node),
             enter=self._actions(node, "enter"),
@@ -135,10 +136,6 @@ class _Reader:
             transitions=self._transitions(node),
             states=tuple(self._states(node, "states", _STATE_KEYS).values()),
         )
-
-    def _then(self, state: MapNode) -> Transition | None:
-        to = self._text(state, "then")
-        return Transition(_value_place(state, "then"), to) if to else None
 
     def _resume(self, state: MapNode) -> Transition | None:
         if "resume" not in state.items:
