@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
 
+from framerunner.wire.mission_report import TransitionTaken
 from offboard.abort import FlightAbort
 from offboard.drone import Drone, DroneError, DroneState, LimitedCommand, VelocityCommand
-from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
+from offboard.engine import MissionEngine, MissionRunError
 from offboard.limits import CONTEST, STILL, CommandLimits
 from offboard.mission import Mission
 from offboard.navigation.view import NavigationView, Surroundings

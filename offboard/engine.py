@@ -1,23 +1,20 @@
 """Runs a mission tick by tick: position and detections in, a velocity command out. No clock, no drone.
 
-Most ticks change no state. Sending an event through python-statemachine costs some hundred microseconds, so
-the engine first evaluates the guards of the present state, compiled by the library's own restricted
-evaluator. Only if one holds is `tick` sent to the chart, which evaluates the guards again, in order of
-priority, and leaves and enters states; otherwise `during` is run here. `quiet_ticks=False` sends every tick
-to the chart; a test shows that both fly alike.
+At each tick the guards of the active state are evaluated in order of priority. The step of the first that
+holds is taken, and otherwise `during` is done; `offboard.chart.table` says what either does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from framerunner.errors import UserError
-from offboard.chart.expressions import compile_value, names_in
-from offboard.chart.native import RESUME, TICK
-from offboard.chart.spec import Action, Leaf, enter_state, state_path
+from framerunner.wire.mission_report import Plain, TransitionTaken
+from offboard.chart.expressions import names_in
+from offboard.chart.spec import RESUME, Transition, state_path
+from offboard.chart.table import Row
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
@@ -31,46 +28,11 @@ from vision.types import Detections
 if TYPE_CHECKING:
     from offboard.navigation.navigator import Navigator
 
-Act = Callable[[Pilot], None]
-
 DONE = "done"
 
 
 class MissionRunError(UserError):
     """The mission cannot continue; the message is one line with the state and the reason."""
-
-
-@dataclass(frozen=True, slots=True)
-class TransitionTaken:
-    """A change of state, and why.
-
-    Attributes:
-        when: the guard that held; "" for a transition without one, "done" if a superstate was finished,
-            "resume" after a pause.
-        values: each name of the guard that held with its value then, such as ("frame.d", 0.44), in the order
-            of the guard; a name that could not be read is left out.
-        ids: the transition, and then each `then` that it led to; see `offboard.chart.spec.transition_id`.
-    """
-
-    source: str  # full id of the leaf that was left
-    target: str  # full id of the present state; if a superstate was finished, the state after it
-    when: str
-    values: tuple[tuple[str, object], ...]
-    time_us: int  # vehicle time
-    seconds_in_source: float  # vehicle time without pauses
-    ids: tuple[str, ...] = ()
-
-
-class _FastState:
-    """A leaf of the chart with compiled guards and `during`."""
-
-    __slots__ = ("during", "finish", "guards", "leaf")
-
-    def __init__(self, leaf: Leaf, finish: bool) -> None:
-        self.leaf = leaf
-        self.guards = tuple(compile_value(transition.when or "True") for transition in leaf.transitions)
-        self.during = tuple(_act(action) for action in leaf.during)
-        self.finish = finish
 
 
 class MissionEngine:
@@ -80,7 +42,6 @@ class MissionEngine:
         mission: what to fly.
         pilot: by default a new one of the mission's class.
         surroundings: what is known of the arena before the flight; a mission with `vision: frames` needs it.
-        quiet_ticks: do not send the chart the ticks that change nothing.
         limits: of the commands, with which it plans.
 
     Attributes:
@@ -95,19 +56,15 @@ class MissionEngine:
         *,
         limits: CommandLimits = CONTEST,
         surroundings: Surroundings | None = None,
-        quiet_ticks: bool = True,
     ) -> None:
         self.state = ""
         self.transition: TransitionTaken | None = None
         self.mission = mission
         self.pilot = mission.new_pilot() if pilot is None else pilot
         self.pilot.limits = limits
-        self._states = _fast_states(mission)
-        self._quiet_ticks = quiet_ticks
         self._navigator = _new_navigator(mission, surroundings, limits)
         self.pilot._navigator = self._navigator
-        self._chart: Any = None  # a `StateChart`, from the first tick on
-        self._present: _FastState | None = None
+        self._present: Row | None = None
         self._started_us = 0
         self._entered_us = 0
         self._last_us = 0
@@ -202,14 +159,14 @@ class MissionEngine:
         """The active states and what their guards read, computed at each call."""
         present, pilot = self._present, self.pilot
         active = state_path(self.state)
-        if present is None or present.finish:
-            return ChartNow(self.state, active, 0.0 if present is None else self._seconds_in_state())
+        if present is None:
+            return ChartNow(self.state, active, 0.0)
         return ChartNow(
             self.state,
             active,
             self._seconds_in_state(),
-            guards_now(present.leaf, present.guards, pilot),
-            values_now(present.leaf.transitions, pilot),
+            guards_now(present.transitions, pilot),
+            values_now(present.transitions, pilot),
         )
 
     def change(self, mission: Mission) -> None:
@@ -223,11 +180,9 @@ class MissionEngine:
                 pilot or perception; the mission in progress stays.
         """
         check_change(self.mission, mission, self.state)
-        states = _fast_states(mission)
-        if self._chart is not None:  # the library reads the active state from the pilot, and enters none
-            self._chart = mission.chart(model=self.pilot)
-            self._present = states[self.state]
-        self.mission, self._states = mission, states
+        if self._present is not None:
+            self._present = mission.table.rows[self.state]
+        self.mission = mission
         memory, declared = vars(self.pilot.memory), mission.spec.variables
         for name in set(memory) - set(declared):
             del memory[name]
@@ -247,64 +202,58 @@ class MissionEngine:
 
     def _start(self, time_us: int) -> None:
         self._started_us = time_us
-        self._chart = self.mission.chart(model=self.pilot)
-        self._settle(time_us)
+        self._enter(self.mission.table.start, time_us)
 
-    def _step(self, present: _FastState, time_us: int) -> None:
+    def _step(self, present: Row, time_us: int) -> None:
         pilot = self.pilot
         pilot.seconds_in_state = (time_us - self._entered_us) / 1e6
         pilot.seconds_in_mission = (time_us - self._started_us) / 1e6
-        for number, guard in enumerate(present.guards):
-            if guard(pilot):
-                self._take(present.leaf, number, time_us)
+        for each in present.transitions:
+            if each.holds(pilot):
+                # Now, because the actions on leaving may change them.
+                values = read_values(names_in(each.transition.when), pilot)
+                self._take(each.transition, values, each.transition.when, time_us)
                 return
-        if self._quiet_ticks:
-            for act in present.during:
-                act(pilot)
-        elif present.during:
-            self._chart.send(TICK)
+        for act in present.during:
+            act(pilot)
 
-    def _resume(self, present: _FastState, paused_us: int, time_us: int) -> bool:
+    def _resume(self, present: Row, paused_us: int, time_us: int) -> bool:
         """End a pause; True if the chart went to another state, which ends this tick."""
         self._paused_us = None
         self._started_us += time_us - paused_us
         self._entered_us += time_us - paused_us
-        resume = present.leaf.resume
-        if resume is None:
+        if present.resume is None:
             return False
-        ids = (present.leaf.resume_id, *enter_state(self.mission.states, resume.to)[1])
-        source, seconds = self.state, (time_us - self._entered_us) / 1e6
         self.pilot.seconds_in_mission = (time_us - self._started_us) / 1e6
         cmd = self.pilot.cmd
         cmd.vel_x = cmd.vel_y = cmd.vel_z = cmd.rot_z = 0.0  # those of the state that is left
-        self._chart.send(RESUME)
-        self._settle(time_us)
-        self.transition = TransitionTaken(source, self.state, RESUME, (), time_us, seconds, ids)
+        self._take(present.resume, (), RESUME, time_us)
         return True
 
-    def _take(self, leaf: Leaf, number: int, time_us: int) -> None:
-        """Let the chart take a transition whose guard holds, and record why."""
-        transition = leaf.transitions[number]
-        source, seconds = self.state, self.pilot.seconds_in_state
-        # Now, because the actions on leaving may change them.
-        values = read_values(names_in(transition.when), self.pilot)
-        self._chart.send(TICK)
-        self._settle(time_us)
-        arrived = self.state == transition.to or self.state.startswith(f"{transition.to}.")
-        when = transition.when if arrived else DONE
-        ids = (leaf.transition_ids[number], *enter_state(self.mission.states, transition.to)[1])
-        self.transition = TransitionTaken(source, self.state, when, values, time_us, seconds, ids)
+    def _take(
+        self, transition: Transition, values: tuple[tuple[str, Plain], ...], when: str, time_us: int
+    ) -> None:
+        """Take a transition, and record it with its guard and the values that the guard read."""
+        source, seconds = self.state, (time_us - self._entered_us) / 1e6
+        ids = self._enter(transition, time_us)
+        arrived = when == RESUME or transition.to in state_path(self.state)
+        reason = when if arrived else DONE
+        self.transition = TransitionTaken(source, self.state, reason, values, time_us, seconds, ids)
+
+    def _enter(self, transition: Transition, time_us: int) -> tuple[str, ...]:
+        """Do what a transition does; the ids of what was taken."""
+        passage = self.mission.table.passage(self.state, transition)
+        for act in passage.actions:
+            act(self.pilot)
+        self.state = passage.leaf
+        self._present = self.mission.table.rows[passage.leaf]
+        self._entered_us = time_us
+        self.pilot.seconds_in_state = 0.0
+        return passage.ids
 
     def _seconds_in_state(self) -> float:
         until_us = self._last_us if self._paused_us is None else self._paused_us
         return (until_us - self._entered_us) / 1e6
-
-    def _settle(self, time_us: int) -> None:
-        """Read the chart's present state."""
-        self.state = next(state.id for state in self._chart.configuration if state.id in self._states)
-        self._present = self._states[self.state]
-        self._entered_us = time_us
-        self.pilot.seconds_in_state = 0.0
 
     def _place(self, error: BaseException) -> str:
         """File and line of the contestant's code that raised an exception."""
@@ -332,34 +281,8 @@ def _new_navigator(
     return Navigator(surroundings, limits)
 
 
-def _fast_states(mission: Mission) -> dict[str, _FastState]:
-    return {
-        leaf_id: _FastState(leaf, leaf_id in mission.finishes) for leaf_id, leaf in mission.leaves.items()
-    }
-
-
 def _kind(value: object) -> type:
     """The kind of a variable's value; numbers are of one kind."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float
     return type(value)
-
-
-def _act(action: Action) -> Act:
-    if action.name:
-        name = action.name
-
-        def call(pilot: Pilot) -> None:
-            getattr(pilot, name)()
-
-        return call
-    *owners, attribute = action.location.split(".")
-    value = compile_value(action.expression)
-
-    def assign(pilot: Pilot) -> None:
-        owner: object = pilot
-        for part in owners:
-            owner = getattr(owner, part)
-        setattr(owner, attribute, value(pilot))
-
-    return assign

@@ -9,15 +9,11 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 
-import yaml
-from statemachine import StateChart
-
 from framerunner.files.extensions import extension_names, find_extension
 from framerunner.files.text_file import TextError, TextFault, read_text
 from framerunner.files.yaml_text import Place
-from offboard.chart.check import check, is_finish
+from offboard.chart.check import check
 from offboard.chart.messages import Message
-from offboard.chart.native import load_chart, native_document
 from offboard.chart.problems import (
     MissionError,
     Problem,
@@ -28,6 +24,7 @@ from offboard.chart.problems import (
 )
 from offboard.chart.read import read_mission_file
 from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
+from offboard.chart.table import Table
 from offboard.pilot import Pilot
 from offboard.pilot_file import PilotFile, PilotSource, class_of, find_pilot
 from scenarios.models import MissionClass
@@ -81,18 +78,18 @@ class Mission:
     remarks: tuple[Problem, ...] = field(default=(), repr=False)
 
     def __getstate__(self) -> dict[str, object]:
-        """Only the fields: the chart's class cannot be pickled."""
+        """Only the fields: the table's functions cannot be pickled."""
         return {part.name: getattr(self, part.name) for part in fields(self)}
 
     @cached_property
-    def chart(self) -> type[StateChart]:
-        """The class whose instances run the chart."""
-        return load_chart(self.spec)
+    def table(self) -> Table:
+        """The chart as the engine runs it."""
+        return Table(self.spec)
 
     @property
-    def native(self) -> str:
-        """The expanded chart as a YAML document of python-statemachine: equal if missions fly alike."""
-        return yaml.safe_dump(native_document(self.spec), sort_keys=False, width=110)
+    def chart_text(self) -> str:
+        """The expanded chart as a text: equal if missions with the same variables and rules fly alike."""
+        return repr((self.spec.name, self.spec.initial, self.spec.states))
 
     @property
     def rules(self) -> str:
@@ -114,7 +111,7 @@ class Mission:
     @cached_property
     def finishes(self) -> frozenset[str]:
         """States in which the mission is over."""
-        return frozenset(leaf_id for leaf_id in self.leaves if is_finish(self.states, leaf_id))
+        return frozenset(leaf_id for leaf_id, row in self.table.rows.items() if row.finish)
 
     def new_pilot(self) -> Pilot:
         """A pilot with the mission's own variables; `MissionError` if a contestant's class fails."""
@@ -199,8 +196,7 @@ def _checked(written: MissionFile, path: Path, pilot: PilotSource | None, open_b
         detector=spec.detector,
         remarks=problems.all,
     )
-    mission.new_pilot()  # now, so that an error in the pilot or the chart is raised now
-    mission.chart  # noqa: B018
+    mission.new_pilot()  # now, so that an error in the pilot is raised now
     return mission
 
 
@@ -333,7 +329,7 @@ def _draw(state: State, indent: str, lines: list[str]) -> None:
         label = f" : {order}{guard}{done}" if order or guard or done else ""
         lines.append(f"{indent}{state.id} --> {transition.to}{label}")
     if state.then:
-        lines.append(f"{indent}{state.id} --> {state.then}")
+        lines.append(f"{indent}{state.id} --> {state.then.to}")
     if state.resume and not state.resume.to.startswith(f"{state.id}."):
         lines.append(f"{indent}{state.id} --> {state.resume.to} : after a pause")
 

@@ -10,9 +10,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from framerunner.errors import UserError
+from framerunner.wire.mission_report import GuardNow, Plain, ValueNow, plain_value, rounded
 from offboard.chart.described import unit_of
 from offboard.chart.expressions import Evaluate, names_in
-from offboard.chart.spec import RESUME, THEN, Leaf, State, Transition, transition_id
+from offboard.chart.spec import State
+from offboard.chart.table import Guarded
 from offboard.pilot_file import is_interrupt
 
 if TYPE_CHECKING:
@@ -22,38 +24,6 @@ if TYPE_CHECKING:
 
 class ChangeRefusedError(UserError):
     """A changed chart cannot take over; the message is one line that says why."""
-
-
-@dataclass(frozen=True, slots=True)
-class GuardNow:
-    """A transition out of the active states, and whether its guard holds.
-
-    Attributes:
-        id: of the transition, see `offboard.chart.spec.transition_id`.
-        to: full id of its target.
-        when: its guard; "" for a transition without one.
-        holds: None if the guard cannot be evaluated now.
-    """
-
-    id: str
-    to: str
-    when: str
-    holds: bool | None
-
-
-@dataclass(frozen=True, slots=True)
-class ValueNow:
-    """A value that a guard reads.
-
-    Attributes:
-        name: as the guard has it, such as "frame.d".
-        value: of any type with a contestant's pilot.
-        unit: such as "m"; "" if it has none or none is known.
-    """
-
-    name: str
-    value: object
-    unit: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,21 +45,24 @@ class ChartNow:
     values: tuple[ValueNow, ...] = ()
 
 
-def guards_now(leaf: Leaf, guards: Sequence[Evaluate], pilot: Pilot) -> tuple[GuardNow, ...]:
-    """The present truth of a leaf's guards, which are compiled in the order of its transitions."""
-    rows = zip(leaf.transition_ids, leaf.transitions, guards, strict=True)
-    return tuple(GuardNow(name, each.to, each.when, _truth(guard, pilot)) for name, each, guard in rows)
-
-
-def values_now(transitions: Sequence[Transition], pilot: Pilot) -> tuple[ValueNow, ...]:
-    """The present values of all names in the guards of transitions."""
-    names = dict.fromkeys(name for each in transitions for name in names_in(each.when))
+def guards_now(transitions: Sequence[Guarded], pilot: Pilot) -> tuple[GuardNow, ...]:
+    """The present truth of the guards of an active state."""
     return tuple(
-        ValueNow(name, value, unit_of(type(pilot), name)) for name, value in read_values(names, pilot)
+        GuardNow(each.transition.id, each.transition.to, each.transition.when, _truth(each.holds, pilot))
+        for each in transitions
     )
 
 
-def read_values(names: Sequence[str] | dict[str, None], pilot: Pilot) -> tuple[tuple[str, object], ...]:
+def values_now(transitions: Sequence[Guarded], pilot: Pilot) -> tuple[ValueNow, ...]:
+    """The present values of all names in the guards of an active state."""
+    names = dict.fromkeys(name for each in transitions for name in names_in(each.transition.when))
+    return tuple(
+        ValueNow(name, rounded(value), unit_of(type(pilot), name))
+        for name, value in read_values(names, pilot)
+    )
+
+
+def read_values(names: Sequence[str] | dict[str, None], pilot: Pilot) -> tuple[tuple[str, Plain], ...]:
     """The present values of dotted names; one that cannot be read is left out."""
     found = []
     for name in names:
@@ -97,11 +70,10 @@ def read_values(names: Sequence[str] | dict[str, None], pilot: Pilot) -> tuple[t
         try:
             for part in name.split("."):
                 value = getattr(value, part)
+            found.append((name, plain_value(value)))
         except BaseException as error:  # of a value that the guard itself did not read
             if is_interrupt(error):
                 raise
-            continue
-        found.append((name, value))
     return tuple(found)
 
 
@@ -147,26 +119,23 @@ def carried_ids(old: Mission, new: Mission) -> dict[str, str]:
 
 
 def _carried(old: State, new: State) -> dict[str, str]:
-    free = dict(enumerate(new.transitions, 1))
-    numbers: dict[int, int] = {}
-    before = list(enumerate(old.transitions, 1))
-    for number, each in before:
-        same = (n for n, one in free.items() if (one.to, one.when) == (each.to, each.when))
-        if (match := next(same, None)) is not None:
-            numbers[number] = match
-            del free[match]
-    for number, each in before:
-        if number in numbers:
-            continue
-        near = sorted(free, key=lambda n: abs(n - number))
-        if (match := next((n for n in near if free[n].to == each.to), None)) is not None:
-            numbers[number] = match
-            del free[match]
-    found = {transition_id(old.id, number): transition_id(new.id, match) for number, match in numbers.items()}
-    if old.then and new.then:
-        found[transition_id(old.id, THEN)] = transition_id(new.id, THEN)
-    if old.resume and new.resume:
-        found[transition_id(old.id, RESUME)] = transition_id(new.id, RESUME)
+    found: dict[str, str] = {}
+    free = list(new.transitions)
+    for each in old.transitions:
+        same = next((one for one in free if (one.to, one.when) == (each.to, each.when)), None)
+        if same is not None:
+            found[each.id] = same.id
+            free.remove(same)
+    for number, each in enumerate(old.transitions):
+        near = [(abs(at - number), at) for at, one in enumerate(new.transitions) if one in free]
+        near = [(away, at) for away, at in near if new.transitions[at].to == each.to]
+        if near and each.id not in found:
+            match = new.transitions[min(near)[1]]
+            found[each.id] = match.id
+            free.remove(match)
+    for one, other in ((old.then, new.then), (old.resume, new.resume)):
+        if one is not None and other is not None:
+            found[one.id] = other.id
     return found
 
 

@@ -6,7 +6,6 @@ Reading it executes it, so it is read only if a person names it; a mission file 
 from __future__ import annotations
 
 import inspect
-import re
 import signal
 import sys
 import threading
@@ -18,21 +17,11 @@ from pathlib import Path
 from types import FrameType, ModuleType, TracebackType
 from typing import get_type_hints
 
-from statemachine import StateChart
-
 from framerunner.files.extensions import extension_names, find_extension
 from framerunner.files.text_file import TextError, read_text
 from framerunner.files.yaml_text import Place
 from offboard.chart.problems import MissionError, mission_error
 from offboard.pilot import Pilot
-
-_INSTANCE_NAMES = (
-    "final_states history_values initial_state model prepare_event resume state state_field tick"
-)
-_CHART_NAMES = frozenset([*dir(StateChart), *_INSTANCE_NAMES.split()])
-"""Names that python-statemachine looks up in the chart before the pilot, or writes to."""
-_CHART_CALLBACKS = re.compile(r"(before|on|after)_(transition|tick|resume|done_.*)|on_(enter|exit|invoke)_.*")
-"""Names that python-statemachine would call at changes of state."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,8 +222,6 @@ def _unusable_members(kind: type[Pilot]) -> Iterator[tuple[object, str]]:
 
 def _why_unusable(name: str, member: object) -> str:
     """Why a member of a pilot's class cannot be used by a mission; empty if it can."""
-    if name in _CHART_NAMES or _CHART_CALLBACKS.fullmatch(name):
-        return f"'{name}' is a name that the statechart uses itself; rename it, such as 'my_{name}'"
     if isinstance(member, property):
         try:
             get_type_hints(member.fget)

@@ -10,6 +10,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, StringConstraints, TypeAdapter
 
 from framerunner.editing.words import Language
+from framerunner.runs.track import StateSpan
+from framerunner.wire.mission_report import GuardNow, Plain, ValueNow
 from offboard.authoring import StrictModel
 
 MAX_TEXT = 100_000
@@ -160,23 +162,6 @@ REQUEST: TypeAdapter[Request] = TypeAdapter(Request)
 Order = Pause | GoOn | Step | Speed | BreakOn | Change | Stop | Watch
 
 
-class Guard(StrictModel):
-    """A transition out of the active states; `holds` is null if its guard cannot be evaluated now."""
-
-    id: str
-    to: str
-    when: str
-    holds: bool | None
-
-
-class Value(StrictModel):
-    """What a guard reads; `unit` is "" if there is none."""
-
-    name: str
-    value: float | bool | int | str | None
-    unit: str
-
-
 class Taken(StrictModel):
     """A transition that was taken; `ids` has it and each `then` it led to."""
 
@@ -184,17 +169,9 @@ class Taken(StrictModel):
     source: str
     target: str
     when: str
-    values: tuple[tuple[str, float | bool | int | str | None], ...]
+    values: tuple[tuple[str, Plain], ...]
     time_s: float
     seconds: float  # in `source`
-
-
-class StateTime(StrictModel):
-    """A time in which a state was active."""
-
-    state: str
-    from_s: float
-    to_s: float
 
 
 class Contact(StrictModel):
@@ -240,11 +217,11 @@ class Now(StrictModel):
     paused: bool
     stopped_in: str
     speed: float | None
-    guards: tuple[Guard, ...]
-    values: tuple[Value, ...]
+    guards: tuple[GuardNow, ...]
+    values: tuple[ValueNow, ...]
     taken: tuple[Taken, ...]
     counts: dict[str, int]
-    spans: tuple[StateTime, ...]
+    spans: tuple[StateSpan, ...]
     contacts: tuple[Contact, ...]
     pose: tuple[float | None, ...]
     command: tuple[float | None, ...]
@@ -308,7 +285,7 @@ class Ended(StrictModel):
     lost_in: str  # the state in which it was lost; "" if it was not
     result: Json | None
     counts: dict[str, int]
-    spans: tuple[StateTime, ...]
+    spans: tuple[StateSpan, ...]
 
 
 class FlownTrack(StrictModel):

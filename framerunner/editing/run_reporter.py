@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 
-from framerunner.editing.messages import Contact, Ended, Guard, Now, StateTime, Taken, Value
+from framerunner.editing.messages import Contact, Ended, Now, Taken
 from framerunner.flying.cause import lost_in
 from framerunner.flying.fly import FinishedFlight
-from framerunner.flying.guard_reporter import plain_value
 from framerunner.flying.run_control import RunStanding
-from framerunner.runs.track import ChartRecord, StateSpan
+from framerunner.runs.track import ChartRecord
 from framerunner.wire.finite_json import finite
+from framerunner.wire.mission_report import TransitionTaken, rounded
 from offboard.app import Moment
 from offboard.drone import DroneState
-from offboard.engine import MissionEngine, TransitionTaken
+from offboard.engine import MissionEngine
 from scenarios.models import TrueState
 
 PERIOD_S = 0.04  # wall time between two messages of a flight that is not paused
@@ -107,14 +107,14 @@ class RunReporter:
             lost_in=lost_in(result, flown.track),
             result=result.as_json(),
             counts=dict(self._record.counts),
-            spans=_spans(self._record.spans()),
+            spans=self._record.spans(),
         )
 
     def failed(self, text: str) -> Ended:
         """The last message of a flight that a fault of the program ended."""
         spans, counts = self._record.spans(), dict(self._record.counts)
         state = spans[-1].state if spans else ""
-        return Ended(run=self._run, text=text, lost_in=state, result=None, counts=counts, spans=_spans(spans))
+        return Ended(run=self._run, text=text, lost_in=state, result=None, counts=counts, spans=spans)
 
     def _now(self, engine: MissionEngine, state: DroneState, standing: RunStanding) -> Now:
         full, self._full = self._full, False
@@ -135,22 +135,16 @@ class RunReporter:
             paused=standing.paused,
             stopped_in=standing.stopped_in,
             speed=standing.speed,
-            guards=tuple(Guard(id=g.id, to=g.to, when=g.when, holds=g.holds) for g in chart.guards),
-            values=tuple(Value(name=v.name, value=_plain(v.value), unit=v.unit) for v in chart.values),
+            guards=chart.guards,
+            values=chart.values,
             taken=tuple(map(_taken, taken[-MAX_TAKEN:])),
             counts={name: record.counts[name] for name in changed},
-            spans=_spans(spans),
+            spans=spans,
             contacts=tuple(contacts[contacts_told:]),
             pose=_numbers(state.x, state.y, state.z, state.yaw),
             command=_numbers(*self._command),
             trail=tuple(self._trail[trail_told:]),
         )
-
-
-def _spans(spans: Sequence[StateSpan]) -> tuple[StateTime, ...]:
-    return tuple(
-        StateTime(state=each.state, from_s=each.from_us / 1e6, to_s=each.to_us / 1e6) for each in spans
-    )
 
 
 def _taken(taken: TransitionTaken) -> Taken:
@@ -159,15 +153,10 @@ def _taken(taken: TransitionTaken) -> Taken:
         source=taken.source,
         target=taken.target,
         when=taken.when,
-        values=tuple((name, _plain(value)) for name, value in taken.values),
+        values=tuple((name, rounded(value)) for name, value in taken.values),
         time_s=taken.time_us / 1e6,
         seconds=taken.seconds_in_source,
     )
-
-
-def _plain(value: object) -> float | bool | int | str | None:
-    plain: float | bool | int | str | None = finite(plain_value(value))
-    return plain
 
 
 def _numbers(*values: float | None) -> Point:

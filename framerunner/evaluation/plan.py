@@ -120,7 +120,7 @@ class Plan:
         return Identity(
             scenarios={each.name: _sha256(each.model_dump_json()) for each in self.scenarios},
             mission=mission.name,
-            mission_sha256=_sha256(f"{mission.native}\n{variables}\n{mission.rules}"),
+            mission_sha256=_sha256(f"{mission.chart_text}\n{variables}\n{mission.rules}"),
             pilot=pilot.name if isinstance(pilot, PilotFile) else pilot.__qualname__,
             pilot_sha256=_pilot_sha256(pilot),
             seeds=tuple(self.seeds),

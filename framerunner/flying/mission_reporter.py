@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping
+from dataclasses import asdict, replace
 from typing import Any
 
-from framerunner.flying.guard_reporter import GuardReporter, plain_value
-from framerunner.flying.navigation_reporter import NavigationReporter
+from framerunner.flying.navigation_reporter import map_document
+from framerunner.wire.mission_report import GuardsDocument, MapDocument, MissionDocument
 from framerunner.wire.mission_tunnel import (
     TEXT_PREFIX,
     Box,
@@ -20,7 +21,7 @@ from framerunner.wire.mission_tunnel import (
 )
 from offboard.app import Moment
 from offboard.drone import DroneState
-from offboard.engine import MissionEngine, TransitionTaken
+from offboard.engine import MissionEngine
 from offboard.link.companion import Companion
 from offboard.mission import Mission, mermaid
 from scenarios.result import FlightResult
@@ -28,9 +29,30 @@ from vision.types import CameraFrame, Detection, Detections
 
 STATE_TICKS = 2  # 10 Hz of vehicle time
 HISTORY = 10
+NEWS_US = 500_000  # of vehicle time between two maps, and between two documents of guards
+MAX_GUARDS = 100
+MAX_COUNTS = 1000
 MAX_HISTORY_PIECES = 4  # two are sent at once, two with the companion's next beat
 
 logger = logging.getLogger(__name__)
+
+
+class _News:
+    """Whether a document that can be made at each tick is sent: if it is due, and not the last one again."""
+
+    def __init__(self) -> None:
+        self._told: MapDocument | GuardsDocument | None = None
+
+    def is_due(self, time_us: int) -> bool:
+        """Whether one may be sent at a vehicle time."""
+        return self._told is None or time_us - self._told.time_us >= NEWS_US
+
+    def take(self, document: MapDocument | GuardsDocument) -> bool:
+        """Take a document; whether it is to be sent."""
+        if self._told is not None and replace(self._told, time_us=document.time_us) == document:
+            return False
+        self._told = document
+        return True
 
 
 class MissionReporter:
@@ -64,8 +86,8 @@ class MissionReporter:
         self._ticks = 0
         self._image_size_px = (0, 0)
         self._detections: Detections | None = None
-        self._navigation = NavigationReporter()
-        self._guards = GuardReporter()
+        self._counts: Counter[str] = Counter()
+        self._map_news, self._guard_news = _News(), _News()
         self._broken = False
         still = (0.0, 0.0, 0.0, 0.0)
         companion.send_state(MissionState(self._crc, -1, 0, 0, 0, False, False, False, still, start_arena))
@@ -87,12 +109,20 @@ class MissionReporter:
 
     async def look(self, engine: MissionEngine, state: DroneState) -> None:
         """Report what the guards read, twice a second: a `TickHook` that never waits."""
-        if self._broken or self._companion.is_sending(DocumentKind.GUARDS):
+        is_busy = self._companion.is_sending(DocumentKind.GUARDS)
+        if self._broken or is_busy or not self._guard_news.is_due(state.time_us):
             return
         try:
-            document = self._guards.document(engine, state.time_us)
-            if document is not None:
-                self._send_document(DocumentKind.GUARDS, {"mission_crc": self._crc, **document})
+            chart = engine.chart_now()
+            document = GuardsDocument(
+                self._crc,
+                state.time_us,
+                counts=dict(self._counts.most_common(MAX_COUNTS)),
+                guards=tuple((each.id, each.holds) for each in chart.guards[:MAX_GUARDS]),
+                values=tuple((each.name, each.value, each.unit) for each in chart.values[:MAX_GUARDS]),
+            )
+            if self._guard_news.take(document):
+                self._send_document(DocumentKind.GUARDS, asdict(document))
         except Exception as error:  # must not end the flight
             self._broken = True
             logger.warning("the mission is no longer reported: %r", error)
@@ -106,8 +136,8 @@ class MissionReporter:
         time_us = moment.state.time_us
         if moment.transition is not None:
             self._transitions += 1
-            self._guards.count(moment.transition)
-            self._history.append(_transition_json(moment.transition))
+            self._counts.update(moment.transition.ids)
+            self._history.append({"time_us": moment.transition.time_us, **moment.transition.as_json()})
             self._send_history()
         if moment.mission_state != self._mission_state or moment.transition is not None:
             self._entered_us = time_us
@@ -164,24 +194,22 @@ class MissionReporter:
 
     def _send_map(self, moment: Moment) -> None:
         """Send the navigator's map if it is due; one that is still being sent is finished before."""
-        if self._companion.is_sending(DocumentKind.MAP):
+        view, time_us = moment.navigation, moment.state.time_us
+        is_busy = self._companion.is_sending(DocumentKind.MAP)
+        if view is None or is_busy or not self._map_news.is_due(time_us):
             return
-        navigation = self._navigation.document(moment)
-        if navigation is not None:
-            self._send_document(DocumentKind.MAP, {"mission_crc": self._crc, **navigation})
+        document = map_document(view, self._crc, time_us)
+        if self._map_news.take(document):
+            self._send_document(DocumentKind.MAP, asdict(document))
 
     def _report_mission(self, mission: Mission, source: str, scenario: str) -> int:
         """Send what is flown, without the parts that make it too large; returns its CRC."""
-        document = {
-            "name": mission.name,
-            "description": mission.description,
-            "scenario": scenario,
-            "states": list(mission.leaves),
-            "mermaid": mermaid(mission),
-            "source": source,
-        }
-        for left_out in ((), ("source",), ("source", "mermaid"), ("source", "mermaid", "states")):
-            crc = self._send_document(DocumentKind.MISSION, {**document, **dict.fromkeys(left_out, "")})
+        states, chart = tuple(mission.leaves), mermaid(mission)
+        whole = MissionDocument(mission.name, mission.description, scenario, states, chart, source)
+        without_source = replace(whole, source="")
+        without_chart = replace(without_source, mermaid="")
+        for document in (whole, without_source, without_chart, replace(without_chart, states=())):
+            crc = self._send_document(DocumentKind.MISSION, asdict(document))
             if crc is not None:
                 return crc
         return 0
@@ -195,18 +223,6 @@ class MissionReporter:
             return None
         self._companion.send_document(kind, pieces)
         return crc
-
-
-def _transition_json(taken: TransitionTaken) -> dict[str, object]:
-    return {
-        "from": taken.source,
-        "to": taken.target,
-        "time_us": taken.time_us,
-        "when": taken.when,
-        "values": [[name, plain_value(value)] for name, value in taken.values],
-        "seconds": round(taken.seconds_in_source, 3),
-        "ids": list(taken.ids),
-    }
 
 
 def _box(detection: Detection) -> Box:

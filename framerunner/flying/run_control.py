@@ -13,9 +13,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite
 
+from framerunner.wire.mission_report import TransitionTaken
 from offboard.chart.spec import state_path
 from offboard.drone import DroneState
-from offboard.engine import MissionEngine, TransitionTaken
+from offboard.engine import MissionEngine
 from offboard.mission import Mission
 from offboard.observation import ChangeRefusedError, carried_ids
 

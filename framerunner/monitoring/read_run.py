@@ -13,6 +13,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from math import cos, isfinite, pi, sin
 from pathlib import Path
 from typing import Any
@@ -22,13 +23,15 @@ import cv2
 from framerunner.child_process import end_with_standard_input, limit_resources
 from framerunner.errors import UserError
 from framerunner.files.text_file import TextError, read_text
-from framerunner.flying.navigation_reporter import navigation_json
+from framerunner.flying.navigation_reporter import map_document
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.open_recording import recorded_flight
 from framerunner.runs.run_files import RunFiles
+from framerunner.wire.finite_json import finite
+from framerunner.wire.mission_report import TransitionTaken
 from offboard.app import Moment
-from offboard.chart.spec import enter_state
-from offboard.engine import DONE, TransitionTaken
+from offboard.chart.spec import state_path
+from offboard.engine import DONE
 from offboard.mission import Mission, MissionError, load_mission, mermaid
 from offboard.navigation.view import NavigationView
 from offboard.pilot_file import PilotSource, find_pilot
@@ -202,7 +205,7 @@ def _maps(moments: Sequence[Moment], clock: Clock) -> list[Json]:
         view = moment.navigation
         if view is not None and view is not last:
             last = view
-            content = navigation_json(view)
+            content = map_document(view).as_json()
             if not found or {**content, "t": found[-1]["t"]} != found[-1]:
                 found.append({**content, "t": clock(moment.state.time_us)})
     return found
@@ -226,18 +229,8 @@ def _transitions(flight: CollectedFlight, clock: Clock, mission: Mission | None)
         if taken is None:
             when = _guard(mission, state, moment.mission_state)
             taken = TransitionTaken(state, moment.mission_state, when, (), now_us, (now_us - since_us) / 1e6)
-        ids = taken.ids or _ids(mission, taken)
-        found.append(
-            {
-                "time_s": clock(now_us),
-                "from": taken.source[:_MAX_TEXT],
-                "to": taken.target[:_MAX_TEXT],
-                "when": taken.when[:_MAX_TEXT],
-                "values": [[name[:_MAX_TEXT], _plain(value)] for name, value in taken.values],
-                "seconds": round(taken.seconds_in_source, 3),
-                "ids": [name[:_MAX_TEXT] for name in ids],
-            }
-        )
+        taken = replace(taken, ids=taken.ids or _ids(mission, taken))
+        found.append({"time_s": clock(now_us), **finite(taken.as_json())})
         state, since_us = moment.mission_state, now_us
     return found
 
@@ -247,7 +240,7 @@ def _guard(mission: Mission | None, source: str, target: str) -> str:
     leaf = None if mission is None else mission.leaves.get(source)
     if leaf is None:
         return ""
-    guards = {each.when for each in leaf.transitions if target == each.to or target.startswith(f"{each.to}.")}
+    guards = {each.when for each in leaf.transitions if each.to in state_path(target)}
     return guards.pop() if len(guards) == 1 else ""
 
 
@@ -256,18 +249,10 @@ def _ids(mission: Mission | None, taken: TransitionTaken) -> tuple[str, ...]:
     leaf = None if mission is None else mission.leaves.get(taken.source)
     if mission is None or leaf is None:
         return ()
-    found = []
-    for name, each in zip(leaf.transition_ids, leaf.transitions, strict=True):
-        arrived, followed = enter_state(mission.states, each.to)
-        if arrived == taken.target and taken.when in (each.when, DONE):
-            found.append((name, *followed))
+    likely = [each for each in leaf.transitions if taken.when in (each.when, DONE)]
+    passages = [mission.table.passage(taken.source, each) for each in likely]
+    found = [each.ids for each in passages if each.leaf == taken.target]
     return found[0] if len(found) == 1 else ()
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    return value if value is None or isinstance(value, bool | int) else str(value)[:_MAX_TEXT]
 
 
 def _rounded(*values: float) -> list[float | None]:

@@ -39,9 +39,9 @@ from framerunner.recording.schemas import (
     TELEMETRY,
 )
 from framerunner.runs.run_files import RESULT
+from framerunner.wire.mission_report import Plain, TransitionTaken, plain_value
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
-from offboard.engine import TransitionTaken
 from offboard.navigation.view import FrameEstimate, NavigationView
 from scenarios.result import FlightResult, ResultError
 from vision.jpeg import JPEG_START, MAX_PIXELS, ImageError, jpeg_structure
@@ -251,9 +251,9 @@ def _transition(time_us: int, message: Json) -> TransitionTaken | None:
     )
 
 
-def _value(message: Json) -> object:
+def _value(message: Json) -> Plain:
     """A guard's value; None for a number that was not finite."""
-    return next((message[kind] for kind in ("number", "flag", "text") if kind in message), None)
+    return plain_value(next((message[kind] for kind in ("number", "flag", "text") if kind in message), None))
 
 
 def _detections(message: Json) -> Detections:

@@ -11,10 +11,12 @@ from itertools import pairwise
 from math import cos, isfinite, sin
 from typing import Any
 
+from framerunner.flying.navigation_reporter import has_place
 from framerunner.geometry.rotations import mounting_flu, multiply, quaternion_from_yaw
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Quaternion, Vec3
 from framerunner.vehicle.airframe import load_airframe
+from framerunner.wire.mission_report import Plain
 from offboard.app import Moment
 from offboard.drone import DroneState
 from offboard.navigation.view import FrameEstimate, NavigationView
@@ -51,7 +53,7 @@ _INFO = 2
 _FLOOR_M = 0.01
 _FRAME_SIZE_M = (0.42, 0.22)  # outer width and height of one that is no part of the scenario
 _DASHES_A_LEG = 4
-_MAX_TEXT = 80  # characters of a guard's value that is no number
+_MAX_TEXT = 80  # characters of a goal
 
 
 def time_of(time_us: int) -> Message:
@@ -206,17 +208,13 @@ def mission_state(moment: Moment, previous: str, previous_s: float) -> Message:
     }
 
 
-def _guard_value(name: str, value: object) -> Message:
-    """A value of a guard; a contestant's pilot may hold anything."""
-    try:
-        if isinstance(value, bool):
-            return {"name": name, "flag": value}
-        if isinstance(value, str) or not hasattr(value, "__float__"):
-            return {"name": name, "text": str(value)[:_MAX_TEXT]}
-        number = float(value)
-    except Exception:  # whatever a contestant's conversion raises
-        return {"name": name, "text": type(value).__name__}
-    return {"name": name, "number": number} if isfinite(number) else {"name": name}
+def _guard_value(name: str, value: Plain) -> Message:
+    """A value of a guard; a number that is not finite is left out."""
+    if isinstance(value, bool):
+        return {"name": name, "flag": value}
+    if isinstance(value, int | float):
+        return {"name": name, "number": float(value)} if isfinite(value) else {"name": name}
+    return {"name": name, "text": str(value)}
 
 
 def crossing(time_us: int, colour: str, time_s: float, offset_m: float, side: str) -> Message:
@@ -238,12 +236,8 @@ def log(time_us: int, name: str, text: str) -> Message:
 
 def frame_map(view: NavigationView, time_us: int) -> Message:
     """The navigator's map; a number that is not finite is left out, with its frame if that has no place."""
-    frames = [_mapped_frame(frame) for frame in view.frames if _has_place(frame)]
+    frames = [_mapped_frame(frame) for frame in view.frames if has_place(frame)]
     return {"timestamp": time_of(time_us), "goal": view.goal[:_MAX_TEXT], "frames": frames}
-
-
-def _has_place(frame: FrameEstimate) -> bool:
-    return all(map(isfinite, (*frame.position_m, frame.yaw_rad)))
 
 
 def _mapped_frame(frame: FrameEstimate) -> Message:
@@ -283,7 +277,7 @@ def map_scene(view: NavigationView, scenario: Scenario, time_us: int) -> Message
             **_drawn_estimate(frame, sizes_m.get(frame.colour, _FRAME_SIZE_M)),
         )
         for number, frame in enumerate(view.frames)
-        if _has_place(frame)
+        if has_place(frame)
     ]
     return {"deletions": [{"timestamp": time_of(time_us), "type": 1, "id": ""}], "entities": entities}
 

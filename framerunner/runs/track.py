@@ -9,8 +9,8 @@ from itertools import groupby
 from math import isfinite
 
 from framerunner.geometry.vectors import Vec3
+from framerunner.wire.mission_report import TransitionTaken
 from offboard.app import Moment
-from offboard.engine import TransitionTaken
 from offboard.navigation.view import FrameEstimate
 
 
@@ -117,11 +117,11 @@ class TrackRecorder:
 
 @dataclass(frozen=True, slots=True)
 class StateSpan:
-    """A time in which a state was active; vehicle time, microseconds."""
+    """A time in which a state was active; vehicle time, seconds."""
 
     state: str  # full id of the leaf
-    from_us: int
-    to_us: int
+    from_s: float
+    to_s: float
 
 
 class ChartRecord:
@@ -150,7 +150,7 @@ class ChartRecord:
             self.taken.append(taken)
             self.counts.update(taken.ids)
         if self._state:
-            self._spans.append(StateSpan(self._state, self._since_us, time_us))
+            self._spans.append(self._span(time_us))
         self._state, self._since_us = moment.mission_state, time_us
 
     def rename(self, ids: Mapping[str, str]) -> None:
@@ -165,4 +165,7 @@ class ChartRecord:
         """The time line of states until now, the present one last."""
         if not self._state:
             return ()
-        return (*self._spans, StateSpan(self._state, self._since_us, self._last_us))
+        return (*self._spans, self._span(self._last_us))
+
+    def _span(self, to_us: int) -> StateSpan:
+        return StateSpan(self._state, self._since_us / 1e6, to_us / 1e6)

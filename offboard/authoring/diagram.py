@@ -7,14 +7,12 @@ edits name.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 
 from framerunner.files.yaml_text import Place, Scalar
 from offboard.authoring.document import Document
-from offboard.authoring.outline import Event, Span, StateOutline, TransitionOutline
-from offboard.chart.check import is_finish
-from offboard.chart.spec import MissionFile, State, Transition, all_states
+from offboard.authoring.outline import Span, StateOutline, TransitionOutline
+from offboard.chart.spec import Event, MissionFile, State, Transition, all_states, is_finish
 
 SETTINGS = ("name", "description", "class", "vision", "detector", "extends")
 
@@ -110,7 +108,11 @@ def diagram(document: Document) -> Diagram:
     written = _Written(document)
     states = {state.id: state for state in all_states(chart.states)}
     nodes = tuple(_node(state, states, written) for state in states.values())
-    edges = tuple(edge for state in states.values() for edge in _edges(state, written, states))
+    edges = tuple(
+        _edge(state.id, transition, event, order, written, missing=transition.to not in states)
+        for state in states.values()
+        for event, order, transition in state.outgoing()
+    )
     outline = document.outline
     return Diagram(
         chart.name,
@@ -165,19 +167,6 @@ def parameters(state: StateOutline) -> tuple[tuple[str, str], ...]:
         return ()
     pairs = [action.text.partition("=") for action in state.actions("enter")]
     return tuple((name.strip(), value.strip()) for name, sign, value in pairs if sign)
-
-
-def _edges(state: State, written: _Written, states: Container[str]) -> Iterator[Edge]:
-    events: list[tuple[Transition, Event, int]] = [
-        (transition, "tick", order) for order, transition in enumerate(state.transitions)
-    ]
-    if state.then:
-        events.append((Transition(state.then_place, state.then), "done", 0))
-    if state.resume is not None:
-        events.append((state.resume, "resume", 0))
-    for transition, event, order in events:
-        missing = transition.to not in states
-        yield _edge(state.id, transition, event, order, written, missing=missing)
 
 
 def _edge(

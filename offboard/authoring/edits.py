@@ -12,7 +12,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from offboard.authoring.messages import EditError
-from offboard.authoring.outline import Event, Section
+from offboard.authoring.outline import Section
+from offboard.chart.spec import Event
 
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=60, description="small letters")]
 StatePath = Annotated[str, Field(max_length=1000, description="as written, such as landing.stop")]
@@ -33,6 +34,14 @@ class TransitionPath(StrictModel):
     state: StatePath
     event: Event = "tick"
     index: Index = 0
+
+
+class _OfState(StrictModel):
+    state: StatePath
+
+
+class _OfTransition(StrictModel):
+    transition: TransitionPath
 
 
 class AddState(StrictModel):
@@ -58,45 +67,40 @@ class AddTemplate(StrictModel):
     states: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
 
 
-class RenameState(StrictModel):
+class RenameState(_OfState):
     """Another name for a state or template, also in all that names it in this document."""
 
     kind: Literal["rename_state"] = "rename_state"
-    state: StatePath
     name: Name
 
 
-class MoveState(StrictModel):
+class MoveState(_OfState):
     """A state to another place among its siblings, or into or out of a superstate."""
 
     kind: Literal["move_state"] = "move_state"
-    state: StatePath
     parent: StatePath = ""
     index: Index | None = None
 
 
-class DuplicateState(StrictModel):
+class DuplicateState(_OfState):
     """A copy of a state beside it, with all its states, and with some of its parameters changed."""
 
     kind: Literal["duplicate_state"] = "duplicate_state"
-    state: StatePath
     name: Name
     parameters: Annotated[dict[Line, Line], Field(max_length=50)] = Field(default_factory=dict)
 
 
-class DeleteState(StrictModel):
+class DeleteState(_OfState):
     """A state less; transitions to it are kept, which the checker then reports, or deleted, too."""
 
     kind: Literal["delete_state"] = "delete_state"
-    state: StatePath
     references: Literal["keep", "delete"] = "keep"
 
 
-class AddTransition(StrictModel):
+class AddTransition(_OfState):
     """A new transition; only one of the event "tick" has a guard, actions and an order of priority."""
 
     kind: Literal["add_transition"] = "add_transition"
-    state: StatePath
     to: StatePath  # of the target, as written, or its full id in the chart
     when: Line = ""
     actions: Actions = ()
@@ -104,67 +108,59 @@ class AddTransition(StrictModel):
     index: Index | None = None  # its order of priority; None: the last
 
 
-class DeleteTransition(StrictModel):
+class DeleteTransition(_OfTransition):
     """A transition less."""
 
     kind: Literal["delete_transition"] = "delete_transition"
-    transition: TransitionPath
 
 
-class RedirectTransition(StrictModel):
+class RedirectTransition(_OfTransition):
     """Another target for a transition."""
 
     kind: Literal["redirect_transition"] = "redirect_transition"
-    transition: TransitionPath
     to: StatePath
 
 
-class SetSource(StrictModel):
+class SetSource(_OfTransition):
     """Another state that has a transition; it comes last there, with its guard and actions."""
 
     kind: Literal["set_source"] = "set_source"
-    transition: TransitionPath
     state: StatePath  # that has it from now on
     to: StatePath  # its target, which stays
 
 
-class MoveTransition(StrictModel):
+class MoveTransition(_OfTransition):
     """Another order of priority for a transition."""
 
     kind: Literal["move_transition"] = "move_transition"
-    transition: TransitionPath
     index: Index
 
 
-class SetGuard(StrictModel):
+class SetGuard(_OfTransition):
     """The guard of a transition; empty for "always"."""
 
     kind: Literal["set_guard"] = "set_guard"
-    transition: TransitionPath
     when: Line
 
 
-class SetEvent(StrictModel):
+class SetEvent(_OfTransition):
     """The event of a transition; one with a guard or actions stays one of the event "tick"."""
 
     kind: Literal["set_event"] = "set_event"
-    transition: TransitionPath
     event: Event
 
 
-class SetTransitionActions(StrictModel):
+class SetTransitionActions(_OfTransition):
     """What is done when a transition is taken."""
 
     kind: Literal["set_transition_actions"] = "set_transition_actions"
-    transition: TransitionPath
     actions: Actions
 
 
-class SetActions(StrictModel):
+class SetActions(_OfState):
     """What a state does on entry, during or on exit."""
 
     kind: Literal["set_actions"] = "set_actions"
-    state: StatePath
     section: Section
     actions: Actions
 
@@ -177,27 +173,24 @@ class SetInitial(StrictModel):
     name: Name
 
 
-class SetFinal(StrictModel):
+class SetFinal(_OfState):
     """Whether a state is final."""
 
     kind: Literal["set_final"] = "set_final"
-    state: StatePath
     final: bool
 
 
-class SetUse(StrictModel):
+class SetUse(_OfState):
     """The template whose states a state takes; empty for none."""
 
     kind: Literal["set_use"] = "set_use"
-    state: StatePath
     template: Annotated[str, Field(pattern=r"^([a-z][a-z0-9_]*)?$", max_length=60)]
 
 
-class SetParameter(StrictModel):
+class SetParameter(_OfState):
     """What a superstate assigns to a name on entry, such as `'green'` to `colour`."""
 
     kind: Literal["set_parameter"] = "set_parameter"
-    state: StatePath
     name: Line
     value: Line
 

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from offboard.authoring.document import Document
-from offboard.authoring.outline import SECTIONS, Event, Section, Span, StateOutline
+from offboard.authoring.outline import SECTIONS, Section, Span, StateOutline
 from offboard.authoring.references import instances
 from offboard.chart.messages import ENGLISH, Message
 from offboard.chart.problems import MissionError, Problem, ProblemList, Severity
+from offboard.chart.spec import Event
 from offboard.mission import expand_and_check
 from offboard.pilot import Pilot
 
@@ -106,23 +107,14 @@ def _finding(document: Document, found: Problem, texts: Mapping[str, str]) -> Fi
     offset = positions.offset_of_yaml(place.line, place.column)
     span = _span(document, offset, whole_line=not place.column)
     line, column = positions.line_column(span.start)
+    column = column if place.column else 0
+    placed = replace(plain, line=line, column=column, start=span.start, end=span.end)
     state = document.outline.at(span.start)
-    where: tuple[Event | None, int | None, str] = (None, None, "")
-    if state is not None:
-        where = _part(state, span.start)
-    return Finding(
-        found.severity,
-        plain.code,
-        plain.message,
-        place.file,
-        line,
-        column if place.column else 0,
-        span.start,
-        span.end,
-        "" if state is None else state.path,
-        *where,
-        nodes=() if state is None else instances(document, state),
-    )
+    if state is None:
+        return placed
+    event, index, section = _part(state, span.start)
+    nodes = instances(document, state)
+    return replace(placed, state=state.path, event=event, index=index, section=section, nodes=nodes)
 
 
 def _part(state: StateOutline, offset: int) -> tuple[Event | None, int | None, str]:

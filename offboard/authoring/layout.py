@@ -16,7 +16,7 @@ from framerunner.errors import UserError
 from framerunner.files.text_file import TextError, decode_text, read_in_folder, replace_file
 from offboard.authoring.document import Document
 from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState, StrictModel
-from offboard.authoring.references import chart_ids, instances, prefix_change
+from offboard.authoring.references import beside, chart_ids, instances, prefix_change
 
 _MAX_BYTES = 1_000_000
 _ADVICE = "correct it, or delete the file and the states are placed anew"
@@ -116,7 +116,7 @@ def follow(layout: Layout, before: Document, edit: Edit, after: Document) -> Lay
         return layout
     pairs = []
     if isinstance(edit, RenameState) and not state.is_template:
-        pairs = [(i, f"{i.rpartition('.')[0]}.{edit.name}".lstrip(".")) for i in instances(before, state)]
+        pairs = [(i, beside(i, edit.name)) for i in instances(before, state)]
     elif isinstance(edit, MoveState):
         prefix = f"{edit.parent}." if edit.parent else ""
         moved = after.outline.get(prefix + state.name)

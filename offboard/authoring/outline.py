@@ -7,17 +7,18 @@ first: `@cross_frame.turning`; the template itself is `@cross_frame`.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 from framerunner.files.yaml_text import ListNode, MapNode, Node, Scalar
 from offboard.chart.problems import NOWHERE
+from offboard.chart.spec import Event
 
-Event = Literal["tick", "done", "resume"]
-"""When a transition is looked at: at every tick, when a final state is reached (`then`), after a pause."""
 Section = Literal["enter", "during", "exit"]
+KEYS: Mapping[Event, str] = {"done": "then", "resume": "resume"}
+"""Of transitions that are not in a list."""
 SECTIONS: tuple[Section, ...] = ("enter", "during", "exit")
 TEMPLATE = "@"
 
@@ -194,8 +195,7 @@ def _transitions(node: Node) -> tuple[TransitionOutline, ...]:
         if isinstance(item, MapNode):
             to, when = (_scalar(item.items.get(key)) for key in ("to", "when"))
             found.append(TransitionOutline("tick", index, item, to, when, scalars(item.items.get("do"))))
-    events: tuple[tuple[Event, str], ...] = (("done", "then"), ("resume", "resume"))
-    for event, key in events:
+    for event, key in KEYS.items():
         target = _scalar(node.items.get(key))
         if target is not None:
             found.append(TransitionOutline(event, 0, target, target))

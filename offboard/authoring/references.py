@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from framerunner.files.yaml_text import Place, Scalar
 from offboard.authoring.document import Document
-from offboard.authoring.outline import TEMPLATE, Event, StateOutline
-from offboard.chart.spec import all_states, look_up
+from offboard.authoring.outline import TEMPLATE, StateOutline
+from offboard.chart.spec import Event, all_states, look_up
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +59,9 @@ def _leads(document: Document) -> dict[Place, set[tuple[str, str]]]:
     ids = {state.id for state in states}
     found: dict[Place, set[tuple[str, str]]] = {}
     for state in states:
-        targets = [(transition.place, transition.to) for transition in state.transitions]
-        targets.append((state.then_place, state.then))
-        if state.resume is not None:
-            targets.append((state.resume.place, state.resume.to))
-        for place, to in targets:
-            if place.file == document.label and to in ids:
-                found.setdefault(place, set()).add((state.id, to))
+        for _, _, transition in state.outgoing():
+            if transition.place.file == document.label and transition.to in ids:
+                found.setdefault(transition.place, set()).add((state.id, transition.to))
     return found
 
 
@@ -93,6 +89,11 @@ def instances(document: Document, state: StateOutline) -> tuple[str, ...]:
 def relative(path: str) -> str:
     """The path of a state without its template."""
     return path.partition(".")[2] if path.startswith(TEMPLATE) else path
+
+
+def beside(path: str, name: str) -> str:
+    """Path or full id of a state with another name beside one."""
+    return f"{path.rpartition('.')[0]}.{name}".lstrip(".")
 
 
 def prefix_change(pairs: list[tuple[str, str]]) -> Callable[[str], str]:

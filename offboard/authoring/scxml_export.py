@@ -17,12 +17,12 @@ import re
 from collections.abc import Iterable
 from xml.etree import ElementTree as ET
 
-from offboard.chart.native import RESUME, TICK
-from offboard.chart.spec import Action, Leaf, MissionFile, State, leaves
+from offboard.chart.spec import RESUME, Action, Leaf, MissionFile, State, leaves
 
 SCXML = "http://www.w3.org/2005/07/scxml"
 NAMESPACE = "urn:framerunner:mission:1"
 DATAMODEL = "python"
+TICK = "tick"
 _NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -69,7 +69,7 @@ def _add_state(parent: ET.Element, state: State, by_leaf: dict[str, Leaf]) -> No
             _add_actions(_add(element, name), actions)
     if state.states:
         if state.then:
-            _add(element, "transition", event=f"done.state.{state.id}", target=state.then)
+            _add(element, "transition", event=f"done.state.{state.id}", target=state.then.to)
         for child in state.states:
             _add_state(element, child, by_leaf)
     elif not state.final:

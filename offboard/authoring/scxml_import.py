@@ -12,13 +12,12 @@ import re
 from dataclasses import dataclass, field
 
 from offboard.authoring.messages import EditError
-from offboard.authoring.scxml_export import NAMESPACE, SCXML
+from offboard.authoring.scxml_export import NAMESPACE, SCXML, TICK
 from offboard.authoring.xml_tree import Element, XmlError, parse_xml
 from offboard.authoring.yaml_writer import Style, Value
 from offboard.chart.expressions import ExpressionError, check_form
-from offboard.chart.native import RESUME, TICK
 from offboard.chart.problems import MAX_REPORTED, cut
-from offboard.chart.spec import MAX_STATES, look_up
+from offboard.chart.spec import MAX_STATES, RESUME, look_up
 
 _INCLUDE = "http://www.w3.org/2001/XInclude"
 _STATES = ("state", "final")

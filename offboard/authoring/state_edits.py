@@ -20,12 +20,13 @@ from offboard.authoring.edits import (
     SetUse,
 )
 from offboard.authoring.messages import EditError, EditMessage
-from offboard.authoring.outline import TEMPLATE, StateOutline
-from offboard.authoring.references import Reference, instances, prefix_change, references, relative
-from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, Work, keys_before
+from offboard.authoring.outline import KEYS, TEMPLATE, StateOutline
+from offboard.authoring.references import Reference, beside, instances, prefix_change, references, relative
+from offboard.authoring.work import STATE_ORDER, Work, keys_before
 from offboard.authoring.yaml_writer import Value, style_of
 from offboard.chart.problems import cut
-from offboard.chart.spec import all_states
+from offboard.chart.read import MISSION_KEYS
+from offboard.chart.spec import Event, all_states
 
 
 def add_state(work: Work, edit: AddState) -> None:
@@ -83,7 +84,7 @@ def _set_first_initial(work: Work, parent: str, name: str) -> None:
         if not state.text("initial"):
             work.set_text(state, "initial", name)
     elif not outline.text("initial") and not outline.text("extends"):
-        work.set_key(work.root, "initial", name, MISSION_ORDER)
+        work.set_key(work.root, "initial", name, MISSION_KEYS)
 
 
 def _add_first(work: Work, owner: Owner, key: str, value: Value) -> None:
@@ -95,7 +96,7 @@ def _add_first(work: Work, owner: Owner, key: str, value: Value) -> None:
         (name, state), *_ = value.items()
         work.patch(work.blocks.add_entry(inner, name, state))
         return
-    order = MISSION_ORDER if owner.key is None else STATE_ORDER
+    order = MISSION_KEYS if owner.key is None else STATE_ORDER
     work.patch(work.blocks.add_entry(owner, key, value, keys_before(order, key)))
 
 
@@ -170,13 +171,9 @@ def rename_state(work: Work, edit: RenameState) -> None:
         if initial is not None and initial.text.strip() == state.name:
             patches.append(work.blocks.set_scalar(initial, edit.name))
         before = references(work.document).values()
-        pairs = [(each, f"{each.rpartition('.')[0]}.{edit.name}".lstrip(".")) for each in _ids(work, state)]
+        pairs = [(each, beside(each, edit.name)) for each in instances(work.document, state)]
     work.patch(*patches)
     work.keep_references(before, prefix_change([(state.path, new_path)]), prefix_change(pairs))
-
-
-def _ids(work: Work, state: StateOutline) -> tuple[str, ...]:
-    return instances(work.document, state)
 
 
 def _initial_of(work: Work, parent: str) -> Scalar | None:
@@ -191,7 +188,7 @@ def move_state(work: Work, edit: MoveState) -> None:
     if edit.parent != state.parent:
         _refuse_taken(work, edit.parent, state.name)
     before = references(work.document).values()
-    old_ids = _ids(work, state)
+    old_ids = instances(work.document, state)
     siblings = [each.path for each in work.document.outline.states_in(edit.parent) if each.path != state.path]
     index = len(siblings) if edit.index is None else min(edit.index, len(siblings))
     if edit.parent == state.parent and not siblings:
@@ -275,7 +272,7 @@ def duplicate_state(work: Work, edit: DuplicateState) -> None:
         raise EditError("edit.braces", state=state.path)
     _refuse_taken(work, TEMPLATE if state.is_template else state.parent, edit.name)
     before = list(references(work.document).values())
-    old_ids = _ids(work, state)
+    old_ids = instances(work.document, state)
     names, blocks = list(state.container.items), work.blocks
     span = blocks.entry(state.container, state.name)
     indent = _column(work, state.container)
@@ -290,7 +287,7 @@ def duplicate_state(work: Work, edit: DuplicateState) -> None:
     path = TEMPLATE + edit.name if state.is_template else prefix + edit.name
     work.keep_references(before, lambda each: each, lambda each: each)
     if not state.is_template:
-        pairs = [(each, f"{each.rpartition('.')[0]}.{edit.name}".lstrip(".")) for each in old_ids]
+        pairs = [(each, beside(each, edit.name)) for each in old_ids]
         inner = [each for each in before if f"{each.state}.".startswith(f"{state.path}.")]
         work.keep_references(inner, prefix_change([(state.path, path)]), prefix_change(pairs))
     for name, value in edit.parameters.items():
@@ -331,7 +328,7 @@ def _remove_with_key(work: Work, node: MapNode, key: str, state: StateOutline) -
 
 
 def _delete_references(work: Work, state: StateOutline) -> None:
-    gone = _ids(work, state)
+    gone = instances(work.document, state)
     leading: dict[str, list[Reference]] = defaultdict(list)
     for reference in sorted(references(work.document).values(), key=lambda each: each.index):
         inside = f"{reference.state}.".startswith(f"{state.path}.")
@@ -343,12 +340,12 @@ def _delete_references(work: Work, state: StateOutline) -> None:
         work.patch(*(deleted_reference(work, each.state, each.event, each.index) for each in last))
 
 
-def deleted_reference(work: Work, path: str, event: str, index: int) -> Patch:
+def deleted_reference(work: Work, path: str, event: Event, index: int) -> Patch:
     """What deletes a transition as written."""
     state = work.state(path)
     assert isinstance(state.node, MapNode)
     if event != "tick":
-        return work.blocks.remove_entry(state.node, "then" if event == "done" else "resume")
+        return work.blocks.remove_entry(state.node, KEYS[event])
     node = state.node.items["transitions"]
     assert not isinstance(node, (Scalar, MapNode))
     if len(node.items) == 1:
@@ -370,7 +367,7 @@ def set_initial(work: Work, edit: SetInitial) -> None:
     if edit.state:
         work.set_text(work.state(edit.state), "initial", edit.name)
     else:
-        work.set_key(work.root, "initial", edit.name, MISSION_ORDER)
+        work.set_key(work.root, "initial", edit.name, MISSION_KEYS)
 
 
 def _state_names(work: Work, parent: str) -> list[str]:

@@ -17,12 +17,11 @@ from offboard.authoring.edits import (
     SetVariable,
 )
 from offboard.authoring.messages import EditError
-from offboard.authoring.outline import Event, StateOutline
+from offboard.authoring.outline import KEYS, StateOutline
 from offboard.authoring.state_edits import deleted_reference
-from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, TRANSITION_ORDER, Work, keys_before
+from offboard.authoring.work import STATE_ORDER, Work, keys_before
 from offboard.authoring.yaml_writer import Value
-
-_KEYS: dict[Event, str] = {"done": "then", "resume": "resume"}
+from offboard.chart.read import MISSION_KEYS, TRANSITION_KEYS
 
 
 def add_transition(work: Work, edit: AddTransition) -> None:
@@ -48,7 +47,7 @@ def add_transition(work: Work, edit: AddTransition) -> None:
 
 
 def _add_single(work: Work, state: StateOutline, edit: AddTransition, to: str) -> None:
-    key = _KEYS[edit.event]
+    key = KEYS[edit.event]
     if edit.when.strip() or edit.actions:
         raise EditError("edit.plain_event", event=edit.event)
     if state.text(key):
@@ -69,9 +68,9 @@ def redirect_transition(work: Work, edit: RedirectTransition) -> None:
     state, transition = work.transition(edit.transition)
     to = work.target_text(state.path, edit.to)
     if transition.event != "tick":
-        work.set_text(state, _KEYS[transition.event], to)
+        work.set_text(state, KEYS[transition.event], to)
     else:
-        work.set_key(Owner(None, transition.node), "to", to, TRANSITION_ORDER)
+        work.set_key(Owner(None, transition.node), "to", to, TRANSITION_KEYS)
 
 
 def set_source(work: Work, edit: SetSource) -> None:
@@ -113,7 +112,7 @@ def set_guard(work: Work, edit: SetGuard) -> None:
     _, transition = work.transition(edit.transition)
     if transition.event != "tick":
         raise EditError("edit.no_guard", event=transition.event)
-    work.set_key(Owner(None, transition.node), "when", edit.when.strip(), TRANSITION_ORDER)
+    work.set_key(Owner(None, transition.node), "when", edit.when.strip(), TRANSITION_KEYS)
 
 
 def set_transition_actions(work: Work, edit: SetTransitionActions) -> None:
@@ -121,7 +120,7 @@ def set_transition_actions(work: Work, edit: SetTransitionActions) -> None:
     _, transition = work.transition(edit.transition)
     if transition.event != "tick":
         raise EditError("edit.no_actions", event=transition.event)
-    owner, order = Owner(None, transition.node), keys_before(TRANSITION_ORDER, "do")
+    owner, order = Owner(None, transition.node), keys_before(TRANSITION_KEYS, "do")
     work.patch(*work.blocks.set_list(owner, "do", [each.strip() for each in edit.actions], order))
 
 
@@ -135,12 +134,12 @@ def set_event(work: Work, edit: SetEvent) -> None:
     if transition.to is None:
         raise EditError("edit.leads_nowhere")
     to = transition.to.text.strip()
-    if edit.event != "tick" and state.text(_KEYS[edit.event]):
+    if edit.event != "tick" and state.text(KEYS[edit.event]):
         raise EditError("edit.event_taken", state=state.path, event=edit.event)
     work.patch(deleted_reference(work, state.path, transition.event, transition.index))
     state = work.state(state.path)
     if edit.event != "tick":
-        work.set_text(state, _KEYS[edit.event], to)
+        work.set_text(state, KEYS[edit.event], to)
         return
     node = state.entry("transitions")
     if isinstance(node, ListNode) and node.items:
@@ -163,7 +162,7 @@ def set_variable(work: Work, edit: SetVariable) -> None:
     elif edit.value and (node is None or (isinstance(node, MapNode) and node.flow)):
         if node is not None:
             work.patch(work.blocks.remove_entry(root, "variables"))
-        work.add(work.root, "variables", {edit.name: edit.value}, MISSION_ORDER)
+        work.add(work.root, "variables", {edit.name: edit.value}, MISSION_KEYS)
     elif edit.value and isinstance(node, Scalar) and not node.text:
         owner = Owner(root.key_nodes["variables"], node, root.flow)
         work.patch(work.blocks.add_entry(owner, edit.name, edit.value))
@@ -171,4 +170,4 @@ def set_variable(work: Work, edit: SetVariable) -> None:
 
 def set_mission(work: Work, edit: SetMission) -> None:
     """Set a key of the mission."""
-    work.set_key(work.root, edit.key, edit.value.strip(), MISSION_ORDER)
+    work.set_key(work.root, edit.key, edit.value.strip(), MISSION_KEYS)

@@ -20,11 +20,6 @@ STATE_ORDER = (
     *("use", "initial", "resume", "enter", "during", "exit"),
     *("transitions", "final", "states", "then"),
 )
-MISSION_ORDER = (
-    *("name", "description", "class", "vision", "detector", "extends"),
-    *("initial", "variables", "templates", "states"),
-)
-TRANSITION_ORDER = ("when", "to", "do")
 
 
 def keys_before(order: tuple[str, ...], key: str) -> tuple[str, ...]:

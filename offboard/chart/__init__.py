@@ -1,1 +1,1 @@
-"""Mission files: from YAML text with line numbers to a checked statechart of python-statemachine."""
+"""Mission files: from YAML text with line numbers to a checked statechart and the table that is flown."""

@@ -17,7 +17,17 @@ from offboard.chart.expressions import (
 from offboard.chart.guards import actions_of, check_guards
 from offboard.chart.messages import Message
 from offboard.chart.problems import ProblemList, cut, did_you_mean
-from offboard.chart.spec import Action, Leaf, MissionFile, State, Transition, all_states, leaves
+from offboard.chart.spec import (
+    Action,
+    Leaf,
+    MissionFile,
+    State,
+    Transition,
+    all_states,
+    entry_of,
+    is_finish,
+    leaves,
+)
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary
 from offboard.pilot import NAMES_ON_MAP, Pilot
 from vision.types import Vision
@@ -159,7 +169,7 @@ def _check_paths(mission: MissionFile, problems: ProblemList) -> None:
     """Every state can be entered and left; from each a final one can be reached without a pause."""
     states = {state.id: state for state in all_states(mission.states)}
     by_leaf = {leaf.state.id: leaf for leaf in leaves(mission.states)}
-    start = [_entry(states, mission.initial)]
+    start = [entry_of(states, mission.initial)]
     successors = _successors(states, by_leaf, pauses=False)
     unpaused = _reached(start, successors)
     back: dict[str, list[str]] = {}
@@ -178,9 +188,9 @@ def _check_paths(mission: MissionFile, problems: ProblemList) -> None:
         return
     entered = _reached(start, _successors(states, by_leaf, pauses=True))
     for state_id in _never_entered(mission.states, entered):
-        if _entry(states, state_id) in entered:
+        if entry_of(states, state_id) in entered:
             continue  # it follows one that was reported
-        entered |= _reached([_entry(states, state_id)], successors)
+        entered |= _reached([entry_of(states, state_id)], successors)
         problems.add(states[state_id].place, Message("state.unreachable", state=state_id))
 
 
@@ -205,8 +215,8 @@ def _successors(states: dict[str, State], by_leaf: dict[str, Leaf], *, pauses: b
             targets.append(leaf.resume.to)
         outer = states.get(leaf_id.rpartition(".")[0])
         if states[leaf_id].final and outer is not None and outer.then:
-            targets.append(outer.then)
-        found[leaf_id] = [_entry(states, target) for target in targets]
+            targets.append(outer.then.to)
+        found[leaf_id] = [entry_of(states, target) for target in targets]
     return found
 
 
@@ -220,16 +230,3 @@ def _reached(start: list[str], successors: dict[str, list[str]]) -> set[str]:
             seen.add(current)
             pending += successors.get(current, [])
     return seen
-
-
-def is_finish(states: dict[str, State], leaf_id: str) -> bool:
-    """Whether the mission is over in this leaf: it is final and its superstate has no `then`."""
-    outer = states.get(leaf_id.rpartition(".")[0])
-    return states[leaf_id].final and (outer is None or not outer.then)
-
-
-def _entry(states: dict[str, State], state_id: str) -> str:
-    """The leaf that is active after entering a state."""
-    while states[state_id].states:
-        state_id = f"{state_id}.{states[state_id].initial}"
-    return state_id

@@ -1,8 +1,8 @@
 """Guards and values: which expressions are allowed, and their compiled form.
 
 Allowed are numbers, texts, names, dotted names, comparison, and/or/not, + - * / and tuples. Calls,
-subscripts, lambdas and everything else are refused here with a reason, and a second time by
-python-statemachine's restricted evaluator, which also evaluates them.
+subscripts, lambdas and everything else are refused with a reason. What is left is compiled as Python in
+which each name is an attribute of the pilot, and with bounds for what could grow without end.
 """
 
 from __future__ import annotations
@@ -11,15 +11,17 @@ import ast
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-
-from statemachine.spec_parser import parse_expr
+from functools import lru_cache
+from numbers import Number
 
 from offboard.chart.kinds import KindError, Kinds, masked
-from offboard.chart.messages import Message, as_message
+from offboard.chart.messages import Message
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary, path_of
 from offboard.pilot import Pilot
 
 MAX_EXPRESSION_CHARACTERS = 500
+MAX_BITS = 4096
+"""Of a whole number that is calculated with: a mission may multiply one by itself at every tick."""
 IN_LOCATION = -1
 
 Evaluate = Callable[[Pilot], object]
@@ -124,10 +126,7 @@ def _checked(text: str, vocabulary: Vocabulary) -> ast.Expression:
             vocabulary.type_of(path_of(node))
         except UnknownNameError as error:
             raise ExpressionError(error.message, _offset(text, node)) from None
-    try:
-        parse_expr(text, _name_of_pilot)
-    except (ValueError, SyntaxError) as error:
-        raise ExpressionError(as_message(str(error))) from None
+    compile_value(text)
     return tree
 
 
@@ -167,25 +166,67 @@ def _offset(text: str, node: ast.AST) -> int:
     return len(text) - len(stripped) + len(before.decode(errors="ignore"))
 
 
+@lru_cache(maxsize=1024)
 def compile_value(text: str) -> Evaluate:
-    """A checked expression as a function of the pilot, by the library's restricted evaluator."""
-    evaluate: Evaluate = parse_expr(text, _name_of_pilot)
+    """An expression as a function of the pilot. Raises `ExpressionError` if its form is not allowed."""
+    check_form(text)
+    pilot = ast.arguments(posonlyargs=[], args=[ast.arg("pilot")], kwonlyargs=[], kw_defaults=[], defaults=[])
+    function = ast.Expression(ast.Lambda(pilot, _OfPilot().visit(_parsed(text)).body))
+    try:
+        code = compile(ast.fix_missing_locations(function), "<expression>", "eval")
+    except (ValueError, RecursionError, MemoryError):
+        raise ExpressionError(Message("expression.too_deep")) from None
+    evaluate: Evaluate = eval(code, {"__builtins__": {}, "number": _number})
     return evaluate
+
+
+class _OfPilot(ast.NodeTransformer):
+    """Makes names attributes of the pilot, and has what is calculated with be numbers of a bounded size.
+
+    The vocabulary has no name that begins with "_"; here they are refused once more.
+    """
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        _refuse_private(node.attr)
+        self.generic_visit(node)
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        _refuse_private(node.id)
+        return ast.Attribute(ast.Name("pilot", ast.Load()), node.id, ast.Load())
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        self.generic_visit(node)
+        return ast.BinOp(_number_of(node.left), node.op, _number_of(node.right))
+
+    def visit_Tuple(self, node: ast.Tuple) -> ast.expr:
+        self.generic_visit(node)
+        return ast.Tuple([_number_of(each) for each in node.elts], ast.Load())
+
+
+def _refuse_private(name: str) -> None:
+    if name.startswith("_"):
+        raise ExpressionError(Message("expression.kind", kind=repr(name)))
+
+
+def _number_of(node: ast.expr) -> ast.expr:
+    is_number = isinstance(node, ast.Constant) and isinstance(node.value, float)
+    return node if is_number else ast.Call(ast.Name("number", ast.Load()), [node], [])
+
+
+def _number(value: object) -> object:
+    """A value that may be calculated with; a variable may have any, and be calculated with at every tick."""
+    if not isinstance(value, (float, int, Number)):
+        raise TypeError(f"{str(value)[:40]!r} is no number")
+    if isinstance(value, int) and value.bit_length() > MAX_BITS:
+        raise ValueError(f"a whole number of more than {MAX_BITS} bits is too large")
+    return value
 
 
 def names_in(text: str) -> tuple[str, ...]:
     """The dotted names of a checked expression, each once, in their order; none of an empty one."""
     nodes = reversed(_name_nodes(_parsed(text))) if text else ()
     return tuple(dict.fromkeys(".".join(path_of(node)) for node in nodes))
-
-
-def _name_of_pilot(name: str) -> Evaluate:
-    def read(pilot: Pilot) -> object:
-        value: object = getattr(pilot, name)
-        return value
-
-    read.__name__ = name
-    return read
 
 
 def _parsed(text: str) -> ast.Expression:

@@ -17,7 +17,7 @@ from vision.types import Vision
 
 Choice = TypeVar("Choice", bound=str)
 
-_MISSION_KEYS = (
+MISSION_KEYS = (
     *("name", "description", "class", "vision", "detector", "extends"),
     *("initial", "variables", "templates", "states"),
 )
@@ -28,7 +28,7 @@ _STATE_KEYS = (
     *("enter", "during", "exit", "transitions", "states"),
 )
 _TEMPLATE_KEYS = ("initial", "states", "resume", "transitions", "enter", "during", "exit")
-_TRANSITION_KEYS = ("when", "to", "do")
+TRANSITION_KEYS = ("when", "to", "do")
 _SYNONYMS = {
     **dict.fromkeys(("while", "loop", "do", "tick", "always"), "during"),
     **dict.fromkeys(("on_enter", "entry", "begin", "on_start"), "enter"),
@@ -65,7 +65,7 @@ def read_mission_file(text: str, path: Path, label: str = "") -> MissionFile:
 
 def parse_mission_yaml(text: str, label: str) -> MapNode:
     """The nodes of a mission's text. Raises `MissionError` if it is not YAML."""
-    return parse_yaml(text, label, _MISSION_KEYS)
+    return parse_yaml(text, label, MISSION_KEYS)
 
 
 def read_nodes(root: MapNode, path: Path, problems: ProblemList) -> MissionFile:
@@ -80,7 +80,7 @@ class _Reader:
         self._problems = problems
 
     def mission(self, root: MapNode, path: Path) -> MissionFile:
-        self._check_keys(root, _MISSION_KEYS, Message("what.a_mission"))
+        self._check_keys(root, MISSION_KEYS, Message("what.a_mission"))
         variables = self._variables(root)
         return MissionFile(
             place=Place(root.place.file, root.place.line),
@@ -120,14 +120,14 @@ class _Reader:
             self._problems.add(node.place, Message("state.no_lines", state=name))
             return State(place, name)
         self._check_keys(node, keys, Message("what.state", state=name))
+        then = self._text(node, "then")
         return State(
             place=place,
             id=name,
             initial=self._text(node, "initial"),
             initial_place=_value_place(node, "initial"),
             final=self._flag(node, "final"),
-            then=self._text(node, "then"),
-            then_place=_value_place(node, "then"),
+            then=Transition(_value_place(node, "then"), then) if then else None,
             use=self._text(node, "use"),
             resume=self._resume(node),
             enter=self._actions(node, "enter"),
@@ -163,7 +163,7 @@ class _Reader:
         return tuple(found)
 
     def _transition(self, node: MapNode) -> Transition:
-        known = self._check_keys(node, _TRANSITION_KEYS, Message("what.a_transition"))
+        known = self._check_keys(node, TRANSITION_KEYS, Message("what.a_transition"))
         to, when = self._text(node, "to"), self._text(node, "when")
         if not to and known:
             self._problems.add(node.place, Message("transition.no_target"))
@@ -178,7 +178,7 @@ class _Reader:
     def _action(self, key: str, node: Node) -> Action | None:
         if isinstance(node, MapNode) and len(node.items) == 1:
             (name, value), place = next(iter(node.items.items())), next(iter(node.keys.values()))
-            if name in _TRANSITION_KEYS:
+            if name in TRANSITION_KEYS:
                 self._problems.add(place, Message("action.misplaced", name=name))
                 return None
             if isinstance(value, Scalar) and _SETTING.match(name):
@@ -313,11 +313,11 @@ class _Reader:
         nothing = Message("plain", text="")
         advice = Message("did_you_mean", name=synonym) if synonym in allowed else nothing
         advice = did_you_mean(key.lower(), allowed, advice)
-        if advice is nothing and allowed == _MISSION_KEYS and isinstance(node.items[key], MapNode):
+        if advice is nothing and allowed == MISSION_KEYS and isinstance(node.items[key], MapNode):
             advice = Message("key.indent_state")
-        elif key in _TRANSITION_KEYS:
+        elif key in TRANSITION_KEYS:
             advice = Message("key.of_transition", key=key)
-        elif key in _MISSION_KEYS and key not in (*allowed, *_STATE_KEYS):
+        elif key in MISSION_KEYS and key not in (*allowed, *_STATE_KEYS):
             advice = Message("key.of_mission")
         if advice is nothing:
             advice = Message("key.listed", names=", ".join(allowed))

@@ -11,9 +11,10 @@ it, then as a full id.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 from framerunner.files.yaml_text import Place
 from offboard.chart.messages import Message
@@ -28,17 +29,19 @@ MAX_PARTS = 20_000
 MAX_CHARACTERS = 100_000
 """Of the expressions of all states, counted likewise."""
 THEN, RESUME = "then", "resume"
+Event = Literal["tick", "done", "resume"]
+"""When a transition is looked at: at every tick, when a final state is reached (`then`), after a pause."""
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
     """One line of `enter`, `exit` or `during`: a primitive by name, or `location = expression`."""
 
-    place: Place
+    place: Place = field(compare=False, repr=False)
     name: str = ""  # of the primitive; empty for an assignment
     location: str = ""  # what is assigned to, dotted; empty for a primitive
     expression: str = ""
-    expression_place: Place = NOWHERE
+    expression_place: Place = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         return self.name or f"{self.location} = {self.expression}"
@@ -48,24 +51,24 @@ class Action:
 class Transition:
     """One way out of a state."""
 
-    place: Place  # of its target
+    place: Place = field(compare=False, repr=False)  # of its target
     to: str  # the target as written; after expansion, a full state id
     when: str = ""  # the guard; empty for "always"
-    when_place: Place = NOWHERE  # of the guard; without one, of the transition
+    when_place: Place = field(default=NOWHERE, compare=False, repr=False)  # without a guard, of itself
     actions: tuple[Action, ...] = ()  # done after leaving the state and before entering the target
+    id: str = ""  # after expansion, see `transition_id`
 
 
 @dataclass(frozen=True, slots=True)
 class State:
     """A state or, if it has states of its own, a superstate."""
 
-    place: Place  # of its name
+    place: Place = field(compare=False, repr=False)  # of its name
     id: str  # name as written; after expansion the full id ("red.turning")
     initial: str = ""  # the state a superstate starts in
-    initial_place: Place = NOWHERE
+    initial_place: Place = field(default=NOWHERE, compare=False, repr=False)
     final: bool = False
-    then: str = ""  # the target of a superstate when one of its final states is reached
-    then_place: Place = NOWHERE
+    then: Transition | None = None  # of a superstate, taken when one of its final states is reached
     use: str = ""  # the template whose states it takes; empty after expansion
     resume: Transition | None = None  # where the mission continues after a pause; None: where it was
     enter: tuple[Action, ...] = ()
@@ -78,6 +81,15 @@ class State:
     def name(self) -> str:
         """Last part of the id."""
         return self.id.rpartition(".")[2]
+
+    def outgoing(self) -> Iterator[tuple[Event, int, Transition]]:
+        """All its transitions: event, order of priority among those of the event, and transition."""
+        for order, transition in enumerate(self.transitions):
+            yield "tick", order, transition
+        if self.then is not None:
+            yield "done", 0, self.then
+        if self.resume is not None:
+            yield "resume", 0, self.resume
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +120,6 @@ class Leaf:
     transitions: tuple[Transition, ...]  # its own, then those of the superstates, in order of priority
     during: tuple[Action, ...]  # its own, then those of the superstates
     resume: Transition | None  # its own or, without one, that of the nearest superstate that has one
-    transition_ids: tuple[str, ...] = ()  # of each transition, see `transition_id`
-    resume_id: str = ""  # of `resume`; empty without one
 
 
 def transition_id(state: str, which: int | str) -> str:
@@ -135,32 +145,22 @@ def leaves(states: tuple[State, ...], outer: tuple[State, ...] = ()) -> list[Lea
         around = (state, *outer)
         transitions = () if state.final else tuple(t for s in around for t in s.transitions)
         during = () if state.final else tuple(a for s in around for a in s.during)
-        numbered = () if state.final else around
-        ids = tuple(transition_id(s.id, n) for s in numbered for n, _ in enumerate(s.transitions, 1))
-        resumed = None if state.final else next((s for s in around if s.resume), None)
-        resume, resume_id = (
-            (None, "") if resumed is None else (resumed.resume, transition_id(resumed.id, RESUME))
-        )
-        found.append(Leaf(state, transitions, during, resume, ids, resume_id))
+        resume = None if state.final else next((s.resume for s in around if s.resume), None)
+        found.append(Leaf(state, transitions, during, resume))
     return found
 
 
-def enter_state(states: Mapping[str, State], target: str) -> tuple[str, tuple[str, ...]]:
-    """Which leaf is active after a state is entered, and the ids of the `then`s that were followed at once.
+def entry_of(states: Mapping[str, State], state_id: str) -> str:
+    """The leaf that is active after entering a state, by full ids, before any `then` is followed."""
+    while states[state_id].states:
+        state_id = f"{state_id}.{states[state_id].initial}"
+    return state_id
 
-    Args:
-        states: all of the expanded chart, by full id.
-        target: full id of the state that is entered.
-    """
-    followed: list[str] = []
-    while True:
-        while states[target].states:
-            target = f"{target}.{states[target].initial}"
-        outer = states.get(target.rpartition(".")[0])
-        if not states[target].final or outer is None or not outer.then or len(followed) == len(states):
-            return target, tuple(followed)
-        followed.append(transition_id(outer.id, THEN))
-        target = outer.then
+
+def is_finish(states: Mapping[str, State], leaf_id: str) -> bool:
+    """Whether the mission is over in this leaf: it is final and its superstate has no `then`."""
+    outer = states.get(leaf_id.rpartition(".")[0])
+    return states[leaf_id].final and (outer is None or not outer.then)
 
 
 def state_path(state: str) -> tuple[str, ...]:
@@ -312,13 +312,17 @@ def _resolved(state: State, ids: set[str], problems: ProblemList) -> State:
         problems.add(place, message)
         return name
 
-    resume = state.resume
+    def with_target(transition: Transition, which: int | str, what: Message | str) -> Transition:
+        to = target(transition.to, transition.place, what)
+        return replace(transition, to=to, id=transition_id(state.id, which))
+
     return replace(
         state,
-        resume=resume and replace(resume, to=target(resume.to, resume.place, "'resume'")),
-        then=target(state.then, state.then_place, "'then'") if state.then else "",
+        resume=state.resume and with_target(state.resume, RESUME, "'resume'"),
+        then=state.then and with_target(state.then, THEN, "'then'"),
         transitions=tuple(
-            replace(t, to=target(t.to, t.place, Message("target.what"))) for t in state.transitions
+            with_target(each, number, Message("target.what"))
+            for number, each in enumerate(state.transitions, 1)
         ),
         states=tuple(_resolved(child, ids, problems) for child in state.states),
     )

@@ -15,7 +15,7 @@ import framerunner
 from framerunner.cli import run
 
 STORED = Path(__file__).with_name("public_api.txt")
-HEAVY = ("aiohttp", "cv2", "jsbsim", "mavsdk", "numpy", "pydantic", "scipy", "statemachine", "yaml")
+HEAVY = ("aiohttp", "cv2", "jsbsim", "mavsdk", "numpy", "pydantic", "scipy", "yaml")
 
 
 def described(name):

@@ -7,10 +7,7 @@ from math import hypot
 import pytest
 
 from offboard.app import Moment, fly_mission
-from offboard.engine import MissionEngine
-from offboard.limits import CONTEST
 from offboard.mission import load_mission
-from offboard.pilot import Imu
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone, Target, crossings
 from vision.types import Detections
 
@@ -88,22 +85,6 @@ async def test_turns_for_ever_at_the_centre_when_a_frame_is_never_seen():
     assert "60 s" in outcome.reason
     assert drone.calls[-2:] == ["hold", "close"]
     assert moments[-1].flight_time_s == pytest.approx(60.0, abs=0.1)
-
-
-async def test_the_quiet_way_flies_exactly_as_the_whole_chart():
-    """Replays a flight's inputs through the engine with and without its shortcut."""
-    mission = load_mission("frame_challenge")
-    _, moments, _ = await fly(mission)
-    quiet, whole = MissionEngine(mission), MissionEngine(mission, quiet_ticks=False)
-    for moment in moments:
-        state = moment.state
-        imu = Imu(state.x, state.y, state.z, state.yaw)
-        command = quiet.tick(imu, moment.detections, state.time_us)
-        assert whole.tick(imu, moment.detections, state.time_us) == command
-        assert CONTEST.limited(command) == moment.command
-        assert quiet.state == whole.state == moment.mission_state
-    assert quiet.finished
-    assert whole.finished
 
 
 async def test_two_flights_are_alike_to_the_last_bit():

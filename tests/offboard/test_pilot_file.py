@@ -134,12 +134,6 @@ BAD_TEXTS = [
     ),
     (GOOD.replace("-> bool", "-> wings"), "my_pilot.py:18: the type of 'high_enough' is unknown: NameError"),
     (with_method("async def wait(self): ..."), "my_pilot.py:28: 'wait' is 'async'"),
-    (with_method("def send(self): ..."), "'send' is a name that the statechart uses itself; rename it"),
-    (
-        with_method("def on_enter_up(self): ..."),
-        "my_pilot.py:28: 'on_enter_up' is a name that the statechart",
-    ),
-    (with_method("state: str = ''"), "my_pilot.py: 'state' is a name that the statechart uses itself"),
 ]
 
 

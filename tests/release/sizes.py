@@ -36,7 +36,6 @@ DEPENDENCIES = {  # what a flight and its result need each for
     "pygeomag": "the Earth's magnetic field",
     "pymavlink": "MAVLink's messages: the drone's side",
     "pyserial": "a real drone at a serial port",
-    "python-statemachine": "missions are statecharts",
     "PyYAML": "scenarios and missions are YAML",
     "rich": "what is shown during a flight",
     "scipy": "design of the stabiliser, planning of paths",

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from math import isfinite
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
-from framerunner.monitor.vehicle.navigation import NavigationDocument, map_message
 from framerunner.wire.dialect import Message
 from framerunner.wire.finite_json import finite
+from framerunner.wire.mission_report import (
+    GuardsDocument,
+    HistoryDocument,
+    MapDocument,
+    MissionDocument,
+    TransitionTaken,
+)
 from framerunner.wire.mission_tunnel import (
     DETECTIONS_TYPE,
     DOCUMENT_TYPE,
@@ -30,47 +37,14 @@ from scenarios.result import FlightResult, first_error
 _ALIVE_S = 2.0
 _TRANSITIONS = 10
 
+_DOCUMENTS: Mapping[DocumentKind, TypeAdapter[Any]] = {
+    DocumentKind.MISSION: TypeAdapter(MissionDocument),
+    DocumentKind.HISTORY: TypeAdapter(HistoryDocument),
+    DocumentKind.MAP: TypeAdapter(MapDocument),
+    DocumentKind.GUARDS: TypeAdapter(GuardsDocument),
+}
+
 JsonMessage = dict[str, Any]
-Name = Annotated[str, Field(max_length=200)]
-
-
-class _Lenient(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True)
-
-
-class MissionDocument(_Lenient):
-    """The fields of the MISSION document that the pages use."""
-
-    name: Name = ""
-    states: list[Name] = Field([], max_length=2000)
-    mermaid: str = ""
-    source: str = ""
-
-
-class _Transition(_Lenient):
-    source: Name = Field("", alias="from")
-    target: Name = Field("", alias="to")
-    time_us: int = Field(0, ge=0, le=2**63)
-    when: str = Field("", max_length=2000)
-    values: list[tuple[Name, float | bool | int | str | None]] = Field([], max_length=100)
-    seconds: float | None = None
-    ids: list[Name] = Field([], max_length=100)  # of older apps: none
-
-
-class _History(_Lenient):
-    """The HISTORY document."""
-
-    transitions: list[_Transition] = Field([], max_length=100)
-
-
-class _Guards(_Lenient):
-    """The GUARDS document."""
-
-    mission_crc: int = Field(0, ge=0, lt=2**32)
-    time_us: int = Field(0, ge=0, le=2**53)
-    counts: dict[Name, Annotated[int, Field(ge=0, le=2**53)]] = Field({}, max_length=1000)
-    guards: list[tuple[Name, bool | None]] = Field([], max_length=100)
-    values: list[tuple[Name, float | bool | int | str | None, Name]] = Field([], max_length=100)
 
 
 class MissionView:
@@ -160,9 +134,9 @@ class MissionView:
         """Forget map and guards, which belong to another flight; returns messages without their content."""
         told = []
         if self._map is not None:
-            told.append(map_message(self._id, NavigationDocument()))
+            told.append(self._map_message(MapDocument()))
         if self._guards is not None:
-            told.append(self._guards_message(_Guards()))
+            told.append(self._guards_message(GuardsDocument()))
         self._map = self._guards = None
         return told
 
@@ -175,39 +149,45 @@ class MissionView:
         return plain(document.states[state.state_index])
 
     def _read(self, document: Document) -> list[JsonMessage]:
+        if document.kind is DocumentKind.RESULT:
+            result = FlightResult.from_outside(dict(document.content))
+            if result is None:
+                self.problem = "result document: it has no verdict"
+            else:
+                self.result = (document.crc, result)
+            return []
         try:
-            if document.kind is DocumentKind.MISSION:
-                self._document = MissionDocument.model_validate(document.content)
-                self._document_crc = document.crc
-                chart = self._chart()
-                return [] if chart is None else [chart]
-            if document.kind is DocumentKind.HISTORY:
-                transitions = _History.model_validate(document.content).transitions
-                self._history = self._transitions(transitions[-_TRANSITIONS:])
-                return [self._history]
-            if document.kind is DocumentKind.MAP:
-                navigation = NavigationDocument.model_validate(document.content)
-                self._map, self._flight_crc = map_message(self._id, navigation), navigation.mission_crc
-                return [self._map]
-            if document.kind is DocumentKind.GUARDS:
-                guards = _Guards.model_validate(document.content)
-                self._guards, self._flight_crc = self._guards_message(guards), guards.mission_crc
-                return [self._guards]
+            content = _DOCUMENTS[document.kind].validate_python(document.content)
         except ValidationError as error:
             self.problem = f"{document.kind.name.lower()} document: {first_error(error)}"
             return []
-        result = FlightResult.from_outside(dict(document.content))
-        if result is None:
-            self.problem = "result document: it has no verdict"
-        else:
-            self.result = (document.crc, result)
-        return []
+        match content:
+            case MissionDocument():
+                self._document, self._document_crc = content, document.crc
+                message = _chart_message(self._id, content)
+            case HistoryDocument():
+                message = self._history = self._transitions(content.transitions[-_TRANSITIONS:])
+            case MapDocument():
+                message = self._map = self._map_message(content)
+                self._flight_crc = content.mission_crc
+            case _:
+                message = self._guards = self._guards_message(content)
+                self._flight_crc = content.mission_crc
+        return [message]
 
     def _chart(self) -> JsonMessage | None:
         document = self._document
-        return None if document is None else {"kind": "chart", "id": self._id, **document.model_dump()}
+        return None if document is None else _chart_message(self._id, document)
 
-    def _guards_message(self, document: _Guards) -> JsonMessage:
+    def _map_message(self, document: MapDocument) -> JsonMessage:
+        """The message "map"; its texts come from outside."""
+        content = document.as_json()
+        for frame in content["frames"]:
+            frame["colour"] = plain(frame["colour"])
+        known = {**content, "goal": plain(document.goal), "t": round(document.time_us * 1e-6, 3)}
+        return {"kind": "map", "id": self._id, **known}
+
+    def _guards_message(self, document: GuardsDocument) -> JsonMessage:
         content = {
             "time_s": round(document.time_us * 1e-6, 3),
             "counts": document.counts,
@@ -216,18 +196,9 @@ class MissionView:
         }
         return {"kind": "guards", "id": self._id, **finite(content)}
 
-    def _transitions(self, transitions: list[_Transition]) -> JsonMessage:
+    def _transitions(self, transitions: Sequence[TransitionTaken]) -> JsonMessage:
         listed = [
-            {
-                "time_s": round(each.time_us * 1e-6, 3),
-                "from": each.source,
-                "to": each.target,
-                "when": each.when,
-                "values": each.values,
-                "seconds": each.seconds,
-                "ids": each.ids,
-            }
-            for each in reversed(transitions)
+            {"time_s": round(each.time_us * 1e-6, 3), **each.as_json()} for each in reversed(transitions)
         ]
         return {"kind": "transitions", "id": self._id, "list": finite(listed)}
 
@@ -241,6 +212,12 @@ class MissionView:
             "height": found.height_px,
             "boxes": {"red": _box(found.red), "green": _box(found.green), "blue": _box(found.blue)},
         }
+
+
+def _chart_message(drone_id: int, document: MissionDocument) -> JsonMessage:
+    content = {"name": document.name, "states": list(document.states)}
+    drawn = {"mermaid": document.mermaid, "source": document.source}
+    return {"kind": "chart", "id": drone_id, **content, **drawn}
 
 
 def _box(box: Box) -> list[float | None] | None:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
+from dataclasses import asdict, replace
 from math import inf, nan
 
 import numpy as np
 import pytest
 
 from framerunner.flying.mission_reporter import HISTORY, MAX_HISTORY_PIECES, MissionReporter
-from framerunner.flying.navigation_reporter import MAX_FRAMES, MAX_POINTS, navigation_json
+from framerunner.flying.navigation_reporter import MAX_FRAMES, MAX_POINTS, map_document
+from framerunner.wire.mission_report import TransitionTaken, plain_value
 from framerunner.wire.mission_tunnel import DocumentAssembler, DocumentKind, split_document
 from offboard.app import Moment, fly_mission
 from offboard.drone import DroneState, VelocityCommand
-from offboard.engine import MissionEngine, TransitionTaken
+from offboard.engine import MissionEngine
 from offboard.mission import load_mission, mermaid
 from offboard.navigation.view import FrameEstimate, NavigationView
 from offboard.pilot import Imu
@@ -73,6 +74,7 @@ def moment(tick, mission_state="red.turning", **changes):
 
 
 def taken(number, source="red.turning", target="red.frame_visible", values=()):
+    values = tuple((name, plain_value(value)) for name, value in values)  # as the engine does
     return TransitionTaken(
         source, target, "frame.d < 1", values, 50_000 * number, 0.05 * number, (f"{source}/1",)
     )
@@ -263,7 +265,7 @@ def test_a_usual_map_takes_a_few_pieces():
     )
     path = tuple(tuple(point) for point in np.cumsum(random.normal(0.0, 0.2, (MAX_POINTS, 3)), axis=0))
     view = NavigationView(frames, path, "look at green")
-    _, pieces = split_document(DocumentKind.MAP, navigation_json(view))
+    _, pieces = split_document(DocumentKind.MAP, asdict(map_document(view)))
     assert len(pieces) <= 6  # 1.5 kB a second at most
 
 

@@ -154,7 +154,7 @@ async def test_a_break_pauses_when_a_superstate_or_a_leaf_is_entered_and_goes_on
     assert flight.record.counts == {"wait/1": 1, "up/1": 1, "over.one/1": 1, "over/then": 1}
     spans = flight.record.spans()
     assert [span.state for span in spans] == ["wait", "up", "over.one", "down"]
-    assert all(one.to_us == other.from_us for one, other in pairwise(spans))
+    assert all(one.to_s == other.from_s for one, other in pairwise(spans))
 
 
 async def test_a_pause_tells_what_the_guards_read(hop):

@@ -16,9 +16,9 @@ from framerunner.monitoring import run_library
 from framerunner.monitoring.read_run import RECORDING, read_run
 from framerunner.monitoring.run_library import RunFolders
 from framerunner.recording.mcap_writer import FlightRecording
+from framerunner.wire.mission_report import TransitionTaken
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
-from offboard.engine import TransitionTaken
 from offboard.mission import load_mission
 from offboard.navigation.view import FrameEstimate, NavigationView
 from scenarios.loader import load_scenario

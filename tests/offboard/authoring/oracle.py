@@ -58,7 +58,7 @@ def meanings(document: Document) -> dict[str, Meaning]:
             tuple(map(str, state.during)),
             tuple(map(str, state.exit)),
             tuple((each.when, known(each.to), tuple(map(str, each.actions))) for each in state.transitions),
-            known(state.then),
+            "" if state.then is None else known(state.then.to),
             "" if state.resume is None else known(state.resume.to),
             state.final,
             state.initial,

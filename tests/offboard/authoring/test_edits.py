@@ -282,7 +282,7 @@ def test_a_template_of_the_mission_that_is_extended(tmp_path):
     path = tmp_path / "careful_crossing.yaml"
     path.write_bytes(after.data)
     before, renamed = load_mission("careful_crossing"), load_mission(path)
-    assert renamed.native == before.native.replace("turning", "rotating")
+    assert renamed.chart_text == before.chart_text.replace("turning", "rotating")
 
 
 REFUSED = [
@@ -432,7 +432,7 @@ def test_a_shipped_mission_is_built_by_edits_from_an_empty_text(tmp_path, name):
     for edit in building(shipped):
         session.apply(parse_edit(edit))
     path.write_bytes(session.document.data)
-    assert load_mission(path).native == load_mission(name).native
+    assert load_mission(path).chart_text == load_mission(name).chart_text
     assert not [each for each in check_document(session.document) if each.severity != "advice"]
 
 

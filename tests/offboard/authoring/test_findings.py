@@ -340,8 +340,7 @@ def test_a_hostile_file_gets_an_error_soon(text):
     assert process_time() - started < 5
 
 
-@pytest.mark.parametrize("quiet", [True, False])
-def test_actions_of_a_transition_are_done_between_exit_and_enter(tmp_path, quiet):
+def test_actions_of_a_transition_are_done_between_exit_and_enter(tmp_path):
     path = tmp_path / "m.yaml"
     path.write_text(
         dedent("""\
@@ -364,7 +363,7 @@ def test_actions_of_a_transition_are_done_between_exit_and_enter(tmp_path, quiet
                 final: true
             """)
     )
-    engine = MissionEngine(load_mission(path), quiet_ticks=quiet)
+    engine = MissionEngine(load_mission(path))
     engine.tick(Imu(), Detections(), 0)
     assert engine.pilot.memory.order == 1
     command = engine.tick(Imu(x=2.0), Detections(), 50_000)
