@@ -37,7 +37,7 @@ Job = Callable[[], Coroutine[Any, Any, None]]
 MODULES = (
     "framerunner.monitor.live_channel",
     "framerunner.monitor.video_proxy",
-    "framerunner.monitor.pilot_channel",
+    "framerunner.monitor.manual_channel",
     "framerunner.monitor.operator_channel",
     "framerunner.monitor.replay_api",
     "framerunner.monitor.extensions",

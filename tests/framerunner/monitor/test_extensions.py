@@ -52,5 +52,5 @@ async def test_the_monitor_has_the_editor_s_flights(monkeypatch, tmp_path):
         async with client.get(f"{served.url}api/editing/choices") as answer:
             assert "test-case-1" in (await answer.json())["scenarios"]
         async with client.ws_connect(f"{served.url}ws/editing") as socket:
-            await socket.send_json({"do": "watch", "run": "none", "tag": 3})
+            await socket.send_json({"kind": "watch", "run": "none", "tag": 3})
             assert (await socket.receive_json())["tag"] == 3

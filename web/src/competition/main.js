@@ -1,4 +1,4 @@
-/** The desk of a contest: who flies and who is next, teams, draw, tries, rule. Organisers have controls, judges correct tries; all others look. */
+/** The page of a contest: who flies and who is next, teams, draw, tries, rule. Organisers have controls, judges correct tries; all others look. */
 
 import "../lib/contest/contest.css";
 import { ask, oneAtATime, watch } from "../lib/contest/channel.js";
@@ -26,7 +26,7 @@ class Desk {
     this.rule = new Rule(this);
     element.append(
       make("div", { class: "bar" }, make("h1", {}, "Competition"), exports()), this.#line,
-      make("div", { class: "desk" },
+      make("div", { class: "contest" },
         make("div", { class: "column" }, this.calls.element, this.queue.element, this.#triesPanel()),
         make("div", { class: "column" }, this.draw.element, this.teams.element, this.rule.element)),
     );

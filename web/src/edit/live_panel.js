@@ -33,7 +33,7 @@ export class LivePanel {
     const drawing = make("div", { class: "e-top-view" });
     this.#view = new TopView(drawing);
     this.#start = button(word("live_start"), () => this.#fly(), { class: "e-first" });
-    this.#stop = button(word("live_stop"), () => this.#do({ do: "stop_live" }), { disabled: true });
+    this.#stop = button(word("live_stop"), () => this.#do({ kind: "stop_live" }), { disabled: true });
     root.classList.add("e-fly");
     root.append(drawing, make("div", { class: "e-flying" },
       this.#choices,
@@ -54,7 +54,7 @@ export class LivePanel {
     this.#start.setAttribute("disabled", "");
     const text = await this.#listener.text();
     this.#clear();
-    await this.#do({ do: "start_live", text, scenario: this.#scenario, speed: Number(this.#speed) });
+    await this.#do({ kind: "start_live", text, scenario: this.#scenario, speed: Number(this.#speed) });
   }
 
   async #do(request) {

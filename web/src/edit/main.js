@@ -358,7 +358,7 @@ function edit(name) {
 
   async function store() {
     if (await session.save()) tell("");
-    else if (refusal === "desk.changed" && confirm(word("overwrite"))) await session.save(true);
+    else if (refusal === "session.changed" && confirm(word("overwrite"))) await session.save(true);
   }
 
   addEventListener("beforeunload", (event) => {

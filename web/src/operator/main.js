@@ -113,9 +113,9 @@ class OperatorPage {
     this.#show();
   }
 
-  #send(what) {
+  #send(kind) {
     const flight = this.#flight?.flight ?? "";
-    return this.#socket?.send({ what, beat: this.#beat?.beat ?? -1, flight }) ?? false;
+    return this.#socket?.send({ kind, beat: this.#beat?.beat ?? -1, flight }) ?? false;
   }
 
   /**

@@ -7,7 +7,7 @@ import { make, setAttribute, setText } from "../lib/dom.js";
 import { Gamepads } from "./gamepad.js";
 import { Keys } from "./keys.js";
 import { layOut } from "./layout.js";
-import { PilotSocket } from "./socket.js";
+import { ManualControlSocket } from "./socket.js";
 import { ScreenStick } from "./sticks.js";
 import { StopButton } from "./stop.js";
 import { AXES, neutral, shaped, strongest } from "./values.js";
@@ -17,7 +17,7 @@ import { pageData, pageRoot } from "../lib/page_data.js";
 
 const PERIOD_MS = 40;
 const LONGEST_LOG = 5;
-const FREE = { pilot: "", yours: false, flying: false };
+const FREE = { holder: "", yours: false, flying: false };
 const WORDS = ["take", "give", "arm", "disarm", "take_off", "land", "hold"];
 const SPEED_KEY = "framerunner.pilot.top-speed";
 
@@ -30,7 +30,7 @@ class PilotPage {
   #left;
   #right;
   #stop;
-  #seats = new Map();
+  #controls = new Map();
   #drones = [];
   #id = null;
   #pose = null;
@@ -62,8 +62,8 @@ class PilotPage {
     setInterval(() => this.#step(), PERIOD_MS);
   }
 
-  get #seat() {
-    return this.#seats.get(this.#id) ?? FREE;
+  get #control() {
+    return this.#controls.get(this.#id) ?? FREE;
   }
 
   get #status() {
@@ -71,13 +71,13 @@ class PilotPage {
   }
 
   #connect() {
-    this.#socket = new PilotSocket({
-      seat: (seat) => this.#takeSeat(seat),
+    this.#socket = new ManualControlSocket({
+      control: (message) => this.#takeControl(message),
       reply: (reply) => this.#say(`${reply.what.replace("_", " ")}: ${reply.text}`, reply.ok ? "good" : "bad"),
       state: (state, reason) => {
         if (state === this.#connection) return;
         if (state === "away") {
-          this.#seats.clear();
+          this.#controls.clear();
           this.#letGo();
           this.#say(`not connected to the monitor${reason ? `: ${reason}` : ""}; trying again`, "bad");
         } else if (state === "refused") {
@@ -91,10 +91,10 @@ class PilotPage {
     });
   }
 
-  #takeSeat(seat) {
-    const before = this.#seat.yours;
-    this.#seats.set(seat.id, seat);
-    const now = this.#seat.yours;
+  #takeControl(control) {
+    const before = this.#control.yours;
+    this.#controls.set(control.id, control);
+    const now = this.#control.yours;
     if (!now) this.#letGo();
     if (now && !before) this.root.scrollIntoView({ block: "start" }); // brings the sticks under the thumbs
     this.#show();
@@ -174,7 +174,7 @@ class PilotPage {
   /** The page is no longer seen: the drone is to hold now, and does so anyway when no sticks come. */
   #goAway() {
     this.#letGo();
-    if (this.#seat.yours && this.#seat.flying) this.#order("hold");
+    if (this.#control.yours && this.#control.flying) this.#order("hold");
   }
 
   /** All inputs are centred at once, and the drone is told so. */
@@ -183,11 +183,11 @@ class PilotPage {
     this.#left.release();
     this.#right.release();
     this.#gamepads.clear();
-    if (this.#seat.yours) this.#send(neutral(), "");
+    if (this.#control.yours) this.#send(neutral(), "");
   }
 
   #keyDown(event) {
-    if (!this.#seat.yours || this.#stop.asks || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!this.#control.yours || this.#stop.asks || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.target === this.#parts.drone) return;
     const speed = { "+": 5, "=": 5, "-": -5 }[event.key];
     if (this.#keys.steers(event.code)) this.#keys.press(event.code);
@@ -201,7 +201,7 @@ class PilotPage {
 
   #keyUp(event) {
     this.#keys.release(event.code);
-    if (this.#seat.yours && !this.#stop.asks && event.code === "Space") event.preventDefault(); // presses no button
+    if (this.#control.yours && !this.#stop.asks && event.code === "Space") event.preventDefault(); // presses no button
   }
 
   #changeSpeed(by) {
@@ -225,8 +225,8 @@ class PilotPage {
       { name: "gamepad", sticks: pad.sticks },
     ];
     const { name, sticks } = attended && !this.#stop.asks ? strongest(inputs) : { name: "", sticks: neutral() };
-    if (this.#seat.yours && !document.hidden) this.#send(shaped(sticks, Number(this.#parts.speed.value) / 100), name);
-    else if (!this.#seat.yours) this.#showSent(neutral(), "");
+    if (this.#control.yours && !document.hidden) this.#send(shaped(sticks, Number(this.#parts.speed.value) / 100), name);
+    else if (!this.#control.yours) this.#showSent(neutral(), "");
     if (performance.now() - this.#shownAt > 200) this.#showFigures();
   }
 
@@ -246,7 +246,7 @@ class PilotPage {
     }
     const pad = this.#gamepads.name ? "gamepad ready" : "";
     const words = name === "gamepad" ? `gamepad ${this.#gamepads.name}` : name || pad;
-    setText(this.#parts.input, this.#seat.yours ? words || "none" : pad || "–");
+    setText(this.#parts.input, this.#control.yours ? words || "none" : pad || "–");
   }
 
   #showFigures() {
@@ -258,18 +258,18 @@ class PilotPage {
   }
 
   #show() {
-    const seat = this.#seat;
-    const { look, head, words } = whoFlies(this.#status, seat);
+    const control = this.#control;
+    const { look, head, words } = whoFlies(this.#status, control);
     setAttribute(this.root, "data-look", look);
     setText(this.#parts.head, head);
     setText(this.#parts.words, words);
-    const steering = seat.yours && seat.flying;
-    setText(this.#parts.give, seat.yours ? "Give back" : "Automatic");
+    const steering = control.yours && control.flying;
+    setText(this.#parts.give, control.yours ? "Give back" : "Automatic");
     setText(this.#parts.take, steering ? "Manual" : "Take sticks");
     setAttribute(this.#parts.take, "aria-pressed", String(steering));
     setAttribute(this.#parts.give, "aria-pressed", String(look === "auto"));
-    this.#parts.give.disabled = !seat.yours;
-    this.#parts.drone.disabled = seat.yours;
+    this.#parts.give.disabled = !control.yours;
+    this.#parts.drone.disabled = control.yours;
     const usable = this.#socket !== null && this.#connection === "open" && this.#id !== null;
     for (const what of WORDS) if (what !== "give") this.#parts[what].disabled = !usable;
     this.#stop.button.disabled = !usable;

@@ -1,17 +1,20 @@
 /** The WebSocket of the sticks. */
 import { ReconnectingSocket } from "../lib/reconnecting_socket.js";
 
-export class PilotSocket {
+/** @import {ManualControl} from "../lib/messages.js" */
+
+export class ManualControlSocket {
+  /** @type {ReconnectingSocket<ManualControl.FromPage, ManualControl.ToPage>} */
   #socket;
 
   /**
-   * @param {{seat: (message: any) => void, reply: (message: any) => void,
+   * @param {{control: (message: ManualControl.ControlMessage) => void, reply: (message: ManualControl.Reply) => void,
    *   state: (state: "open"|"away"|"refused", reason: string) => void}} hear
    */
   constructor(hear) {
     this.#socket = new ReconnectingSocket("/ws/pilot", {
       message: (message) => {
-        if (message.kind === "seat") hear.seat(message);
+        if (message.kind === "control") hear.control(message);
         else if (message.kind === "reply") hear.reply(message);
       },
       state: hear.state,
@@ -28,7 +31,7 @@ export class PilotSocket {
 
   /**
    * @param {number} id of the drone
-   * @param {string} what
+   * @param {ManualControl.Order["what"]} what
    * @param {boolean} confirmed
    * @returns {boolean} whether it could be sent
    */

@@ -4,21 +4,21 @@ const BY_HAND = ["Manual", "Altitude", "Position", "Position Slow", "Acro", "Sta
 
 /**
  * @param {object|undefined} status of the drone, as in the live channel
- * @param {{pilot: string, yours: boolean, flying: boolean}} seat
+ * @param {{holder: string, yours: boolean, flying: boolean}} control
  * @returns {{look: "mine"|"theirs"|"auto"|"lost", head: string, words: string}}
  */
-export function whoFlies(status, seat) {
+export function whoFlies(status, control) {
   if (!status) return { look: "lost", head: "No drone", words: "start one: framerunner sim" };
   const link = status.link?.state;
   if (link === "lost") return { look: "lost", head: "Link lost", words: `last mode: ${status.mode}` };
   const off = status.armed ? "" : ", motors off";
-  if (seat.yours && seat.flying) return { look: "mine", head: "Manual", words: `you fly${off}` };
-  if (seat.pilot && seat.flying) return { look: "theirs", head: "Manual", words: `${seat.pilot} flies${off}` };
-  if (seat.yours) return { look: "auto", head: "Automatic", words: `${doing(status)}; your sticks wait` };
+  if (control.yours && control.flying) return { look: "mine", head: "Manual", words: `you fly${off}` };
+  if (control.holder && control.flying) return { look: "theirs", head: "Manual", words: `${control.holder} flies${off}` };
+  if (control.yours) return { look: "auto", head: "Automatic", words: `${doing(status)}; your sticks wait` };
   if (BY_HAND.includes(status.mode) && status.armed) {
     return { look: "theirs", head: "Manual", words: "somebody outside the monitor flies" };
   }
-  const held = seat.pilot ? `; ${seat.pilot} has the seat` : "";
+  const held = control.holder ? `; ${control.holder} has the sticks` : "";
   return { look: "auto", head: "Automatic", words: `${doing(status)}${held}` };
 }
 

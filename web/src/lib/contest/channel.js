@@ -60,7 +60,8 @@ function detailOf(text) {
  *   changed: something is other than before, also after each new connection; link: whether there is a connection
  */
 export function watch(hear) {
-  return new ReconnectingSocket("/ws/competition", {
+  /** @type {ReconnectingSocket<never, any>} */
+  const socket = new ReconnectingSocket("/ws/competition", {
     message: (message) => {
       if (message.kind === "changed") hear.changed(message);
       else if (message.kind === "running") {
@@ -71,6 +72,7 @@ export function watch(hear) {
     },
     state: (state) => hear.link(state === "open"),
   });
+  return socket;
 }
 
 /**

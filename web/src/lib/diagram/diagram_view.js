@@ -9,9 +9,9 @@ import { HANDLE, labelWords, missingShape, stateShape, svg } from "./shapes.js";
 import { Viewport } from "./viewport.js";
 
 /**
- * @typedef {import("./types.js").Diagram} Diagram
- * @typedef {import("./types.js").Finding} Finding
- * @typedef {import("./types.js").Point} Point
+ * @typedef {import("../messages.js").Documents.DrawnDiagram} Diagram
+ * @typedef {import("../messages.js").Documents.ShownFinding} Finding
+ * @typedef {{x: number, y: number}} Point
  * @typedef {import("./geometry.js").Box} Box
  * @typedef {{kind: "mission"|"state"|"transition", id: string}} Selection id: of a state or transition of the diagram
  */
@@ -67,7 +67,7 @@ export class DiagramView {
   #children = new Map();
   #parents = new Map();
   #initials = new Map();
-  /** @type {Map<string, import("./types.js").Edge>} */
+  /** @type {Map<string, import("../messages.js").Documents.DrawnEdge>} */
   #edges = new Map();
   /** @type {Selection} */
   #selection = { kind: "mission", id: "" };
@@ -210,7 +210,7 @@ export class DiagramView {
     }
   }
 
-  /** @param {import("./types.js").StateNode} state @returns {SVGGElement} */
+  /** @param {import("../messages.js").Documents.DrawnNode} state @returns {SVGGElement} */
   #state(state) {
     const { id, parent } = state;
     const initial = parent === "" ? this.#diagram.initial : this.#initials.get(parent);
