@@ -18,7 +18,7 @@ from framerunner.monitor.channel import Allowance, PageMessageError
 from framerunner.monitor.manual_channel import FROM_PAGE, SticksMessage
 from framerunner.monitor.manual_control import NEUTRAL, Order
 from framerunner.monitor.vehicle.commands import Sticks
-from tests.framerunner.monitor.pilot_fakes import FakeFleet
+from tests.framerunner.monitor.manual_fakes import FakeFleet
 
 CENTRED = {"kind": "sticks", "forward": 0, "right": 0, "up": 0, "yaw": 0}
 PILOT = Visitor("Ana", Role.JUDGE)

@@ -8,7 +8,7 @@ import pytest
 from framerunner.monitor.manual_channel import ManualControls
 from framerunner.monitor.manual_control import NEUTRAL, Browser, Clock, Control, ControlMessage, Order
 from framerunner.monitor.vehicle.commands import Sticks
-from tests.framerunner.monitor.pilot_fakes import MISSION, FakeFleet
+from tests.framerunner.monitor.manual_fakes import MISSION, FakeFleet
 
 FORWARD = Sticks(0.5, 0.0, 0.0, 0.0)
 

@@ -19,7 +19,7 @@ from framerunner.preflight.operator_link import OperatorLink
 from offboard.safety.operator import Operator
 from tests.chromium import Complaints
 from tests.framerunner.monitor.serving import StubFleet
-from tests.framerunner.monitor.test_pilot_page import EQUIPMENT
+from tests.framerunner.monitor.test_manual_page import EQUIPMENT
 from tests.waiting import until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")

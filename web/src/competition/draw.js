@@ -11,6 +11,7 @@ export class Draw {
   #count = make("input", { id: "draw-count", type: "number", min: "1", max: "10", inputmode: "numeric" });
   #other = make("input", { id: "draw-other", maxlength: "80", autocomplete: "off", spellcheck: "false" });
   #flown = false;
+  /** @type {string[]|null} */
   #known = null;
 
   /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} page */

@@ -13,6 +13,7 @@ class Desk {
   #line = make("p", { class: "line", role: "status", hidden: true });
   #tries = make("tbody");
   #none = make("p", { class: "hint" }, "No try has been flown. Each flight is one: ", make("code", {}, "framerunner fly test-case-1"));
+  /** @type {any} */
   #board = null;
   #clocks = new Map();
 
@@ -84,7 +85,7 @@ class Desk {
 
   #showTries(tries) {
     this.#none.hidden = tries.length > 0;
-    this.#tries.parentElement.hidden = tries.length === 0;
+    /** @type {HTMLElement} */ (this.#tries.parentElement).hidden = tries.length === 0;
     this.#clocks.clear();
     this.#tries.replaceChildren(...tries.map((each) => this.#row(each)));
   }

@@ -14,6 +14,7 @@ export class Calls {
   #scenario = make("select", { id: "next-scenario" });
   #call = make("button", { type: "submit", class: "main" }, "Call");
   #undo = make("button", { type: "button", id: "undo-call" });
+  /** @type {any} */
   #board = null;
 
   /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} page */
@@ -118,6 +119,7 @@ export class Queue {
   #count = make("span", { class: "count" });
   #all = make("button", { type: "button", id: "queue-all" }, "Add all teams");
   #shuffle = make("button", { type: "button", id: "queue-shuffle" }, "Shuffle");
+  /** @type {any} */
   #board = null;
   #busy = false;
 

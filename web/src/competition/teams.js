@@ -15,6 +15,7 @@ export class Teams {
   #members = make("input", { id: "team-members", maxlength: "300", autocomplete: "off", dir: "auto" });
   #save = make("button", { type: "submit", class: "main" }, "Enter");
   #cancel = make("button", { type: "button", hidden: true }, "Cancel");
+  /** @type {any} */
   #edited = null;
 
   /**

@@ -5,9 +5,9 @@ import { Clock } from "../lib/replay/clock.js";
 import { fetchJson, Run } from "../lib/replay/run.js";
 import { yawOf } from "../lib/yaw.js";
 import { button } from "./fields.js";
+import { FlightView } from "./flight_view.js";
 import { withOuterStates } from "./flights.js";
 import { drawStrip } from "./state_strip.js";
-import { TopView } from "./top_view.js";
 import { contactsOf } from "./verdict.js";
 import { word } from "./words.js";
 
@@ -43,7 +43,7 @@ export class ReplayPanel {
   constructor(root, listener) {
     this.#listener = listener;
     const drawing = make("div", { class: "e-top-view" });
-    this.#view = new TopView(drawing);
+    this.#view = new FlightView(drawing);
     root.classList.add("e-fly", "e-replay");
     this.#list.addEventListener("change", () => this.show(this.#list.value));
     root.append(drawing, make("div", { class: "e-flying" },

@@ -1,10 +1,10 @@
 /** Flying the mission from its page: one flight with pause, step and breaks, or many on random layouts. */
 import { make, number, setText } from "../lib/dom.js";
 import { button, choice } from "./fields.js";
+import { FlightView } from "./flight_view.js";
 import { Flights } from "./flights.js";
 import { FIRST_SCENARIO, loadChoices, options, scenarioFields } from "./scenario_fields.js";
 import { drawStrip } from "./state_strip.js";
-import { TopView } from "./top_view.js";
 import { contactsOf, hitWords, shortVerdict, verdictWords } from "./verdict.js";
 import { waitingWords, word } from "./words.js";
 
@@ -24,6 +24,7 @@ export class RunPanel {
   #level = "calm";
   #speed = "1";
   #isStopped = false; // by the button
+  /** @type {any} */
   #layout = null;
   /** @type {Set<string>} */
   #breaks = new Set();
@@ -61,7 +62,7 @@ export class RunPanel {
     this.#pause = button(word("pause"), () => this.#togglePause(), { disabled: true });
     this.#stop = button(word("stop"), () => this.#stopFlight(), { disabled: true });
     const drawing = make("div", { class: "e-top-view" });
-    this.#view = new TopView(drawing);
+    this.#view = new FlightView(drawing);
     const speed = choice(word("speed"), SPEEDS, this.#speed, (value) => {
       this.#speed = value;
       if (this.#run) this.#order({ kind: "speed", speed: value ? Number(value) : null });

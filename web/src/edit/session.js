@@ -110,7 +110,7 @@ export class EditSession {
       return isNewer;
     }
     for (const [number, { message: sent, answer }] of this.#waiting) {
-      if (number <= message.answered) {
+      if (number <= (message.answered ?? 0)) {
         this.#waiting.delete(number);
         answer({});
       } else this.#socket.send(sent);
@@ -213,37 +213,45 @@ export class EditSession {
   /** @param {ToPage} message */
   #receive(message) {
     if (message.warning) this.#listener.refused(message.warning, "");
-    if (message.kind === "document" || message.kind === "changed") {
-      const stays = message.kind === "document" && message.answered !== undefined && this.#synchronize(message);
-      this.revision = message.revision;
-      for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) this[key] = message[key];
-      if (language() === "es") for (const finding of this.findings) finding.message = finding.spanish ?? finding.message;
-      this.catalogue = message.catalogue ?? this.catalogue;
-      // While the text cannot be read, the last diagram stays.
-      if (message.diagram.readable) this.diagram = message.diagram;
-      this.isReadable = message.diagram.readable;
-      this.#setStatus(message);
-      // A change that overtakes typed text makes the server refuse that and send the whole text.
-      const isOvertaken = this.#isTypedUnderWay && message.answers === undefined;
-      const isOwn = message.answers !== undefined && message.text === undefined;
-      this.#listener.changed(isOvertaken ? [] : message.changes ?? [], stays ? null : message.text ?? null, isOwn);
-      if (message.text !== undefined && message.restored) this.#listener.note("restored");
-      if (message.text !== undefined && message.problem) this.#listener.refused(message.problem, "");
-      if (stays) this.flush();
-    } else {
-      this.#setStatus(message);
-      const isOutdated = [...this.#waiting.values()].some(({ message: sent }) => sent.kind === "layout" && sent.number > message.answers);
-      if (message.layout && !isOutdated && !isSame(message.layout, this.layout)) {
-        this.layout = message.layout;
-        this.#listener.placed();
-      }
-    }
-    const asked = this.#waiting.get(message.answers);
+    if (message.kind === "status") this.#takeStatus(message);
+    else this.#takeDocument(message);
+    const answers = message.answers ?? 0;
+    const asked = this.#waiting.get(answers);
     if (asked) {
-      this.#waiting.delete(message.answers);
+      this.#waiting.delete(answers);
       asked.answer(message);
     }
     this.#listener.status();
+  }
+
+  /** @param {Documents.DocumentMessage|Documents.ChangedMessage} message */
+  #takeDocument(message) {
+    const stays = message.kind === "document" && message.answered !== undefined && this.#synchronize(message);
+    this.revision = message.revision;
+    for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) this[key] = message[key];
+    if (language() === "es") for (const finding of this.findings) finding.message = finding.spanish ?? finding.message;
+    this.catalogue = message.catalogue ?? this.catalogue;
+    // While the text cannot be read, the last diagram stays.
+    if (message.diagram.readable) this.diagram = message.diagram;
+    this.isReadable = message.diagram.readable;
+    this.#setStatus(message);
+    // A change that overtakes typed text makes the server refuse that and send the whole text.
+    const isOvertaken = this.#isTypedUnderWay && message.answers === undefined;
+    const isOwn = message.answers !== undefined && message.text === undefined;
+    this.#listener.changed(isOvertaken ? [] : message.changes ?? [], stays ? null : message.text ?? null, isOwn);
+    if (message.text !== undefined && message.restored) this.#listener.note("restored");
+    if (message.text !== undefined && message.problem) this.#listener.refused(message.problem, "");
+    if (stays) this.flush();
+  }
+
+  /** @param {Documents.StatusMessage} message */
+  #takeStatus(message) {
+    this.#setStatus(message);
+    const isOutdated = [...this.#waiting.values()].some(({ message: sent }) => sent.kind === "layout" && sent.number > (message.answers ?? Infinity));
+    if (message.layout && !isOutdated && !isSame(message.layout, this.layout)) {
+      this.layout = message.layout;
+      this.#listener.placed();
+    }
   }
 
   /** @param {ToPage} message */

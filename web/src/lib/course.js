@@ -60,7 +60,7 @@ export async function checkLesson(content, waits) {
   const answer = await post("check", content);
   if (!answer.ok) return refusal(answer);
   let rest = "";
-  const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+  const reader = /** @type {ReadableStream} */ (answer.body).pipeThrough(new TextDecoderStream()).getReader();
   for (;;) {
     const { value, done } = await reader.read().catch(() => ({ value: "", done: true }));
     const lines = (rest + (value ?? "")).split("\n");

@@ -15,7 +15,7 @@ const SHOWN_MS = 6000;
  */
 export function watchLive(hear, line, onChange = () => {}) {
   const channel = new LiveChannel();
-  let [lostAt, lastPose, hiding] = [null, null, 0];
+  let [lostAt, lastPose, hiding] = /** @type {[number|null, number|null, number]} */ ([null, null, 0]);
 
   const say = (text, look) => {
     clearTimeout(hiding);

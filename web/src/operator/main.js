@@ -18,7 +18,9 @@ class OperatorPage {
   #socket;
   #go;
   #you = 0;
+  /** @type {import("../lib/messages.js").Operator.FlightMessage|null} */
   #flight = null;
+  /** @type {import("../lib/messages.js").Operator.BeatMessage|null} */
   #beat = null;
   #beatAt = 0;
   #ended = "";
@@ -27,6 +29,7 @@ class OperatorPage {
   #refused = "";
   #stoppedAt = 0;
   #pendingStop = ""; // the flight that is to be stopped and has not said yet that it is
+  /** @type {import("../lib/messages.js").Live.DroneStatus|null} */
   #status = null;
 
   /** @param {HTMLElement} root @param {boolean} mayFly */
@@ -124,7 +127,7 @@ class OperatorPage {
    */
   #stop() {
     if (!this.#mayGoOn) return;
-    if (!this.#beat?.stops) this.#pendingStop = this.#flight.flight;
+    if (!this.#beat?.stops) this.#pendingStop = this.#flight?.flight ?? "";
     this.#send("stop");
     this.#show();
   }
@@ -174,8 +177,8 @@ class OperatorPage {
     setText(words, this.#flight ? state.words : `${state.words}: start one by framerunner fly --drone … --monitor`);
     setText(this.#parts.title, this.#flight?.title ?? "");
     const stops = this.#beat?.stops ?? 0;
-    go.disabled = !(this.#isAlive && this.#beat.asks);
-    const areOff = ["motors stopped", "ended"].includes(this.#beat?.phase);
+    go.disabled = !(this.#isAlive && this.#beat?.asks);
+    const areOff = ["motors stopped", "ended"].includes(this.#beat?.phase ?? "");
     land.disabled = !this.#mayGoOn || areOff;
     setText(land.firstElementChild, this.#pendingStop ? "Land: being sent" : stops ? "Land again" : "Land");
     motors.disabled = areOff || !(this.#isAlive && stops > 0 && performance.now() - this.#stoppedAt > MOTORS_AFTER_MS);

@@ -12,7 +12,7 @@ import { pageData, pageRoot } from "../lib/page_data.js";
 const root = pageRoot("replay");
 root.classList.add("m-live", "r-page");
 const query = new URLSearchParams(location.search);
-const chosen = [...new Set([query.get("a"), query.get("b")].filter(Boolean))];
+const chosen = [...new Set([query.get("a") ?? "", query.get("b") ?? ""].filter(Boolean))];
 
 const line = make("p", { class: "m-line", role: "status", hidden: true });
 const sides = make("div", { class: "r-sides" });

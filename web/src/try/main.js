@@ -19,6 +19,7 @@ class TryPage {
   #counts = make("p", { class: "counts", "aria-live": "polite" });
   #save = make("button", { type: "submit", class: "main" }, "Save");
   #history = make("ol", { class: "history" });
+  /** @type {any} */
   #detail = null;
   #stale = false;
 
@@ -127,7 +128,7 @@ class TryPage {
     if (!judge) return;
     this.#showTeams(teams, detail.try.team, before?.try.team);
     if (!filled || force) this.#fields.show(detail);
-    for (const form of [this.#form, this.#team.form]) form.hidden = false;
+    for (const form of [this.#form, this.#team.form]) if (form) form.hidden = false;
     this.#preview();
   }
 

@@ -19,7 +19,9 @@ export class Statechart {
   #source;
   #buttons;
   #view;
+  /** @type {{name: string, mermaid: string, states: string[], source: string}|null} */
   #chart = null;
+  /** @type {string|null} */
   #active = null;
   #entered = 0;
 

@@ -277,18 +277,23 @@ export class DiagramView {
     }
   }
 
+  /** Where a state that is drawn is. @param {string} path */
+  #box(path) {
+    return /** @type {Box} */ (this.#boxes.get(path));
+  }
+
   /** @param {string} path */
   #place(path) {
-    const { x, y } = this.#boxes.get(path);
-    this.#stateElements.get(path).setAttribute("transform", `translate(${x},${y})`);
+    const { x, y } = this.#box(path);
+    this.#stateElements.get(path)?.setAttribute("transform", `translate(${x},${y})`);
   }
 
   /** Draw a line, its label in the middle. @param {string} id */
   #drawLine(id) {
-    const elements = this.#transitionElements.get(id);
-    const { source, target } = this.#edges.get(id);
+    const elements = this.#transitionElements.get(id), edge = this.#edges.get(id);
+    if (!elements || !edge) return;
     const box = this.#missing.get(id);
-    elements.curve = line(this.#boxes.get(source), box ?? this.#boxes.get(target), elements.lane);
+    elements.curve = line(this.#box(edge.source), box ?? this.#box(edge.target), elements.lane);
     const drawn = pathOf(elements.curve);
     elements.path.setAttribute("d", drawn);
     elements.hit.setAttribute("d", drawn);
@@ -384,7 +389,8 @@ export class DiagramView {
     for (const [path, group] of this.#stateElements) group.classList.toggle("e-active", active.has(path) || inside(path));
     for (const [id, { group, label }] of this.#transitionElements) {
       const count = counts.get(id) ?? 0;
-      const words = count > 0 ? `${label.dataset.words} (${count}×)` : label.dataset.words;
+      const plain = label.dataset.words ?? "";
+      const words = count > 0 ? `${plain} (${count}×)` : plain;
       if (label.textContent !== words) label.textContent = words;
       group.classList.toggle("e-taken", taken.has(id));
     }
@@ -496,7 +502,7 @@ export class DiagramView {
   stateAt(point, except = new Set()) {
     let found = null;
     for (const { id: path } of this.#diagram.nodes) {
-      if (!except.has(path) && contains(this.#boxes.get(path), point)) found = path; // inner ones come later
+      if (!except.has(path) && contains(this.#box(path), point)) found = path; // inner ones come later
     }
     return found;
   }
@@ -511,7 +517,7 @@ export class DiagramView {
 
   /** @param {string} path */
   #handleHeight(path) {
-    return this.#children.has(path) ? 15 : this.#boxes.get(path).height / 2;
+    return this.#children.has(path) ? 15 : this.#box(path).height / 2;
   }
 
   /** @param {string} path @returns {string[]} it and all states in it */
@@ -543,7 +549,7 @@ export class DiagramView {
    */
   mover(id) {
     const family = this.#family(id);
-    const before = new Map(family.map((each) => [each, { ...this.#boxes.get(each) }]));
+    const before = new Map(family.map((each) => [each, { ...this.#box(each) }]));
     const dangling = new Map([...this.#missing].filter(([each]) => family.includes(this.#edges.get(each)?.source ?? "")).map(([each, box]) => [each, { ...box }]));
     const lines = new Set(family.flatMap((each) => this.#touching.get(each) ?? []));
     return (dx, dy) => {

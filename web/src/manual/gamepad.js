@@ -9,6 +9,7 @@ const BUTTONS = { 0: "take", 1: "give", 2: "hold" };
 
 /** The first gamepad that has two sticks. */
 export class Gamepads {
+  /** @type {Object<string, boolean>|null} */
   #pressed = null;
 
   /** Its name; "" if there is none. */

@@ -1,15 +1,19 @@
-/** What the pilot looks at: the camera's image and, where there is room, the arena from behind the drone. */
+/** What the person with the sticks looks at: the camera's image and, where there is room, the arena from behind the drone. */
 
 import { CameraView } from "../lib/flight/camera.js";
 
-const ROOM = "(min-width: 60rem) and (min-height: 36rem)"; // as in pilot.css
+const ROOM = "(min-width: 60rem) and (min-height: 36rem)"; // as in manual.css
 
-export class PilotViews {
+export class ManualViews {
   #camera;
   #arenaBox;
+  /** @type {import("../lib/arena/arena.js").Arena|null} */
   #arena = null;
+  /** @type {number|null} */
   #id = null;
+  /** @type {import("../lib/messages.js").Live.World|null} */
   #world = null;
+  /** @type {Object<number, string[]>} */
   #states = {};
 
   /** @param {HTMLElement} camera an empty box @param {HTMLElement} arena an empty box */

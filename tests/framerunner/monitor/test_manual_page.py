@@ -12,8 +12,8 @@ from framerunner.monitor.manual_control import NEUTRAL
 from framerunner.monitor.ports import Equipment
 from framerunner.monitor.vehicle.commands import Sticks
 from tests.chromium import Complaints, until
-from tests.framerunner.monitor.pilot_fakes import MISSION, FakeFleet
-from tests.framerunner.monitor.pilot_server import served
+from tests.framerunner.monitor.manual_fakes import MISSION, FakeFleet
+from tests.framerunner.monitor.manual_server import served
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 PHONE = {"width": 390, "height": 844}
@@ -64,7 +64,7 @@ class Pilot:
         await self.flying()
 
     async def flying(self):
-        await self.page.wait_for_selector('#pilot[data-look="mine"]')
+        await self.page.wait_for_selector('#manual[data-look="mine"]')
 
     async def sends(self, condition):
         """Wait until sticks are sent that fulfil a condition."""
@@ -288,7 +288,7 @@ async def test_stopping_the_motors_by_holding_the_button_for_a_second(monitor):
 async def test_a_second_window_sees_who_flies_and_may_not(monitor):
     first, second = await monitor(), await monitor()
     await first.take()
-    await second.page.wait_for_selector('#pilot[data-look="theirs"]')
+    await second.page.wait_for_selector('#manual[data-look="theirs"]')
     assert await second.page.locator(".p-who").text_content() == "Manualanother window flies"
     await second.page.get_by_role("button", name="Take sticks").click()
     await second.says("another window has the sticks; ask for them to be given back")

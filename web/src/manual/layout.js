@@ -1,4 +1,4 @@
-/** Makes the page's elements; what they do is `pilot.js`'s. */
+/** Makes the page's elements; what they do is `main.js`'s. */
 
 import { make } from "../lib/dom.js";
 import { AXES } from "./values.js";

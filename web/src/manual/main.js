@@ -1,7 +1,7 @@
 /** The page at /pilot: sticks, switch, orders, and what the drone does. */
 
 import "../lib/flight/flight.css";
-import "./pilot.css";
+import "./manual.css";
 import { LiveChannel } from "../lib/live_channel.js";
 import { make, setAttribute, setText } from "../lib/dom.js";
 import { Gamepads } from "./gamepad.js";
@@ -11,7 +11,7 @@ import { ManualControlSocket } from "./socket.js";
 import { ScreenStick } from "./sticks.js";
 import { StopButton } from "./stop.js";
 import { AXES, neutral, shaped, strongest } from "./values.js";
-import { PilotViews } from "./views.js";
+import { ManualViews } from "./views.js";
 import { figuresOf, whoFlies } from "./words.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 
@@ -21,9 +21,10 @@ const FREE = { holder: "", yours: false, flying: false };
 const WORDS = ["take", "give", "arm", "disarm", "take_off", "land", "hold"];
 const SPEED_KEY = "framerunner.pilot.top-speed";
 
-class PilotPage {
+class ManualPage {
   #parts;
   #views;
+  /** @type {ManualControlSocket|null} */
   #socket = null;
   #keys = new Keys();
   #gamepads = new Gamepads();
@@ -31,8 +32,11 @@ class PilotPage {
   #right;
   #stop;
   #controls = new Map();
+  /** @type {import("../lib/messages.js").Live.DroneStatus[]} */
   #drones = [];
+  /** @type {number|null} */
   #id = null;
+  /** @type {import("../lib/messages.js").Live.DronePose|null} */
   #pose = null;
   #connection = "away";
   #shownAt = 0;
@@ -41,7 +45,7 @@ class PilotPage {
   constructor(root, mayFly) {
     this.#parts = layOut(root);
     this.root = root;
-    this.#views = new PilotViews(this.#parts.camera, this.#parts.arena);
+    this.#views = new ManualViews(this.#parts.camera, this.#parts.arena);
     this.#left = new ScreenStick(this.#parts.left, {
       label: "Left stick: up, down, turn",
       ends: ["up", "turn right", "down", "turn left"],
@@ -297,5 +301,5 @@ function recall() {
   }
 }
 
-const root = pageRoot("pilot");
-new PilotPage(root, pageData().mayFly !== false);
+const root = pageRoot("manual");
+new ManualPage(root, pageData().mayFly !== false);

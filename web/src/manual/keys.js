@@ -21,6 +21,7 @@ const KEYS = {
 export class Keys {
   #held = new Set();
   #sticks = neutral();
+  /** @type {number|null} */
   #lastMs = null;
 
   /** @param {string} code of a key @returns {boolean} whether it steers */

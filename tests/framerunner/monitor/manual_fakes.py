@@ -1,4 +1,4 @@
-"""Fake drones for the pilot's tests."""
+"""Fake drones for the tests of manual control."""
 
 import asyncio
 
