@@ -57,12 +57,14 @@ from pydantic import BaseModel, ValidationError
 from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket
 
+from framerunner.course.lessons import load_lessons
 from framerunner.editing import messages
-from framerunner.editing.places import lesson_names, level_names, scenario_names
 from framerunner.editing.service import EditingService, EditingSettings
 from framerunner.editing.words import Language, Said, language_of, say
 from framerunner.monitor.access import Visitor
 from framerunner.monitor.channel import Channel, PageMessageError, Terms, refuse
+from scenarios.loader import list_scenarios
+from scenarios.random_scenarios import LEVEL_FILES
 
 _FROM_PAGE: Terms[messages.Request] = Terms(
     messages.REQUEST,
@@ -88,9 +90,9 @@ class EditingRouter:
         @router.get("/api/editing/choices")
         def choices() -> dict[str, list[str] | int]:
             return {
-                "scenarios": scenario_names(),
-                "lessons": lesson_names(),
-                "levels": level_names(),
+                "scenarios": list_scenarios(),
+                "lessons": [lesson.name for lesson in load_lessons()],
+                "levels": LEVEL_FILES.names(),
                 "max_text": messages.MAX_TEXT,
                 "max_count": messages.MAX_COUNT,
             }

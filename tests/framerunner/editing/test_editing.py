@@ -20,7 +20,7 @@ from framerunner.course.lessons import find_lesson
 from framerunner.editing.service import EditingSettings
 from framerunner.editing.waiting_queue import WaitingQueue
 from framerunner.editing.web import EditingRouter
-from framerunner.editing.worker_pool import WorkerPool
+from framerunner.editing.workers import WorkerPool
 from framerunner.evaluation.runner import fly_task
 from framerunner.flying.plan import FlightPlan
 from framerunner.monitor.access import Role, Visitor

@@ -3,6 +3,7 @@ import { loginAddress } from "../lib/course.js";
 import { make } from "../lib/dom.js";
 import { language } from "../lib/language.js";
 import { pageData } from "../lib/page_data.js";
+import { request } from "../lib/request.js";
 import { button, choice, textField } from "./fields.js";
 import { word } from "./words.js";
 
@@ -12,26 +13,21 @@ export async function chooseFile(root) {
   const problem = make("p", { class: "problem", role: "alert", hidden: true });
   const list = make("ul", { class: "e-files" });
   root.append(make("h1", {}, word("open")), problem, list);
-  const answer = await fetch(`/api/edit/files?language=${language()}`);
-  const told = await answer.json();
-  if (!answer.ok) {
+  /** @param {Error & {status?: number}} error */
+  const refused = (error) => {
     problem.hidden = false;
-    problem.replaceChildren(told.detail, " ", answer.status === 403 ? make("a", { href: loginAddress() }, word("log_in")) : "");
-    return;
-  }
+    problem.replaceChildren(error.message, " ", error.status === 403 ? make("a", { href: loginAddress() }, word("log_in")) : "");
+  };
+  const told = await request(`/api/edit/files?language=${language()}`).catch(refused);
+  if (!told) return;
   const link = (name) => make("li", {}, make("a", { href: `/edit?file=${encodeURIComponent(name)}` }, name));
   list.replaceChildren(...told.files.map(link));
   if (told.files.length === 0) list.append(make("li", { class: "hint" }, word("no_files")));
   if (!mayEdit) return;
   /** Ask for a new file and open it. @param {"files"|"import"} how @param {object} content */
   const create = async (how, content) => {
-    const made = await fetch(`/api/edit/${how}?language=${language()}`, {
-      method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(content),
-    });
-    const { file: created, detail } = await made.json();
-    if (made.ok) location.href = `/edit?file=${encodeURIComponent(created)}`;
-    problem.hidden = made.ok;
-    problem.textContent = typeof detail === "string" ? detail : made.statusText;
+    const made = await request(`/api/edit/${how}?language=${language()}`, content).catch(refused);
+    if (made) location.href = `/edit?file=${encodeURIComponent(made.file)}`;
   };
   let name = "my_mission", source = "empty";
   const sources = [["empty", word("empty")], ["example", word("example")], ...told.missions.map((/** @type {string} */ each) => [each, word("a_copy", { name: each })])];

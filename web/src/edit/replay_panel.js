@@ -2,7 +2,8 @@
 import { make, number, setText } from "../lib/dom.js";
 import { Bar } from "../lib/replay/bar.js";
 import { Clock } from "../lib/replay/clock.js";
-import { fetchJson, Run } from "../lib/replay/run.js";
+import { Run } from "../lib/replay/run.js";
+import { request } from "../lib/request.js";
 import { yawOf } from "../lib/yaw.js";
 import { button } from "./fields.js";
 import { FlightView } from "./flight_view.js";
@@ -57,7 +58,7 @@ export class ReplayPanel {
   async load() {
     try {
       /** @type {RunInfo[]} */
-      const runs = (await fetchJson("/api/runs")).filter(({ verdict }) => verdict !== "unreadable").slice(0, MAX_LISTED);
+      const runs = (await request("/api/runs")).filter(({ verdict }) => verdict !== "unreadable").slice(0, MAX_LISTED);
       const chosen = this.#run?.name ?? "";
       const group = (isOfSession, label) => {
         const own = runs.filter(({ session }) => session === isOfSession);

@@ -5,7 +5,8 @@ import { make, setText } from "../lib/dom.js";
 import { Bar } from "../lib/replay/bar.js";
 import { Clock } from "../lib/replay/clock.js";
 import { pageOf, RunList } from "./list.js";
-import { fetchJson, Run } from "../lib/replay/run.js";
+import { Run } from "../lib/replay/run.js";
+import { request } from "../lib/request.js";
 import { Side } from "./side.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 
@@ -31,7 +32,7 @@ async function list() {
   const without = "This monitor was given no folder of flights. Start it with --runs FOLDER; framerunner fly leaves its flights in runs/.";
   if (!pageData().hasRuns) return choice.append(make("summary", {}, "Flights"), make("p", { class: "r-none" }, without));
   try {
-    const runs = await fetchJson("/api/runs");
+    const runs = await request("/api/runs");
     choice.append(make("summary", {}, chosen.length ? "Choose another flight, or one to see beside" : "Choose a flight"));
     if (runs.length) new RunList(choice, runs, chosen);
     else choice.append(make("p", { class: "r-none" }, hint));

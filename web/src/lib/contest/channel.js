@@ -1,5 +1,6 @@
 /** How the contest's pages exchange data with the monitor: requests, judges' changes, and a WebSocket that reports changes. */
 import { ReconnectingSocket } from "../reconnecting_socket.js";
+import { request } from "../request.js";
 
 /** Tries that are being flown, as the WebSocket sent them last, and how many times it did. */
 const latest = { running: [], messages: 0 };
@@ -11,7 +12,7 @@ const latest = { running: [], messages: 0 };
  */
 export async function ask(path) {
   const before = latest.messages;
-  const given = await answer(await reach(fetch(`/api/competition/${path}`, { cache: "no-store" })));
+  const given = await request(`/api/competition/${path}`);
   if (latest.messages !== before && given.running !== undefined) given.running = latest.running;
   return given;
 }
@@ -22,36 +23,8 @@ export async function ask(path) {
  * @param {object} form
  * @returns {Promise<object>} throws an Error with one line for people; its `status` is that of HTTP
  */
-export async function send(path, form) {
-  return answer(await reach(fetch(`/api/competition/${path}`, {
-    method: "POST",
-    headers: { "Content-Type": "application/json" },
-    body: JSON.stringify(form),
-  })));
-}
-
-async function reach(fetching) {
-  try {
-    return await fetching;
-  } catch {
-    throw new Error("the monitor does not answer");
-  }
-}
-
-async function answer(response) {
-  if (response.ok) return response.json();
-  const text = await response.text();
-  const words = detailOf(text) ?? `the monitor answers ${response.status}`;
-  throw Object.assign(new Error(words), { status: response.status });
-}
-
-function detailOf(text) {
-  try {
-    const detail = JSON.parse(text).detail;
-    return typeof detail === "string" ? detail : null;
-  } catch {
-    return text.length < 200 ? text.trim() || null : null;
-  }
+export function send(path, form) {
+  return request(`/api/competition/${path}`, form);
 }
 
 /**
