@@ -15,10 +15,12 @@ from pydantic import TypeAdapter
 from framerunner.editing import messages as flights
 from framerunner.editing.documents import messages as documents
 from framerunner.monitor import live_messages, manual_channel
+from framerunner.monitor.competition import views as contest
 from framerunner.wire import operator_messages
 
 _OUTPUT = Path(__file__).parent / "src" / "lib" / "messages.d.ts"
 _CHANNELS: dict[str, tuple[Any, Any]] = {  # by name: what pages send, what they are sent
+    "Contest": (None, contest.Message),
     "Documents": (documents.PageMessage, documents.ToPage),
     "Flights": (flights.Request, flights.ToPage),
     "Live": (None, live_messages.LiveMessage),

@@ -19,7 +19,7 @@ from framerunner.monitor.channel import TRY_LATER_CODE, Channel, Terms, close
 from framerunner.monitor.competition.calls import Entry
 from framerunner.monitor.competition.database import DatabaseError
 from framerunner.monitor.competition.rules import Correction, Rule
-from framerunner.monitor.competition.service import CompetitionService, Message
+from framerunner.monitor.competition.service import CompetitionService
 from framerunner.monitor.competition.validation import (
     DrawForm,
     Form,
@@ -37,6 +37,7 @@ from framerunner.monitor.competition.validation import (
     shown,
 )
 from framerunner.monitor.competition.views import (
+    Message,
     RankingStateView,
     RankingView,
     StateView,
@@ -278,7 +279,7 @@ def _add_channel(web: FastAPI, service: CompetitionService) -> None:
         channel: Channel[None, Message] = Channel(websocket, Terms(None))
 
         def put(message: Message) -> None:
-            channel.send(message, newest_of=message["kind"])
+            channel.send(message, newest_of=message.kind)
 
         unsubscribe = service.subscribe(put)
         for message in service.messages():

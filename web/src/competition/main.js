@@ -8,6 +8,7 @@ import { Teams } from "./teams.js";
 import { frameMarks, moment, nameOf, notCounted, orDash, seconds, standing } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
+import { reasonOf } from "../lib/request.js";
 
 class Desk {
   #line = make("p", { class: "line", role: "status", hidden: true });
@@ -31,7 +32,7 @@ class Desk {
         make("div", { class: "column" }, this.calls.element, this.queue.element, this.#triesPanel()),
         make("div", { class: "column" }, this.draw.element, this.teams.element, this.rule.element)),
     );
-    this.refresh = oneAtATime(() => this.#load(), (error) => this.say(error.message));
+    this.refresh = oneAtATime(() => this.#load(), (error) => this.say(reasonOf(error)));
     watch({
       changed: this.refresh,
       running: (tries) => this.#run(tries),
@@ -50,7 +51,7 @@ class Desk {
     try {
       await work();
     } catch (error) {
-      this.say(error.message);
+      this.say(reasonOf(error));
       this.#line.scrollIntoView({ block: "nearest" });
       return false;
     }

@@ -3,7 +3,7 @@ import { make, number, setText } from "../lib/dom.js";
 import { Bar } from "../lib/replay/bar.js";
 import { Clock } from "../lib/replay/clock.js";
 import { Run } from "../lib/replay/run.js";
-import { request } from "../lib/request.js";
+import { reasonOf, request } from "../lib/request.js";
 import { yawOf } from "../lib/yaw.js";
 import { button } from "./fields.js";
 import { FlightView } from "./flight_view.js";
@@ -69,7 +69,7 @@ export class ReplayPanel {
       this.#list.replaceChildren(make("option", { value: "" }, runs.length > 0 ? word("choose_flight") : word("no_flights")), ...groups);
       this.#list.value = runs.some(({ name }) => name === chosen) ? chosen : "";
     } catch (error) {
-      setText(this.#line, error.message);
+      setText(this.#line, reasonOf(error));
     }
   }
 
@@ -91,7 +91,7 @@ export class ReplayPanel {
       if (run.poses.length === 0) setText(this.#line, word("nothing_recorded"));
       else this.#take(run);
     } catch (error) {
-      if (asked === this.#asked) setText(this.#line, error.message);
+      if (asked === this.#asked) setText(this.#line, reasonOf(error));
     }
   }
 

@@ -1,5 +1,12 @@
 // Made by web/page_types.py from the models of the messages; `make page-types` makes it anew.
 
+export namespace Contest {
+  type ChangedMessage = { kind: "changed"; version: number; problem: string };
+  type RunningMessage = { kind: "running"; tries: (RunningView)[] };
+  type RunningView = { id: number; team: number | null; team_name: string; scenario: string; barrier: string; drone_id: number; frames: (string)[]; crossed: (string)[]; contacts: number; penalty_s: number; try_time_s: number };
+  type ToPage = ChangedMessage | RunningMessage;
+}
+
 export namespace Documents {
   type EditMessage = { number: number; kind: "edit"; edit: Record<string, any> };
   type LayoutMessage = { number: number; kind: "layout"; places: Record<string, StateBox | null>; settled?: boolean };

@@ -15,6 +15,9 @@ export async function request(address, content) {
   throw Object.assign(new Error(words), { status: answer?.status ?? 0 });
 }
 
+/** Why something failed, in one line. @param {unknown} error */
+export const reasonOf = (error) => (error instanceof Error ? error.message : String(error));
+
 /** @param {string} text of a refusal @returns {string} "" if it has no reason for people */
 function reasonIn(text) {
   try {

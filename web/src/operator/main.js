@@ -13,14 +13,17 @@ const SHOW_MS = 200;
 const MOTORS_AFTER_MS = 500; // the button cannot be hit by the finger that has just landed the drone
 const FIGURES = [["battery", "Battery"], ["link", "Drone's link"], ["mode", "Mode"], ["motors", "Motors"]];
 
+/** @import {Operator} from "../lib/messages.js" */
+
 class OperatorPage {
   #parts;
-  #socket;
+  /** @type {ReconnectingSocket<Operator.FromPage, Operator.ToPage>|null} */
+  #socket = null;
   #go;
   #you = 0;
-  /** @type {import("../lib/messages.js").Operator.FlightMessage|null} */
+  /** @type {Operator.FlightMessage|null} */
   #flight = null;
-  /** @type {import("../lib/messages.js").Operator.BeatMessage|null} */
+  /** @type {Operator.BeatMessage|null} */
   #beat = null;
   #beatAt = 0;
   #ended = "";
@@ -73,6 +76,7 @@ class OperatorPage {
     this.#show();
   }
 
+  /** @param {Operator.ToPage} message */
   #take(message) {
     if (message.kind === "you") this.#you = message.page;
     else if (message.kind === "none") this.#flight = this.#beat = null;
@@ -116,6 +120,7 @@ class OperatorPage {
     this.#show();
   }
 
+  /** @param {Operator.FromPage["kind"]} kind */
   #send(kind) {
     const flight = this.#flight?.flight ?? "";
     return this.#socket?.send({ kind, beat: this.#beat?.beat ?? -1, flight }) ?? false;

@@ -6,7 +6,7 @@ import { Bar } from "../lib/replay/bar.js";
 import { Clock } from "../lib/replay/clock.js";
 import { pageOf, RunList } from "./list.js";
 import { Run } from "../lib/replay/run.js";
-import { request } from "../lib/request.js";
+import { reasonOf, request } from "../lib/request.js";
 import { Side } from "./side.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 
@@ -37,7 +37,7 @@ async function list() {
     if (runs.length) new RunList(choice, runs, chosen);
     else choice.append(make("p", { class: "r-none" }, hint));
   } catch (error) {
-    choice.append(make("summary", {}, "Flights"), make("p", { class: "r-none", role: "alert" }, error.message));
+    choice.append(make("summary", {}, "Flights"), make("p", { class: "r-none", role: "alert" }, reasonOf(error)));
   }
 }
 

@@ -7,6 +7,7 @@ import { Fields } from "./form.js";
 import { frameMarks, moment, nameOf, notCounted, orDash, seconds, standing } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
+import { reasonOf } from "../lib/request.js";
 
 const { judge, attempt } = pageData();
 
@@ -31,7 +32,7 @@ class TryPage {
       ...(judge ? [this.#teamForm(), this.#judgeForm()] : []),
       make("section", { class: "panel", "aria-labelledby": "history-title" },
         make("h2", { id: "history-title" }, "What judges changed"), this.#history));
-    const refresh = oneAtATime(() => this.#load(false), (error) => this.#say(error.message));
+    const refresh = oneAtATime(() => this.#load(false), (error) => this.#say(reasonOf(error)));
     watch({
       changed: refresh,
       running: (tries) => {
@@ -81,8 +82,8 @@ class TryPage {
       await this.#load(!keep, keep);
       this.#say(`Saved. ${this.#counts.textContent}`, "good");
     } catch (error) {
-      this.#say(error.message);
-      if (error.status === 409) this.#offerNew();
+      this.#say(reasonOf(error));
+      if (/** @type {{status?: number}} */ (error).status === 409) this.#offerNew();
     } finally {
       this.#save.disabled = false;
     }

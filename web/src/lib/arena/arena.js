@@ -1,6 +1,7 @@
 import { kindOf, stateColour } from "../colours.js";
 import { isTyping, make, setAttribute, setText } from "../dom.js";
 import { ArenaAbove } from "./arena_above.js";
+import { reasonOf } from "../request.js";
 
 /**
  * @typedef {object} Pose one drone, as in the live channel's message "pose"
@@ -170,7 +171,7 @@ export class Arena {
       const { ArenaScene } = await import("./scene.js");
       this.#painter = new ArenaScene(this.#box, this.#labels);
     } catch (error) {
-      console.info(`no 3-D here (${error.message}); the arena is drawn from above`);
+      console.info(`no 3-D here (${reasonOf(error)}); the arena is drawn from above`);
       this.#painter = new ArenaAbove(this.#box, "This browser draws no 3-D here, so the arena is shown from above.");
       for (const button of [...Object.values(this.#buttons), this.#sizeButton]) button.hidden = true;
     }

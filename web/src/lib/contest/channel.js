@@ -2,8 +2,10 @@
 import { ReconnectingSocket } from "../reconnecting_socket.js";
 import { request } from "../request.js";
 
+/** @import {Contest} from "../messages.js" */
+
 /** Tries that are being flown, as the WebSocket sent them last, and how many times it did. */
-const latest = { running: [], messages: 0 };
+const latest = { running: /** @type {Contest.RunningView[]} */ ([]), messages: 0 };
 
 /**
  * Request something. The tries of an answer are replaced by those that the WebSocket sent while it was under way.
@@ -29,11 +31,11 @@ export function send(path, form) {
 
 /**
  * Hear of changes, for as long as the page lives; a lost connection is opened again.
- * @param {{changed: function(any): void, running: function(any[]): void, link: function(boolean): void}} hear
+ * @param {{changed: (message: Contest.ChangedMessage) => void, running: (tries: Contest.RunningView[]) => void, link: (isOpen: boolean) => void}} hear
  *   changed: something is other than before, also after each new connection; link: whether there is a connection
  */
 export function watch(hear) {
-  /** @type {ReconnectingSocket<never, any>} */
+  /** @type {ReconnectingSocket<never, Contest.ToPage>} */
   const socket = new ReconnectingSocket("/ws/competition", {
     message: (message) => {
       if (message.kind === "changed") hear.changed(message);
@@ -63,7 +65,7 @@ export function oneAtATime(work, fail) {
       try {
         await work();
       } catch (error) {
-        fail(error);
+        fail(error instanceof Error ? error : new Error(String(error)));
       }
     }
     going = null;

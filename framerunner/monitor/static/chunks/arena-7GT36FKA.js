@@ -1,1 +1,0 @@
-import{a}from"./chunk-5Z5LFCCO.js";import"./chunk-QEQBBZGE.js";import"./chunk-FV6F74XH.js";import"./chunk-T2ACLE3U.js";import"./chunk-OULW4S7M.js";export{a as Arena};
