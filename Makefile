@@ -77,7 +77,10 @@ NPM_CI = npm ci --ignore-scripts --no-audit --no-fund
 lint-web:
 	@$(IF_NODE) $(MAKE) --silent $(NODE_MODULES) && cd web && npm run --silent lint && npm run --silent types
 
-.PHONY: web web-check
+.PHONY: web web-check page-types
+page-types: $(VENV)/installed-dev ## write the types of the pages' messages, web/src/lib/messages.d.ts, from their models
+	$(PYTHON) web/page_types.py
+
 web: $(NODE_MODULES) ## bundle the monitor's pages, web/, into framerunner/monitor/static/ (needs Node.js 20)
 	cd web && npm run --silent build
 

@@ -35,13 +35,13 @@ WATCH = """
 window.seen = {};
 const send = WebSocket.prototype.send;
 WebSocket.prototype.send = function (data) {
-  if (data.includes('"type":"type"')) window.seen.sent = performance.now();
+  if (data.includes('"kind":"type"')) window.seen.sent = performance.now();
   return send.call(this, data);
 };
 const handler = Object.getOwnPropertyDescriptor(WebSocket.prototype, "onmessage");
 Object.defineProperty(WebSocket.prototype, "onmessage", { ...handler, set(hear) {
   handler.set.call(this, (event) => {
-    if (String(event.data).startsWith('{"type": "changed"')) window.seen.arrived ??= performance.now();
+    if (String(event.data).startsWith('{"kind": "changed"')) window.seen.arrived ??= performance.now();
     hear(event);
   });
 } });

@@ -13,7 +13,7 @@ import { adaptedPackages } from "./adapted_packages.mjs";
 
 const HERE = path.dirname(fileURLToPath(import.meta.url));
 const SOURCE = path.join(HERE, "src");
-const OUTPUT = path.resolve(process.argv[2] ?? path.join(HERE, "..", "monitor", "static"));
+const OUTPUT = path.resolve(process.argv[2] ?? path.join(HERE, "..", "framerunner", "monitor", "static"));
 const LICENCE = /^(licen[cs]e|copying|notice)(\.|-|$)/i;
 
 /** The entries: "live" from src/live/main.js. */

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
+
+from pydantic import TypeAdapter, ValidationError
 
 from framerunner.errors import SettingError
 from framerunner.files.text_file import append_in_folder, read_in_folder
@@ -19,7 +21,6 @@ from framerunner.monitor.competition.views import csv_text
 EventKind = Literal["opened", "flown", "passed", "reset"]
 MAX_LEARNER = 60  # characters of a name
 _ADVICE = f"use 1 to {MAX_LEARNER} printable characters"
-_KINDS = get_args(EventKind)
 _MAX_FILE_BYTES = 50_000_000
 
 
@@ -41,6 +42,9 @@ class CourseEvent:
     lesson: str
     kind: EventKind
     reason: str = ""
+
+
+_EVENT = TypeAdapter(CourseEvent)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,14 +156,8 @@ def _one_line(text: str) -> str:
 
 def _read(line: bytes) -> CourseEvent | None:
     try:
-        found = json.loads(line)
-        event = CourseEvent(
-            float(found["time_s"]),
-            _one_line(str(found["learner"]))[:MAX_LEARNER].strip(),
-            str(found["lesson"]),
-            found["kind"],
-            str(found.get("reason", "")),
-        )
-    except (ValueError, KeyError, TypeError, AttributeError):
+        event = _EVENT.validate_json(line)
+    except ValidationError:
         return None
-    return event if event.kind in _KINDS and event.learner else None
+    learner = _one_line(event.learner)[:MAX_LEARNER].strip()
+    return replace(event, learner=learner) if learner else None

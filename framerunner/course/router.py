@@ -201,7 +201,7 @@ class CourseRouter:
         watcher = _Result(language)
         try:
             start = StartBatch(
-                do="start_batch", text=text, level=None, scenarios=(lesson.name,), language=language
+                kind="start_batch", text=text, level=None, scenarios=(lesson.name,), language=language
             )
             await self._service.do(start, watcher)
             while "reason" not in (told := await watcher.next()):

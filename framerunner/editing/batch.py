@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from framerunner.editing import messages
-from framerunner.editing.places import find_scenario, level_names
+from framerunner.editing.places import find_scenario
 from framerunner.editing.session_runs import keep_result
 from framerunner.evaluation.backends import Pool
 from framerunner.evaluation.plan import Plan, plan_level
@@ -21,6 +21,7 @@ from framerunner.wire.finite_json import finite
 from offboard.mission import Mission
 from scenarios.models import Scenario
 from scenarios.random_numbers import LevelError
+from scenarios.random_scenarios import LEVEL_FILES
 from scenarios.verdict import Verdict
 
 _RANKS = {verdict: rank for rank, verdict in enumerate(reversed(Verdict))}
@@ -64,8 +65,8 @@ def _plan(start: messages.StartBatch, mission: Mission) -> Plan:
     if start.scenarios:
         scenarios = [find_scenario(name) for name in dict.fromkeys(start.scenarios)]
         return Plan("scenarios", "scenarios", scenarios, mission, [0] * len(scenarios))
-    if start.level not in level_names():
-        known = ", ".join(level_names())
+    if start.level not in LEVEL_FILES.names():
+        known = ", ".join(LEVEL_FILES.names())
         raise LevelError(f"level '{start.level}': is not known; there are {known}")
     return plan_level(start.level, start.first_seed, start.count, mission)
 

@@ -44,7 +44,7 @@ class _Request(StrictModel):
 class Start(_Request):
     """Fly a mission once, watched and controlled."""
 
-    do: Literal["start"]
+    kind: Literal["start"]
     text: _Text
     scenario: _Name = "test-case-1"
     seed: _Seed = 0
@@ -60,59 +60,59 @@ class _OfRun(_Request):
 class Pause(_OfRun):
     """Wait before the next tick."""
 
-    do: Literal["pause"]
+    kind: Literal["pause"]
 
 
 class GoOn(_OfRun):
     """End a pause."""
 
-    do: Literal["go_on"]
+    kind: Literal["go_on"]
 
 
 class Step(_OfRun):
     """Let ticks of the mission pass, then pause."""
 
-    do: Literal["step"]
+    kind: Literal["step"]
     ticks: int = Field(1, ge=1, le=MAX_STEPS)
 
 
 class Speed(_OfRun):
     """Fly faster or slower."""
 
-    do: Literal["speed"]
+    kind: Literal["speed"]
     speed: _Speed
 
 
 class BreakOn(_OfRun):
     """Pause when one of these states is entered; replaces those named before."""
 
-    do: Literal["break_on"]
+    kind: Literal["break_on"]
     states: tuple[_StateId, ...] = Field((), max_length=MAX_BREAKS)
 
 
 class Change(_OfRun):
     """Go on with a changed mission in the same active state."""
 
-    do: Literal["change"]
+    kind: Literal["change"]
     text: _Text
 
 
 class Stop(_OfRun):
     """End a flight."""
 
-    do: Literal["stop"]
+    kind: Literal["stop"]
 
 
 class Watch(_OfRun):
     """Be sent what a flight or the flights of a batch do; `run` may be a batch."""
 
-    do: Literal["watch"]
+    kind: Literal["watch"]
 
 
 class StartBatch(_Request):
     """Fly a mission on random layouts of a level, or on scenarios."""
 
-    do: Literal["start_batch"]
+    kind: Literal["start_batch"]
     text: _Text
     level: _Name | None = "calm"
     count: int = Field(20, ge=1, le=MAX_COUNT)
@@ -123,14 +123,14 @@ class StartBatch(_Request):
 class Cancel(_Request):
     """End a batch; its results stay."""
 
-    do: Literal["cancel"]
+    kind: Literal["cancel"]
     batch: _Id
 
 
 class StartLive(_Request):
     """Fly a mission in a real simulator, seen on the live channel."""
 
-    do: Literal["start_live"]
+    kind: Literal["start_live"]
     text: _Text
     scenario: _Name = "test-case-1"
     speed: Annotated[float, Field(ge=0.1, le=20, allow_inf_nan=False)] = 1.0
@@ -139,7 +139,7 @@ class StartLive(_Request):
 class StopLive(_Request):
     """End the flight in the real simulator."""
 
-    do: Literal["stop_live"]
+    kind: Literal["stop_live"]
 
 
 Request = Annotated[
@@ -156,7 +156,7 @@ Request = Annotated[
     | Cancel
     | StartLive
     | StopLive,
-    Field(discriminator="do"),
+    Field(discriminator="kind"),
 ]
 REQUEST: TypeAdapter[Request] = TypeAdapter(Request)
 Order = Pause | GoOn | Step | Speed | BreakOn | Change | Stop | Watch
@@ -372,6 +372,11 @@ FromWorker = Annotated[
 FROM_WORKER: TypeAdapter[FromWorker] = TypeAdapter(FromWorker)
 
 
+ToPage = (
+    Started | Now | Changed | Refused | Waiting | Done | Ended | BatchStarted | Flight | BatchEnded | Live
+)
+
+
 class _WorkerTask(StrictModel):
     """What a worker process is given first.
 
@@ -415,4 +420,4 @@ class _Tagged(BaseModel):
 
 
 TAGGED = TypeAdapter(_Tagged)
-ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="do")])
+ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="kind")])

@@ -3,24 +3,8 @@
 from __future__ import annotations
 
 from framerunner.course.lessons import load_lessons
-from scenarios.loader import list_scenarios, load_scenario
+from scenarios.loader import load_scenario
 from scenarios.models import Scenario
-from scenarios.random_scenarios import LEVEL_FILES
-
-
-def scenario_names() -> list[str]:
-    """Names of the scenarios of the package."""
-    return list_scenarios()
-
-
-def lesson_names() -> list[str]:
-    """Names of the lessons, whose scenarios can be flown."""
-    return [lesson.name for lesson in load_lessons()]
-
-
-def level_names() -> list[str]:
-    """Names of the levels, from which random scenarios are drawn."""
-    return LEVEL_FILES.names()
 
 
 def find_scenario(name: str) -> Scenario:

@@ -20,8 +20,7 @@ from framerunner.editing.live import LiveFlight, LiveSettings
 from framerunner.editing.session_runs import forget_old
 from framerunner.editing.waiting_queue import WaitingQueue
 from framerunner.editing.words import Language, Said, say
-from framerunner.editing.worker_pool import WorkerPool
-from framerunner.editing.worker_process import WorkerProcess
+from framerunner.editing.workers import WorkerPool, WorkerProcess
 
 _MAX_OWN_RUNS = 4  # flights under control of one page
 _MAX_WAITING = 300

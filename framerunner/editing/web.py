@@ -5,24 +5,24 @@ characters, "max_count": flights of a batch}`. A `scenario` below is the name of
 goals then count; random ones are named as level and seed, such as `calm-17`.
 
 `/ws/editing?language=es` has the server's words in Spanish. It is closed with code 4403 if the visitor may
-not start flights. Each message is a JSON object. A request has `do` and may have `tag`, a whole number that
+not start flights. Each message is a JSON object. A request may have `tag`, a whole number that
 comes back with its answer:
 
-    {"do": "start", "text": MISSION, "scenario": "test-case-1", "seed": 0, "speed": 1 or null,
+    {"kind": "start", "text": MISSION, "scenario": "test-case-1", "seed": 0, "speed": 1 or null,
      "paused": false, "break_on": [state ids]}      answer: started {run, layout} or refused
-    {"do": "pause" | "go_on" | "stop", "run"}       answer: done or refused; likewise those that follow
-    {"do": "step", "run", "ticks": 1}
-    {"do": "speed", "run", "speed": vehicle seconds a second, null: as fast as possible}
-    {"do": "break_on", "run", "states": [ids]}      replaces those named before
-    {"do": "change", "run", "text": MISSION}        answer: changed {ids} or refused
-    {"do": "watch", "run": id of a flight or batch} who started it watches it already
-    {"do": "start_batch", "text", "level": "calm", "count": 20, "first_seed": 1}
-    {"do": "start_batch", "text", "scenarios": [names]}      answer: batch_started {batch, count} or refused
-    {"do": "cancel", "batch"}                       its results stay
-    {"do": "start_live", "text", "scenario", "speed": 1.0}   a flight in the real simulator: `framerunner fly`
-    {"do": "stop_live"}                             answer: done or refused
+    {"kind": "pause" | "go_on" | "stop", "run"}       answer: done or refused; likewise those that follow
+    {"kind": "step", "run", "ticks": 1}
+    {"kind": "speed", "run", "speed": vehicle seconds a second, null: as fast as possible}
+    {"kind": "break_on", "run", "states": [ids]}      replaces those named before
+    {"kind": "change", "run", "text": MISSION}        answer: changed {ids} or refused
+    {"kind": "watch", "run": id of a flight or batch} who started it watches it already
+    {"kind": "start_batch", "text", "level": "calm", "count": 20, "first_seed": 1}
+    {"kind": "start_batch", "text", "scenarios": [names]}      answer: batch_started {batch, count} or refused
+    {"kind": "cancel", "batch"}                       its results stay
+    {"kind": "start_live", "text", "scenario", "speed": 1.0}   flies in the real simulator: `framerunner fly`
+    {"kind": "stop_live"}                             answer: done or refused
 
-The server tells `{"kind": ...}`:
+The server tells:
 
     now      {run, full, time_s, began_s, state, active, seconds_in_state, paused, stopped_in, speed,
               guards: [{id, to, when, holds}], values: [{name, value, unit}],
@@ -50,26 +50,27 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import time
-from collections import deque
 from collections.abc import Callable
 
 from fastapi import APIRouter
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from starlette.requests import HTTPConnection
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
+from framerunner.course.lessons import load_lessons
 from framerunner.editing import messages
-from framerunner.editing.places import lesson_names, level_names, scenario_names
 from framerunner.editing.service import EditingService, EditingSettings
 from framerunner.editing.words import Language, Said, language_of, say
-from framerunner.monitor.access import Visitor, refuse
-from framerunner.monitor.pilot_channel import Allowance
-from scenarios.result import first_error
+from framerunner.monitor.access import Visitor
+from framerunner.monitor.channel import Channel, PageMessageError, Terms, refuse
+from scenarios.loader import list_scenarios
+from scenarios.random_scenarios import LEVEL_FILES
 
-TOO_SLOW_CODE, TOO_MANY_CODE = 1013, 4429
-_MAX_QUEUE = 1000
-_MAX_MESSAGE = 4 * messages.MAX_TEXT
+_FROM_PAGE: Terms[messages.Request] = Terms(
+    messages.REQUEST,
+    max_bytes=4 * messages.MAX_TEXT,
+    max_waiting=1000,
+)
 
 
 class EditingRouter:
@@ -89,9 +90,9 @@ class EditingRouter:
         @router.get("/api/editing/choices")
         def choices() -> dict[str, list[str] | int]:
             return {
-                "scenarios": scenario_names(),
-                "lessons": lesson_names(),
-                "levels": level_names(),
+                "scenarios": list_scenarios(),
+                "lessons": [lesson.name for lesson in load_lessons()],
+                "levels": LEVEL_FILES.names(),
                 "max_text": messages.MAX_TEXT,
                 "max_count": messages.MAX_COUNT,
             }
@@ -103,7 +104,20 @@ class EditingRouter:
                 await refuse(websocket, say(Said("access.fly"), language))
                 return
             await websocket.accept()
-            await _Connection(websocket, self._service, language, lambda: who(websocket)).serve()
+            page = EditorPage(websocket, language)
+
+            async def take(request: messages.Request) -> None:
+                visitor = who(websocket)
+                is_live = isinstance(request, messages.StartLive | messages.StopLive)
+                if not (visitor.may_teach if is_live else visitor.may_learn):
+                    # A flight in the simulator is seen on all pages, and is a try of the contest.
+                    why = Said("access.live" if is_live and visitor.may_learn else "access.fly")
+                    page.send(messages.Refused(tag=request.tag, text=say(why, language)))
+                    return
+                await self._service.do(request.model_copy(update={"language": language}), page)
+
+            self._service.enter(page)
+            await page.serve(take, left=lambda: self._service.leave(page), refused=page.refuse)
 
         return router
 
@@ -115,89 +129,16 @@ class EditingRouter:
             await self._service.close()
 
 
-class _Connection:
-    """One browser's WebSocket; a watcher of the service."""
+class EditorPage(Channel[messages.Request, BaseModel]):
+    """One browser's WebSocket; a watcher of the service. `language` is that of the page."""
 
-    def __init__(
-        self,
-        websocket: WebSocket,
-        service: EditingService,
-        language: Language,
-        visitor: Callable[[], Visitor],
-    ) -> None:
+    def __init__(self, websocket: WebSocket, language: Language) -> None:
+        super().__init__(websocket, _FROM_PAGE)
         self.language = language
-        self._visitor = visitor
-        self._websocket = websocket
-        self._service = service
-        self._outbox: deque[str] = deque()
-        self._arrived = asyncio.Event()
-        self._allowance = Allowance(time.monotonic)
-        self._too_slow = False
 
-    def put(self, line: str) -> None:
-        """Queue a message; a page that does not keep up is disconnected."""
-        if len(self._outbox) < _MAX_QUEUE:
-            self._outbox.append(line)
-        else:
-            self._too_slow = True
-        self._arrived.set()
-
-    async def serve(self) -> None:
-        """Receive and send until the browser disconnects or is disconnected."""
-        self._service.enter(self)
-        sending = asyncio.create_task(self._send())
-        receiving = asyncio.create_task(self._receive())
-        try:
-            await asyncio.wait({sending, receiving}, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            self._service.leave(self)
-            for task in (sending, receiving):
-                task.cancel()
-
-    async def _receive(self) -> None:
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-            while True:
-                message = await self._websocket.receive()
-                if message["type"] == "websocket.disconnect":
-                    return
-                text = message.get("text") or ""
-                if not self._allowance.spend():
-                    await self._websocket.close(TOO_MANY_CODE, "too many messages a second")
-                    return
-                await self._take(text)
-
-    async def _take(self, text: str) -> None:
-        if len(text) > _MAX_MESSAGE:
-            text = say(Said("message.too_long"), self.language)
-            self.put(messages.Refused(tag=0, text=text).model_dump_json())
-            return
-        try:
-            request = messages.REQUEST.validate_json(text)
-        except ValidationError as error:
-            self.put(messages.Refused(tag=_tag_in(text), text=first_error(error)).model_dump_json())
-            return
-        visitor, is_live = self._visitor(), isinstance(request, messages.StartLive | messages.StopLive)
-        if not (visitor.may_teach if is_live else visitor.may_learn):
-            # A flight in the simulator is seen on all pages, and is a try of the contest.
-            why = Said("access.live" if is_live and visitor.may_learn else "access.fly")
-            self.put(messages.Refused(tag=request.tag, text=say(why, self.language)).model_dump_json())
-            return
-        await self._service.do(request.model_copy(update={"language": self.language}), self)
-
-    async def _send(self) -> None:
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):
-            while True:
-                await self._arrived.wait()
-                self._arrived.clear()
-                if self._too_slow:
-                    await self._websocket.close(TOO_SLOW_CODE, "this page does not keep up")
-                    return
-                while self._outbox:
-                    await self._websocket.send_text(self._outbox.popleft())
-
-
-def _tag_in(text: str) -> int:
-    """The tag of a request that cannot be carried out; 0 if it has none."""
-    with contextlib.suppress(ValidationError):
-        return messages.TAGGED.validate_json(text).tag
-    return 0
+    def refuse(self, text: str, problem: PageMessageError) -> None:
+        """Answer a message that is no request; what a person has typed may be the reason."""
+        tag = 0
+        with contextlib.suppress(ValidationError):
+            tag = messages.TAGGED.validate_json(text).tag
+        self.send(messages.Refused(tag=tag, text=str(problem)))

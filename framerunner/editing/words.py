@@ -63,7 +63,6 @@ _ENGLISH: Mapping[str, str] = {
     "flight.ended_process": "the flight ended its process: {how}",
     "flight.no_state": "break_on '{name}': is not a state of the mission; take its full id",
     "flight.more": "{first} (and {count} more)",
-    "message.too_long": "the message is too long",
     # The real flight.
     "live.busy": "a flight in the simulator is in the air already; stop it first",
     "live.none": "no flight in the simulator was started here",
@@ -127,7 +126,6 @@ _SPANISH: Mapping[str, str] = {
     "flight.ended_process": "el vuelo terminó su proceso: {how}",
     "flight.no_state": "break_on '{name}': no es un estado de la misión; usa su nombre completo",
     "flight.more": "{first} (y {count} más)",
-    "message.too_long": "el mensaje es demasiado largo",
     "live.busy": "ya hay un vuelo en el simulador; páralo antes",
     "live.none": "aquí no se inició ningún vuelo en el simulador",
     "live.no_link": (

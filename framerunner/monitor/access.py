@@ -18,18 +18,15 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
-from starlette.websockets import WebSocket
 
 from framerunner.errors import UserError
 from framerunner.files.text_file import replace_file
 from framerunner.monitor.visitors.login_limit import LoginLimit
 from framerunner.monitor.visitors.pupils import PupilBook, PupilError, owns
 
-REFUSED_CODE = 4403  # closes a WebSocket, as 403 ends a request
 SESSION_S = 12 * 3600.0
 MAX_NAME_LENGTH = 60
 _MAX_SESSIONS = 1000  # of a role
-_MAX_REASON_BYTES = 120  # WebSockets allow 123
 _MAX_OWN_SESSIONS = 20  # of a pupil
 _INVISIBLE = ("C", "Zl", "Zp")  # Unicode categories: control and format characters, line ends
 _SUFFIX = ".sessions"
@@ -409,12 +406,6 @@ class Access:
         role_limit = _MAX_SESSIONS if visitor.role is not Role.PUPIL else _MAX_SESSIONS * _MAX_OWN_SESSIONS
         ended = {*own[: max(0, len(own) - own_limit + 1)], *of_role[: max(0, len(of_role) - role_limit + 1)]}
         self._sessions = {key: each for key, each in self._sessions.items() if key not in ended}
-
-
-async def refuse(websocket: WebSocket, text: str) -> None:
-    """Accept a WebSocket and close it with code 4403 and one short line, which the page can show."""
-    await websocket.accept()
-    await websocket.close(REFUSED_CODE, text.encode()[:_MAX_REASON_BYTES].decode(errors="ignore"))
 
 
 def _clean_name(name: str) -> str:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from framerunner.monitor.addresses import Places, client_address
+from framerunner.monitor.channel import TRY_LATER_CODE, Channel, Terms, close
+from framerunner.monitor.live_messages import LiveMessage
 from framerunner.wire import finite_json
 
 if TYPE_CHECKING:
@@ -24,55 +25,36 @@ STATUS_AT_LEAST_EVERY = 40  # poses; shows a browser that the connection is aliv
 MAX_VIEWERS = 200
 MAX_VIEWERS_PER_ADDRESS = 60  # a page has two; a class may share one address
 MAX_PENDING = 200
-TOO_SLOW_CODE = 1013  # "try again later"
 # Kinds of which only the newest counts: one that was not sent yet is replaced.
 _REPLACED = ("pose", "status", "detections", "map", "guards")
 _POSE_DECIMALS = 4  # a tenth of a millimetre; in a quaternion 0.2 mrad
 _log = logging.getLogger(__name__)
 
 
-class Viewer:
-    """The messages that one browser is still to be sent.
+class Viewer(Channel[None, LiveMessage]):
+    """A browser that is sent what the drones do; what it sends is ignored.
 
     Args:
+        websocket: of the browser.
         kinds: of messages it requested; empty: all.
+
+    Attributes:
         address: of the browser.
     """
 
-    def __init__(self, kinds: Iterable[str] = (), address: str = "") -> None:
-        self.address = address
+    def __init__(self, websocket: WebSocket, kinds: Iterable[str] = ()) -> None:
+        super().__init__(websocket, Terms(None, max_waiting=MAX_PENDING))
+        self.address = client_address(websocket.scope)
         self._kinds = frozenset(kinds)
-        self._events: deque[str] = deque()
-        self._newest: dict[tuple[str, object], str] = {}
-        self._arrived = asyncio.Event()
-        self.too_slow = False
 
     def takes(self, kind: str) -> bool:
         """Whether it requested messages of a kind."""
         return not self._kinds or kind in self._kinds
 
-    def put(self, kind: str, drone_id: object, text: str) -> None:
-        """Queue a message."""
-        if not self.takes(kind):
-            return
-        if kind in _REPLACED:
-            self._newest[kind, drone_id] = text
-        elif len(self._events) < MAX_PENDING:
-            self._events.append(text)
-        else:
-            self.too_slow = True
-        self._arrived.set()
-
-    async def next(self) -> str | None:
-        """Wait for the next message, events first; None when too many events wait."""
-        while not (self._events or self._newest or self.too_slow):
-            self._arrived.clear()
-            await self._arrived.wait()
-        if self.too_slow:
-            return None
-        if self._events:
-            return self._events.popleft()
-        return self._newest.pop(next(iter(self._newest)))
+    def show(self, kind: str, drone_id: object, text: str) -> None:
+        """Queue a message, if it is of a kind that was requested."""
+        if self.takes(kind):
+            self.put(text, (kind, drone_id) if kind in _REPLACED else None)
 
 
 class LiveChannel:
@@ -92,7 +74,7 @@ class LiveChannel:
             return False
         for message in self._fleet.welcome():
             if viewer.takes(message["kind"]):
-                viewer.put(message["kind"], message.get("id"), self._encode_welcome(message))
+                viewer.show(message["kind"], message.get("id"), self._encode_welcome(message))
         self._viewers.add(viewer)
         self._has_viewers.set()
         return True
@@ -122,7 +104,7 @@ class LiveChannel:
         if any(viewer.takes(kind) for viewer in self._viewers):
             text = encode(message)
             for viewer in self._viewers:
-                viewer.put(kind, message.get("id"), text)
+                viewer.show(kind, message.get("id"), text)
 
     async def run(self) -> None:
         """Send poses and status while there are viewers, until cancelled."""
@@ -150,7 +132,7 @@ class LiveChannel:
             if text != self._last_status or count % STATUS_AT_LEAST_EVERY == 0:
                 self._last_status = text
                 for viewer in self._viewers:
-                    viewer.put("status", None, text)
+                    viewer.show("status", None, text)
 
 
 def register(monitor: Monitor) -> None:
@@ -161,31 +143,12 @@ def register(monitor: Monitor) -> None:
     @monitor.web.websocket("/ws/live")
     async def live(websocket: WebSocket, kinds: str = "") -> None:
         await websocket.accept()
-        viewer = Viewer((kind for kind in kinds.split(",") if kind), client_address(websocket.scope))
+        viewer = Viewer(websocket, (kind for kind in kinds.split(",") if kind))
         if not channel.enter(viewer):
-            await websocket.close(TOO_SLOW_CODE, "too many are watching")
+            await close(websocket, TRY_LATER_CODE, "too many are watching")
             return
         monitor.on_viewer()
-        sending = asyncio.create_task(_send(websocket, viewer))
-        try:
-            while True:  # until the browser disconnects; what it sends is ignored
-                await websocket.receive()
-                if websocket.client_state.name == "DISCONNECTED":
-                    break
-        except (WebSocketDisconnect, RuntimeError):
-            pass
-        finally:
-            channel.leave(viewer)
-            sending.cancel()
-
-
-async def _send(websocket: WebSocket, viewer: Viewer) -> None:
-    try:
-        while (text := await viewer.next()) is not None:
-            await websocket.send_text(text)
-        await websocket.close(TOO_SLOW_CODE, "too slow")
-    except (WebSocketDisconnect, RuntimeError, OSError):
-        pass  # disconnected
+        await viewer.serve(left=lambda: channel.leave(viewer))
 
 
 def encode(message: Mapping[str, Any]) -> str:

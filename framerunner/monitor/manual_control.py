@@ -7,8 +7,11 @@ import logging
 from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from pydantic import Field
+
+from framerunner.monitor.channel import PageModel
 from framerunner.monitor.vehicle.commands import Answer, Sticks
 
 if TYPE_CHECKING:
@@ -19,7 +22,6 @@ ABANDONED_S = 5.0  # of silence, after which another browser may take manual con
 STREAM_FIRST_S = 0.4  # sticks are sent before position mode is requested, which requires them
 HOLD_AGAIN_S = 1.0
 NEUTRAL = Sticks(0.0, 0.0, 0.0, 0.0)
-ORDERS = ("take", "give", "arm", "disarm", "take_off", "land", "hold", "stop_motors")
 
 MANUAL_MODES = frozenset(
     {"MANUAL", "STABILIZED", "ACRO", "RATTITUDE", "ALTITUDE", "POSITION", "POSITION SLOW"}
@@ -29,23 +31,47 @@ _ENDING = _OVERTAKING | {"give"}  # after these the drone flies by itself
 _BRAKING = _ENDING | {"take"}  # while these are carried out, sticks are neutral
 _TAKE_OFF, _HOLD = "TAKEOFF", "HOLD"
 
-JsonMessage = dict[str, Any]
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class Order:
+class Order(PageModel):
     """An order of a browser to a drone.
 
     Attributes:
-        drone_id: MAVLink system id.
-        what: one of `ORDERS`.
+        id: MAVLink system id of the drone.
         confirmed: the person has confirmed it.
     """
 
-    drone_id: int
-    what: str
+    kind: Literal["do"] = "do"
+    id: Annotated[int, Field(ge=1, le=255)]
+    what: Literal["take", "give", "arm", "disarm", "take_off", "land", "hold", "stop_motors"]
     confirmed: bool = False
+
+
+class Reply(PageModel):
+    """The answer to an order: whether it was done, and one line for people."""
+
+    kind: Literal["reply"] = "reply"
+    what: str
+    ok: bool
+    text: str
+
+
+class ControlMessage(PageModel):
+    """Who has manual control of a drone.
+
+    Attributes:
+        id: MAVLink system id of the drone.
+        holder: name of the person; "": nobody.
+        yours: it is the browser that gets this.
+        flying: the holder's sticks reach the drone.
+    """
+
+    kind: Literal["control"] = "control"
+    id: int
+    holder: str
+    yours: bool
+    flying: bool
 
 
 @dataclass(eq=False, slots=True)
@@ -60,7 +86,7 @@ class Browser:
 
     name: str
     may_judge: bool = False
-    send: Callable[[JsonMessage], None] = lambda _message: None
+    send: Callable[[Reply | ControlMessage], None] = lambda _message: None
 
 
 class Control(Enum):

@@ -12,56 +12,61 @@ import contextlib
 import json
 import logging
 import socket
-import time
 from errno import EADDRINUSE
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from pydantic import ValidationError
-from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+from pydantic import TypeAdapter
+from starlette.websockets import WebSocket
 
-from framerunner.monitor.access import refuse
-from framerunner.monitor.pilot_channel import Allowance
+from framerunner.monitor.channel import (
+    REFUSED_CODE,
+    TRY_LATER_CODE,
+    Channel,
+    ChannelEndError,
+    Terms,
+    close,
+    encoded,
+    refuse,
+)
 from framerunner.monitor.settings import MonitorError
 from framerunner.wire.operator_messages import (
     ALL_PAGES,
     MAX_LINE_BYTES,
     AnswerMessage,
     EndMessage,
+    NoFlightMessage,
     PageDemand,
     PageMessage,
+    ToPage,
+    YouMessage,
 )
 
 if TYPE_CHECKING:
     from framerunner.monitor.server import Monitor
 
-MAX_MESSAGE_BYTES = 500  # a page sends some 80
 MAX_PAGES = 20
-BAD_MESSAGE_CODE, TOO_MANY_CODE = 4400, 4429
-_MAX_QUEUE = 100  # messages to a page; beats come five times a second
 _MAX_UNSENT_BYTES = 1 << 16
 _TRIAL_S = 1.0
 REFUSED = "another flight has tried to connect and was refused; end this one first"
-_NO_FLIGHT: dict[str, Any] = {"kind": "none"}
+
+_FROM_PAGE: Terms[PageDemand] = Terms(
+    TypeAdapter(PageDemand),
+    max_bytes=500,  # a page sends some 80
+    always=lambda demand: demand.kind == "stop",  # a stop is taken in any case
+)
 
 logger = logging.getLogger(__name__)
 
 
-class _Page:
+class _Page(Channel[PageDemand, ToPage]):
     """One page's connection."""
 
-    def __init__(self, number: int, name: str) -> None:
+    def __init__(self, websocket: WebSocket, number: int, name: str) -> None:
+        super().__init__(websocket, _FROM_PAGE)
         self.number = number
         self.name = name
-        self.outbox: asyncio.Queue[str] = asyncio.Queue(_MAX_QUEUE)
-        self.is_slow = asyncio.Event()
-
-    def put(self, text: str) -> None:
-        try:
-            self.outbox.put_nowait(text)
-        except asyncio.QueueFull:
-            self.is_slow.set()
 
 
 class OperatorSession:
@@ -86,7 +91,7 @@ class OperatorSession:
         self._pages: dict[int, _Page] = {}
         self._numbers = count(1)
         self._flight: asyncio.StreamWriter | None = None
-        self._shown = json.dumps(_NO_FLIGHT)  # what a page that opens is sent first
+        self._shown = encoded(NoFlightMessage())  # what a page that opens is sent first
 
     async def run(self) -> None:
         """Listen for flights until cancelled."""
@@ -97,13 +102,13 @@ class OperatorSession:
             with contextlib.suppress(OSError):
                 self._path.unlink()
 
-    def enter(self, name: str) -> _Page | None:
+    def enter(self, websocket: WebSocket, name: str) -> _Page | None:
         """Add a page of a person; None if there are too many."""
         if len(self._pages) >= MAX_PAGES:
             return None
-        page = _Page(next(self._numbers), name)
+        page = _Page(websocket, next(self._numbers), name)
         self._pages[page.number] = page
-        page.put(json.dumps({"kind": "you", "page": page.number}))
+        page.send(YouMessage(page=page.number))
         page.put(self._shown)
         return page
 
@@ -114,7 +119,11 @@ class OperatorSession:
 
     def demand(self, page: _Page, demand: PageDemand) -> None:
         """Pass a page's demand on; without a flight it means nothing."""
-        self._tell(PageMessage(page=page.number, name=page.name, **demand.model_dump()))
+        self._tell(
+            PageMessage(
+                page=page.number, name=page.name, what=demand.kind, beat=demand.beat, flight=demand.flight
+            )
+        )
 
     def _tell(self, message: PageMessage) -> None:
         flight = self._flight
@@ -161,7 +170,7 @@ class OperatorSession:
         if kind == "flight":
             self._shown = text
         elif kind == "end":
-            self._shown = json.dumps(_NO_FLIGHT)
+            self._shown = encoded(NoFlightMessage())
         self._show_all(text)
         return bool(kind == "end")
 
@@ -212,56 +221,14 @@ def register(monitor: Monitor) -> None:
             await refuse(websocket, "this monitor was started without --operator-socket")
             return
         await websocket.accept()
-        page = session.enter(visitor.name)
+        page = session.enter(websocket, visitor.name)
         if page is None:
-            await websocket.close(TOO_MANY_CODE, "too many operators' pages")
+            await close(websocket, TRY_LATER_CODE, "too many operators' pages")
             return
-        tasks = [
-            asyncio.create_task(each)
-            for each in (
-                _receive(monitor, session, page, websocket),
-                _send(page, websocket),
-                page.is_slow.wait(),
-            )
-        ]
-        try:
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            session.leave(page)
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
-            if websocket.application_state is WebSocketState.CONNECTED:
-                with contextlib.suppress(RuntimeError, OSError):
-                    await websocket.close(TOO_MANY_CODE if page.is_slow.is_set() else 1000)
 
+        def take(demand: PageDemand) -> None:
+            if demand.kind != "stop" and not monitor.access.visitor(websocket).may_fly:
+                raise ChannelEndError(REFUSED_CODE, "logged out")
+            session.demand(page, demand)
 
-async def _receive(monitor: Monitor, session: OperatorSession, page: _Page, websocket: WebSocket) -> None:
-    """Take a page's demands until it leaves, sends something else, or its person has logged out."""
-    allowance = Allowance(time.monotonic)
-    while True:
-        message = await websocket.receive()
-        if message["type"] == "websocket.disconnect":
-            return
-        text = message.get("text") or ""
-        try:
-            if len(text) > MAX_MESSAGE_BYTES:
-                raise ValueError("too long")
-            demand = PageDemand.model_validate_json(text)
-        except (ValidationError, ValueError):
-            await websocket.close(BAD_MESSAGE_CODE, "not a message of this page")
-            return
-        if demand.what != "stop":  # a stop is taken in any case
-            if not monitor.access.visitor(websocket).may_fly:
-                await websocket.close(4403, "logged out")
-                return
-            if not allowance.spend():
-                await websocket.close(TOO_MANY_CODE, "too many messages a second")
-                return
-        session.demand(page, demand)
-
-
-async def _send(page: _Page, websocket: WebSocket) -> None:
-    with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):
-        while True:
-            await websocket.send_text(await page.outbox.get())
+        await page.serve(take, left=lambda: session.leave(page))

@@ -37,10 +37,9 @@ Job = Callable[[], Coroutine[Any, Any, None]]
 MODULES = (
     "framerunner.monitor.live_channel",
     "framerunner.monitor.video_proxy",
-    "framerunner.monitor.pilot_channel",
+    "framerunner.monitor.manual_channel",
     "framerunner.monitor.operator_channel",
     "framerunner.monitor.replay_api",
-    "framerunner.monitor.extensions",
     "framerunner.monitor.competition.api",
     "framerunner.monitor.competition.stage",
     "framerunner.monitor.pages.shell",
@@ -135,6 +134,9 @@ def assemble(
     web.mount("/static", StaticBundles())
     for name in MODULES:
         import_module(name).register(monitor)
+    for extension in equipment.extensions:  # each checks what a visitor may do
+        web.include_router(extension.router(access.visitor))
+        monitor.jobs.append(extension.run)
     return monitor
 
 

@@ -22,12 +22,12 @@ class PageDemand(_Message):
     """What a page sends.
 
     Attributes:
-        what: `here` answers a beat; `go` says ten times a second that the button is held.
+        kind: `here` answers a beat; `go` says ten times a second that the button is held.
         beat: number of the latest beat that the page has received; -1 before the first.
         flight: that the page shows.
     """
 
-    what: Literal["here", "go", "let_go", "stop", "stop_motors"]
+    kind: Literal["here", "go", "let_go", "stop", "stop_motors"]
     beat: Annotated[int, Field(ge=-1, le=1 << 53)] = -1
     flight: Annotated[str, Field(max_length=80)] = ""
 
@@ -140,3 +140,19 @@ class EndMessage(_Message):
     flight: str
     words: str
     lost: bool = False
+
+
+class YouMessage(_Message):
+    """The first message to a page: its number."""
+
+    kind: Literal["you"] = "you"
+    page: int
+
+
+class NoFlightMessage(_Message):
+    """No flight is connected."""
+
+    kind: Literal["none"] = "none"
+
+
+ToPage = YouMessage | NoFlightMessage | FlightMessage | BeatMessage | AnswerMessage | EndMessage

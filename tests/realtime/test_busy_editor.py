@@ -66,7 +66,7 @@ async def test_other_clients_are_served_while_a_hostile_text_is_read(program, na
             asking = asyncio.create_task(ask())
             await asyncio.sleep(0.1)
             change = {"start": 0, "removed": len(first["text"]), "inserted": TEXTS[name]}
-            message = {"type": "type", "number": 1, "revision": 0, "changes": [change]}
+            message = {"kind": "type", "number": 1, "revision": 0, "changes": [change]}
             began_s, processor_s = time.monotonic(), processor_s_of(program.process.pid)
             await window.send_str(json.dumps(message))
             answer = {}

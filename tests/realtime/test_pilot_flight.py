@@ -10,7 +10,7 @@ import pytest
 
 from scenarios.loader import load_scenario
 from tests.chromium import Complaints, chromium
-from tests.framerunner.monitor.pilot_server import served
+from tests.framerunner.monitor.manual_server import served
 from tests.framerunner.monitor.simulated_link import SimulatedLink, equipment
 
 pytestmark = pytest.mark.realtime
@@ -167,7 +167,7 @@ async def test_keys_and_gamepad_fly_the_drone_to_where_they_point(flight):
         await page.add_init_script(script)
         await page.goto(f"{flight.url}pilot")
         await page.get_by_role("button", name="Take sticks").click()
-        await page.wait_for_selector('#pilot[data-look="mine"]')
+        await page.wait_for_selector('#manual[data-look="mine"]')
         await page.get_by_role("button", name="Arm", exact=True).click()
         await flight.until(lambda: flight.armed)
         await page.keyboard.down("KeyW")

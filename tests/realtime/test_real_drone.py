@@ -147,7 +147,7 @@ async def operate(url):
                 flown_s = time.monotonic() if told["phase"] == "flying" else flown_s
             lands = flown_s is not None and time.monotonic() - flown_s > 8.0
             what = "go" if told["asks"] else "stop" if lands else "here"
-            await page.send_json({"what": what, "beat": told["beat"], "flight": flight})
+            await page.send_json({"kind": what, "beat": told["beat"], "flight": flight})
     return phases
 
 

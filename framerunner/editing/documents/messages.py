@@ -2,10 +2,10 @@
 
 From a page, each with a `number`, counted upwards, that the answer repeats as `answers`:
 
-    {"type": "edit", "edit": {...}}            an edit of `offboard.authoring.edits`
-    {"type": "type", "revision": 3, "changes": [{"start", "removed", "inserted"}]}     typed text
-    {"type": "undo"}, {"type": "redo"}, {"type": "save", "force": false}
-    {"type": "layout", "places": {"red": {"x": 1, "y": 2}, "green": null}, "settled": false}
+    {"kind": "edit", "edit": {...}}            an edit of `offboard.authoring.edits`
+    {"kind": "type", "revision": 3, "changes": [{"start", "removed", "inserted"}]}     typed text
+    {"kind": "undo"}, {"kind": "redo"}, {"kind": "save", "force": false}
+    {"kind": "layout", "places": {"red": {"x": 1, "y": 2}, "green": null}, "settled": false}
 
 To a page: `document` with the whole text, `changed` with the changes of it, each made for the text after
 those before it, `status`, with the `layout` if only that has changed, `{"warning": words}`, and in an answer
@@ -19,14 +19,15 @@ another one if the program was started anew and knows only what was journalled.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NotRequired
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter
+from typing_extensions import TypedDict
 
 from framerunner.editing.documents.open_document import OpenDocument
-from framerunner.errors import UserError
 from offboard.authoring import (
     SPANISH,
+    Catalogue,
     Change,
     Edge,
     Finding,
@@ -45,10 +46,6 @@ from offboard.authoring import (
 _Number = Annotated[int, Field(ge=0, le=2**53)]
 
 
-class PageMessageError(UserError):
-    """A message that the editor's page does not send; its text is one line."""
-
-
 class _FromPage(StrictModel):
     number: _Number
 
@@ -64,14 +61,14 @@ class TypedChange(StrictModel):
 class EditMessage(_FromPage):
     """An edit of the diagram."""
 
-    type: Literal["edit"]
+    kind: Literal["edit"]
     edit: dict[str, Any]
 
 
 class TypeMessage(_FromPage):
     """Typed text."""
 
-    type: Literal["type"]
+    kind: Literal["type"]
     revision: _Number
     changes: Annotated[tuple[TypedChange, ...], Field(max_length=10_000)]
 
@@ -79,41 +76,163 @@ class TypeMessage(_FromPage):
 class StepMessage(_FromPage):
     """One step back, or forward again."""
 
-    type: Literal["undo", "redo"]
+    kind: Literal["undo", "redo"]
 
 
 class SaveMessage(_FromPage):
     """Write the file."""
 
-    type: Literal["save"]
+    kind: Literal["save"]
     force: bool = False
 
 
 class LayoutMessage(_FromPage):
     """Where states are drawn; `settled`: by the page, which is nothing to undo."""
 
-    type: Literal["layout"]
+    kind: Literal["layout"]
     places: Annotated[dict[str, StateBox | None], Field(max_length=5000)]
     settled: bool = False
 
 
-PageMessage = EditMessage | TypeMessage | StepMessage | SaveMessage | LayoutMessage
-_ADAPTER: TypeAdapter[PageMessage] = TypeAdapter(Annotated[PageMessage, Field(discriminator="type")])
+PageMessage = Annotated[
+    EditMessage | TypeMessage | StepMessage | SaveMessage | LayoutMessage, Field(discriminator="kind")
+]
+PAGE_MESSAGE: TypeAdapter[PageMessage] = TypeAdapter(PageMessage)
 
 
-def read_message(text: str | bytes) -> PageMessage:
-    """A page's message. Raises `PageMessageError`."""
-    try:
-        return _ADAPTER.validate_json(text)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"]) or "message"
-        raise PageMessageError(f"{where}: {first['msg'][:200]}") from None
+_Span = tuple[int, int] | None
+
+
+class DrawnNode(TypedDict):
+    """A state of the diagram; see `offboard.authoring.diagram.Node`."""
+
+    id: str
+    name: str
+    parent: str
+    initial: str
+    final: bool
+    finish: bool
+    enter: list[str]
+    during: list[str]
+    exit: list[str]
+    parameters: list[tuple[str, str]]
+    template: str
+    source: str
+    span: _Span
+    name_span: NotRequired[_Span]
+
+
+class DrawnEdge(TypedDict):
+    """A transition of the diagram; see `offboard.authoring.diagram.Edge`."""
+
+    id: str
+    source: str
+    target: str
+    missing: bool
+    event: Literal["tick", "done", "resume"]
+    order: int
+    when: str
+    actions: list[str]
+    source_state: str
+    source_index: int
+    span: _Span
+    when_span: NotRequired[_Span]
+    to_span: NotRequired[_Span]
+
+
+class DrawnDiagram(TypedDict):
+    """The chart as it is flown."""
+
+    initial: str
+    readable: bool
+    nodes: list[DrawnNode]
+    edges: list[DrawnEdge]
+
+
+class ShownFinding(TypedDict):
+    """Something wrong with the mission; see `offboard.authoring.findings.Finding`."""
+
+    severity: Literal["error", "warning", "advice"]
+    code: str
+    message: str
+    spanish: NotRequired[str]
+    line: int
+    span: _Span
+    state: str
+    event: str | None
+    index: int | None
+    nodes: list[str]
+
+
+class Place(TypedDict):
+    """Where a state is drawn, pixels of the page."""
+
+    x: float
+    y: float
+
+
+class StatusMessage(TypedDict):
+    """What a page shows beside the document; only what is told has changed."""
+
+    kind: Literal["status"]
+    saved: NotRequired[bool]
+    can_undo: NotRequired[bool]
+    can_redo: NotRequired[bool]
+    others: NotRequired[int]
+    layout: NotRequired[dict[str, Place]]
+    warning: NotRequired[str]
+    answers: NotRequired[int]
+    refused: NotRequired[str]
+    code: NotRequired[str]
+
+
+class _Document(TypedDict):
+    saved: bool
+    can_undo: bool
+    can_redo: bool
+    name: str
+    revision: int
+    session: str
+    restored: bool
+    problem: str
+    diagram: DrawnDiagram
+    mission: dict[str, str]
+    variables: dict[str, str]
+    templates: list[str]
+    findings: list[ShownFinding]
+    layout: dict[str, Place]
+    catalogue: NotRequired[Catalogue]
+    answers: NotRequired[int]
+    refused: NotRequired[str]
+    code: NotRequired[str]
+    warning: NotRequired[str]
+    others: NotRequired[int]
+
+
+class DocumentMessage(_Document):
+    """The whole document; `answered`: number of the page's last message that was carried out."""
+
+    kind: Literal["document"]
+    text: str
+    answered: NotRequired[int]
+    changes: NotRequired[list[TypedChange]]
+
+
+class ChangedMessage(_Document):
+    """The document after changes of its text, each made for the text after those before it."""
+
+    kind: Literal["changed"]
+    changes: list[TypedChange]
+    text: NotRequired[str]
+    answered: NotRequired[int]
+
+
+ToPage = DocumentMessage | ChangedMessage | StatusMessage
 
 
 def document_message(opened: OpenDocument) -> dict[str, object]:
     """The whole document."""
-    return {**_state(opened), "type": "document", "text": opened.document.text}
+    return {**_state(opened), "kind": "document", "text": opened.document.text}
 
 
 def changed_message(opened: OpenDocument, before: str, changes: Sequence[Change]) -> dict[str, object]:
@@ -124,13 +243,13 @@ def changed_message(opened: OpenDocument, before: str, changes: Sequence[Change]
         removed = len(change.removed.encode("utf-16-le")) // 2
         written.append({"start": start, "removed": removed, "inserted": change.inserted})
         before = before[: change.start] + change.inserted + before[change.start + len(change.removed) :]
-    return {**_state(opened), "type": "changed", "changes": written}
+    return {**_state(opened), "kind": "changed", "changes": written}
 
 
 def status_message(opened: OpenDocument) -> dict[str, object]:
     """What a page shows beside the document."""
     return {
-        "type": "status",
+        "kind": "status",
         "saved": opened.is_saved,
         "can_undo": opened.session.can_undo,
         "can_redo": opened.session.can_redo,

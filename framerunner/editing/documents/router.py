@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
-import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -14,13 +12,13 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Body, HTTPException, Request
 from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, Response
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from framerunner.editing.documents.messages import (
+    PAGE_MESSAGE,
     EditMessage,
     LayoutMessage,
     PageMessage,
-    PageMessageError,
     SaveMessage,
     StepMessage,
     TypeMessage,
@@ -28,27 +26,26 @@ from framerunner.editing.documents.messages import (
     changed_message,
     document_message,
     places_message,
-    read_message,
     status_message,
 )
 from framerunner.editing.documents.open_document import OpenDocument
 from framerunner.editing.documents.session import EditorSession, SharedDocument
 from framerunner.editing.words import Language, Said, SaidError, language_of, reason, say
 from framerunner.errors import UserError
-from framerunner.monitor.access import REFUSED_CODE, Visitor, refuse
+from framerunner.monitor.access import Visitor
+from framerunner.monitor.channel import REFUSED_CODE, Channel, ChannelEndError, Terms, refuse
 from offboard.authoring import Change, export_scxml, import_scxml, mermaid_of, parse_edit
 from offboard.mission import list_missions
 
 _Text = Annotated[str, Body(max_length=100)]
 _Scxml = Annotated[str, Body(max_length=1_000_000)]
 _JOURNAL_PERIOD_S = 2.0
-_BAD_MESSAGE_CODE = 4400  # as HTTP's
-_MAX_QUEUE = 200
 _MAX_CLIENT = 40  # characters
-_MAX_REASON_BYTES = 120  # WebSockets allow 123
-_GONE = (WebSocketDisconnect, RuntimeError, OSError)  # sending to a page that was closed
-
-logger = logging.getLogger(__name__)
+_FROM_PAGE: Terms[PageMessage] = Terms(
+    PAGE_MESSAGE,
+    max_bytes=100_000_000,  # the server itself takes less; a text that is too long is refused in words
+    is_limited=False,  # typed text is never dropped
+)
 
 
 class DocumentsRouter:
@@ -94,7 +91,7 @@ class DocumentsRouter:
                 shared.opened.speaks_spanish |= language == "es"
                 await websocket.accept()
                 window = _Window(websocket, session, shared, client[:_MAX_CLIENT])
-                await window.serve(lambda: who(websocket).may_edit(file))
+                await window.show(lambda: who(websocket).may_edit(file))
             finally:
                 shared.leave()
 
@@ -176,52 +173,40 @@ class _Told:
     warning: Said | None = None
 
 
-class _Window:
+class _Window(Channel[PageMessage, Mapping[str, object]]):
     """A page's WebSocket; a viewer of its document."""
 
     def __init__(
         self, websocket: WebSocket, session: EditorSession, shared: SharedDocument, client: str
     ) -> None:
+        super().__init__(websocket, _FROM_PAGE)
         self.language = language_of(websocket)
-        self._websocket = websocket
         self._session = session
         self._shared = shared
         self._client = client
-        self._outbox: asyncio.Queue[str] = asyncio.Queue(_MAX_QUEUE)
-        self._is_slow = asyncio.Event()
 
-    async def serve(self, may_edit: Callable[[], bool]) -> None:
+    async def show(self, may_edit: Callable[[], bool]) -> None:
         """Receive and send until the page leaves, or its person may not edit any more."""
         shared = self._shared
         async with shared.lock:
             self.put(await self._session.work(self._first))
             shared.viewers.append(self)
         self._tell_others()
-        tasks = [
-            asyncio.create_task(each)
-            for each in (self._receive(may_edit), self._send(), self._is_slow.wait())
-        ]
-        try:
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        finally:
+
+        async def take(message: PageMessage) -> None:
+            if not may_edit():
+                raise ChannelEndError(REFUSED_CODE, say(Said("access.edit"), self.language))
+            await asyncio.shield(self._take(message))  # what has begun is carried out, whatever the page does
+
+        def left() -> None:
             shared.viewers.remove(self)
             self._tell_others()
-            for task in tasks:
-                task.cancel()
-            for failure in await asyncio.gather(*tasks, return_exceptions=True):
-                if isinstance(failure, Exception):
-                    logger.error("an editor's WebSocket failed", exc_info=failure)
 
-    def put(self, line: str) -> None:
-        """Queue a message; a page that does not keep up is disconnected, and connects again."""
-        try:
-            self._outbox.put_nowait(line)
-        except asyncio.QueueFull:
-            self._is_slow.set()
+        await self.serve(take, left=left)
 
     def warn(self, what: Said) -> None:
         """Tell the person something."""
-        self.put(_json({"type": "status", "warning": say(what, self.language)}))
+        self.put(_json({"kind": "status", "warning": say(what, self.language)}))
 
     def _first(self) -> str:
         """The whole document. A new page is told of what is not saved; one that was here knows."""
@@ -231,28 +216,6 @@ class _Window:
         if not answered:
             message["restored"] = not opened.is_saved and not shared.viewers
         return _json({**message, "answered": answered, "catalogue": catalogue_message(opened)})
-
-    async def _send(self) -> None:
-        with contextlib.suppress(*_GONE):
-            while True:
-                await self._websocket.send_text(await self._outbox.get())
-
-    async def _receive(self, may_edit: Callable[[], bool]) -> None:
-        while True:
-            received = await self._websocket.receive()
-            if received["type"] == "websocket.disconnect":
-                return
-            if not may_edit():
-                await self._websocket.close(REFUSED_CODE, say(Said("access.edit"), self.language))
-                return
-            try:
-                message = read_message(received.get("text") or received.get("bytes") or "")
-            except PageMessageError as error:
-                why = str(error).encode()[:_MAX_REASON_BYTES].decode(errors="ignore")
-                with contextlib.suppress(*_GONE):
-                    await self._websocket.close(_BAD_MESSAGE_CODE, why)
-                return
-            await asyncio.shield(self._take(message))  # what has begun is carried out, whatever the page does
 
     async def _take(self, message: PageMessage) -> None:
         """Do what a page asks for, tell all pages, and answer."""
@@ -302,7 +265,7 @@ class _Window:
     def _tell_others(self) -> None:
         others = len(self._shared.viewers) - 1
         for viewer in self._shared.viewers:
-            viewer.put(_json({"type": "status", "others": others}))
+            viewer.put(_json({"kind": "status", "others": others}))
 
 
 def _json(message: dict[str, object]) -> str:
@@ -316,7 +279,7 @@ def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[Change]:
     if isinstance(message, TypeMessage):
         return _type(opened, message)
     if isinstance(message, StepMessage):
-        return opened.undo() if message.type == "undo" else opened.redo()
+        return opened.undo() if message.kind == "undo" else opened.redo()
     if isinstance(message, LayoutMessage):
         opened.place(dict(message.places), settled=message.settled)
     return ()

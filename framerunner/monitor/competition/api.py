@@ -5,7 +5,6 @@ Everybody may read; judges may write on tries, organisers on all.
 
 from __future__ import annotations
 
-import asyncio
 import json
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +12,14 @@ from fastapi import APIRouter, FastAPI, HTTPException, Request, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel
 from sqlalchemy.exc import SQLAlchemyError
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from framerunner.monitor.addresses import Places, client_address
+from framerunner.monitor.channel import TRY_LATER_CODE, Channel, Terms, close
 from framerunner.monitor.competition.calls import Entry
 from framerunner.monitor.competition.database import DatabaseError
 from framerunner.monitor.competition.rules import Correction, Rule
-from framerunner.monitor.competition.service import CompetitionService, Message
+from framerunner.monitor.competition.service import CompetitionService
 from framerunner.monitor.competition.validation import (
     DrawForm,
     Form,
@@ -37,6 +37,7 @@ from framerunner.monitor.competition.validation import (
     shown,
 )
 from framerunner.monitor.competition.views import (
+    Message,
     RankingStateView,
     RankingView,
     StateView,
@@ -55,7 +56,6 @@ MAX_BODY_BYTES = 65_536
 MAX_WATCHERS = 300
 MAX_WATCHERS_PER_ADDRESS = 90
 _MAX_ID = 2**31 - 1  # of a database's integer
-_TRY_AGAIN_LATER = 1013  # status code of a WebSocket
 
 
 def register(monitor: Monitor) -> None:
@@ -274,40 +274,19 @@ def _add_channel(web: FastAPI, service: CompetitionService) -> None:
         await websocket.accept()
         address = client_address(websocket.scope)
         if places.take(address):
-            await websocket.close(_TRY_AGAIN_LATER, "too many are watching")
+            await close(websocket, TRY_LATER_CODE, "too many are watching")
             return
-        try:
-            await _serve_watcher(service, websocket)
-        finally:
+        channel: Channel[None, Message] = Channel(websocket, Terms(None))
+
+        def put(message: Message) -> None:
+            channel.send(message, newest_of=message.kind)
+
+        unsubscribe = service.subscribe(put)
+        for message in service.messages():
+            put(message)
+
+        def left() -> None:
+            unsubscribe()
             places.give_back(address)
 
-
-async def _serve_watcher(service: CompetitionService, websocket: WebSocket) -> None:
-    """Send a page the newest message of each kind, until it is gone."""
-    newest: dict[str, str] = {}
-    arrived = asyncio.Event()
-
-    def put(message: Message) -> None:
-        newest[message["kind"]] = json.dumps(message)
-        arrived.set()
-
-    async def send() -> None:
-        while True:
-            await arrived.wait()
-            arrived.clear()
-            while newest:
-                await websocket.send_text(newest.pop(next(iter(newest))))
-
-    unsubscribe = service.subscribe(put)
-    for message in service.messages():
-        put(message)
-    sending = asyncio.create_task(send())
-    try:
-        while (await websocket.receive())["type"] != "websocket.disconnect":
-            pass  # nothing is expected of a page
-    except (WebSocketDisconnect, RuntimeError):
-        pass
-    finally:
-        unsubscribe()
-        sending.cancel()
-        await asyncio.gather(sending, return_exceptions=True)
+        await channel.serve(left=left)

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from datetime import UTC, datetime
 from random import Random, SystemRandom
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -21,7 +21,13 @@ from framerunner.monitor.competition.database import Database, DatabaseError
 from framerunner.monitor.competition.rules import TryScore, read_report
 from framerunner.monitor.competition.store import Store
 from framerunner.monitor.competition.validation import RefusedError, shown
-from framerunner.monitor.competition.views import Board, RunningView
+from framerunner.monitor.competition.views import (
+    Board,
+    ChangedMessage,
+    Message,
+    RunningMessage,
+    RunningView,
+)
 from framerunner.monitor.vehicle.tries import TryEvent
 from scenarios.models import COLOURS
 
@@ -29,7 +35,6 @@ if TYPE_CHECKING:
     from framerunner.monitor.ports import Equipment
 
 Answer = TypeVar("Answer")
-Message = dict[str, Any]
 
 _ANSWER_S = 15.0
 _RETRY_S = 1.0
@@ -118,8 +123,7 @@ class CompetitionService:
         """Notify a listener of changes.
 
         Args:
-            listener: called on the loop with {"kind": "changed", "version", "problem"} or
-                {"kind": "running", "tries"}; must not block.
+            listener: called on the loop with each message; must not block.
 
         Returns:
             Ends it.
@@ -131,8 +135,8 @@ class CompetitionService:
         """The present state as messages: "changed", then "running"."""
         version = self._board.version if self._board is not None else 0
         return [
-            {"kind": "changed", "version": version, "problem": self.problem},
-            {"kind": "running", "tries": [view.model_dump() for view in self.running]},
+            ChangedMessage(version=version, problem=self.problem),
+            RunningMessage(tries=self.running),
         ]
 
     def on_try_event(self, event: TryEvent) -> None:

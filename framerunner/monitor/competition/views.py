@@ -208,6 +208,24 @@ class RunningView(View):
     try_time_s: float
 
 
+class ChangedMessage(View):
+    """The contest changed; pages then request what they show."""
+
+    kind: Literal["changed"] = "changed"
+    version: int
+    problem: str = Field(description='what is wrong with the database; "" while it works')
+
+
+class RunningMessage(View):
+    """The tries that are being flown."""
+
+    kind: Literal["running"] = "running"
+    tries: tuple[RunningView, ...]
+
+
+Message = ChangedMessage | RunningMessage
+
+
 class Board(View):
     """The whole contest as of one moment."""
 

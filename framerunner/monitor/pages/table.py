@@ -71,9 +71,9 @@ PAGES = (
     Page(
         "/pilot",
         "Pilot",
-        "pilot",
+        "manual",
         lambda _monitor, _request, visitor: {"mayFly": visitor.may_fly},
-        root_classes="pilot",
+        root_classes="manual",
     ),
     Page(
         "/operator",

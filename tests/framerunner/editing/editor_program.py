@@ -11,9 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _START = "from framerunner.cli import main; main()"
-_NO_SPARES = (
-    "from framerunner.editing.worker_pool import WorkerPool; WorkerPool.prepare = lambda pool: None; "
-)
+_NO_SPARES = "from framerunner.editing.workers import WorkerPool; WorkerPool.prepare = lambda pool: None; "
 
 
 @dataclass

@@ -26,14 +26,14 @@ class Socket:
 
     def receive(self, kind):
         """The next message of a type."""
-        while (message := self._socket.receive_json())["type"] != kind:
+        while (message := self._socket.receive_json())["kind"] != kind:
             pass
         return message
 
     def ask(self, kind, **fields):
         """Ask for something; the answer."""
         self._number += 1
-        self._socket.send_json({"type": kind, "number": self._number, **fields})
+        self._socket.send_json({"kind": kind, "number": self._number, **fields})
         while (message := self._socket.receive_json()).get("answers") != self._number:
             pass
         return message

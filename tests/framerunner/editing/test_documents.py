@@ -175,12 +175,12 @@ def test_a_file_that_is_not_there_closes_with_one_line(path, name):
     [
         "no JSON",
         "[]",
-        '{"type": "run", "number": 1}',
-        '{"type": "edit", "number": -1, "edit": {}}',
-        '{"type": "save", "number": 1, "path": "/etc/passwd"}',
-        '{"type": "layout", "number": 1, "places": {"up": {"x": "left", "y": 0}}}',
+        '{"kind": "run", "number": 1}',
+        '{"kind": "edit", "number": -1, "edit": {}}',
+        '{"kind": "save", "number": 1, "path": "/etc/passwd"}',
+        '{"kind": "layout", "number": 1, "places": {"up": {"x": "left", "y": 0}}}',
         "[" * 100_000,
-        '{"type": "edit", "number": 1, "edit": ' + '{"a": ' * 100_000,
+        '{"kind": "edit", "number": 1, "edit": ' + '{"a": ' * 100_000,
     ],
     ids=lambda message: message[:40],
 )

@@ -8,6 +8,7 @@ import json
 import os
 import signal
 import time
+from concurrent.futures import CancelledError
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ from framerunner.course.lessons import find_lesson
 from framerunner.editing.service import EditingSettings
 from framerunner.editing.waiting_queue import WaitingQueue
 from framerunner.editing.web import EditingRouter
-from framerunner.editing.worker_pool import WorkerPool
+from framerunner.editing.workers import WorkerPool
 from framerunner.evaluation.runner import fly_task
 from framerunner.flying.plan import FlightPlan
 from framerunner.monitor.access import Role, Visitor
@@ -87,7 +88,7 @@ class Page:
 
     def ask(self, do, **fields):
         self._tag += 1
-        self._socket.send_text(json.dumps({"do": do, "tag": self._tag, **fields}))
+        self._socket.send_text(json.dumps({"kind": do, "tag": self._tag, **fields}))
         return self._tag
 
     def until(self, *kinds, holds=lambda message: True):
@@ -124,7 +125,8 @@ def page(*, role=Role.ORGANISER, **settings):
 
     web = FastAPI(lifespan=lifespan)
     web.include_router(router.router(lambda _: Visitor("Ada", role, "ada")))
-    with TestClient(web) as client, client.websocket_connect("/ws/editing") as socket:
+    end = contextlib.suppress(CancelledError)  # of the endpoint, when the test is over
+    with TestClient(web) as client, end, client.websocket_connect("/ws/editing") as socket:
         yield Page(socket)
 
 
@@ -372,12 +374,12 @@ def test_a_line_expects_turns_by_the_durations_of_those_before():
     ("message", "words"),
     [
         ("[", "Invalid JSON"),
-        ('{"do": "fly"}', "do"),
-        ('{"do": "start", "text": "x", "scenario": "../../etc/passwd", "tag": 7}', "scenario"),
-        ('{"do": "start", "text": "x", "pilot": "mine.py"}', "pilot"),
-        ('{"do": "start", "text": "x", "speed": 0}', "speed"),
-        ('{"do": "step", "run": "nothing", "ticks": 2}', "'nothing': there is no such flight"),
-        ('{"do": "start_batch", "text": "x", "count": 100000}', "count"),
+        ('{"kind": "fly"}', "kind"),
+        ('{"kind": "start", "text": "x", "scenario": "../../etc/passwd", "tag": 7}', "scenario"),
+        ('{"kind": "start", "text": "x", "pilot": "mine.py"}', "pilot"),
+        ('{"kind": "start", "text": "x", "speed": 0}', "speed"),
+        ('{"kind": "step", "run": "nothing", "ticks": 2}', "'nothing': there is no such flight"),
+        ('{"kind": "start_batch", "text": "x", "count": 100000}', "count"),
     ],
 )
 def test_a_message_that_cannot_be_understood_is_refused_in_one_line(message, words):

@@ -37,7 +37,7 @@ async def test_an_extension_is_served_and_told_who_may_act(monkeypatch, bind, ma
     adder, equipment = Adder(), module.equipment
     monkeypatch.setattr(module, "equipment", lambda: replace(equipment(), extensions=(adder,)))
     async with (
-        serving(monkeypatch, "framerunner.monitor.extensions", bind=bind) as served,
+        serving(monkeypatch, bind=bind) as served,
         browser() as client,
         client.get(f"http://127.0.0.1:{served.port}/api/added") as answer,
     ):
@@ -48,9 +48,9 @@ async def test_an_extension_is_served_and_told_who_may_act(monkeypatch, bind, ma
 async def test_the_monitor_has_the_editor_s_flights(monkeypatch, tmp_path):
     given = real_equipment("udpin://127.0.0.1:0", None, tmp_path)
     monkeypatch.setattr(module, "equipment", lambda: given)
-    async with serving(monkeypatch, "framerunner.monitor.extensions") as served, browser() as client:
+    async with serving(monkeypatch) as served, browser() as client:
         async with client.get(f"{served.url}api/editing/choices") as answer:
             assert "test-case-1" in (await answer.json())["scenarios"]
         async with client.ws_connect(f"{served.url}ws/editing") as socket:
-            await socket.send_json({"do": "watch", "run": "none", "tag": 3})
+            await socket.send_json({"kind": "watch", "run": "none", "tag": 3})
             assert (await socket.receive_json())["tag"] == 3

@@ -6,7 +6,10 @@ import re
 from math import hypot
 
 import pytest
+from pydantic import TypeAdapter
 
+from framerunner.monitor.live_channel import encode
+from framerunner.monitor.live_messages import LiveMessage
 from framerunner.monitor.vehicle.commands import Sticks
 from scenarios.loader import load_scenario
 from tests.framerunner.monitor.simulated_link import SimulatedLink, all_finite, equipment, served_link
@@ -186,6 +189,8 @@ async def test_a_late_watcher_gets_the_history():
         assert times == sorted(set(times))
         assert max(heights) - min(heights) > 0.3
         assert kinds[-1] == "status"
+        for message in (*watched.fleet.welcome(), watched.fleet.pose_message()):
+            TypeAdapter(LiveMessage).validate_json(encode(message), extra="forbid")
 
 
 async def test_a_link_that_fails_is_opened_again(link):

@@ -6,9 +6,11 @@ import random
 import struct
 
 import pytest
+from pydantic import TypeAdapter
 from pymavlink.generator.mavcrc import x25crc
 
 from framerunner.monitor.fleet import Fleet
+from framerunner.monitor.live_messages import LiveMessage
 from framerunner.wire.dialect import mavlink
 from scenarios.loader import load_scenario
 from tests.framerunner.monitor.simulated_link import SimulatedLink, all_finite, equipment
@@ -61,6 +63,9 @@ def parsed(data):
     return parser.parse_buffer(data) or []
 
 
+MESSAGE = TypeAdapter(LiveMessage)  # what the pages' scripts are checked with
+
+
 @pytest.mark.parametrize("seed", range(4))
 async def test_no_sequence_of_messages_causes_a_fault(seed):
     chance = random.Random(seed)
@@ -83,6 +88,8 @@ async def test_no_sequence_of_messages_causes_a_fault(seed):
         everything = [fleet.pose_message(), fleet.status_message(), *fleet.welcome(), *told]
         assert all_finite(everything)
         json.dumps(everything, allow_nan=False)
+        for message in everything:
+            MESSAGE.validate_json(json.dumps(message), extra="forbid")
         told.clear()
     assert fleet.faults == 0
     for vehicle in fleet._vehicles.values():

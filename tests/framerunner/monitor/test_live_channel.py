@@ -1,12 +1,18 @@
 import asyncio
 import json
 import math
+from types import SimpleNamespace
 
 import pytest
 
 from framerunner.monitor import FIRST_VIEWER
+from framerunner.monitor.channel import ChannelEndError
 from framerunner.monitor.live_channel import MAX_PENDING, LiveChannel, Viewer, encode
 from tests.framerunner.monitor.serving import StubFleet, browser, serving
+
+
+def viewer_of(kinds=()):
+    return Viewer(SimpleNamespace(scope={}), kinds)
 
 
 def kinds(viewer):
@@ -29,7 +35,7 @@ def test_numbers_are_rounded_and_finite():
 
 async def test_the_welcome_comes_first_and_events_before_poses():
     fleet = StubFleet()
-    channel, viewer = LiveChannel(fleet), Viewer()
+    channel, viewer = LiveChannel(fleet), viewer_of()
     channel.enter(viewer)
     channel.send(fleet.pose_message())
     channel.send({"kind": "text", "id": 1, "text": "hello"})
@@ -38,7 +44,7 @@ async def test_the_welcome_comes_first_and_events_before_poses():
 
 async def test_only_the_newest_pose_waits_and_each_drone_has_its_own_detections():
     fleet = StubFleet()
-    channel, viewer = LiveChannel(fleet), Viewer(["pose", "detections"])
+    channel, viewer = LiveChannel(fleet), viewer_of(["pose", "detections"])
     channel.enter(viewer)
     for _ in range(100):
         channel.send(fleet.pose_message())
@@ -49,13 +55,14 @@ async def test_only_the_newest_pose_waits_and_each_drone_has_its_own_detections(
 
 
 async def test_a_viewer_with_too_many_waiting_events_is_dropped():
-    channel, slow, other = LiveChannel(StubFleet()), Viewer(["text"]), Viewer(["text"])
+    channel, slow, other = LiveChannel(StubFleet()), viewer_of(["text"]), viewer_of(["text"])
     channel.enter(slow)
     channel.enter(other)
     for number in range(MAX_PENDING + 1):
         channel.send({"kind": "text", "id": 1, "text": str(number)})
         assert json.loads(await other.next())["text"] == str(number)
-    assert await slow.next() is None
+    with pytest.raises(ChannelEndError, match="does not keep up"):
+        await slow.next()
 
 
 async def test_no_poses_are_made_without_viewers(monkeypatch):
@@ -167,7 +174,7 @@ async def test_a_late_viewer_gets_the_history_and_the_next_one_its_new_samples()
     channel = LiveChannel(fleet)
     for rows in ([[0.1, 1.0, None]], [[0.1, 1.0, None], [0.2, 2.0, None]], []):
         welcome["poses"] = rows
-        viewer, other = Viewer(["history"]), Viewer(["pose"])
+        viewer, other = viewer_of(["history"]), viewer_of(["pose"])
         channel.enter(viewer)
         channel.enter(other)
         assert json.loads(await viewer.next())["poses"] == rows

@@ -354,18 +354,8 @@ async def test_without_webgl_the_arena_is_shown_from_above(chromium, fake):
     page, complaints = await visit(chromium, fake, script=WITHOUT_WEBGL)
     await expect(page.locator(".m-arena-words")).to_contain_text("from above")
     await fake.say("pose", drones=[pose(p=[4.0, 4.0, 1.0])])
-    # The drone's dark arrow comes to stand on the floor's gold.
-    await until(
-        page,
-        """() => {
-          const canvas = document.querySelector(".m-topview");
-          const {width, height} = canvas;
-          const pixels = canvas.getContext("2d").getImageData(width / 2, 0, width / 2, height / 2).data;
-          for (let index = 0; index < pixels.length; index += 4)
-            if (pixels[index + 3] === 255 && pixels[index] === 28 && pixels[index + 1] === 39) return true;
-          return false;
-        }""",
-    )
+    await expect(page.locator(".m-topview .t-drone")).to_have_count(1)
+    await expect(page.locator(".m-topview .t-height")).to_have_text("1.0 m")
     assert complaints == []
 
 
@@ -397,19 +387,6 @@ def reported_map():
     return message
 
 
-# Pixels of a colour in the picture of the arena from above, in its upper left quarter.
-COUNT_PIXELS = """(colour) => {
-  const canvas = document.querySelector(".m-topview");
-  const { width, height } = canvas;
-  const pixels = canvas.getContext("2d").getImageData(0, 0, width / 2 - 30, height / 2 - 20).data;
-  let count = 0;
-  for (let index = 0; index < pixels.length; index += 4)
-    if (colour.every((value, channel) => Math.abs(pixels[index + channel] - value) < 12)) count += 1;
-  return count;
-}"""
-PURE_RED, PALE_RED, PATH = [255, 0, 0], [233, 132, 42], [179, 0, 125]
-
-
 async def test_the_navigators_map_is_drawn_from_above_and_can_be_switched_off(chromium, fake):
     scenario = world()["scenario"] | {"frames": []}
     fake.welcome = [world(scenario=scenario), chart(), {"kind": "status", "drones": [status()]}]
@@ -421,10 +398,13 @@ async def test_the_navigators_map_is_drawn_from_above_and_can_be_switched_off(ch
     await fake.say(**message)
     await expect(page.locator(".m-arena")).to_have_attribute("data-mapped", "red constructor")
     await expect(goal).to_have_text(f"navigator: {MARKUP}")
-    for colour, least in ((PURE_RED, 20), (PALE_RED, 300), (PATH, 30)):
-        await until(page, f"(colour) => ({COUNT_PIXELS})(colour) >= {least}", arg=colour)
+    mapped, path = page.locator(".m-topview [data-mapped]"), page.locator(".m-topview .t-path")
+    assert [await each.get_attribute("stroke") for each in await mapped.all()] == ["#ff0000", "#7a7a7a"]
+    await expect(mapped.locator("ellipse")).to_have_count(1)
+    assert len((await path.get_attribute("points")).split()) == 2
     await button.click()
-    await until(page, f"(colour) => ({COUNT_PIXELS})(colour) === 0", arg=PATH)
+    await expect(path).to_have_count(0)
+    await expect(mapped).to_have_count(0)
     await expect(goal).to_be_hidden()
     await button.click()
     await expect(goal).to_be_visible()

@@ -5,10 +5,10 @@ from contextlib import suppress
 
 import pytest
 
-from framerunner.monitor.manual_control import NEUTRAL, Browser, Clock, Control, Order
-from framerunner.monitor.pilot_channel import ManualControls
+from framerunner.monitor.manual_channel import ManualControls
+from framerunner.monitor.manual_control import NEUTRAL, Browser, Clock, Control, ControlMessage, Order
 from framerunner.monitor.vehicle.commands import Sticks
-from tests.framerunner.monitor.pilot_fakes import MISSION, FakeFleet
+from tests.framerunner.monitor.manual_fakes import MISSION, FakeFleet
 
 FORWARD = Sticks(0.5, 0.0, 0.0, 0.0)
 
@@ -66,7 +66,9 @@ class Game:
             await self.settle()
 
     async def order(self, browser, what, number=1, confirmed=False, streaming=True):
-        task = asyncio.create_task(self.controls.do(browser, Order(number, what, confirmed)))
+        task = asyncio.create_task(
+            self.controls.do(browser, Order(id=number, what=what, confirmed=confirmed))
+        )
         for _ in range(40):
             await self.settle()
             if task.done():
@@ -94,7 +96,7 @@ async def game():
 
 async def test_taking_sends_neutral_sticks_before_it_requests_position_mode(game):
     ana = game.browser("Ana")
-    task = asyncio.create_task(game.controls.do(ana, Order(1, "take")))
+    task = asyncio.create_task(game.controls.do(ana, Order(id=1, what="take")))
     await game.pass_time(0.3, ana, FORWARD)
     assert game.fleet.orders == []
     assert game.fleet.sent and all(sticks == NEUTRAL for _, sticks in game.fleet.sent)
@@ -119,8 +121,8 @@ async def test_every_browser_is_told_who_has_the_sticks(game):
     ana, _ben = game.browser("Ana"), game.browser("Ben")
     await game.take(ana)
     mine, theirs = game.told["Ana"][-1], game.told["Ben"][-1]
-    assert mine == {"kind": "seat", "id": 1, "pilot": "Ana", "yours": True, "flying": True}
-    assert theirs == {"kind": "seat", "id": 1, "pilot": "Ana", "yours": False, "flying": True}
+    assert mine == ControlMessage(id=1, holder="Ana", yours=True, flying=True)
+    assert theirs == ControlMessage(id=1, holder="Ana", yours=False, flying=True)
 
 
 async def test_a_refusal_has_the_vehicle_s_reason_and_frees_the_seat(game):
@@ -154,7 +156,7 @@ async def test_sticks_after_silence_are_not_sent(game):
     await game.pass_time(0.6)
     await game.pass_time(0.2, ana, FORWARD)
     assert game.last_sticks() == NEUTRAL
-    assert game.told["Ana"][-1]["yours"] and not game.told["Ana"][-1]["flying"]
+    assert game.told["Ana"][-1].yours and not game.told["Ana"][-1].flying
     await game.take(ana)
     game.controls.sticks(ana, FORWARD)
     assert game.last_sticks() == FORWARD
@@ -195,7 +197,7 @@ async def test_silence_does_not_interrupt_a_failsafe(game):
 async def test_the_drone_holds_when_the_page_is_closed_while_it_takes_the_sticks(game):
     ana = game.browser("Ana")
     game.fleet.gates["position"] = asyncio.Event()
-    task = asyncio.create_task(game.controls.do(ana, Order(1, "take")))
+    task = asyncio.create_task(game.controls.do(ana, Order(id=1, what="take")))
     await game.pass_time(0.5, ana)
     assert game.fleet.orders == ["position"]
     game.controls.remove(ana)
@@ -247,7 +249,7 @@ async def test_closing_the_page_does_not_interrupt_giving_back(game):
     await game.take(ana)
     game.fleet.status[1]["mission"] = MISSION
     game.fleet.gates["offboard"] = asyncio.Event()
-    task = asyncio.create_task(game.controls.do(ana, Order(1, "give")))
+    task = asyncio.create_task(game.controls.do(ana, Order(id=1, what="give")))
     await game.settle()
     game.controls.remove(ana)
     game.fleet.gates["offboard"].set()
@@ -291,7 +293,7 @@ async def test_a_judge_takes_the_sticks_at_any_time_and_the_pilot_is_told(game):
     await game.pass_time(0.1, ana, FORWARD)
     await game.take(judge)
     assert game.control().holder is judge and game.last_sticks() == NEUTRAL
-    assert not game.told["Ana"][-1]["yours"]
+    assert not game.told["Ana"][-1].yours
     assert (1, "warning", "Judge took the sticks of drone 1 from Ana") in game.fleet.notices
 
 
@@ -311,7 +313,7 @@ async def test_stopping_the_motors_needs_confirmation_and_does_not_wait(game):
     answer = await game.order(ana, "stop_motors")
     assert not answer.ok and "confirmed" in answer.text and game.fleet.orders == []
     game.fleet.gates["arm"] = asyncio.Event()
-    waiting = asyncio.create_task(game.controls.do(ana, Order(1, "arm")))
+    waiting = asyncio.create_task(game.controls.do(ana, Order(id=1, what="arm")))
     await game.settle()
     assert (await game.order(ana, "stop_motors", confirmed=True)).ok
     assert game.fleet.orders == ["arm", "stop_motors"]
@@ -321,7 +323,7 @@ async def test_stopping_the_motors_needs_confirmation_and_does_not_wait(game):
 async def test_hold_replaces_the_present_order_and_others_wait(game):
     ana = game.browser("Ana")
     game.fleet.gates["position"] = asyncio.Event()
-    taking = asyncio.create_task(game.controls.do(ana, Order(1, "take")))
+    taking = asyncio.create_task(game.controls.do(ana, Order(id=1, what="take")))
     await game.pass_time(0.5, ana)
     answer = await game.order(ana, "arm")
     assert not answer.ok and answer.text == "drone 1 has not answered to take yet"
@@ -394,7 +396,7 @@ async def test_the_watch_runs_by_itself_while_a_browser_is_there():
     ana = Browser("Ana", False, told.append)
     controls.add(ana)
     loop = asyncio.get_running_loop()
-    task = asyncio.create_task(controls.do(ana, Order(1, "take")))
+    task = asyncio.create_task(controls.do(ana, Order(id=1, what="take")))
     while not task.done():
         controls.sticks(ana, NEUTRAL)
         await asyncio.sleep(0.02)

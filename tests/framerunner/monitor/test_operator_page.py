@@ -19,7 +19,7 @@ from framerunner.preflight.operator_link import OperatorLink
 from offboard.safety.operator import Operator
 from tests.chromium import Complaints
 from tests.framerunner.monitor.serving import StubFleet
-from tests.framerunner.monitor.test_pilot_page import EQUIPMENT
+from tests.framerunner.monitor.test_manual_page import EQUIPMENT
 from tests.waiting import until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -364,7 +364,7 @@ async def test_a_socket_that_cannot_be_opened_is_told_before_any_url(tmp_path):
     assert lines == []
 
 
-@pytest.mark.parametrize("text", ["", "{}", '{"what": "arm"}', '{"what": "go", "beat": 1e99}', "x" * 600])
+@pytest.mark.parametrize("text", ["", "{}", '{"kind": "arm"}', '{"kind": "go", "beat": 1e99}', "x" * 600])
 async def test_what_no_page_sends_ends_the_connection(tmp_path, text):
     operator = Operator()
     async with (

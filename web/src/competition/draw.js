@@ -5,20 +5,21 @@ import { moment, nameOf } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 
 export class Draw {
-  #desk;
+  #page;
   #drawn = make("div", { class: "drawn" });
   #pool = make("div", { class: "pool" });
   #count = make("input", { id: "draw-count", type: "number", min: "1", max: "10", inputmode: "numeric" });
   #other = make("input", { id: "draw-other", maxlength: "80", autocomplete: "off", spellcheck: "false" });
   #flown = false;
+  /** @type {string[]|null} */
   #known = null;
 
-  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} desk */
-  constructor(desk) {
-    this.#desk = desk;
+  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} page */
+  constructor(page) {
+    this.#page = page;
     this.element = make("section", { class: "panel", "aria-labelledby": "draw-title" },
       make("h2", { id: "draw-title" }, "Scenarios of the round"), this.#drawn);
-    if (desk.judge) this.element.append(this.#form());
+    if (page.judge) this.element.append(this.#form());
   }
 
   #form() {
@@ -44,7 +45,7 @@ export class Draw {
 
   #add() {
     const name = this.#other.value.trim();
-    return this.#desk.attempt(async () => {
+    return this.#page.attempt(async () => {
       await send("pool", { scenario: name });
       const known = /** @type {HTMLInputElement|null} */ (this.#pool.querySelector(`[value="${CSS.escape(name)}"]`));
       if (known) known.checked = true;
@@ -63,7 +64,7 @@ export class Draw {
     const ticked = [.../** @type {NodeListOf<HTMLInputElement>} */ (this.#pool.querySelectorAll("input:checked"))].map((box) => box.value);
     const question = "Tries were flown in this round. Draw for the next round? The tries stay in theirs.";
     if (this.#flown && !confirm(question)) return;
-    this.#desk.attempt(() => send("draw", { pool: ticked, count: Number(this.#count.value) }));
+    this.#page.attempt(() => send("draw", { pool: ticked, count: Number(this.#count.value) }));
   }
 
   /** @param {object} board @param {string[]} scenarios that can be drawn */
@@ -81,7 +82,7 @@ export class Draw {
           ` at ${moment(draw.at)} from ${draw.pool.length}.`),
         make("ol", {}, ...items));
     }
-    if (this.#known === null && this.#desk.judge) {
+    if (this.#known === null && this.#page.judge) {
       for (const name of scenarios) this.#tick(name, true);
       this.#count.value = String(board.rule.scenarios);
       this.#known = scenarios;
@@ -90,18 +91,18 @@ export class Draw {
 }
 
 export class Rule {
-  #desk;
+  #page;
   #words = make("p");
   #set = make("p", { class: "hint" });
   #fields = {};
   #shown = "";
 
-  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} desk */
-  constructor(desk) {
-    this.#desk = desk;
+  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} page */
+  constructor(page) {
+    this.#page = page;
     this.element = make("section", { class: "panel", "aria-labelledby": "rule-title" },
       make("h2", { id: "rule-title" }, "Rule"), this.#words, this.#set);
-    if (desk.judge) this.element.append(this.#form());
+    if (page.judge) this.element.append(this.#form());
   }
 
   #form() {
@@ -121,7 +122,7 @@ export class Rule {
       make("div", { class: "buttons" }, make("button", { type: "submit", class: "main" }, "Set")));
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      this.#desk.attempt(() => send("settings", {
+      this.#page.attempt(() => send("settings", {
         limit_s: Number(this.#fields["rule-limit"].value),
         missing_frame_s: Number(this.#fields["rule-missing"].value),
         scenarios: Number(this.#fields["rule-scenarios"].value),
@@ -138,7 +139,7 @@ export class Rule {
       + `counts ${rule.limit_s} s and ${rule.missing_frame_s} s for each frame missing; a scenario not flown counts `
       + `as if all were. Of several tries the ${rule.counting} counts.`);
     this.#set.replaceChildren(...(rule.at === null ? [] : ["Set by ", nameOf(rule.who), ` at ${moment(rule.at)}.`]));
-    if (!this.#desk.judge || this.#shown === JSON.stringify(rule)) return; // somebody may be typing
+    if (!this.#page.judge || this.#shown === JSON.stringify(rule)) return; // somebody may be typing
     this.#shown = JSON.stringify(rule);
     this.#fields["rule-limit"].value = rule.limit_s;
     this.#fields["rule-missing"].value = rule.missing_frame_s;

@@ -1,4 +1,4 @@
-/** The desk of a contest: who flies and who is next, teams, draw, tries, rule. Organisers have controls, judges correct tries; all others look. */
+/** The page of a contest: who flies and who is next, teams, draw, tries, rule. Organisers have controls, judges correct tries; all others look. */
 
 import "../lib/contest/contest.css";
 import { ask, oneAtATime, watch } from "../lib/contest/channel.js";
@@ -8,11 +8,13 @@ import { Teams } from "./teams.js";
 import { frameMarks, moment, nameOf, notCounted, orDash, seconds, standing } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
+import { reasonOf } from "../lib/request.js";
 
 class Desk {
   #line = make("p", { class: "line", role: "status", hidden: true });
   #tries = make("tbody");
   #none = make("p", { class: "hint" }, "No try has been flown. Each flight is one: ", make("code", {}, "framerunner fly test-case-1"));
+  /** @type {any} */
   #board = null;
   #clocks = new Map();
 
@@ -26,11 +28,11 @@ class Desk {
     this.rule = new Rule(this);
     element.append(
       make("div", { class: "bar" }, make("h1", {}, "Competition"), exports()), this.#line,
-      make("div", { class: "desk" },
+      make("div", { class: "contest" },
         make("div", { class: "column" }, this.calls.element, this.queue.element, this.#triesPanel()),
         make("div", { class: "column" }, this.draw.element, this.teams.element, this.rule.element)),
     );
-    this.refresh = oneAtATime(() => this.#load(), (error) => this.say(error.message));
+    this.refresh = oneAtATime(() => this.#load(), (error) => this.say(reasonOf(error)));
     watch({
       changed: this.refresh,
       running: (tries) => this.#run(tries),
@@ -49,7 +51,7 @@ class Desk {
     try {
       await work();
     } catch (error) {
-      this.say(error.message);
+      this.say(reasonOf(error));
       this.#line.scrollIntoView({ block: "nearest" });
       return false;
     }
@@ -84,7 +86,7 @@ class Desk {
 
   #showTries(tries) {
     this.#none.hidden = tries.length > 0;
-    this.#tries.parentElement.hidden = tries.length === 0;
+    /** @type {HTMLElement} */ (this.#tries.parentElement).hidden = tries.length === 0;
     this.#clocks.clear();
     this.#tries.replaceChildren(...tries.map((each) => this.#row(each)));
   }

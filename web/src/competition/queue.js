@@ -7,21 +7,22 @@ import { make, setText } from "../lib/dom.js";
 
 /** "Now and next": who flies, who is called, and an organiser's form to call a team. */
 export class Calls {
-  #desk;
+  #page;
   #now = make("div", { class: "now" });
   #form = make("form", { class: "call" });
   #team = make("select", { id: "next-team" });
   #scenario = make("select", { id: "next-scenario" });
   #call = make("button", { type: "submit", class: "main" }, "Call");
   #undo = make("button", { type: "button", id: "undo-call" });
+  /** @type {any} */
   #board = null;
 
-  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} desk */
-  constructor(desk) {
-    this.#desk = desk;
+  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} page */
+  constructor(page) {
+    this.#page = page;
     this.element = make("section", { class: "panel", "aria-labelledby": "next-title" },
       make("h2", { id: "next-title" }, "Now and next"), this.#now);
-    if (!desk.judge) return;
+    if (!page.judge) return;
     this.#form.append(
       make("label", { for: "next-team" }, "Team"), this.#team,
       make("label", { for: "next-scenario" }, "Scenario"), this.#scenario,
@@ -44,14 +45,14 @@ export class Calls {
   #callTeam() {
     const team = this.#chosen;
     if (team === null) {
-      this.#desk.say("the queue is empty and no team is chosen; choose one, or fill the queue with Add all teams");
+      this.#page.say("the queue is empty and no team is chosen; choose one, or fill the queue with Add all teams");
       return;
     }
     const called = this.#board.called;
     const question = `${called?.team_name} is called and has not flown. Call ${team.name} in its place?`;
     if (isWaiting(called) && called.team !== team.id && !confirm(question)) return;
     const form = { team: team.id, scenario: this.#scenario.value };
-    this.#desk.attempt(async () => {
+    this.#page.attempt(async () => {
       await send("next", form);
       this.#team.value = "";
     });
@@ -63,13 +64,13 @@ export class Calls {
     const question = `${call.tries.length === 1 ? `Try ${tries} was` : `Tries ${tries} were`} flown on this call and `
       + `would be nobody's: it would not count for ${call.team_name}. Take the call back?`;
     if (call.tries.length > 0 && !confirm(question)) return;
-    this.#desk.attempt(() => send("next/undo", { call: call.id }));
+    this.#page.attempt(() => send("next/undo", { call: call.id }));
   }
 
   /** @param {object} board */
   show(board) {
     this.#board = board;
-    if (!this.#desk.judge) return;
+    if (!this.#page.judge) return;
     const draw = board.draws.find((each) => each.round === board.round);
     const teams = board.teams.filter((team) => !team.withdrawn);
     const first = board.queue.teams[0];
@@ -95,7 +96,7 @@ export class Calls {
     if (called === null) {
       lines.push(make("p", { class: "hint" },
         "No team is called: a try that begins now has no team until a judge assigns it. ",
-        this.#desk.judge ? "Call one here." : "Organisers call one after their log-in."));
+        this.#page.judge ? "Call one here." : "Organisers call one after their log-in."));
     }
     this.#now.replaceChildren(...lines);
   }
@@ -113,20 +114,21 @@ function offer(select, options) {
 
 /** The queue: everybody sees the order, organisers change it. */
 export class Queue {
-  #desk;
+  #page;
   #list = make("ol", { class: "queue" });
   #count = make("span", { class: "count" });
   #all = make("button", { type: "button", id: "queue-all" }, "Add all teams");
   #shuffle = make("button", { type: "button", id: "queue-shuffle" }, "Shuffle");
+  /** @type {any} */
   #board = null;
   #busy = false;
 
-  /** @param {{judge: boolean, attempt: function(function(): Promise<void>): Promise<boolean>}} desk */
-  constructor(desk) {
-    this.#desk = desk;
+  /** @param {{judge: boolean, attempt: function(function(): Promise<void>): Promise<boolean>}} page */
+  constructor(page) {
+    this.#page = page;
     this.element = make("section", { class: "panel", "aria-labelledby": "queue-title" },
       make("h2", { id: "queue-title" }, "Queue ", this.#count), this.#list);
-    if (!desk.judge) return;
+    if (!page.judge) return;
     this.#all.addEventListener("click", () => this.#set([...this.#order, ...this.#absent]));
     this.#shuffle.addEventListener("click", () => this.#set(this.#order, true));
     this.element.append(make("div", { class: "buttons queue-buttons" }, this.#all, this.#shuffle));
@@ -150,7 +152,7 @@ export class Queue {
   async #set(teams, shuffle = false) {
     if (this.#busy) return; // a second click would speak of an order that is not there any more
     this.#busy = true;
-    await this.#desk.attempt(() => send("queue", { seen: this.#board.queue.number, teams, shuffle }));
+    await this.#page.attempt(() => send("queue", { seen: this.#board.queue.number, teams, shuffle }));
     this.#busy = false;
   }
 
@@ -167,7 +169,7 @@ export class Queue {
     setText(this.#count, teams.length === 0 ? "" : String(teams.length));
     this.#all.hidden = this.#absent.length === 0;
     this.#shuffle.hidden = teams.length < 2;
-    if (teams.length === 0) this.#list.replaceChildren(make("li", { class: "hint" }, this.#desk.judge ? "The queue is empty. Enter teams, then Add all teams." : "The queue is empty."));
+    if (teams.length === 0) this.#list.replaceChildren(make("li", { class: "hint" }, this.#page.judge ? "The queue is empty. Enter teams, then Add all teams." : "The queue is empty."));
     else this.#list.replaceChildren(...teams.map((each, place) => this.#row(each, place, teams.length - 1)));
   }
 
@@ -175,7 +177,7 @@ export class Queue {
     const row = make("li", { "data-queued": String(each.team) },
       make("span", { class: "who-is" }, make("span", { class: "place" }, `${place + 1}`),
         nameOf(each.team_name, { class: "name" })));
-    if (!this.#desk.judge) return row;
+    if (!this.#page.judge) return row;
     const button = (sign, words, key, to, disabled) => {
       const element = make("button", {
         type: "button", disabled, title: words, "data-key": `${key}-${each.team}`, "aria-label": `${words}: ${each.team_name}`,

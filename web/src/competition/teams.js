@@ -6,7 +6,7 @@ import { nameOf } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 
 export class Teams {
-  #desk;
+  #page;
   #list = make("ul", { class: "teams" });
   #count = make("span", { class: "count" });
   #form = make("form", { class: "fields" });
@@ -15,16 +15,17 @@ export class Teams {
   #members = make("input", { id: "team-members", maxlength: "300", autocomplete: "off", dir: "auto" });
   #save = make("button", { type: "submit", class: "main" }, "Enter");
   #cancel = make("button", { type: "button", hidden: true }, "Cancel");
+  /** @type {any} */
   #edited = null;
 
   /**
-   * @param {{judge: boolean, queue: import("./queue.js").Queue, attempt: function(function(): Promise<void>): Promise<boolean>}} desk
+   * @param {{judge: boolean, queue: import("./queue.js").Queue, attempt: function(function(): Promise<void>): Promise<boolean>}} page
    */
-  constructor(desk) {
-    this.#desk = desk;
+  constructor(page) {
+    this.#page = page;
     this.element = make("section", { class: "panel", "aria-labelledby": "teams-title" },
       make("h2", { id: "teams-title" }, "Teams ", this.#count), this.#list);
-    if (!desk.judge) return;
+    if (!page.judge) return;
     this.#form.append(this.#title,
       make("label", { for: "team-name" }, "Name"), this.#name,
       make("label", { for: "team-members" }, "Members (optional)"), this.#members,
@@ -40,7 +41,7 @@ export class Teams {
   async #store() {
     const path = this.#edited === null ? "teams" : `teams/${this.#edited.id}`;
     const form = { name: this.#name.value, members: this.#members.value };
-    if (await this.#desk.attempt(() => send(path, form))) this.#edit(null);
+    if (await this.#page.attempt(() => send(path, form))) this.#edit(null);
   }
 
   #edit(team) {
@@ -64,7 +65,7 @@ export class Teams {
       return flying.has(team.id) ? "flying" : team.id === waiting ? "called" : inQueue;
     };
     if (board.teams.length === 0) {
-      this.#list.replaceChildren(make("li", { class: "hint" }, this.#desk.judge ? "No team has been entered. Enter the first one here." : "No team has been entered. Organisers enter them after their log-in."));
+      this.#list.replaceChildren(make("li", { class: "hint" }, this.#page.judge ? "No team has been entered. Enter the first one here." : "No team has been entered. Organisers enter them after their log-in."));
       return;
     }
     this.#list.replaceChildren(...board.teams.map((team) => this.#row(team, state(team))));
@@ -76,17 +77,17 @@ export class Teams {
         team.members === "" ? null : nameOf(team.members, { class: "members" })),
       team.withdrawn ? make("span", { class: "tag" }, "withdrawn") : null,
       state === "" ? null : make("span", { class: "tag good" }, state));
-    if (!this.#desk.judge) return row;
+    if (!this.#page.judge) return row;
     const button = (words, key, work) => {
       const element = make("button", { type: "button", "data-key": `${key}-${team.id}`, "aria-label": `${words}: ${team.name}` }, words);
       element.addEventListener("click", work);
       return element;
     };
-    const withdraw = (withdrawn) => this.#desk.attempt(() => send(`teams/${team.id}`, { withdrawn }));
+    const withdraw = (withdrawn) => this.#page.attempt(() => send(`teams/${team.id}`, { withdrawn }));
     row.append(make("span", { class: "buttons" },
       team.withdrawn || state.startsWith("in the queue")
         ? null
-        : button("Queue", "queue", () => this.#desk.queue.add(team.id)),
+        : button("Queue", "queue", () => this.#page.queue.add(team.id)),
       button("Change", "change", () => this.#edit(team)),
       team.withdrawn
         ? button("Take back in", "withdraw", () => withdraw(false))

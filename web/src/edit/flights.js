@@ -4,54 +4,56 @@ import { ReconnectingSocket } from "../lib/reconnecting_socket.js";
 import { word } from "./words.js";
 
 /**
- * @typedef {{id: string, to: string, when: string, holds: boolean|null}} Guard
- * @typedef {{run: string, full: boolean, time_s: number, state: string, active: string[], seconds_in_state: number, began_s: number|null,
- *   paused: boolean, stopped_in: string, guards: Guard[], values: {name: string, value: any, unit: string}[],
- *   taken: {ids: string[], time_s: number}[], counts: Object<string, number>, spans: {state: string, from_s: number, to_s: number}[],
- *   contacts: {name: string, time_s: number}[], pose: number[], trail: number[][]}} Now
- * @typedef {{batch: string, scenario: string, seed: number, verdict: string, completed: boolean, reason: string,
- *   lost_in: string, rank: number, total_time_s: number|null, counts: Object<string, number>,
- *   track: {x: number[], y: number[], z: number[], time_s: number[]}, layout: any, result: import("./verdict.js").Result}} Flight
+ * @import {Flights as Messages} from "../lib/messages.js"
+ * @typedef {Messages.Now} Now
+ * @typedef {Messages.Flight} Flight
+ * @typedef {Messages.Done | Messages.Refused | Messages.Started | Messages.Changed | Messages.BatchStarted} Answer
+ * @typedef {Messages.FromPage extends infer Each ? Each extends any ? Omit<Each, "tag"> : never : never} Request
  */
 
 export class Flights {
+  /** @type {ReconnectingSocket<Messages.FromPage, Messages.ToPage>} */
   #socket;
   #listener;
   #tag = 0;
-  /** @type {Map<number, (answer: any) => void>} */
+  /** @type {Map<number, (answer: Answer) => void>} */
   #waiting = new Map();
 
-  /** @param {{heard: (message: any) => void, lost: () => void}} listener */
+  /** @param {{heard: (message: Messages.ToPage) => void, lost: () => void}} listener */
   constructor(listener) {
     this.#listener = listener;
     this.#socket = new ReconnectingSocket(`/ws/editing?language=${language()}`, {
       message: (message) => this.#hear(message),
       state: (state) => {
         if (state === "open") return;
-        for (const answer of this.#waiting.values()) answer({ kind: "refused", text: word("lost_connection") });
+        for (const answer of this.#waiting.values()) answer(refused(word("lost_connection")));
         this.#waiting.clear();
         listener.lost();
       },
     });
   }
 
-  /** Ask for something. @param {object} request @returns {Promise<any>} the answer; `kind` is "refused" if it was */
+  /** Ask for something. @param {Request} request @returns {Promise<Answer>} the answer; `kind` is "refused" if it was */
   ask(request) {
     this.#tag += 1;
     const tag = this.#tag;
-    if (!this.#socket.send({ ...request, tag })) return Promise.resolve({ kind: "refused", text: word("no_connection") });
+    if (!this.#socket.send({ ...request, tag })) return Promise.resolve(refused(word("no_connection")));
     return new Promise((resolve) => this.#waiting.set(tag, resolve));
   }
 
+  /** @param {Messages.ToPage} message */
   #hear(message) {
-    const answer = this.#waiting.get(message.tag);
-    if (answer && message.tag && message.kind !== "waiting") {
+    const answer = "tag" in message ? this.#waiting.get(message.tag) : undefined;
+    if (answer && "tag" in message && message.tag && message.kind !== "waiting") {
       this.#waiting.delete(message.tag);
       answer(message);
     }
     this.#listener.heard(message);
   }
 }
+
+/** @param {string} text @returns {Answer} of this page itself */
+const refused = (text) => ({ kind: "refused", tag: 0, text, lines: [], run: "" });
 
 /** A state's id and those of the states around it, outermost first; none if it is empty. @param {string} id @returns {string[]} */
 export function withOuterStates(id) {

@@ -1,8 +1,8 @@
 /** Flies the mission in the real simulator, which the live channel shows: any page that is open sees it. */
 import { make, setText } from "../lib/dom.js";
 import { button, choice } from "./fields.js";
+import { FlightView } from "./flight_view.js";
 import { FIRST_SCENARIO, loadChoices, scenarioFields } from "./scenario_fields.js";
-import { TopView } from "./top_view.js";
 import { word } from "./words.js";
 
 const SPEEDS = /** @type {[string, string][]} */ ([["0.5", "0.5 ×"], ["1", "1 ×"], ["2", "2 ×"], ["5", "5 ×"], ["10", "10 ×"]]);
@@ -31,9 +31,9 @@ export class LivePanel {
   constructor(root, listener) {
     this.#listener = listener;
     const drawing = make("div", { class: "e-top-view" });
-    this.#view = new TopView(drawing);
+    this.#view = new FlightView(drawing);
     this.#start = button(word("live_start"), () => this.#fly(), { class: "e-first" });
-    this.#stop = button(word("live_stop"), () => this.#do({ do: "stop_live" }), { disabled: true });
+    this.#stop = button(word("live_stop"), () => this.#do({ kind: "stop_live" }), { disabled: true });
     root.classList.add("e-fly");
     root.append(drawing, make("div", { class: "e-flying" },
       this.#choices,
@@ -54,7 +54,7 @@ export class LivePanel {
     this.#start.setAttribute("disabled", "");
     const text = await this.#listener.text();
     this.#clear();
-    await this.#do({ do: "start_live", text, scenario: this.#scenario, speed: Number(this.#speed) });
+    await this.#do({ kind: "start_live", text, scenario: this.#scenario, speed: Number(this.#speed) });
   }
 
   async #do(request) {

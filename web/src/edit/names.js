@@ -14,7 +14,7 @@ export function bounds({ low, high, unit }) {
 /**
  * Show all names; the search that is typed stays.
  * @param {HTMLElement} root
- * @param {{values: ValueEntry[], primitives: import("./session.js").PrimitiveEntry[]}} catalogue
+ * @param {import("../lib/messages.js").Documents.Catalogue} catalogue
  */
 export function showNames(root, { values, primitives }) {
   const key = JSON.stringify([values, primitives]);

@@ -2,12 +2,13 @@
 import { make, number, setText } from "../lib/dom.js";
 import { Bar } from "../lib/replay/bar.js";
 import { Clock } from "../lib/replay/clock.js";
-import { fetchJson, Run } from "../lib/replay/run.js";
+import { Run } from "../lib/replay/run.js";
+import { reasonOf, request } from "../lib/request.js";
 import { yawOf } from "../lib/yaw.js";
 import { button } from "./fields.js";
+import { FlightView } from "./flight_view.js";
 import { withOuterStates } from "./flights.js";
 import { drawStrip } from "./state_strip.js";
-import { TopView } from "./top_view.js";
 import { contactsOf } from "./verdict.js";
 import { word } from "./words.js";
 
@@ -43,7 +44,7 @@ export class ReplayPanel {
   constructor(root, listener) {
     this.#listener = listener;
     const drawing = make("div", { class: "e-top-view" });
-    this.#view = new TopView(drawing);
+    this.#view = new FlightView(drawing);
     root.classList.add("e-fly", "e-replay");
     this.#list.addEventListener("change", () => this.show(this.#list.value));
     root.append(drawing, make("div", { class: "e-flying" },
@@ -57,7 +58,7 @@ export class ReplayPanel {
   async load() {
     try {
       /** @type {RunInfo[]} */
-      const runs = (await fetchJson("/api/runs")).filter(({ verdict }) => verdict !== "unreadable").slice(0, MAX_LISTED);
+      const runs = (await request("/api/runs")).filter(({ verdict }) => verdict !== "unreadable").slice(0, MAX_LISTED);
       const chosen = this.#run?.name ?? "";
       const group = (isOfSession, label) => {
         const own = runs.filter(({ session }) => session === isOfSession);
@@ -68,7 +69,7 @@ export class ReplayPanel {
       this.#list.replaceChildren(make("option", { value: "" }, runs.length > 0 ? word("choose_flight") : word("no_flights")), ...groups);
       this.#list.value = runs.some(({ name }) => name === chosen) ? chosen : "";
     } catch (error) {
-      setText(this.#line, error.message);
+      setText(this.#line, reasonOf(error));
     }
   }
 
@@ -90,7 +91,7 @@ export class ReplayPanel {
       if (run.poses.length === 0) setText(this.#line, word("nothing_recorded"));
       else this.#take(run);
     } catch (error) {
-      if (asked === this.#asked) setText(this.#line, error.message);
+      if (asked === this.#asked) setText(this.#line, reasonOf(error));
     }
   }
 

@@ -1,10 +1,10 @@
 /** Flying the mission from its page: one flight with pause, step and breaks, or many on random layouts. */
 import { make, number, setText } from "../lib/dom.js";
 import { button, choice } from "./fields.js";
+import { FlightView } from "./flight_view.js";
 import { Flights } from "./flights.js";
 import { FIRST_SCENARIO, loadChoices, options, scenarioFields } from "./scenario_fields.js";
 import { drawStrip } from "./state_strip.js";
-import { TopView } from "./top_view.js";
 import { contactsOf, hitWords, shortVerdict, verdictWords } from "./verdict.js";
 import { waitingWords, word } from "./words.js";
 
@@ -24,6 +24,7 @@ export class RunPanel {
   #level = "calm";
   #speed = "1";
   #isStopped = false; // by the button
+  /** @type {any} */
   #layout = null;
   /** @type {Set<string>} */
   #breaks = new Set();
@@ -61,10 +62,10 @@ export class RunPanel {
     this.#pause = button(word("pause"), () => this.#togglePause(), { disabled: true });
     this.#stop = button(word("stop"), () => this.#stopFlight(), { disabled: true });
     const drawing = make("div", { class: "e-top-view" });
-    this.#view = new TopView(drawing);
+    this.#view = new FlightView(drawing);
     const speed = choice(word("speed"), SPEEDS, this.#speed, (value) => {
       this.#speed = value;
-      if (this.#run) this.#order({ do: "speed", speed: value ? Number(value) : null });
+      if (this.#run) this.#order({ kind: "speed", speed: value ? Number(value) : null });
     });
     root.classList.add("e-fly");
     root.classList.toggle("e-simple", isSimple);
@@ -103,10 +104,11 @@ export class RunPanel {
 
   /** Show a flight that is over; what it was worth, in words. @param {Flight} flight @returns {string} */
   showFlight(flight) {
-    const contacts = contactsOf(flight.result);
+    const result = /** @type {import("./verdict.js").Result} */ (flight.result);
+    const contacts = contactsOf(result);
     this.#view.show(flight.layout, flight.track, contacts);
     this.#listener.lit([], flight.counts, []);
-    const words = verdictWords(flight.result, flight.layout, this.#view.places);
+    const words = verdictWords(result, flight.layout, this.#view.places);
     setText(this.#line, words);
     setText(this.#hit, hitWords(contacts));
     return [words, hitWords(contacts)].filter(Boolean).join(" ");
@@ -135,13 +137,13 @@ export class RunPanel {
     if (this.#waits) return; // the line tells its place in the queue
     const text = await this.#text();
     if (!text) return;
-    if (this.#run) await this.#flights.ask({ do: "stop", run: this.#run });
+    if (this.#run) await this.#flights.ask({ kind: "stop", run: this.#run });
     this.#counts = {};
     this.#spans = [];
     this.#contacts = [];
     this.#isStopped = false;
     const answer = await this.#flights.ask({
-      do: "start", text, scenario: this.#scenario, seed: 0, speed: this.#speed ? Number(this.#speed) : null, paused, break_on: [...this.#breaks],
+      kind: "start", text, scenario: this.#scenario, seed: 0, speed: this.#speed ? Number(this.#speed) : null, paused, break_on: [...this.#breaks],
     });
     if (answer.kind === "started") {
       this.#setRun(answer.run);
@@ -149,19 +151,19 @@ export class RunPanel {
       this.#view.setWorld(answer.layout);
     } else {
       this.#setRun("");
-      setText(this.#line, answer.text);
+      if (answer.kind === "refused") setText(this.#line, answer.text);
     }
   }
 
   /** Let one tick pass; a flight that is not yet there begins with a pause. */
   #step() {
-    return this.#run ? this.#order({ do: "step", ticks: 1 }) : this.#start(true);
+    return this.#run ? this.#order({ kind: "step", ticks: 1 }) : this.#start(true);
   }
 
   #stopFlight() {
-    if (this.#waits) return this.#flights.ask({ do: "cancel", batch: this.#waits });
+    if (this.#waits) return this.#flights.ask({ kind: "cancel", batch: this.#waits });
     this.#isStopped = true;
-    return this.#order({ do: "stop" });
+    return this.#order({ kind: "stop" });
   }
 
   async #order(request) {
@@ -186,11 +188,11 @@ export class RunPanel {
     if (this.#breaks.has(id)) this.#breaks.delete(id);
     else this.#breaks.add(id);
     setText(this.#line, this.#breaks.size > 0 ? word("breaks", { states: [...this.#breaks].join(", ") }) : word("no_breaks"));
-    if (this.#run) this.#order({ do: "break_on", states: [...this.#breaks] });
+    if (this.#run) this.#order({ kind: "break_on", states: [...this.#breaks] });
   }
 
   async #change() {
-    await this.#order({ do: "change", text: await this.#listener.text() });
+    await this.#order({ kind: "change", text: await this.#listener.text() });
   }
 
   async #startBatch() {
@@ -198,14 +200,14 @@ export class RunPanel {
     if (!text) return;
     this.#rows = [];
     this.#table.replaceChildren();
-    const answer = await this.#flights.ask({ do: "start_batch", text, level: this.#level, count: BATCH, first_seed: 1 });
+    const answer = await this.#flights.ask({ kind: "start_batch", text, level: this.#level, count: BATCH, first_seed: 1 });
     if (this.#waits) this.#setRun("");
     if (answer.kind === "batch_started") {
       this.#batch = answer.batch;
       this.#progress.max = answer.count;
       this.#showBatch();
       this.#table.scrollIntoView({ block: "nearest" });
-    } else setText(this.#line, answer.text);
+    } else if (answer.kind === "refused") setText(this.#line, answer.text);
   }
 
   #forget() {

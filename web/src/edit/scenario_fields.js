@@ -1,4 +1,5 @@
 /** The choice of what is flown: a scenario, or a random layout instead. */
+import { request } from "../lib/request.js";
 import { choice, textField } from "./fields.js";
 import { word } from "./words.js";
 
@@ -7,9 +8,8 @@ export const FIRST_SCENARIO = "test-case-1";
 /** @typedef {{scenarios: string[], lessons: string[], levels: string[]}} Choices names of what can be flown */
 
 /** @returns {Promise<Choices|null>} null: the server does not tell */
-export async function loadChoices() {
-  const answer = await fetch("/api/editing/choices");
-  return answer.ok ? answer.json() : null;
+export function loadChoices() {
+  return request("/api/editing/choices").catch(() => null);
 }
 
 /** Names as options of a choice. @param {string[]} names @returns {[string, string][]} */

@@ -6,23 +6,23 @@ import { word } from "./words.js";
 const TYPING_PAUSE_MS = 80; // after which typed text is sent
 
 /**
- * @typedef {import("../lib/diagram/types.js").Span} Span
- * @typedef {import("../lib/diagram/types.js").Finding} Finding
- * @typedef {import("../lib/diagram/types.js").StateNode} StateNode
- * @typedef {import("../lib/diagram/types.js").Edge} Edge
- * @typedef {import("../lib/diagram/types.js").Diagram} Diagram
- * @typedef {import("../lib/diagram/types.js").Point} Point
- * @typedef {{start: number, removed: number, inserted: string}} TextChange offsets in UTF-16 code units
- * @typedef {{name: string, type: string, text: string, unit: string, low: number|null, high: number|null,
- *   assignable: boolean, needs_map: boolean}} ValueEntry
- * @typedef {{name: string, text: string, help: string, needs_map: boolean}} PrimitiveEntry
+ * @import {Documents} from "../lib/messages.js"
+ * @typedef {Documents.ToPage} ToPage
+ * @typedef {Documents.FromPage} FromPage
+ * @typedef {FromPage extends infer Each ? Each extends any ? Omit<Each, "number"> : never : never} Unnumbered
+ * @typedef {Documents.TypedChange} TextChange offsets in UTF-16 code units
+ * @typedef {Documents.Place} Point
+ * @typedef {Documents.DrawnEdge} Edge
+ * @typedef {Documents.ShownFinding} Finding
+ * @typedef {Documents.ValueEntry} ValueEntry
  */
 
 export class EditSession {
+  /** @type {ReconnectingSocket<FromPage, ToPage>} */
   #socket;
   #listener;
   #number = 0;
-  /** What was sent and is not answered yet, in order. @type {Map<number, {message: any, answer: (reply: any) => void}>} */
+  /** What was sent and is not answered yet, in order. @type {Map<number, {message: FromPage, answer: (reply: {refused?: string, code?: string}) => void}>} */
   #waiting = new Map();
   #client = Array.from({ length: 4 }, () => Math.random().toString(36).slice(2, 10)).join("");
   #session = ""; // of the program that has the document
@@ -34,7 +34,7 @@ export class EditSession {
   #isTypedUnderWay = false;
 
   revision = 0;
-  /** @type {Diagram} */
+  /** @type {Documents.DrawnDiagram} */
   diagram = { initial: "", readable: true, nodes: [], edges: [] };
   /** @type {Object<string, string>} */
   mission = {};
@@ -42,8 +42,8 @@ export class EditSession {
   variables = {};
   /** @type {string[]} */
   templates = [];
-  /** @type {{values: ValueEntry[], primitives: PrimitiveEntry[]}} */
-  catalogue = { values: [], primitives: [] };
+  /** @type {Documents.Catalogue} */
+  catalogue = { values: [], primitives: [], operators: [] };
   /** @type {Finding[]} */
   findings = [];
   /** @type {Object<string, Point>} */
@@ -85,7 +85,7 @@ export class EditSession {
 
   /**
    * The document was sent, first or after a lost connection. What the program does not have is sent again.
-   * @param {any} message
+   * @param {Documents.DocumentMessage} message
    * @returns {boolean} whether the text that is shown stays
    */
   #synchronize(message) {
@@ -94,28 +94,28 @@ export class EditSession {
     this.#isReady = true;
     const text = this.#listener.text();
     if (isOther) {
-      const edits = [...this.#waiting].filter(([, { message: sent }]) => sent.type !== "type");
+      const edits = [...this.#waiting].filter(([, { message: sent }]) => sent.kind !== "type");
       for (const [number, { message: sent, answer }] of this.#waiting) {
-        if (sent.type !== "type") continue;
+        if (sent.kind !== "type") continue;
         this.#waiting.delete(number);
         answer({});
       }
       const isNewer = !this.isSaved && text !== message.text;
       if (isNewer) {
         this.#typed = null; // it is in the text
-        this.#ask({ type: "type", revision: message.revision, changes: [difference(message.text, text)] });
+        this.#ask({ kind: "type", revision: message.revision, changes: [difference(message.text, text)] });
         this.#listener.note("sent_again");
       }
       for (const [, { message: sent }] of edits) this.#socket.send(sent);
       return isNewer;
     }
     for (const [number, { message: sent, answer }] of this.#waiting) {
-      if (number <= message.answered) {
+      if (number <= (message.answered ?? 0)) {
         this.#waiting.delete(number);
         answer({});
       } else this.#socket.send(sent);
     }
-    const isTyped = [...this.#waiting.values()].some(({ message: sent }) => sent.type === "type") || this.#typed !== null;
+    const isTyped = [...this.#waiting.values()].some(({ message: sent }) => sent.kind === "type") || this.#typed !== null;
     return isTyped; // the program has the text without it; the answer has the right one if it cannot be applied
   }
 
@@ -126,22 +126,22 @@ export class EditSession {
    */
   async edit(edit) {
     await this.flush();
-    return this.#ask({ type: "edit", edit });
+    return this.#ask({ kind: "edit", edit });
   }
 
   async undo() {
     await this.flush();
-    return this.#ask({ type: "undo" });
+    return this.#ask({ kind: "undo" });
   }
 
   async redo() {
     await this.flush();
-    return this.#ask({ type: "redo" });
+    return this.#ask({ kind: "redo" });
   }
 
   async save(force = false) {
     await this.flush();
-    return this.#ask({ type: "save", force });
+    return this.#ask({ kind: "save", force });
   }
 
   /**
@@ -153,7 +153,7 @@ export class EditSession {
     if (Object.keys(places).length === 0) return true;
     Object.assign(this.layout, places); // at once: the next drawing has them
     await this.flush();
-    return this.#ask({ type: "layout", places, settled });
+    return this.#ask({ kind: "layout", places, settled });
   }
 
   /**
@@ -187,15 +187,15 @@ export class EditSession {
       this.#typed = null;
       if (changes.length === 0) return;
       this.#isTypedUnderWay = true;
-      await this.#ask({ type: "type", revision: this.revision, changes });
+      await this.#ask({ kind: "type", revision: this.revision, changes });
       this.#isTypedUnderWay = false;
     })();
     return this.#sending;
   }
 
-  /** @param {object} message @returns {Promise<boolean>} */
+  /** @param {Unnumbered} message @returns {Promise<boolean>} */
   #ask(message) {
-    const sent = { ...message, number: this.#number + 1 };
+    const sent = /** @type {FromPage} */ ({ ...message, number: this.#number + 1 });
     if (!this.#isReady || !this.#socket.send(sent)) {
       this.#listener.refused(word("no_connection"), "");
       return Promise.resolve(false);
@@ -210,43 +210,51 @@ export class EditSession {
     });
   }
 
-  /** @param {any} message */
+  /** @param {ToPage} message */
   #receive(message) {
     if (message.warning) this.#listener.refused(message.warning, "");
-    if (message.type === "document" || message.type === "changed") {
-      const stays = message.type === "document" && message.answered !== undefined && this.#synchronize(message);
-      this.revision = message.revision;
-      for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) this[key] = message[key];
-      if (language() === "es") for (const finding of this.findings) finding.message = finding.spanish ?? finding.message;
-      this.catalogue = message.catalogue ?? this.catalogue;
-      // While the text cannot be read, the last diagram stays.
-      if (message.diagram.readable) this.diagram = message.diagram;
-      this.isReadable = message.diagram.readable;
-      this.#setStatus(message);
-      // A change that overtakes typed text makes the server refuse that and send the whole text.
-      const isOvertaken = this.#isTypedUnderWay && message.answers === undefined;
-      const isOwn = message.answers !== undefined && message.text === undefined;
-      this.#listener.changed(isOvertaken ? [] : message.changes ?? [], stays ? null : message.text ?? null, isOwn);
-      if (message.text !== undefined && message.restored) this.#listener.note("restored");
-      if (message.text !== undefined && message.problem) this.#listener.refused(message.problem, "");
-      if (stays) this.flush();
-    } else {
-      this.#setStatus(message);
-      const isOutdated = [...this.#waiting.values()].some(({ message: sent }) => sent.type === "layout" && sent.number > message.answers);
-      if (message.layout && !isOutdated && !isSame(message.layout, this.layout)) {
-        this.layout = message.layout;
-        this.#listener.placed();
-      }
-    }
-    const asked = this.#waiting.get(message.answers);
+    if (message.kind === "status") this.#takeStatus(message);
+    else this.#takeDocument(message);
+    const answers = message.answers ?? 0;
+    const asked = this.#waiting.get(answers);
     if (asked) {
-      this.#waiting.delete(message.answers);
+      this.#waiting.delete(answers);
       asked.answer(message);
     }
     this.#listener.status();
   }
 
-  /** @param {any} message */
+  /** @param {Documents.DocumentMessage|Documents.ChangedMessage} message */
+  #takeDocument(message) {
+    const stays = message.kind === "document" && message.answered !== undefined && this.#synchronize(message);
+    this.revision = message.revision;
+    for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) this[key] = message[key];
+    if (language() === "es") for (const finding of this.findings) finding.message = finding.spanish ?? finding.message;
+    this.catalogue = message.catalogue ?? this.catalogue;
+    // While the text cannot be read, the last diagram stays.
+    if (message.diagram.readable) this.diagram = message.diagram;
+    this.isReadable = message.diagram.readable;
+    this.#setStatus(message);
+    // A change that overtakes typed text makes the server refuse that and send the whole text.
+    const isOvertaken = this.#isTypedUnderWay && message.answers === undefined;
+    const isOwn = message.answers !== undefined && message.text === undefined;
+    this.#listener.changed(isOvertaken ? [] : message.changes ?? [], stays ? null : message.text ?? null, isOwn);
+    if (message.text !== undefined && message.restored) this.#listener.note("restored");
+    if (message.text !== undefined && message.problem) this.#listener.refused(message.problem, "");
+    if (stays) this.flush();
+  }
+
+  /** @param {Documents.StatusMessage} message */
+  #takeStatus(message) {
+    this.#setStatus(message);
+    const isOutdated = [...this.#waiting.values()].some(({ message: sent }) => sent.kind === "layout" && sent.number > (message.answers ?? Infinity));
+    if (message.layout && !isOutdated && !isSame(message.layout, this.layout)) {
+      this.layout = message.layout;
+      this.#listener.placed();
+    }
+  }
+
+  /** @param {ToPage} message */
   #setStatus(message) {
     this.isSaved = message.saved ?? this.isSaved;
     this.canUndo = message.can_undo ?? this.canUndo;

@@ -1,6 +1,7 @@
 /** What the course's pages share: the lessons, and the pupil's name. */
 import { language, translator } from "./language.js";
 import { pageData } from "./page_data.js";
+import { request } from "./request.js";
 
 const KEPT = "framerunner-learner";
 
@@ -28,8 +29,7 @@ export const inLanguage = (words) => words[language()];
 
 /** @returns {Promise<Lesson[]>} */
 export async function loadLessons() {
-  const answer = await fetch("/api/course");
-  return answer.ok ? (await answer.json()).lessons : [];
+  return (await request("/api/course").catch(() => ({ lessons: [] }))).lessons;
 }
 
 const word = translator({
@@ -60,7 +60,7 @@ export async function checkLesson(content, waits) {
   const answer = await post("check", content);
   if (!answer.ok) return refusal(answer);
   let rest = "";
-  const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+  const reader = /** @type {ReadableStream} */ (answer.body).pipeThrough(new TextDecoderStream()).getReader();
   for (;;) {
     const { value, done } = await reader.read().catch(() => ({ value: "", done: true }));
     const lines = (rest + (value ?? "")).split("\n");

@@ -7,6 +7,8 @@
  */
 import { ReconnectingSocket } from "./reconnecting_socket.js";
 
+/** @import {Live} from "./messages.js" */
+
 const SILENCE_MS = 7000; // a status comes every two seconds
 
 export class LiveChannel {
@@ -14,6 +16,7 @@ export class LiveChannel {
   #listeners = new Map();
   /** @type {((state: "open"|"away") => void)[]} */
   #stateListeners = [];
+  /** @type {ReconnectingSocket<never, Live.ToPage>} */
   #socket;
 
   /** @param {string[]} kinds of messages that are wanted; none: all */
@@ -32,8 +35,9 @@ export class LiveChannel {
 
   /**
    * Hear messages of a kind.
-   * @param {string} kind as in docs/monitor-channels.md
-   * @param {(message: any) => void} hear
+   * @template {Live.ToPage["kind"]} K
+   * @param {K} kind as in docs/monitor-channels.md
+   * @param {(message: Extract<Live.ToPage, {kind: K}>) => void} hear
    */
   on(kind, hear) {
     const listeners = this.#listeners.get(kind) ?? [];

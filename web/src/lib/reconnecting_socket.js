@@ -5,11 +5,13 @@ const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 2000;
 
 /**
+ * @template {object} In
  * @typedef {object} SocketListener
- * @property {(message: any) => void} message told each message, which is JSON
+ * @property {(message: In) => void} message told each message, which is JSON
  * @property {(state: "open"|"away"|"refused", reason: string) => void} state told whether there is a connection
  */
 
+/** @template {object} Out what is sent @template {object} In what is received */
 export class ReconnectingSocket {
   #url;
   #listener;
@@ -24,7 +26,7 @@ export class ReconnectingSocket {
   /**
    * Connect, and after each loss connect again, for as long as the page is shown.
    * @param {string} address such as "/ws/live?kinds=status"
-   * @param {SocketListener} listener
+   * @param {SocketListener<In>} listener
    * @param {{silence_ms?: number}} [options] silence_ms: a connection without a message for so long is taken for
    *   lost even if nobody closed it; 0: never
    */
@@ -44,7 +46,7 @@ export class ReconnectingSocket {
     return this.#socket?.readyState === WebSocket.OPEN && this.#socket.bufferedAmount === 0;
   }
 
-  /** @param {object} message @returns {boolean} whether there is a connection to send it by */
+  /** @param {Out} message @returns {boolean} whether there is a connection to send it by */
   send(message) {
     if (this.#socket?.readyState !== WebSocket.OPEN) return false;
     this.#socket.send(JSON.stringify(message));

@@ -2,18 +2,20 @@
 import { LiveChannel } from "./live_channel.js";
 import { setText } from "./dom.js";
 
+/** @import {Live} from "./messages.js" */
+
 const SILENCE_MS = 4000; // poses come 20 times a second; a link that fell silent is gone even if nobody closed it
 const SHOWN_MS = 6000;
 
 /**
  * Connect, and after each loss connect again.
- * @param {Object<string, function(object): void>} hear what to do with a message of each kind
+ * @param {{[K in Live.ToPage["kind"]]?: (message: Extract<Live.ToPage, {kind: K}>) => void}} hear what to do with a message of each kind
  * @param {HTMLElement} line where it says what happened; hidden while there is nothing to say
  * @param {function(boolean): void} [onChange] told true when connected and false when not
  */
 export function watchLive(hear, line, onChange = () => {}) {
   const channel = new LiveChannel();
-  let [lostAt, lastPose, hiding] = [null, null, 0];
+  let [lostAt, lastPose, hiding] = /** @type {[number|null, number|null, number]} */ ([null, null, 0]);
 
   const say = (text, look) => {
     clearTimeout(hiding);
@@ -38,7 +40,7 @@ export function watchLive(hear, line, onChange = () => {}) {
     onChange(true);
   };
 
-  for (const [kind, take] of Object.entries(hear)) channel.on(kind, take);
+  for (const [kind, take] of Object.entries(hear)) channel.on(/** @type {Live.ToPage["kind"]} */ (kind), /** @type {(message: any) => void} */ (take));
   channel.on("pose", ({ drones }) => { lastPose = drones.length > 0 ? performance.now() : null; });
   channel.onState((state) => (state === "open" ? back() : lost()));
   document.addEventListener("visibilitychange", () => {

@@ -52,6 +52,7 @@ grid.append(side);
 const messages = new Messages(panel(side, "messages", "Messages"));
 
 let isConnected = false;
+/** @type {import("../lib/contest/contest.js").Contest} */
 let contest = { running: [], stage: null };
 const orders = new Map();
 

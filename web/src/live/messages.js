@@ -44,6 +44,6 @@ export class Messages {
     const kind = make("span", { class: "m-severity", "data-look": look }, severity);
     const by = who ? make("span", { class: "m-who" }, who) : null;
     this.#list.prepend(make("li", { "data-look": look }, time, kind, by, make("span", { class: "m-text" }, String(text))));
-    while (this.#list.children.length > MOST) this.#list.lastElementChild.remove();
+    while (this.#list.children.length > MOST) this.#list.lastElementChild?.remove();
   }
 }

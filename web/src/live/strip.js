@@ -39,7 +39,7 @@ export class DroneStrip {
     this.#put("pilot", status?.pilot ? `${status.pilot} has the sticks` : null, "warn");
   }
 
-  #put(name, text, look = null) {
+  #put(name, text, look = /** @type {string|null} */ (null)) {
     const { item, value } = this.#items[name];
     item.hidden = text === null;
     setText(value, text ?? "");

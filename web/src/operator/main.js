@@ -13,12 +13,17 @@ const SHOW_MS = 200;
 const MOTORS_AFTER_MS = 500; // the button cannot be hit by the finger that has just landed the drone
 const FIGURES = [["battery", "Battery"], ["link", "Drone's link"], ["mode", "Mode"], ["motors", "Motors"]];
 
+/** @import {Operator} from "../lib/messages.js" */
+
 class OperatorPage {
   #parts;
-  #socket;
+  /** @type {ReconnectingSocket<Operator.FromPage, Operator.ToPage>|null} */
+  #socket = null;
   #go;
   #you = 0;
+  /** @type {Operator.FlightMessage|null} */
   #flight = null;
+  /** @type {Operator.BeatMessage|null} */
   #beat = null;
   #beatAt = 0;
   #ended = "";
@@ -27,6 +32,7 @@ class OperatorPage {
   #refused = "";
   #stoppedAt = 0;
   #pendingStop = ""; // the flight that is to be stopped and has not said yet that it is
+  /** @type {import("../lib/messages.js").Live.DroneStatus|null} */
   #status = null;
 
   /** @param {HTMLElement} root @param {boolean} mayFly */
@@ -70,6 +76,7 @@ class OperatorPage {
     this.#show();
   }
 
+  /** @param {Operator.ToPage} message */
   #take(message) {
     if (message.kind === "you") this.#you = message.page;
     else if (message.kind === "none") this.#flight = this.#beat = null;
@@ -113,9 +120,10 @@ class OperatorPage {
     this.#show();
   }
 
-  #send(what) {
+  /** @param {Operator.FromPage["kind"]} kind */
+  #send(kind) {
     const flight = this.#flight?.flight ?? "";
-    return this.#socket?.send({ what, beat: this.#beat?.beat ?? -1, flight }) ?? false;
+    return this.#socket?.send({ kind, beat: this.#beat?.beat ?? -1, flight }) ?? false;
   }
 
   /**
@@ -124,7 +132,7 @@ class OperatorPage {
    */
   #stop() {
     if (!this.#mayGoOn) return;
-    if (!this.#beat?.stops) this.#pendingStop = this.#flight.flight;
+    if (!this.#beat?.stops) this.#pendingStop = this.#flight?.flight ?? "";
     this.#send("stop");
     this.#show();
   }
@@ -174,8 +182,8 @@ class OperatorPage {
     setText(words, this.#flight ? state.words : `${state.words}: start one by framerunner fly --drone … --monitor`);
     setText(this.#parts.title, this.#flight?.title ?? "");
     const stops = this.#beat?.stops ?? 0;
-    go.disabled = !(this.#isAlive && this.#beat.asks);
-    const areOff = ["motors stopped", "ended"].includes(this.#beat?.phase);
+    go.disabled = !(this.#isAlive && this.#beat?.asks);
+    const areOff = ["motors stopped", "ended"].includes(this.#beat?.phase ?? "");
     land.disabled = !this.#mayGoOn || areOff;
     setText(land.firstElementChild, this.#pendingStop ? "Land: being sent" : stops ? "Land again" : "Land");
     motors.disabled = areOff || !(this.#isAlive && stops > 0 && performance.now() - this.#stoppedAt > MOTORS_AFTER_MS);

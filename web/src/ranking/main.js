@@ -30,6 +30,7 @@ class Ranking {
   #linked = true;
   #problem = "";
   #heard_ms = 0;
+  /** @type {any[]} */
   #clocks = [];
   called = null;
   queue = { teams: [] };
@@ -110,6 +111,7 @@ class Ranking {
     this.#element.style.setProperty("--columns", String(Math.max(2, scenarios.length)));
     this.#head.replaceChildren(...titles.map((title, index) =>
       make("th", { scope: "col", role: "columnheader", class: kinds[index] }, title)));
+    /** @type {string[]} */
     this.titles = titles;
   }
 
@@ -156,7 +158,7 @@ class Ranking {
     element.replaceChildren(
       make("td", { class: "rank", role: "cell" }, String(row.rank ?? "–")),
       make("th", { class: "team", role: "rowheader", scope: "row" }, nameOf(row.name, { class: "name" })),
-      ...row.cells.map((cell, index) => this.#cell(cell, this.titles[index + 2])),
+      ...row.cells.map((cell, index) => this.#cell(cell, this.titles?.[index + 2] ?? "")),
       make("td", { class: "total", role: "cell" }, row.flown ? seconds(row.total_s) : "–"),
     );
   }

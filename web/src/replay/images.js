@@ -11,7 +11,9 @@ export class Images {
   #count;
   #kept = new Map(); // number to Blob, oldest first
   #loading = new Set();
+  /** @type {any} */
   #wanted = null;
+  /** @type {number|null} */
   #shown = null;
 
   /**

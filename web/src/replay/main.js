@@ -5,14 +5,15 @@ import { make, setText } from "../lib/dom.js";
 import { Bar } from "../lib/replay/bar.js";
 import { Clock } from "../lib/replay/clock.js";
 import { pageOf, RunList } from "./list.js";
-import { fetchJson, Run } from "../lib/replay/run.js";
+import { Run } from "../lib/replay/run.js";
+import { reasonOf, request } from "../lib/request.js";
 import { Side } from "./side.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 
 const root = pageRoot("replay");
 root.classList.add("m-live", "r-page");
 const query = new URLSearchParams(location.search);
-const chosen = [...new Set([query.get("a"), query.get("b")].filter(Boolean))];
+const chosen = [...new Set([query.get("a") ?? "", query.get("b") ?? ""].filter(Boolean))];
 
 const line = make("p", { class: "m-line", role: "status", hidden: true });
 const sides = make("div", { class: "r-sides" });
@@ -31,12 +32,12 @@ async function list() {
   const without = "This monitor was given no folder of flights. Start it with --runs FOLDER; framerunner fly leaves its flights in runs/.";
   if (!pageData().hasRuns) return choice.append(make("summary", {}, "Flights"), make("p", { class: "r-none" }, without));
   try {
-    const runs = await fetchJson("/api/runs");
+    const runs = await request("/api/runs");
     choice.append(make("summary", {}, chosen.length ? "Choose another flight, or one to see beside" : "Choose a flight"));
     if (runs.length) new RunList(choice, runs, chosen);
     else choice.append(make("p", { class: "r-none" }, hint));
   } catch (error) {
-    choice.append(make("summary", {}, "Flights"), make("p", { class: "r-none", role: "alert" }, error.message));
+    choice.append(make("summary", {}, "Flights"), make("p", { class: "r-none", role: "alert" }, reasonOf(error)));
   }
 }
 

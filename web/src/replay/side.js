@@ -20,6 +20,7 @@ export class Side {
   #statechart;
   #place;
   #drawn = 0; // poses that are in the trail
+  /** @type {number|null} */
   #last = null;
   #told = -1;
 

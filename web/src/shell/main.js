@@ -37,13 +37,13 @@ function show([state, words]) {
   const element = place.querySelector(".words");
   place.dataset.state = state;
   const said = document.documentElement.lang === "es" ? SPANISH[words] ?? words.replace("link lost", SPANISH["link lost"]).replace(" of ", " de ") : words; // few pages have two languages
-  if (element.textContent !== said) element.textContent = said;
+  if (element && element.textContent !== said) element.textContent = said;
 }
 
 // On a narrow screen the navigation is a row that is moved sideways: begin where we are.
 const here = /** @type {HTMLElement|null} */ (document.querySelector(".top nav [aria-current]"));
 const row = here?.closest("nav");
-if (row) row.scrollLeft = here.offsetLeft - row.offsetLeft - 40;
+if (here && row) row.scrollLeft = here.offsetLeft - row.offsetLeft - 40;
 
 let wasAway = false;
 const channel = new LiveChannel(["status"]);

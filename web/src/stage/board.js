@@ -17,6 +17,7 @@ export class StageRanking {
   #next = make("div", { class: "s-next" });
   #rows = make("ol", { class: "s-rows" });
   #list = make("div", { class: "s-list" }, this.#rows);
+  /** @type {string|null} */
   #shown = null;
   #pages;
 
@@ -31,22 +32,7 @@ export class StageRanking {
     const told = JSON.stringify([stage?.called, stage?.queue, stage?.last, stage?.ranking]);
     if (told === this.#shown) return;
     this.#shown = told;
-    const called = isWaiting(stage?.called ?? null) ? stage.called : null;
-    const first = stage?.queue.teams[0] ?? null;
-    const words = called || first
-      ? [
-        make("p", { class: "s-label" }, called ? "Called" : "Next"),
-        bigName((called ?? first).team_name, "s-called"),
-        make("p", { class: "s-where" }, called?.scenario ?? ""),
-      ]
-      : [bigName("No try is running", "s-called"), make("p", { class: "s-where" }, "Organisers call the next team on the page Competition.")];
-    if (called && first) words.push(make("p", { class: "s-before" }, "Next: ", nameOf(first.team_name)));
-    const last = stage?.last;
-    if (last) {
-      const worth = last.completed ? `${number(last.total_s)} s` : "not completed";
-      words.push(make("p", { class: "s-before" }, "Last: ", nameOf(last.team_name || "without a team"), ` · ${worth}`));
-    }
-    this.#next.replaceChildren(...words);
+    this.#next.replaceChildren(...nextWords(stage));
     const rows = stage?.ranking?.rows ?? [];
     this.#rows.replaceChildren(...rows.map((row) => make(
       "li", { "data-rank": String(row.rank) },
@@ -58,9 +44,30 @@ export class StageRanking {
   }
 }
 
+/** Who was called, who is next and who flew last. @param {any} stage as `/api/competition/stage` answers */
+function nextWords(stage) {
+  const called = isWaiting(stage?.called ?? null) ? stage.called : null;
+  const first = stage?.queue.teams[0] ?? null;
+  const words = called || first
+    ? [
+      make("p", { class: "s-label" }, called ? "Called" : "Next"),
+      bigName((called ?? first).team_name, "s-called"),
+      make("p", { class: "s-where" }, called?.scenario ?? ""),
+    ]
+    : [bigName("No try is running", "s-called"), make("p", { class: "s-where" }, "Organisers call the next team on the page Competition.")];
+  if (called && first) words.push(make("p", { class: "s-before" }, "Next: ", nameOf(first.team_name)));
+  const last = stage?.last;
+  if (last) {
+    const worth = last.completed ? `${number(last.total_s)} s` : "not completed";
+    words.push(make("p", { class: "s-before" }, "Last: ", nameOf(last.team_name || "without a team"), ` · ${worth}`));
+  }
+  return words;
+}
+
 /** The first three of a round that everybody has flown. */
 export class Podium {
   #steps = make("ol", { class: "s-steps" });
+  /** @type {string|null} */
   #shown = null;
 
   constructor() {

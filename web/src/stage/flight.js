@@ -68,7 +68,7 @@ export class Splits {
     const end = isDone ? figures.total_time_s : null;
     tiles.push(tile("landed", "", isDone ? "crossed" : isLanding ? "next" : "open", end, best?.completed ? best.total_s : null));
     this.#list.replaceChildren(...tiles);
-    const name = best ? nameOf(best.team_name || "without a team") : null;
+    const name = nameOf(best?.team_name || "without a team");
     this.#against.replaceChildren(...(best ? ["best: ", name, best.completed ? `, ${number(best.total_s)} s` : ", not completed"] : []));
   }
 }

@@ -24,9 +24,12 @@ class StagePage {
   #splits = new Splits();
   #board = new StageRanking();
   #podium = new Podium();
+  /** @type {import("../lib/contest/contest.js").Contest} */
   #contest = { running: [], stage: null };
+  /** @type {any} */
   #against = null; // the best try when the present one began
   #isFlying = false;
+  /** @type {number|null} */
   #endedAt = null; // performance.now() of the end of the last flight seen; null: none was seen
 
   /** @param {HTMLElement} root an empty box */

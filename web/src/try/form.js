@@ -154,7 +154,7 @@ export class Fields {
     const completed = this.completed.said;
     return {
       crossed: this.crossed.said,
-      completed: completed === null ? null : completed.length > 0,
+      completed: completed ? completed.length > 0 : null,
       contacts: this.contacts.said,
       penalty_s: this.penalty.said,
       try_time_s: this.time.said,

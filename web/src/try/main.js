@@ -7,6 +7,7 @@ import { Fields } from "./form.js";
 import { frameMarks, moment, nameOf, notCounted, orDash, seconds, standing } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
+import { reasonOf } from "../lib/request.js";
 
 const { judge, attempt } = pageData();
 
@@ -19,6 +20,7 @@ class TryPage {
   #counts = make("p", { class: "counts", "aria-live": "polite" });
   #save = make("button", { type: "submit", class: "main" }, "Save");
   #history = make("ol", { class: "history" });
+  /** @type {any} */
   #detail = null;
   #stale = false;
 
@@ -30,7 +32,7 @@ class TryPage {
       ...(judge ? [this.#teamForm(), this.#judgeForm()] : []),
       make("section", { class: "panel", "aria-labelledby": "history-title" },
         make("h2", { id: "history-title" }, "What judges changed"), this.#history));
-    const refresh = oneAtATime(() => this.#load(false), (error) => this.#say(error.message));
+    const refresh = oneAtATime(() => this.#load(false), (error) => this.#say(reasonOf(error)));
     watch({
       changed: refresh,
       running: (tries) => {
@@ -80,8 +82,8 @@ class TryPage {
       await this.#load(!keep, keep);
       this.#say(`Saved. ${this.#counts.textContent}`, "good");
     } catch (error) {
-      this.#say(error.message);
-      if (error.status === 409) this.#offerNew();
+      this.#say(reasonOf(error));
+      if (/** @type {{status?: number}} */ (error).status === 409) this.#offerNew();
     } finally {
       this.#save.disabled = false;
     }
@@ -127,7 +129,7 @@ class TryPage {
     if (!judge) return;
     this.#showTeams(teams, detail.try.team, before?.try.team);
     if (!filled || force) this.#fields.show(detail);
-    for (const form of [this.#form, this.#team.form]) form.hidden = false;
+    for (const form of [this.#form, this.#team.form]) if (form) form.hidden = false;
     this.#preview();
   }
 

@@ -16,7 +16,7 @@ from tests.framerunner.monitor.competition.harness import EQUIPMENT, event
 async def main():
     service = CompetitionService(sys.argv[1], EQUIPMENT)
     def hear(message):
-        if message["kind"] == "changed" and any(each.state == "ended" for each in service._board.tries):
+        if message.kind == "changed" and any(each.state == "ended" for each in service._board.tries):
             sys.stdout.write("shown\\n")
             sys.stdout.flush()
             while True:  # killed here; nothing more is written

@@ -73,7 +73,7 @@ async def test_requests_wait_until_the_database_is_open_but_not_for_ever(url, mo
         await service.board()
     with pytest.raises(DatabaseError, match="being opened"):
         await service.change(lambda store: store.board().rule)
-    assert service.running == () and service.messages()[0]["version"] == 0
+    assert service.running == () and service.messages()[0].version == 0
 
 
 @pytest.mark.parametrize("steps", range(6))
@@ -99,7 +99,7 @@ async def test_listeners_get_only_what_is_committed(url):
         seen = []
 
         def hear(message):
-            if message["kind"] == "changed":
+            if message.kind == "changed":
                 other = Store(service._store._database)  # what another reader of the file finds now
                 seen.append((message["version"], [each.state for each in other.board().tries]))
 
@@ -123,7 +123,7 @@ async def test_events_of_a_running_try_are_sent_without_reading_everything(url):
             service.on_try_event(event("running", "k", time_s=time_s, crossed=("red",)))
             await until(lambda now=time_s: service.running[0].try_time_s == now)
         assert service._board.version == version
-        assert [m["tries"][0]["try_time_s"] for m in heard if m["kind"] == "running"][-3:] == [1.0, 2.0, 3.0]
+        assert [m.tries[0].try_time_s for m in heard if m.kind == "running"][-3:] == [1.0, 2.0, 3.0]
         assert service.running[0].crossed == ("red",)
         service.on_try_event(event("ended", "k"))
         await until(lambda: not service.running)
@@ -167,7 +167,7 @@ async def test_results_wait_for_a_database_that_is_unreachable(url, monkeypatch)
     monkeypatch.setattr(Store, "take", fail)
     async with serving(url) as service:
         problems = []
-        service.subscribe(lambda message: problems.append(message.get("problem")))
+        service.subscribe(lambda message: problems.append(getattr(message, "problem", None)))
         service.on_try_event(event("began", "k", time_s=0.0))
         service.on_try_event(event("running", "k", time_s=1.0))
         service.on_try_event(event("ended", "k"))

@@ -1,6 +1,7 @@
 import { kindOf, stateColour } from "../colours.js";
 import { isTyping, make, setAttribute, setText } from "../dom.js";
-import { TopView } from "./topview.js";
+import { ArenaAbove } from "./arena_above.js";
+import { reasonOf } from "../request.js";
 
 /**
  * @typedef {object} Pose one drone, as in the live channel's message "pose"
@@ -32,8 +33,10 @@ export class Arena {
   #sizeButton;
   #mapButton;
   #goal;
+  /** @type {import("./map.js").NavigationMap|null} */
   #map = null;
-  #painter = null; // an ArenaScene or a TopView, once it is there
+  /** @type {any} */
+  #painter = null; // an ArenaScene or an ArenaAbove, once it is there
   #waiting = [];
   #last = new Map(); // newest pose by drone
   #orders = new Map();
@@ -168,8 +171,8 @@ export class Arena {
       const { ArenaScene } = await import("./scene.js");
       this.#painter = new ArenaScene(this.#box, this.#labels);
     } catch (error) {
-      console.info(`no 3-D here (${error.message}); the arena is drawn from above`);
-      this.#painter = new TopView(this.#box, "This browser draws no 3-D here, so the arena is shown from above.");
+      console.info(`no 3-D here (${reasonOf(error)}); the arena is drawn from above`);
+      this.#painter = new ArenaAbove(this.#box, "This browser draws no 3-D here, so the arena is shown from above.");
       for (const button of [...Object.values(this.#buttons), this.#sizeButton]) button.hidden = true;
     }
     for (const what of this.#waiting.splice(0)) what(this.#painter);

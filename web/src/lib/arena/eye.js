@@ -18,6 +18,7 @@ export class ArenaEye {
   #arena = { length_x_m: 10, width_y_m: 10, height_m: 4 };
   #onboard = { width_px: 320, height_px: 240, horizontal_fov_rad: 1.57, position_flu_m: [0.08, 0, 0] };
   #isTouched = false;
+  /** @type {import("three").Vector3|null} */
   #heading = null;
   #orbitCamera;
   #otherCamera;

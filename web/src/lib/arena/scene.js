@@ -25,11 +25,15 @@ export class ArenaScene {
   #scene;
   #fog;
   #eye;
+  /** @type {any} */
   #world = null;
+  /** @type {any} */
   #scenario = null;
   #mapModel;
+  /** @type {any} */
   #map = null;
   #drones = new Map();
+  /** @type {number|null} */
   #selected = null;
   #isTrueSize = false;
   #paint = LIGHT;
@@ -136,7 +140,6 @@ export class ArenaScene {
 
   dispose() {
     this.#renderer.dispose();
-    this.#renderer = null;
   }
 
   #makeRenderer(canvas, context) {
@@ -172,7 +175,7 @@ export class ArenaScene {
     new ResizeObserver(resize).observe(this.#box);
     resize();
     new IntersectionObserver((entries) => {
-      this.#isSeen = entries.at(-1).isIntersecting;
+      this.#isSeen = entries.at(-1)?.isIntersecting ?? false;
       this.#ask();
     }).observe(this.#box);
   }

@@ -3,6 +3,7 @@ import { make, number, setAttribute, setText } from "../dom.js";
 import { DiagramView } from "../diagram/diagram_view.js";
 import { readMermaid } from "../diagram/from_mermaid.js";
 import { lookAt } from "../diagram/look.js";
+import { reasonOf } from "../request.js";
 
 const NONE = "no mission yet; fly one: framerunner fly test-case-1";
 
@@ -19,7 +20,9 @@ export class Statechart {
   #source;
   #buttons;
   #view;
+  /** @type {{name: string, mermaid: string, states: string[], source: string}|null} */
   #chart = null;
+  /** @type {string|null} */
   #active = null;
   #entered = 0;
 
@@ -67,7 +70,7 @@ export class Statechart {
       this.#light();
       this.#setMode("follow");
     } catch (error) {
-      console.info(`the diagram cannot be drawn: ${error.message}`);
+      console.info(`the diagram cannot be drawn: ${reasonOf(error)}`);
       this.#say("the diagram cannot be drawn; the states and transitions stand below");
     }
   }

@@ -1,8 +1,11 @@
 /** How the contest's pages exchange data with the monitor: requests, judges' changes, and a WebSocket that reports changes. */
 import { ReconnectingSocket } from "../reconnecting_socket.js";
+import { request } from "../request.js";
+
+/** @import {Contest} from "../messages.js" */
 
 /** Tries that are being flown, as the WebSocket sent them last, and how many times it did. */
-const latest = { running: [], messages: 0 };
+const latest = { running: /** @type {Contest.RunningView[]} */ ([]), messages: 0 };
 
 /**
  * Request something. The tries of an answer are replaced by those that the WebSocket sent while it was under way.
@@ -11,7 +14,7 @@ const latest = { running: [], messages: 0 };
  */
 export async function ask(path) {
   const before = latest.messages;
-  const given = await answer(await reach(fetch(`/api/competition/${path}`, { cache: "no-store" })));
+  const given = await request(`/api/competition/${path}`);
   if (latest.messages !== before && given.running !== undefined) given.running = latest.running;
   return given;
 }
@@ -22,45 +25,18 @@ export async function ask(path) {
  * @param {object} form
  * @returns {Promise<object>} throws an Error with one line for people; its `status` is that of HTTP
  */
-export async function send(path, form) {
-  return answer(await reach(fetch(`/api/competition/${path}`, {
-    method: "POST",
-    headers: { "Content-Type": "application/json" },
-    body: JSON.stringify(form),
-  })));
-}
-
-async function reach(fetching) {
-  try {
-    return await fetching;
-  } catch {
-    throw new Error("the monitor does not answer");
-  }
-}
-
-async function answer(response) {
-  if (response.ok) return response.json();
-  const text = await response.text();
-  const words = detailOf(text) ?? `the monitor answers ${response.status}`;
-  throw Object.assign(new Error(words), { status: response.status });
-}
-
-function detailOf(text) {
-  try {
-    const detail = JSON.parse(text).detail;
-    return typeof detail === "string" ? detail : null;
-  } catch {
-    return text.length < 200 ? text.trim() || null : null;
-  }
+export function send(path, form) {
+  return request(`/api/competition/${path}`, form);
 }
 
 /**
  * Hear of changes, for as long as the page lives; a lost connection is opened again.
- * @param {{changed: function(any): void, running: function(any[]): void, link: function(boolean): void}} hear
+ * @param {{changed: (message: Contest.ChangedMessage) => void, running: (tries: Contest.RunningView[]) => void, link: (isOpen: boolean) => void}} hear
  *   changed: something is other than before, also after each new connection; link: whether there is a connection
  */
 export function watch(hear) {
-  return new ReconnectingSocket("/ws/competition", {
+  /** @type {ReconnectingSocket<never, Contest.ToPage>} */
+  const socket = new ReconnectingSocket("/ws/competition", {
     message: (message) => {
       if (message.kind === "changed") hear.changed(message);
       else if (message.kind === "running") {
@@ -71,6 +47,7 @@ export function watch(hear) {
     },
     state: (state) => hear.link(state === "open"),
   });
+  return socket;
 }
 
 /**
@@ -88,7 +65,7 @@ export function oneAtATime(work, fail) {
       try {
         await work();
       } catch (error) {
-        fail(error);
+        fail(error instanceof Error ? error : new Error(String(error)));
       }
     }
     going = null;

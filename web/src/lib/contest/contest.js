@@ -3,8 +3,8 @@ import { ask, oneAtATime, watch } from "./channel.js";
 
 /**
  * @typedef {object} Contest
- * @property {object[]} running tries that are being flown, as in `/ws/competition`
- * @property {object|null} stage as `/api/competition/stage` answers; null before the first answer
+ * @property {any[]} running tries that are being flown, as in `/ws/competition`
+ * @property {any} stage as `/api/competition/stage` answers; null before the first answer
  */
 
 /**
@@ -12,10 +12,11 @@ import { ask, oneAtATime, watch } from "./channel.js";
  * @param {function(Contest): void} hear told at each change
  */
 export function watchContest(hear) {
+  /** @type {Contest} */
   const known = { running: [], stage: null };
   const refresh = oneAtATime(async () => {
-    known.stage = await ask("stage");
-    known.running = known.stage.running;
+    const stage = await ask("stage");
+    Object.assign(known, { stage, running: stage.running });
     hear(known);
   }, (error) => console.info(`the contest is not known: ${error.message}`));
   watch({

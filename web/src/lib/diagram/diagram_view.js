@@ -9,9 +9,9 @@ import { HANDLE, labelWords, missingShape, stateShape, svg } from "./shapes.js";
 import { Viewport } from "./viewport.js";
 
 /**
- * @typedef {import("./types.js").Diagram} Diagram
- * @typedef {import("./types.js").Finding} Finding
- * @typedef {import("./types.js").Point} Point
+ * @typedef {import("../messages.js").Documents.DrawnDiagram} Diagram
+ * @typedef {import("../messages.js").Documents.ShownFinding} Finding
+ * @typedef {{x: number, y: number}} Point
  * @typedef {import("./geometry.js").Box} Box
  * @typedef {{kind: "mission"|"state"|"transition", id: string}} Selection id: of a state or transition of the diagram
  */
@@ -67,7 +67,7 @@ export class DiagramView {
   #children = new Map();
   #parents = new Map();
   #initials = new Map();
-  /** @type {Map<string, import("./types.js").Edge>} */
+  /** @type {Map<string, import("../messages.js").Documents.DrawnEdge>} */
   #edges = new Map();
   /** @type {Selection} */
   #selection = { kind: "mission", id: "" };
@@ -210,7 +210,7 @@ export class DiagramView {
     }
   }
 
-  /** @param {import("./types.js").StateNode} state @returns {SVGGElement} */
+  /** @param {import("../messages.js").Documents.DrawnNode} state @returns {SVGGElement} */
   #state(state) {
     const { id, parent } = state;
     const initial = parent === "" ? this.#diagram.initial : this.#initials.get(parent);
@@ -277,18 +277,23 @@ export class DiagramView {
     }
   }
 
+  /** Where a state that is drawn is. @param {string} path */
+  #box(path) {
+    return /** @type {Box} */ (this.#boxes.get(path));
+  }
+
   /** @param {string} path */
   #place(path) {
-    const { x, y } = this.#boxes.get(path);
-    this.#stateElements.get(path).setAttribute("transform", `translate(${x},${y})`);
+    const { x, y } = this.#box(path);
+    this.#stateElements.get(path)?.setAttribute("transform", `translate(${x},${y})`);
   }
 
   /** Draw a line, its label in the middle. @param {string} id */
   #drawLine(id) {
-    const elements = this.#transitionElements.get(id);
-    const { source, target } = this.#edges.get(id);
+    const elements = this.#transitionElements.get(id), edge = this.#edges.get(id);
+    if (!elements || !edge) return;
     const box = this.#missing.get(id);
-    elements.curve = line(this.#boxes.get(source), box ?? this.#boxes.get(target), elements.lane);
+    elements.curve = line(this.#box(edge.source), box ?? this.#box(edge.target), elements.lane);
     const drawn = pathOf(elements.curve);
     elements.path.setAttribute("d", drawn);
     elements.hit.setAttribute("d", drawn);
@@ -384,7 +389,8 @@ export class DiagramView {
     for (const [path, group] of this.#stateElements) group.classList.toggle("e-active", active.has(path) || inside(path));
     for (const [id, { group, label }] of this.#transitionElements) {
       const count = counts.get(id) ?? 0;
-      const words = count > 0 ? `${label.dataset.words} (${count}×)` : label.dataset.words;
+      const plain = label.dataset.words ?? "";
+      const words = count > 0 ? `${plain} (${count}×)` : plain;
       if (label.textContent !== words) label.textContent = words;
       group.classList.toggle("e-taken", taken.has(id));
     }
@@ -496,7 +502,7 @@ export class DiagramView {
   stateAt(point, except = new Set()) {
     let found = null;
     for (const { id: path } of this.#diagram.nodes) {
-      if (!except.has(path) && contains(this.#boxes.get(path), point)) found = path; // inner ones come later
+      if (!except.has(path) && contains(this.#box(path), point)) found = path; // inner ones come later
     }
     return found;
   }
@@ -511,7 +517,7 @@ export class DiagramView {
 
   /** @param {string} path */
   #handleHeight(path) {
-    return this.#children.has(path) ? 15 : this.#boxes.get(path).height / 2;
+    return this.#children.has(path) ? 15 : this.#box(path).height / 2;
   }
 
   /** @param {string} path @returns {string[]} it and all states in it */
@@ -543,7 +549,7 @@ export class DiagramView {
    */
   mover(id) {
     const family = this.#family(id);
-    const before = new Map(family.map((each) => [each, { ...this.#boxes.get(each) }]));
+    const before = new Map(family.map((each) => [each, { ...this.#box(each) }]));
     const dangling = new Map([...this.#missing].filter(([each]) => family.includes(this.#edges.get(each)?.source ?? "")).map(([each, box]) => [each, { ...box }]));
     const lines = new Set(family.flatMap((each) => this.#touching.get(each) ?? []));
     return (dx, dy) => {

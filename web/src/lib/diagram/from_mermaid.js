@@ -1,8 +1,8 @@
 /** Reads the diagram that an app sends: Mermaid's language as `framerunner mission show` writes it, and no more of it. */
 
 /**
- * @typedef {import("./types.js").Diagram} Diagram
- * @typedef {import("./types.js").StateNode} StateNode
+ * @typedef {import("../messages.js").Documents.DrawnDiagram} Diagram
+ * @typedef {import("../messages.js").Documents.DrawnNode} StateNode
  */
 
 const MOST_LINES = 4000; // a diagram comes from a drone, and is drawn at once
@@ -15,7 +15,7 @@ export function readMermaid(text) {
   if (lines.length > MOST_LINES) throw new Error("it is too long");
   /** @type {Map<string, StateNode>} */
   const nodes = new Map();
-  const diagram = { initial: "", readable: true, nodes: /** @type {StateNode[]} */ ([]), edges: /** @type {import("./types.js").Edge[]} */ ([]) };
+  const diagram = { initial: "", readable: true, nodes: /** @type {StateNode[]} */ ([]), edges: /** @type {import("../messages.js").Documents.DrawnEdge[]} */ ([]) };
   const superstates = new Set(lines.flatMap((line) => /^state ".*" as (\S+) \{$/.exec(line)?.[1] ?? []));
   /** @type {Map<string, number>} */
   const counts = new Map();

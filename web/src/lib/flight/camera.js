@@ -10,13 +10,18 @@ export class CameraView {
   #image;
   #canvas;
   #words;
+  /** @type {string|null} */
   #address = null;
+  /** @type {string|null} */
   #owned = null;
+  /** @type {any} */
   #message = null;
   #drawn = "";
   #again = 0;
   #note;
+  /** @type {ImageBitmap|null} */
   #bitmap = null;
+  /** @type {any} */
   #wanted = null;
 
   /** @param {HTMLElement} element an empty box; the view takes its width */
@@ -101,7 +106,7 @@ export class CameraView {
   /** @param {{width: number, height: number, boxes: object}|null} message as "detections"; null: nothing known */
   setDetections(message) {
     this.#message = message;
-    if (message?.width > 0 && message?.height > 0) {
+    if (message && message.width > 0 && message.height > 0) {
       this.#box.style.setProperty("--shape", `${message.width} / ${message.height}`);
     }
     const told = JSON.stringify([message?.width, message?.height, message?.boxes]);
@@ -132,7 +137,7 @@ export class CameraView {
     const ratio = Math.min(2, devicePixelRatio || 1);
     const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
-    const pen = canvas.getContext("2d", { willReadFrequently: true });
+    const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
     const [message, bitmap] = [this.#message, this.#bitmap];

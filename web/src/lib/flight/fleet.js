@@ -15,6 +15,7 @@ export class Fleet {
   #drones = new Map();
   #tabs;
   #hear;
+  /** @type {number|null} */
   #chosen = null;
 
   /**

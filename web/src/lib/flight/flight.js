@@ -12,7 +12,9 @@ export class Flight {
   #playout;
   #stream;
   #hear;
+  /** @type {number|null} */
   #chosen = null;
+  /** @type {import("../messages.js").Live.DroneStatus|null} */
   #status = null;
   #image = false; // there is one to be seen
   #imageAt = 0;

@@ -2,7 +2,7 @@
 
 /**
  * @param {number} id of the drone
- * @param {Array<number|null>[]} rows t, x, y, z, yaw, velocity forward, left, up, turn rate, the four commanded, motors, state
+ * @param {any[][]} rows t, x, y, z, yaw, velocity forward, left, up, turn rate, the four commanded, motors, state
  * @returns {import("../arena/arena.js").Pose[]} with the attitude level
  */
 export function posesOf(id, rows) {

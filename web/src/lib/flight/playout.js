@@ -19,10 +19,14 @@ const OTHER_CLOCK_S = 5; // an image whose time is this far off has another cloc
 
 export class Playout {
   #tracks = new Map(); // by drone: {poses, shown: seconds or null, newest, heardAt, isTaken: the first pose was passed}
+  /** @type {any[]} */
   #images = [];
+  /** @type {import("../messages.js").Live.Detections[]} */
   #detections = [];
   #detectedAt = -Infinity;
+  /** @type {any} */
   #loose = null; // an image that tells no time, or one of another clock
+  /** @type {number|null} */
   #chosen = null;
   #lag_s = 0;
   #last = 0;
@@ -37,7 +41,7 @@ export class Playout {
     this.#show = show;
   }
 
-  /** Whose images and detections these are from now on. @param {number} id */
+  /** Whose images and detections these are from now on. @param {number|null} id */
   choose(id) {
     this.#chosen = id;
     this.#images = [];
@@ -120,6 +124,7 @@ export class Playout {
   #tick(now) {
     const passed_s = Math.min(0.5, (now - this.#last) / 1000);
     this.#last = now;
+    /** @type {any[][]} */
     const [poses, passed] = [[], []];
     let moves = false;
     for (const track of this.#tracks.values()) {

@@ -70,7 +70,8 @@ export class Plots {
     if (last && t < last[0]) this.#samples = [];
     else if (last && t === last[0]) return;
     const yaw = yawOf(q);
-    this.#samples.push([t, ...p, yaw, ...(v ?? [NaN, NaN, NaN]), r ?? NaN, ...(c ?? [NaN, NaN, NaN, NaN])]);
+    const sample = [t, ...p, yaw, ...(v ?? [null, null, null]), r ?? null, ...(c ?? [null, null, null, null])];
+    this.#samples.push(sample.map((value) => value ?? NaN));
     if (this.#samples.length > MOST) this.#samples.splice(0, MOST / 2);
     this.#dirty = true;
   }
@@ -174,6 +175,7 @@ export class Plots {
  * @returns {[number[], (number|null)[], (number|null)[]]}
  */
 function columns(samples, { measured, commanded, wraps }) {
+  /** @type {[number[], (number|null)[], (number|null)[]]} */
   const [times, aims, values] = [[], [], []];
   const known = (value) => (Number.isFinite(value) ? value : null);
   for (const sample of samples) {

@@ -6,8 +6,10 @@ const RETRY_MS = 2000;
 
 /** One connection to `/video/ID/frames`, made again when it ends. */
 export class FrameStream {
+  /** @type {string|null} */
   #address = null;
   #hear;
+  /** @type {AbortController|null} */
   #control = null;
 
   /** @param {function({t: number|null, jpeg: Blob}): void} hear told each image; t: seconds, null if not known */
@@ -33,7 +35,7 @@ export class FrameStream {
     while (!control.signal.aborted) {
       try {
         const answer = await fetch(address, { signal: control.signal, cache: "no-store" });
-        if (answer.ok) await this.#read(answer.body.getReader(), control.signal);
+        if (answer.ok && answer.body) await this.#read(answer.body.getReader(), control.signal);
       } catch { /* the connection ended; it is made again */ }
       await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
     }

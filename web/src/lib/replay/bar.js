@@ -24,7 +24,7 @@ export class Bar {
   constructor(element, clock, runs, { keys = true } = {}) {
     this.#clock = clock;
     this.#runs = runs;
-    const button = (words, label, act, keys = null) => {
+    const button = (words, label, act, keys = /** @type {string|null} */ (null)) => {
       const made = make("button", { type: "button", "aria-label": label, title: keys ? `${label} (${keys})` : label }, words);
       made.addEventListener("click", act);
       return made;

@@ -4,6 +4,7 @@ export const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
 
 export class Clock {
   #t = 0;
+  /** @type {[number, number]|null} */
   #began = null; // wall time, seconds, and the time shown then
   #speed = 1;
   #begin = 0;
@@ -64,7 +65,7 @@ export class Clock {
   }
 
   #advance() {
-    if (!this.isPlaying) return;
+    if (!this.#began) return;
     const [wall, t] = this.#began;
     this.#t = Math.min(this.#end, t + (this.now() - wall) * this.#speed);
     if (this.#t >= this.#end) this.#began = null;

@@ -1,23 +1,8 @@
 /** A recorded flight: fetched whole, asked for any of its times. Nothing here touches the page. */
+import { request } from "../request.js";
 
 const OLD_IMAGE_S = 1; // boxes of an image older than this are not drawn
 const TRANSITIONS = 10;
-
-/**
- * Fetch JSON.
- * @param {string} address
- * @throws {Error} with one line for people
- */
-export async function fetchJson(address) {
-  let answer;
-  try {
-    answer = await fetch(address);
-  } catch {
-    throw new Error("the monitor does not answer");
-  }
-  if (!answer.ok) throw new Error((await answer.text()).trim().slice(0, 400) || `the monitor answered ${answer.status}`);
-  return answer.json();
-}
 
 /** The address of a run. @param {string} name */
 export function addressOf(name) {
@@ -68,7 +53,7 @@ export class Run {
 
   /** Fetch a run. @param {string} name */
   static async fetch(name) {
-    return new Run(await fetchJson(addressOf(name)));
+    return new Run(await request(addressOf(name)));
   }
 
   /** How many poses there are up to a time. */

@@ -1,0 +1,49 @@
+/** A gamepad: mode 2, that is, the left stick climbs and turns, the right one goes forward and sideways. */
+
+import { neutral, withoutDeadZone } from "./values.js";
+
+const DEAD_ZONE = 0.08;
+
+/** Buttons of the standard mapping: the lowest of the four on the right, the right one, the left one. */
+const BUTTONS = { 0: "take", 1: "give", 2: "hold" };
+
+/** The first gamepad that has two sticks. */
+export class Gamepads {
+  /** @type {Object<string, boolean>|null} */
+  #pressed = null;
+
+  /** Its name; "" if there is none. */
+  name = "";
+
+  /**
+   * Look at it once.
+   * @returns {{sticks: import("./values.js").Sticks, orders: string[]}} orders: of buttons pressed since last time
+   */
+  read() {
+    const pad = [...(navigator.getGamepads?.() ?? [])].find((each) => each?.connected && each.axes.length >= 4);
+    this.name = pad ? pad.id : "";
+    if (!pad) {
+      this.#pressed = null;
+      return { sticks: neutral(), orders: [] };
+    }
+    const [turn, down, right, back] = [0, 1, 2, 3].map((axis) => withoutDeadZone(pad.axes[axis], DEAD_ZONE));
+    return { sticks: { forward: 0 - back, right, up: 0 - down, yaw: turn }, orders: this.#orders(pad) };
+  }
+
+  /** Forget which buttons are down: those held now have to be let go before they count. */
+  clear() {
+    this.#pressed = null;
+  }
+
+  #orders(pad) {
+    const orders = [];
+    const before = this.#pressed;
+    this.#pressed = {};
+    for (const [number, what] of Object.entries(BUTTONS)) {
+      const down = Boolean(pad.buttons[number]?.pressed);
+      this.#pressed[number] = down;
+      if (down && before !== null && !before[number]) orders.push(what);
+    }
+    return orders;
+  }
+}
