@@ -56,6 +56,20 @@ class ColourMask:
     box: tuple[int, int, int, int]  # column, row, columns and rows of the smallest box around them
 
 
+def split_planes(image: Image) -> list[Plane]:
+    """Blue, green and red of an image, BGR, each of shape (height, width), uint8.
+
+    Raises:
+        ValueError: the image is not of shape (height, width, 3) and type uint8.
+    """
+    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
+        raise ValueError(f"image: need (height, width, 3) of uint8, got {image.shape} of {image.dtype}")
+    height, width = image.shape[:2]
+    # Splitting into allocated planes is several times quicker than letting OpenCV allocate them.
+    planes: list[Plane] = list(np.empty((3, height, width), np.uint8))
+    return list(cv2.split(image, planes))
+
+
 def find_colours(image: Image) -> list[ColourMask]:
     """Find the pixels of all colours that frames and obstacles have.
 
@@ -68,13 +82,8 @@ def find_colours(image: Image) -> list[ColourMask]:
     Raises:
         ValueError: the image is not of that shape and type.
     """
-    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
-        raise ValueError(f"image: need (height, width, 3) of uint8, got {image.shape} of {image.dtype}")
-    height, width = image.shape[:2]
-    # Splitting into allocated planes is several times quicker than letting OpenCV allocate them.
-    planes: list[Plane] = list(np.empty((3, height, width), np.uint8))
-    blue, green, red = cv2.split(image, planes)
-    spare: list[Plane] = list(np.empty((2, height, width), np.uint8))
+    blue, green, red = split_planes(image)
+    spare: list[Plane] = list(np.empty((2, *image.shape[:2]), np.uint8))
     found = [
         _primary("red", red, green, blue, spare),
         _primary("green", green, red, blue, spare),

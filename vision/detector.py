@@ -17,9 +17,8 @@ from __future__ import annotations
 from math import acos, degrees, hypot
 
 import cv2
-import numpy as np
-import numpy.typing as npt
 
+from vision.colour_regions import Plane, split_planes
 from vision.types import NOT_SEEN, Detection, Detections, Image
 
 FRAME_HEIGHT_M = 0.23
@@ -30,8 +29,6 @@ MIN_EXCESS = 50
 """The shown channel must exceed the next one by more than this."""
 MAX_GREY_GAP = 20
 """The other two channels must differ by less than this."""
-
-_Plane = npt.NDArray[np.uint8]
 
 
 def detect(image: Image, time_us: int | None = None, *, focal_px: float | None = None) -> Detections:
@@ -48,13 +45,8 @@ def detect(image: Image, time_us: int | None = None, *, focal_px: float | None =
     Raises:
         ValueError: the image is not of that shape and type.
     """
-    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
-        raise ValueError(f"image: need (height, width, 3) of uint8, got {image.shape} of {image.dtype}")
-    height, width = image.shape[:2]
-    # Splitting into allocated planes is several times quicker than letting OpenCV allocate them.
-    planes: list[_Plane] = list(np.empty((3, height, width), np.uint8))
-    blue, green, red = cv2.split(image, planes)
-    focal = width / 2 if focal_px is None else focal_px
+    blue, green, red = split_planes(image)
+    focal = image.shape[1] / 2 if focal_px is None else focal_px
     return Detections(
         red=_find(red, green, blue, focal),
         green=_find(green, blue, red, focal),
@@ -90,7 +82,7 @@ def measure(
     return Detection(n, s, e, w, distance_m, degrees(acos(apparent_width / full_width)))
 
 
-def _find(shown: _Plane, following: _Plane, other: _Plane, focal_px: float) -> Detection:
+def _find(shown: Plane, following: Plane, other: Plane, focal_px: float) -> Detection:
     """Detect one colour, given the planes of its channel, the next channel and the remaining one."""
     # Saturating subtraction keeps every difference in uint8; a pixel stays non-zero where a test passes.
     _, mask = cv2.threshold(cv2.subtract(shown, following), MIN_EXCESS, 255, cv2.THRESH_BINARY)

@@ -197,17 +197,15 @@ class FolderSource:
 
     Args:
         folder: holds the images.
-        rate_hz: images a second; by default as fast as they are taken.
 
     Attributes:
         bad_frames: files skipped so far because they could not be decoded.
     """
 
-    def __init__(self, folder: Path, rate_hz: float | None = None) -> None:
+    def __init__(self, folder: Path) -> None:
         self.bad_frames = 0
         self._folder = folder
         self._name = _name_of(str(folder))
-        self._period_s = 1.0 / rate_hz if rate_hz else 0.0
         self._paths: list[Path] = []
         self._decoder = ImageDecoder()
 
@@ -240,7 +238,7 @@ class FolderSource:
             found = _TIME.search(path.stem)
             time_us = int(found.group(1)) if found else None
             yield CameraFrame(image, time_us, time.monotonic(), data if is_jpeg else None)
-            await asyncio.sleep(self._period_s)
+            await asyncio.sleep(0)
 
 
 def _read(path: Path) -> bytes:

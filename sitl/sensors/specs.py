@@ -21,6 +21,12 @@ Rate = Annotated[float, Field(ge=0.1, le=1000)]
 DelayTime = Annotated[float, Field(ge=0, le=5)]
 
 
+def _check_distances(min_m: float, max_m: float) -> None:
+    """Refuse a sensor that can see nothing."""
+    if min_m >= max_m:
+        raise refusal(min_m, f"must be below max_distance_m {max_m}", "min_distance_m")
+
+
 class GyroscopeSpec(Part):
     """The gyroscope of an IMU; figures of each axis."""
 
@@ -106,9 +112,7 @@ class RangeFinderSpec(Part):
 
     @model_validator(mode="after")
     def _measures_something(self) -> Self:
-        if self.min_distance_m >= self.max_distance_m:
-            message = f"must be below max_distance_m {self.max_distance_m}"
-            raise refusal(self.min_distance_m, message, "min_distance_m")
+        _check_distances(self.min_distance_m, self.max_distance_m)
         return self
 
 
@@ -127,9 +131,7 @@ class OpticalFlowSpec(Part):
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:
-        if self.min_distance_m >= self.max_distance_m:
-            message = f"must be below max_distance_m {self.max_distance_m}"
-            raise refusal(self.min_distance_m, message, "min_distance_m")
+        _check_distances(self.min_distance_m, self.max_distance_m)
         return self
 
 
