@@ -1,9 +1,9 @@
 """The parameter protocols PARAM_* and PARAM_EXT_*: list, read, set, save.
 
 PARAM_*: values are typed, integers are sent bytewise. As PX4: `_HASH_CHECK` is the first entry of the list,
-with index 65535, and setting it to the right value ends the list (the ground station has all in its cache); an
-unknown name or index or a wrong type is not answered; a change is sent on all links. Different: an invalid
-value is refused, with a text and the value kept.
+with index 65535, and setting it to the right value ends the list (the ground station has all in its
+cache); an unknown name or index or a wrong type is not answered; a change is sent on all links. Different:
+an invalid value is refused, with a text and the value kept.
 
 PARAM_EXT_*, which PX4's autopilot does not answer: the same parameters. Every set is acknowledged with the
 value that is kept; a change is sent on all links as PARAM_VALUE.
