@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import getpass
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -110,16 +109,6 @@ def _check_rows(report: PreflightReport) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def wrapped_rows(section: CardSection, widths: Sequence[int]) -> list[tuple[list[str], ...]]:
-    """A section's rows with each cell broken into lines of at most a column's width in characters."""
-    from textwrap import wrap
-
-    return [
-        tuple(wrap(cell, width) or [""] for cell, width in zip(row.cells, widths, strict=False))
-        for row in section.rows
-    ]
-
-
 def write_card(card: FlightCard, folder: Path) -> None:
     """Write the card as a page and as a PDF; what cannot be written is reported on standard error."""
     try:
@@ -129,7 +118,7 @@ def write_card(card: FlightCard, folder: Path) -> None:
     try:
         from framerunner.preflight.card_pdf import write_pdf
 
-        write_pdf(card, folder / PDF_NAME)
+        write_pdf(card.title, card.sections, folder / PDF_NAME)
     except OSError as error:
         warn(f"cannot write '{folder / PDF_NAME}': {error.strerror or error}")
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from textwrap import wrap
 
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
-from framerunner.preflight.card import FlightCard, wrapped_rows
 from framerunner.wire.operator_messages import CardSection
 
 _PAGE_IN = (8.27, 11.69)
@@ -24,13 +24,13 @@ _Line = tuple[str, float, tuple[str, ...], str]
 """What it is, its height, its cells and their colour."""
 
 
-def write_pdf(card: FlightCard, path: Path) -> None:
-    """Write the card. Raises OSError."""
-    with PdfPages(path, metadata={"Title": card.title}) as pages:
+def write_pdf(title: str, sections: Sequence[CardSection], path: Path) -> None:
+    """Write a card of some tables. Raises OSError."""
+    with PdfPages(path, metadata={"Title": title}) as pages:
         figure, at = Figure(figsize=_PAGE_IN), _TOP
-        figure.text(_LEFT, at - 0.02, card.title, fontsize=_TITLE_PT, weight="bold", parse_math=False)
+        figure.text(_LEFT, at - 0.02, title, fontsize=_TITLE_PT, weight="bold", parse_math=False)
         at -= 0.05
-        for line in (line for section in card.sections for line in _lines(section)):
+        for line in (line for section in sections for line in _lines(section)):
             kind, height, cells, colour = line
             if at - height < _BOTTOM:
                 pages.savefig(figure)
@@ -56,8 +56,16 @@ def write_pdf(card: FlightCard, path: Path) -> None:
 def _lines(section: CardSection) -> Iterator[_Line]:
     yield "title", 2.0 * _LINE, (section.title,), "black"
     widths = _WIDTHS[len(section.rows[0].cells)]
-    for row, cells in zip(section.rows, wrapped_rows(section, widths), strict=True):
+    for row, cells in zip(section.rows, _wrapped_rows(section, widths), strict=True):
         colour = _COLOURS.get(row.cells[1], "black") if len(row.cells) == 5 else "black"
         for number in range(max(map(len, cells))):
             texts = tuple(cell[number] if number < len(cell) else "" for cell in cells)
             yield "row", (1.25 if number == 0 else 1.0) * _LINE, texts, colour
+
+
+def _wrapped_rows(section: CardSection, widths: Sequence[int]) -> list[tuple[list[str], ...]]:
+    """A section's rows with each cell broken into lines of at most a column's width in characters."""
+    return [
+        tuple(wrap(cell, width) or [""] for cell, width in zip(row.cells, widths, strict=False))
+        for row in section.rows
+    ]

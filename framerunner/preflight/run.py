@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from framerunner.camera_calibration.camera_delay import UNMEASURED, CameraDelay
-from framerunner.doctor.camera_times import CameraTimes, days_since, measure_camera
+from framerunner.doctor.camera_times import days_since, measure_camera
 from framerunner.doctor.checks import examine
 from framerunner.doctor.listen import listen
 from framerunner.errors import UserError
@@ -150,8 +150,9 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
     check_names(settings.accepted, CHECK_NAMES)
     fence = flight_fence(plan.box, plan.start_pose[:3])
     cancelled = threading.Event()
-    camera = None if settings.camera_url is None else _camera(settings.camera_url)
-    watching = None if camera is None else asyncio.create_task(camera)
+    url, watching = settings.camera_url, None
+    if url is not None:
+        watching = asyncio.create_task(measure_camera(url, CAMERA_S))
     try:
         measured = await asyncio.to_thread(_measure, plan, settings, fence, cancelled)
         times = None if watching is None else await watching
@@ -179,7 +180,9 @@ async def run_preflight(plan: FlightPlan, settings: PreflightSettings) -> Prefli
         if plan.chart.vision == "frames":
             checks += calibration_checks(plan.calibration, times.size_px, days_since)
     accepted = tuple(accept(checks, settings.accepted))
-    vehicle = _vehicle_words(record)
+    vehicle = (
+        f"{record.autopilot_name}, {record.type_name}, system {record.system_id}, mode {record.mode_name}"
+    )
     return PreflightReport(vehicle, record.vehicle, accepted, fence, measured.changes, measured.kept)
 
 
@@ -191,10 +194,6 @@ def tell(report: PreflightReport) -> None:
     lines = [check.line for check in report.checks]
     lines += [f"set      {each.name}: {each.before:g} -> {each.after:g}" for each in report.changes]
     print("\n".join(lines), file=sys.stderr, flush=True)
-
-
-async def _camera(url: str) -> CameraTimes:
-    return await measure_camera(url, CAMERA_S)
 
 
 def _measure(
@@ -342,8 +341,3 @@ def _caps_check(plan: FlightPlan, fence: FlightFence) -> Check:
     if limits.forward_m_s > caps.level_m_s or max(limits.up_m_s, limits.down_m_s) > caps.vertical_m_s:
         return Check("caps", Outcome.NOTE, value, limit, "they are below what the mission may ask for")
     return Check("caps", Outcome.PASS, value, limit)
-
-
-def _vehicle_words(record: Record) -> str:
-    name, kind = record.autopilot_name, record.type_name
-    return f"{name}, {kind}, system {record.system_id}, mode {record.mode_name}"

@@ -62,14 +62,10 @@ _MULTICOPTERS = frozenset(
 )
 
 
-def is_ardupilot(heartbeat: Message) -> bool:
-    """Whether a HEARTBEAT is ArduPilot's."""
-    return bool(heartbeat.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
-
-
 def is_arducopter(heartbeat: Message) -> bool:
     """Whether a HEARTBEAT is ArduCopter's; ArduPilot's other vehicles number their modes otherwise."""
-    return is_ardupilot(heartbeat) and heartbeat.type in _MULTICOPTERS
+    is_ardupilot = heartbeat.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    return bool(is_ardupilot and heartbeat.type in _MULTICOPTERS)
 
 
 def mode_name(custom_mode: int) -> str:

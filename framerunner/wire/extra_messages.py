@@ -49,11 +49,13 @@ def _message_class(definition: Any, dialect: Any) -> Any:  # noqa: ANN401
     fields, ordered = definition.fields, definition.ordered_fields
     instance = next((field for field in fields if field.instance), None)
 
-    def init(self: Any, *values: Any) -> None:  # noqa: ANN401
+    def init(self: Any, *values: Any, **named: Any) -> None:  # noqa: ANN401
         dialect.MAVLink_message.__init__(self, self.id, self.msgname)
         self._fieldnames = self.fieldnames
         self._instance_field, self._instance_offset = self.instance_field, self.instance_offset
-        for field, value in zip(fields, values, strict=True):
+        given = {field.name: value for field, value in zip(fields, values, strict=False)} | named
+        for field in fields:
+            value = given[field.name]
             if field.type == "char":
                 setattr(self, f"_{field.name}_raw", value)
                 setattr(self, field.name, value.split(b"\0", 1)[0].decode("ascii", "replace"))

@@ -95,6 +95,7 @@ class VehicleTelemetry:
     def __init__(self) -> None:
         self.restarts = 0  # how often the vehicle's clock restarted at zero
         self.attitudes = self.positions = 0  # numbers of reports, of all boots
+        self.autopilot: int | None = None  # MAV_AUTOPILOT; None before the first heartbeat
         self._forget()
         self._takers: dict[int, Callable[[Message, float], bool]] = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._take_heartbeat,
@@ -115,7 +116,6 @@ class VehicleTelemetry:
         self.attitude_heard_s = self.position_heard_s = -1e9  # receiver's time of the newest report
         self.boot_unix_us: int | None = None  # time of boot, microseconds since 1970
         self.armed = False
-        self.is_px4 = False  # its modes are PX4's
         self.mode: Px4Mode | None = None  # None too if it is not one of PX4's
         self.mode_name = ""  # title of the mode; "" before the first heartbeat
         self.custom_mode = 0  # HEARTBEAT.custom_mode
@@ -148,6 +148,11 @@ class VehicleTelemetry:
         """Vehicle time up to which attitude and position are both reported; None while one is missing."""
         attitude, position = self.attitude, self.position
         return None if attitude is None or position is None else min(attitude.time_us, position.time_us)
+
+    @property
+    def is_px4(self) -> bool:
+        """Its modes are PX4's."""
+        return bool(self.autopilot == mavlink.MAV_AUTOPILOT_PX4)
 
     @property
     def stands_disarmed(self) -> bool:
@@ -237,7 +242,7 @@ class VehicleTelemetry:
 
     def _take_heartbeat(self, message: Message, _now_s: float) -> bool:
         self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
-        self.is_px4 = message.autopilot == mavlink.MAV_AUTOPILOT_PX4
+        self.autopilot = message.autopilot
         self.custom_mode = message.custom_mode
         self.mode = mode_of(message.custom_mode) if self.is_px4 else None
         self.mode_name = mode_title(message)

@@ -81,7 +81,7 @@ class TelemetryFeed:
         self.position_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self.velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self.position_us = 0
-        self._gimbal: GimbalAttitude | None = None
+        self.gimbal: GimbalAttitude | None = None  # None before the first
         self.arming = Arming()  # with the heartbeats
         self.mode = ""  # name of the flight mode, such as "OFFBOARD"
         self.landed = True  # from EXTENDED_SYS_STATE
@@ -119,14 +119,14 @@ class TelemetryFeed:
         self._loop = asyncio.get_running_loop()
         plugin.subscribe_attitude_euler(self._on_attitude)
         subscribe(direct, "LOCAL_POSITION_NED", self._on_position)
-        subscribe(direct, "GIMBAL_DEVICE_ATTITUDE_STATUS", self._on_gimbal)
+        subscribe(direct, "GIMBAL_DEVICE_ATTITUDE_STATUS", partial(_take_gimbal, self))
         plugin.subscribe_armed(self._on_armed)
         if numbered_modes:
             subscribe(direct, "HEARTBEAT", partial(_take_mode, self, numbered_modes))
         else:
             plugin.subscribe_flight_mode(self._on_mode)
         plugin.subscribe_landed_state(self._on_landed)
-        plugin.subscribe_health(self._on_health)
+        plugin.subscribe_health(partial(_take_health, self))
         plugin.subscribe_status_text(self._on_text)
 
     async def next_tick(self, timeout_s: float) -> bool:
@@ -236,7 +236,7 @@ class TelemetryFeed:
                 self.position_us,
                 radians(euler.roll_deg),
                 radians(euler.pitch_deg),
-                self._gimbal,
+                self.gimbal,
                 self.landed,
             )
             self._samples.append(self.sample)
@@ -253,9 +253,6 @@ class TelemetryFeed:
         self._position_received_s = self._clock()
         self.positions += 1
 
-    def _on_gimbal(self, message: Message) -> None:
-        self._gimbal = gimbal_attitude(message) or self._gimbal
-
     def _on_armed(self, armed: bool, _user: object) -> None:
         self.arming.see_heartbeat(bool(armed))
         self._heartbeat_received_s = self._clock()  # MAVSDK calls this with each heartbeat
@@ -266,9 +263,6 @@ class TelemetryFeed:
     def _on_landed(self, state: Any, _user: object) -> None:  # noqa: ANN401
         self.landed = getattr(state, "name", str(state)) == "ON_GROUND"
         self._landed_received = True
-
-    def _on_health(self, health: Any, _user: object) -> None:  # noqa: ANN401
-        self.health = health
 
     def _on_text(self, text: Any, _user: object) -> None:  # noqa: ANN401
         said = plain(text.text)
@@ -288,6 +282,14 @@ class TelemetryFeed:
 def pose_of(feed: TelemetryFeed) -> Pose:
     """Where the vehicle is, in its local NED axes."""
     return Pose(feed.position_ned_m, feed.yaw_ned_rad)
+
+
+def _take_health(feed: TelemetryFeed, health: Any, _user: object) -> None:  # noqa: ANN401
+    feed.health = health
+
+
+def _take_gimbal(feed: TelemetryFeed, message: Message) -> None:
+    feed.gimbal = gimbal_attitude(message) or feed.gimbal
 
 
 def _take_mode(feed: TelemetryFeed, names: Mapping[int, str], heartbeat: Message) -> None:

@@ -168,8 +168,8 @@ class Record(Session):
     @property
     def autopilot_name(self) -> str:
         """The kind of autopilot in words."""
-        number = self.latest["HEARTBEAT"].autopilot
-        return _AUTOPILOTS.get(number, f"autopilot {number}")
+        number = self.telemetry.autopilot
+        return "unknown" if number is None else _AUTOPILOTS.get(number, f"autopilot {number}")
 
     @property
     def charge(self) -> tuple[float, float]:

@@ -211,7 +211,6 @@ class Session:
     Attributes:
         system_id: None before it is heard.
         telemetry: what it reports.
-        autopilot: MAV_AUTOPILOT, by its heartbeats; None before the first.
         rates: streams that are requested when they come too slowly; None: none are.
     """
 
@@ -225,7 +224,6 @@ class Session:
     ) -> None:
         self.system_id = system_id
         self.telemetry = VehicleTelemetry() if telemetry is None else telemetry
-        self.autopilot: int | None = None
         self.rates: RateWatch | None = None
         self._own_system_id = own_system_id
         self._heartbeat = heartbeat
@@ -243,7 +241,7 @@ class Session:
     @property
     def is_ardupilot(self) -> bool:
         """Its autopilot is ArduPilot."""
-        return bool(self.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
+        return bool(self.telemetry.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
 
     @property
     def armed(self) -> bool:
@@ -267,8 +265,6 @@ class Session:
             self.system_id = message.get_srcSystem()
         if not self.is_from_autopilot(message):
             return False
-        if message.get_type() == "HEARTBEAT":
-            self.autopilot = message.autopilot
         for request in self._requests:
             request.take(message, now_s)
         self._requests = [each for each in self._requests if not each.over]
@@ -363,7 +359,9 @@ class Session:
         """The heartbeat that is due: once a second, and at once when the client becomes another kind."""
         if self._heartbeat == "none":
             return []
-        is_station = self._heartbeat == "ground station" and self.autopilot is not None and not self.armed
+        is_station = (
+            self._heartbeat == "ground station" and self.telemetry.autopilot is not None and not self.armed
+        )
         heartbeat = ground_station_heartbeat() if is_station else companion_heartbeat()
         if now_s < self._beat_due_s and heartbeat.type == self._beat_type:
             return []

@@ -61,8 +61,6 @@ def put(record, message):
     """Put a message into a record, without its counts."""
     record.latest[message.get_type()] = message
     record.telemetry.take(message)
-    if message.get_type() == "HEARTBEAT":
-        record.autopilot = message.autopilot
 
 
 def healthy(**parameters):

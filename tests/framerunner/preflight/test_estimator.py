@@ -14,7 +14,7 @@ NAME = "EKF_STATUS_REPORT"
 
 def record(flags=ALL, position=0.1, *, origin=True, autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA):
     found = Record(system_id=1)
-    found.autopilot = autopilot
+    found.telemetry.autopilot = autopilot
     found.latest[NAME] = ardupilotmega.MAVLink_ekf_status_report_message(flags, 0.1, position, 0.1, 0.1, 0.1)
     if origin:
         found.latest["GPS_GLOBAL_ORIGIN"] = mavlink.MAVLink_gps_global_origin_message(1, 2, 3)
