@@ -151,8 +151,7 @@ class FlightAbort:
 
     async def _watch(self) -> bool:
         """See the ticks to the end; True: it has held for as long as it may."""
-        ticks = self._drone.ticks()
-        try:
+        async with contextlib.aclosing(self._drone.ticks()) as ticks:
             async for state in ticks:
                 if self._end_us is None:
                     self._end_us = state.time_us + ATTEND_US
@@ -167,10 +166,6 @@ class FlightAbort:
                 if ends_us is not None and state.mode == self._held_mode and state.time_us > ends_us:
                     return True
                 self._see(state)
-        finally:
-            close = getattr(ticks, "aclose", None)
-            if close is not None:
-                await close()
         return False
 
     async def _stop_motors(self) -> str:

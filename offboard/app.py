@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
+from contextlib import aclosing
 from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
@@ -206,11 +207,9 @@ class _Flight:
             operator.phase = "flying"
             return
         operator.phase = "waiting"
-        ticks, began_us = self.drone.ticks(), None
-        try:
+        began_us = None
+        async with aclosing(self._ticks()) as ticks:
             async for state in ticks:
-                if self.before_tick is not None:
-                    await self.before_tick(self.engine, state)
                 if state.armed:
                     raise DroneError("the vehicle was armed by others while it waited for the go; disarm it")
                 if operator.has_go:
@@ -220,28 +219,30 @@ class _Flight:
                 if state.time_us - began_us > GO_LIMIT_US:
                     minutes = GO_LIMIT_US / MICROSECONDS / 60
                     raise DroneError(f"no go within {minutes:g} min; the checks are too old, so start again")
+                detections = self.perception.latest(state.time_us)
                 self.remark = f"{GO_WORDS}: {operator.hint}"
-                self._observe(state, NO_COMMAND, self.perception.latest(state.time_us))
-        finally:
-            self.remark = ""
-            await _close(ticks)
+                self._observe(state, NO_COMMAND, detections)
+                self.remark = ""
 
     async def _fly(self) -> bool:
         """Tick until the mission is finished; True if the time limit ended before."""
-        ticks = self.drone.ticks()
-        try:
+        async with aclosing(self._ticks()) as ticks:
             async for state in ticks:
-                if self.before_tick is not None:
-                    await self.before_tick(self.engine, state)
                 if self._update_time(state.time_us):
                     return True
                 await self._tick(state)
                 if self.engine.finished:
                     await self._stop_motors()
                     return False
-        finally:
-            await _close(ticks)
         raise DroneError("the drone's ticks ended")
+
+    async def _ticks(self) -> AsyncGenerator[DroneState, None]:
+        """The drone's states, each after the flight's hook."""
+        async with aclosing(self.drone.ticks()) as ticks:
+            async for state in ticks:
+                if self.before_tick is not None:
+                    await self.before_tick(self.engine, state)
+                yield state
 
     async def _tick(self, state: DroneState) -> None:
         if self.flying and (self.paused or not state.offboard) and await self._update_pause(state):
@@ -383,32 +384,28 @@ class _Flight:
 
         A landing takes many seconds, in which no tick is observed; the time counts from its end.
         """
-        ticks = self.drone.ticks()
         end_us = None if self.landed else self.now_us + REST_US
         try:
-            async for state in ticks:
-                if self.before_tick is not None:
-                    await self.before_tick(self.engine, state)
-                if end_us is None:
-                    end_us = state.time_us + REST_US
-                if self.observer is not None:
-                    since_us = state.time_us if self.started_us is None else self.started_us
-                    self.observer(
-                        Moment(
-                            state,
-                            STILL,
-                            Detections(),
-                            mission_state=self.engine.state,
-                            flight_time_s=(state.time_us - since_us) / MICROSECONDS,
-                            navigation=self.navigation,
+            async with aclosing(self._ticks()) as ticks:
+                async for state in ticks:
+                    if end_us is None:
+                        end_us = state.time_us + REST_US
+                    if self.observer is not None:
+                        since_us = state.time_us if self.started_us is None else self.started_us
+                        self.observer(
+                            Moment(
+                                state,
+                                STILL,
+                                Detections(),
+                                mission_state=self.engine.state,
+                                flight_time_s=(state.time_us - since_us) / MICROSECONDS,
+                                navigation=self.navigation,
+                            )
                         )
-                    )
-                if state.time_us >= end_us:
-                    break
+                    if state.time_us >= end_us:
+                        break
         except DroneError:
             return  # the flight has ended; a link lost now changes nothing
-        finally:
-            await _close(ticks)
 
     async def _stop(self, ended: Literal["timed out", "aborted"], reason: str) -> MissionEnd:
         """Stop commanding, and hold or land."""
@@ -451,9 +448,3 @@ def _uncancel() -> None:
     task = asyncio.current_task()
     if task is not None:
         task.uncancel()
-
-
-async def _close(ticks: AsyncIterator[DroneState]) -> None:
-    close = getattr(ticks, "aclose", None)
-    if close is not None:
-        await close()

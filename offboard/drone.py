@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from dataclasses import dataclass
 from enum import Enum
 from math import isfinite, isnan
@@ -133,7 +133,7 @@ class Drone(Protocol):
     async def ready(self) -> None:
         """Wait until it can be armed; the error says what is still missing."""
 
-    def ticks(self) -> AsyncIterator[DroneState]:
+    def ticks(self) -> AsyncGenerator[DroneState, None]:
         """States at 20 Hz of vehicle time."""
         ...
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from dataclasses import replace
 
 from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityCommand
@@ -19,7 +19,7 @@ class DryRunDrone(MavsdkDrone):
 
     _runs = False
 
-    async def ticks(self) -> AsyncIterator[DroneState]:
+    async def ticks(self) -> AsyncGenerator[DroneState, None]:
         """States at 20 Hz; see the class."""
         async for state in super().ticks():
             if self._runs and state.armed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -233,7 +233,7 @@ class MavsdkDrone:
             await self._requester.request("offboard mode", self._stream.request_offboard())
         await self._requester.until(lambda: not self._feed.missing(), limit_s)
 
-    async def ticks(self) -> AsyncIterator[DroneState]:
+    async def ticks(self) -> AsyncGenerator[DroneState, None]:
         """States at 20 Hz of vehicle time; ticks that were not waited for are skipped."""
         while True:
             command = self._sent if self._commanding and not self._pilot_has_it else None

@@ -12,7 +12,7 @@ rounding, a lockstep flight is the same as one over UDP until something else dif
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncGenerator, Callable, Sequence
 from dataclasses import dataclass
 from math import degrees, pi, radians
 from struct import Struct
@@ -155,7 +155,7 @@ class LockstepDrone:
             Pose(self._received.position_ned_m, _received_angle(self._autopilot.state.yaw_rad)),
         )
 
-    async def ticks(self) -> AsyncIterator[DroneState]:
+    async def ticks(self) -> AsyncGenerator[DroneState, None]:
         """States at 20 Hz of vehicle time; see `next_state`."""
         task = asyncio.current_task()
         while True:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from dataclasses import dataclass, field
 from itertools import pairwise, product
 from math import atan2, ceil, cos, exp, floor, hypot, pi, remainder, sin
@@ -114,7 +114,7 @@ class KinematicDrone:
         self.command_now = limited.command
         return limited
 
-    async def ticks(self) -> AsyncIterator[DroneState]:
+    async def ticks(self) -> AsyncGenerator[DroneState, None]:
         tick = 0
         while True:
             self._move(TICK_US / 1e6)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from dataclasses import dataclass, replace
 from random import Random
 
@@ -50,7 +50,7 @@ class LateDrone:
     def __getattr__(self, name):
         return getattr(self._drone, name)
 
-    async def ticks(self) -> AsyncIterator[DroneState]:
+    async def ticks(self) -> AsyncGenerator[DroneState, None]:
         missed: list[DroneState] = []
         stalled = 0
         async for state in self._drone.ticks():
