@@ -41,7 +41,7 @@ WebSocket.prototype.send = function (data) {
 const handler = Object.getOwnPropertyDescriptor(WebSocket.prototype, "onmessage");
 Object.defineProperty(WebSocket.prototype, "onmessage", { ...handler, set(hear) {
   handler.set.call(this, (event) => {
-    if (String(event.data).startsWith('{"kind": "changed"')) window.seen.arrived ??= performance.now();
+    if (String(event.data).startsWith('{"kind":"changed"')) window.seen.arrived ??= performance.now();
     hear(event);
   });
 } });

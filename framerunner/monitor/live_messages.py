@@ -125,7 +125,7 @@ class Status(TypedDict):
     drones: list[DroneStatus]
 
 
-class History(TypedDict):
+class FlightHistory(TypedDict):
     """A drone's flight so far; each row is a sample."""
 
     kind: Literal["history"]
@@ -201,7 +201,7 @@ class Transitions(TypedDict):
     list: list[Transition]
 
 
-class Guard(TypedDict):
+class GuardState(TypedDict):
     """Whether a transition's guard holds; null: it cannot be evaluated now."""
 
     id: str
@@ -223,7 +223,7 @@ class Guards(TypedDict):
     id: int
     time_s: float
     counts: dict[str, int]
-    guards: list[Guard]
+    guards: list[GuardState]
     values: list[GuardValue]
 
 
@@ -250,5 +250,5 @@ class Notice(TypedDict):
 
 
 LiveMessage = (
-    World | Poses | Status | History | Detections | Map | Chart | Transitions | Guards | Text | Notice
+    World | Poses | Status | FlightHistory | Detections | Map | Chart | Transitions | Guards | Text | Notice
 )

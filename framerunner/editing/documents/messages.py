@@ -19,6 +19,7 @@ another one if the program was started anew and knows only what was journalled.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Any, Literal, NotRequired
 
 from pydantic import Field, TypeAdapter
@@ -29,14 +30,12 @@ from offboard.authoring import (
     SPANISH,
     Catalogue,
     Change,
-    Edge,
+    Diagram,
     Finding,
-    Node,
     Positions,
     Span,
     StateBox,
     StrictModel,
-    as_json,
     catalogue,
     diagram,
     findings_of,
@@ -100,70 +99,6 @@ PageMessage = Annotated[
 PAGE_MESSAGE: TypeAdapter[PageMessage] = TypeAdapter(PageMessage)
 
 
-_Span = tuple[int, int] | None
-
-
-class DrawnNode(TypedDict):
-    """A state of the diagram; see `offboard.authoring.diagram.Node`."""
-
-    id: str
-    name: str
-    parent: str
-    initial: str
-    final: bool
-    finish: bool
-    enter: list[str]
-    during: list[str]
-    exit: list[str]
-    parameters: list[tuple[str, str]]
-    template: str
-    source: str
-    span: _Span
-    name_span: NotRequired[_Span]
-
-
-class DrawnEdge(TypedDict):
-    """A transition of the diagram; see `offboard.authoring.diagram.Edge`."""
-
-    id: str
-    source: str
-    target: str
-    missing: bool
-    event: Literal["tick", "done", "resume"]
-    order: int
-    when: str
-    actions: list[str]
-    source_state: str
-    source_index: int
-    span: _Span
-    when_span: NotRequired[_Span]
-    to_span: NotRequired[_Span]
-
-
-class DrawnDiagram(TypedDict):
-    """The chart as it is flown."""
-
-    initial: str
-    readable: bool
-    nodes: list[DrawnNode]
-    edges: list[DrawnEdge]
-
-
-class ShownFinding(TypedDict):
-    """Something wrong with the mission; see `offboard.authoring.findings.Finding`."""
-
-    severity: Literal["error", "warning", "advice"]
-    code: str
-    message: str
-    spanish: NotRequired[str]
-    line: int
-    span: _Span
-    state: str
-    event: str | None
-    index: int | None
-    nodes: list[str]
-
-
 class Place(TypedDict):
     """Where a state is drawn, pixels of the page."""
 
@@ -195,11 +130,12 @@ class _Document(TypedDict):
     session: str
     restored: bool
     problem: str
-    diagram: DrawnDiagram
+    diagram: Diagram
     mission: dict[str, str]
     variables: dict[str, str]
     templates: list[str]
-    findings: list[ShownFinding]
+    findings: list[Finding]
+    spanish: NotRequired[list[str]]
     layout: dict[str, Place]
     catalogue: NotRequired[Catalogue]
     answers: NotRequired[int]
@@ -261,55 +197,48 @@ def places_message(opened: OpenDocument) -> dict[str, object]:
     return {name: {"x": box.x, "y": box.y} for name, box in opened.layout.states.items()}
 
 
-def _fields(each: Node | Edge | Finding) -> dict[str, object]:
-    """As `dataclasses.asdict`, which copies all texts and takes a quarter of the answer's time."""
-    return {name: getattr(each, name) for name in each.__slots__}
-
-
 def _state(opened: OpenDocument) -> dict[str, object]:
     document = opened.document
     positions = document.positions
 
-    def at(span: Span | None) -> list[int] | None:
-        if span is None:
-            return None
-        return [positions.to_utf16(each) for each in (span.start, span.end)]
+    def at(span: Span | None) -> Span | None:
+        return span and Span(positions.to_utf16(span.start), positions.to_utf16(span.end))
 
     drawn = diagram(document)
+    nodes = (replace(each, span=at(each.span), name_span=at(each.name_span)) for each in drawn.nodes)
+    edges = (
+        replace(each, span=at(each.span), when_span=at(each.when_span), to_span=at(each.to_span))
+        for each in drawn.edges
+    )
     problems = reported_problems(document, opened.pilot_class)
     findings = findings_of(document, problems)
-    found = [{**_fields(each), "span": at(Span(each.start, each.end))} for each in findings]
-    if opened.speaks_spanish:
-        for shown, problem in zip(found, problems, strict=True):
-            shown["spanish"] = problem.message.text(SPANISH)
-    nodes = [
-        {**_fields(node), "span": at(node.span), "name_span": at(node.name_span)} for node in drawn.nodes
-    ]
-    edges = [
-        {**_fields(edge), "span": at(edge.span), "when_span": at(edge.when_span), "to_span": at(edge.to_span)}
-        for edge in drawn.edges
-    ]
     outline = document.outline
     keys = ("name", "description", "class", "vision", "detector", "extends", "initial")
-    return {
+    state = {
         **status_message(opened),
         "name": opened.path.name,
         "revision": opened.revision,
         "session": opened.name,
         "restored": opened.restored,
         "problem": opened.problem,
-        "diagram": {"initial": drawn.initial, "readable": drawn.readable, "nodes": nodes, "edges": edges},
+        "diagram": replace(drawn, nodes=tuple(nodes), edges=tuple(edges)),
         "mission": {key: outline.text(key) for key in keys},
         "variables": {name: value.text for name, value in outline.variables.items()},
         "templates": [state.name for state in outline.templates],
-        "findings": found,
+        "findings": [
+            replace(each, start=positions.to_utf16(each.start), end=positions.to_utf16(each.end))
+            for each in findings
+        ],
         "layout": places_message(opened),
     }
+    if opened.speaks_spanish:
+        state["spanish"] = [each.message.text(SPANISH) for each in problems]
+    return state
 
 
-def catalogue_message(opened: OpenDocument) -> dict[str, object]:
+def catalogue_message(opened: OpenDocument) -> Catalogue:
     """The names that the mission can use."""
     outline = opened.document.outline
     variables = dict.fromkeys(outline.variables, 0.0)
     contest = outline.text("class") != "open"
-    return as_json(catalogue(opened.pilot_class, variables, contest=contest))
+    return catalogue(opened.pilot_class, variables, contest=contest)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Body, HTTPException, Request
+from pydantic_core import to_json
 from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, Response
 from starlette.websockets import WebSocket
@@ -269,7 +269,7 @@ class _Window(Channel[PageMessage, Mapping[str, object]]):
 
 
 def _json(message: dict[str, object]) -> str:
-    return json.dumps(message, ensure_ascii=False)
+    return to_json(message, inf_nan_mode="null").decode()
 
 
 def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[Change]:

@@ -487,9 +487,9 @@ def test_a_contestants_names_are_offered_and_checked(path):
     path.write_text(HOVER.replace("final: true", "transitions: [{when: my_answer > 1, to: up}]"))
     for pilot_class, errors in ((kind, 0), (Pilot, 1)):
         opened = OpenDocument.open(path, pilot_class)
-        values = [each["name"] for each in catalogue_message(opened)["values"]]
+        values = [each.name for each in catalogue_message(opened).values]
         assert ("my_answer" in values) is (pilot_class is kind)
-        found = [each["code"] for each in document_message(opened)["findings"]]
+        found = [each.code for each in document_message(opened)["findings"]]
         assert found.count("name.unknown") == errors
 
 

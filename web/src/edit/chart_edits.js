@@ -3,6 +3,7 @@
 /**
  * @typedef {import("./session.js").EditSession} EditSession
  * @typedef {import("../lib/diagram/diagram_view.js").Selection} Selection
+ * @typedef {{span: import("../lib/messages.js").Documents.Span|null}} Written
  */
 
 /**
@@ -51,13 +52,13 @@ export async function moveState(session, moved, parent, place) {
  * @returns {Selection}
  */
 export function writtenAt({ nodes, edges }, offset, selected) {
-  const isAt = (/** @type {{span: [number, number]|null}} */ { span }) => span !== null && span[0] <= offset && offset <= span[1];
+  const isAt = (/** @type {Written} */ { span }) => span !== null && span.start <= offset && offset <= span.end;
   /** @param {{id: string}[]} found */
   const kept = (found) => found.find(({ id }) => id === selected) ?? found.find(({ id }) => selected.startsWith(id.replace(/\/.*/, ""))) ?? found[0];
   const at = edges.filter(isAt);
   if (at.length > 0) return { kind: "transition", id: kept(at).id };
   const around = nodes.filter(isAt);
-  const length = (/** @type {{span: [number, number]|null}} */ { span }) => (span ? span[1] - span[0] : 0);
+  const length = (/** @type {Written} */ { span }) => (span ? span.end - span.start : 0);
   const least = Math.min(...around.map(length));
   const inmost = around.filter((node) => length(node) === least);
   return inmost.length > 0 ? { kind: "state", id: kept(inmost).id } : { kind: "mission", id: "" };

@@ -244,7 +244,7 @@ export class Editor {
     this.#inspector.show(chosen);
     const { nodes, edges } = this.#session.diagram;
     const { span } = (chosen.kind === "state" ? nodes : edges).find(({ id }) => id === chosen.id) ?? {};
-    if (showText && span) this.#text.show(span[0], span[1]);
+    if (showText && span) this.#text.show(span.start, span.end);
   }
 
   /** Keep where new states are drawn: they stay there. */
@@ -284,9 +284,9 @@ export class Editor {
     this.#text.setFindings(findings);
     this.#inspector.show(this.#selection);
     this.#tabs.mark("findings", signOf(findings));
-    showFindings(this.#findings, findings, ({ nodes: [node], event, index, span }) => {
+    showFindings(this.#findings, findings, ({ nodes: [node], event, index, start, end }) => {
       if (node) this.#select(event === null ? { kind: "state", id: node } : { kind: "transition", id: `${node}/${event}/${index}` }, false);
-      if (span) this.#text.show(span[0], span[1]);
+      this.#text.show(start, end);
     });
     showNames(this.#names, this.#session.catalogue);
     this.#root.classList.toggle("e-unreadable", !isReadable);

@@ -6,7 +6,7 @@ import { word } from "./words.js";
 
 /**
  * @typedef {import("./session.js").EditSession} EditSession
- * @typedef {import("../lib/messages.js").Documents.DrawnNode} StateNode
+ * @typedef {import("../lib/messages.js").Documents.Node} StateNode
  * @typedef {import("./session.js").Edge} Edge
  * @typedef {import("../lib/diagram/diagram_view.js").Selection} Selection
  */

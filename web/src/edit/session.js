@@ -12,8 +12,8 @@ const TYPING_PAUSE_MS = 80; // after which typed text is sent
  * @typedef {FromPage extends infer Each ? Each extends any ? Omit<Each, "number"> : never : never} Unnumbered
  * @typedef {Documents.TypedChange} TextChange offsets in UTF-16 code units
  * @typedef {Documents.Place} Point
- * @typedef {Documents.DrawnEdge} Edge
- * @typedef {Documents.ShownFinding} Finding
+ * @typedef {Documents.Edge} Edge
+ * @typedef {Documents.Finding} Finding
  * @typedef {Documents.ValueEntry} ValueEntry
  */
 
@@ -34,8 +34,8 @@ export class EditSession {
   #isTypedUnderWay = false;
 
   revision = 0;
-  /** @type {Documents.DrawnDiagram} */
-  diagram = { initial: "", readable: true, nodes: [], edges: [] };
+  /** @type {Documents.Diagram} */
+  diagram = { name: "", initial: "", readable: true, nodes: [], edges: [] };
   /** @type {Object<string, string>} */
   mission = {};
   /** @type {Object<string, string>} */
@@ -229,7 +229,7 @@ export class EditSession {
     const stays = message.kind === "document" && message.answered !== undefined && this.#synchronize(message);
     this.revision = message.revision;
     for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) this[key] = message[key];
-    if (language() === "es") for (const finding of this.findings) finding.message = finding.spanish ?? finding.message;
+    if (language() === "es") this.findings.forEach((finding, index) => { finding.message = message.spanish?.[index] ?? finding.message; });
     this.catalogue = message.catalogue ?? this.catalogue;
     // While the text cannot be read, the last diagram stays.
     if (message.diagram.readable) this.diagram = message.diagram;

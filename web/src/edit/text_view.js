@@ -168,8 +168,8 @@ export class TextView {
   /** Mark findings. @param {import("./session.js").Finding[]} findings */
   setFindings(findings) {
     const { length } = this.#view.state.doc;
-    const diagnostics = findings.map(({ span, severity, message }) => ({
-      from: Math.min(span?.[0] ?? 0, length), to: Math.min(span?.[1] ?? 0, length), severity: SEVERITY[severity], message,
+    const diagnostics = findings.map(({ start, end, severity, message }) => ({
+      from: Math.min(start, length), to: Math.min(end, length), severity: SEVERITY[severity], message,
     }));
     this.#view.dispatch(setDiagnostics(this.#view.state, /** @type {any} */ (diagnostics)));
   }

@@ -40,6 +40,7 @@ EQUIPMENT = SimpleNamespace(
     scenario=None,
     list_scenarios=lambda: ["broken", "case-1", "case-2", "case-3", "case-4", "no-frames", "two-1"],
     load_scenario=load,
+    extensions=(),
     scenario_argument=str,
 )
 

@@ -101,7 +101,7 @@ async def test_listeners_get_only_what_is_committed(url):
         def hear(message):
             if message.kind == "changed":
                 other = Store(service._store._database)  # what another reader of the file finds now
-                seen.append((message["version"], [each.state for each in other.board().tries]))
+                seen.append((message.version, [each.state for each in other.board().tries]))
 
         service.subscribe(hear)
         service.on_try_event(event("began", "k", time_s=0.0))

@@ -9,8 +9,8 @@ import { HANDLE, labelWords, missingShape, stateShape, svg } from "./shapes.js";
 import { Viewport } from "./viewport.js";
 
 /**
- * @typedef {import("../messages.js").Documents.DrawnDiagram} Diagram
- * @typedef {import("../messages.js").Documents.ShownFinding} Finding
+ * @typedef {import("../messages.js").Documents.Diagram} Diagram
+ * @typedef {import("../messages.js").Documents.Finding} Finding
  * @typedef {{x: number, y: number}} Point
  * @typedef {import("./geometry.js").Box} Box
  * @typedef {{kind: "mission"|"state"|"transition", id: string}} Selection id: of a state or transition of the diagram
@@ -22,7 +22,8 @@ const MISSING_HEIGHT = 24;
 const LARGEST = { edited: 1.2, lookedAt: 1.8 }; // scale by itself
 const READABLE = 10 / 11; // the least scale by itself: the letters of labels have 11 pixels, and shall have 10 on the page
 const BESIDE = { right: 40, bottom: 24 }; // of all states, for lines
-const EMPTY = { initial: "", readable: true, nodes: [], edges: [] };
+/** @type {Diagram} */
+const EMPTY = { name: "", initial: "", readable: true, nodes: [], edges: [], settings: {}, variables: {}, templates: {} };
 
 export class DiagramView {
   root;
@@ -67,7 +68,7 @@ export class DiagramView {
   #children = new Map();
   #parents = new Map();
   #initials = new Map();
-  /** @type {Map<string, import("../messages.js").Documents.DrawnEdge>} */
+  /** @type {Map<string, import("../messages.js").Documents.Edge>} */
   #edges = new Map();
   /** @type {Selection} */
   #selection = { kind: "mission", id: "" };
@@ -210,7 +211,7 @@ export class DiagramView {
     }
   }
 
-  /** @param {import("../messages.js").Documents.DrawnNode} state @returns {SVGGElement} */
+  /** @param {import("../messages.js").Documents.Node} state @returns {SVGGElement} */
   #state(state) {
     const { id, parent } = state;
     const initial = parent === "" ? this.#diagram.initial : this.#initials.get(parent);

@@ -1,6 +1,6 @@
 /** A diagram with some superstates closed: drawn as plain states, with the transitions of what is in them. */
 
-/** @typedef {import("../messages.js").Documents.DrawnDiagram} Diagram */
+/** @typedef {import("../messages.js").Documents.Diagram} Diagram */
 
 /** The states around a state, from the outermost to itself. @param {Map<string, string>} parents @param {string} id @returns {string[]} */
 export function chainOf(parents, id) {

@@ -1,8 +1,8 @@
 /** Reads the diagram that an app sends: Mermaid's language as `framerunner mission show` writes it, and no more of it. */
 
 /**
- * @typedef {import("../messages.js").Documents.DrawnDiagram} Diagram
- * @typedef {import("../messages.js").Documents.DrawnNode} StateNode
+ * @typedef {import("../messages.js").Documents.Diagram} Diagram
+ * @typedef {import("../messages.js").Documents.Node} StateNode
  */
 
 const MOST_LINES = 4000; // a diagram comes from a drone, and is drawn at once
@@ -15,7 +15,7 @@ export function readMermaid(text) {
   if (lines.length > MOST_LINES) throw new Error("it is too long");
   /** @type {Map<string, StateNode>} */
   const nodes = new Map();
-  const diagram = { initial: "", readable: true, nodes: /** @type {StateNode[]} */ ([]), edges: /** @type {import("../messages.js").Documents.DrawnEdge[]} */ ([]) };
+  const diagram = { name: "", initial: "", readable: true, nodes: /** @type {StateNode[]} */ ([]), edges: /** @type {import("../messages.js").Documents.Edge[]} */ ([]) };
   const superstates = new Set(lines.flatMap((line) => /^state ".*" as (\S+) \{$/.exec(line)?.[1] ?? []));
   /** @type {Map<string, number>} */
   const counts = new Map();
@@ -25,7 +25,7 @@ export function readMermaid(text) {
     if (known) return known;
     const made = {
       id, name, parent: around.at(-1) ?? "", initial: "", final: false, finish: false, enter: [], during: [], exit: [],
-      parameters: /** @type {[string, string][]} */ ([]), template: "", source: id, span: null,
+      parameters: /** @type {[string, string][]} */ ([]), template: "", source: id, span: null, name_span: null,
     };
     nodes.set(id, made);
     return made;
@@ -38,7 +38,7 @@ export function readMermaid(text) {
     if (event === "tick") counts.set(source, order + 1);
     diagram.edges.push({
       id: `${source}/${event}/${order}/${diagram.edges.length}`, source, target, missing: false, event, order, when: event === "tick" ? when : "",
-      actions: actions ? [actions] : [], source_state: source, source_index: order, span: null,
+      actions: actions ? [actions] : [], source_state: source, source_index: order, span: null, when_span: null, to_span: null,
     });
   };
   for (const line of lines) {

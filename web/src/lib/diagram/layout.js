@@ -4,7 +4,7 @@ import { freePlace, makeRoom } from "./free_place.js";
 import { overlap } from "./geometry.js";
 
 /**
- * @typedef {import("../messages.js").Documents.DrawnDiagram} Diagram
+ * @typedef {import("../messages.js").Documents.Diagram} Diagram
  * @typedef {import("./geometry.js").Point} Point
  * @typedef {import("./geometry.js").Box} Box
  * @typedef {import("./arrange.js").Join} Join

@@ -16,7 +16,7 @@ const shorten = (text) => (text.length > LONGEST_LABEL ? `${text.slice(0, LONGES
 
 /**
  * The words beside a transition.
- * @param {import("../messages.js").Documents.DrawnEdge} edge
+ * @param {import("../messages.js").Documents.Edge} edge
  * @param {{done: string, resume: string}} words for transitions of these events
  */
 export function labelWords({ event, order, when }, words) {
@@ -25,7 +25,7 @@ export function labelWords({ event, order, when }, words) {
 
 /**
  * A state's box.
- * @param {import("../messages.js").Documents.DrawnNode} state
+ * @param {import("../messages.js").Documents.Node} state
  * @param {import("./geometry.js").Box} box
  * @param {{isSuper: boolean, isClosed: boolean, isInitial: boolean, handleHeight: number, isEdited: boolean}} how isSuper: with its states in it
  * @returns {SVGGElement}
@@ -58,7 +58,7 @@ export function stateShape({ id, name, template, final, source, enter, during, e
 
 /**
  * What stands for a state that is missing, at the end of a transition to it.
- * @param {import("../messages.js").Documents.DrawnEdge} edge
+ * @param {import("../messages.js").Documents.Edge} edge
  * @param {import("./geometry.js").Box} box
  * @returns {SVGGElement}
  */
