@@ -35,14 +35,14 @@ from offboard.drone import DroneState
 from offboard.mission import MissionError, load_mission
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario, ScenarioError
-from sitl.camera import Camera, Motion
+from sitl.camera import ExposureMotion, SimulatedCamera
 from sitl.simulation import Simulation
 from sitl.world import PHYSICS_RATE_HZ, STEPS_PER_CONTROL
 from vision.types import Image
 
 REPEATS = 5
-Pose = tuple[Vec3, Quaternion, Sequence[Solid], Motion]
-"""Of the camera: what `Camera.render` needs."""
+Pose = tuple[Vec3, Quaternion, Sequence[Solid], ExposureMotion]
+"""Of the camera: what `SimulatedCamera.render` needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Parts:
 
     scenario: str
     mission: str
-    vision: str  # what the mission has found in images: boxes, or frames for its map
+    vision: str  # what the mission has found in images: boxes, or gates for its map
     image_rate_hz: float  # the camera's
     images_per_s: float  # painted and searched: a mission with a map leaves out those that it does not need
     simulated_s: float  # length of the whole flight
@@ -104,7 +104,7 @@ def measure(plan: FlightPlan) -> Parts:
     images: list[Image] = []
     poses: list[Pose] = []
     flight_s, wall_s, simulated_s = fly(plan, images, poses)
-    searched, camera = len(poses), Camera(scenario)
+    searched, camera = len(poses), SimulatedCamera(scenario)
     render_s = best(lambda: [camera.render(*pose) for pose in poses], 1) / len(poses)
     detect = plan_detector(plan, rendered=True)
     detect_s = best(lambda: [detect(image, 0) for image in images], 1) / len(images)
@@ -161,7 +161,7 @@ def fly(plan: FlightPlan, images: list[Image], poses: list[Pose]) -> tuple[float
 def _pose(before: DroneState, state: DroneState) -> Pose:
     """Pose and motion at a tick; of the turn only that of the heading, since the tick before."""
     turn_rad_s = remainder(state.yaw - before.yaw, 2 * pi) / max((state.time_us - before.time_us) / 1e6, 1e-3)
-    motion = Motion(state.time_us, state.velocity_arena_m_s, (0.0, 0.0, -turn_rad_s))
+    motion = ExposureMotion(state.time_us, state.velocity_arena_m_s, (0.0, 0.0, -turn_rad_s))
     return (state.x, state.y, state.z), state.attitude_arena, (), motion
 
 

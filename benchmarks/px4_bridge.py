@@ -11,8 +11,8 @@ from framerunner.wire.dialect import mavlink
 from framerunner.wire.framing import PacketReader, packed
 from scenarios.loader import load_scenario
 from sitl.autopilots.sensors import with_estimable_sensors
-from sitl.px4.messages import ActuatorControls
 from sitl.px4.simulation import Px4Simulation
+from sitl.px4.simulator_messages import ActuatorControls
 
 STEPS = 20_000
 HOVER = 0.26

@@ -20,7 +20,7 @@ STEP_AIM_RUNS = 10.0
 # 60 times real time where a `run()` takes 2.5 µs: each of the 500 steps a second may then cost
 # 1 / (60 * 500 * 2.5e-6) = 13.3 `run()`s, on any machine.
 FLIGHT_AIM_RUNS = 40.0 / 3.0
-# Likewise 45 times real time with a mission that has a map of frames and plans paths.
+# Likewise 45 times real time with a mission that has a map of gates and plans paths.
 MAP_FLIGHT_AIM_RUNS = 160.0 / 9.0
 
 

@@ -29,7 +29,7 @@ from benchmarks.compare import (
 )
 from benchmarks.peers.job import EXIT_CANNOT_FLY, SINGLE_THREADS, Box, Flight, Job
 from scenarios.models import Scenario
-from sitl.solids import frame_solids
+from sitl.solids import gate_solids
 
 ROOT = Path(__file__).parents[1]
 LIMIT_S = 900.0
@@ -67,7 +67,7 @@ class Results:
 def job_for(scenario: Scenario, name: str, seconds: float, image_rate_hz: float) -> Job:
     """The job without goals, which our own flight gives."""
     camera = scenario.camera
-    solids = [scenario.base.solid, *(solid for frame in scenario.frames for solid in frame_solids(frame))]
+    solids = [scenario.base.solid, *(solid for gate in scenario.frames for solid in gate_solids(gate))]
     return Job(
         variant="",
         scenario=name,

@@ -1,10 +1,10 @@
-"""The autopilot: the flight loop, and the commands of ground stations, apps and pilots to it."""
+"""The autopilot: the flight loop, and the commands of ground stations, apps and operators to it."""
 
 from __future__ import annotations
 
 from math import isinf, isnan, nan
 
-from firmware_py.commander_table import BY_HAND, Event, State
+from firmware_py.commander_table import BY_HAND, CommanderState, Event
 from firmware_py.flight_loop import FlightLoop
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import IssuedCommand
@@ -127,10 +127,10 @@ class Autopilot(FlightLoop):
         if self._motors_stopped or state in BY_HAND or self._land_detector.landed:
             return
         threshold = self.parameters.value("COM_RC_STICK_OV") / 100.0
-        bit = _OFFBOARD_BIT if state is State.OFFBOARD else _AUTO_BIT
+        bit = _OFFBOARD_BIT if state is CommanderState.OFFBOARD else _AUTO_BIT
         moved = max(abs(sticks.forward), abs(sticks.right), abs(sticks.yaw)) > threshold
         if moved and self.parameters.integer("COM_RC_OVERRIDE") & bit:
-            self._handle(Event.PILOT_TAKES_OVER)
+            self._handle(Event.STICKS_TAKE_OVER)
 
     def ground_station_heard(self) -> None:
         """Note a ground station's heartbeat."""

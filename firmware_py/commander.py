@@ -7,8 +7,8 @@ from math import nan
 from typing import NamedTuple
 
 from firmware_py.commander_guards import (
-    Cause,
     Choices,
+    FailsafeCause,
     Reaction,
     Situation,
     Timeouts,
@@ -21,9 +21,9 @@ from firmware_py.commander_table import (
     FLOWN_MODE,
     RULES,
     TICK_RULES,
+    CommanderRow,
+    CommanderState,
     Event,
-    Row,
-    State,
     Trigger,
     first_match,
 )
@@ -108,7 +108,7 @@ class Commander:
     """
 
     def __init__(self) -> None:
-        self.state = State.DISARMED
+        self.state = CommanderState.DISARMED
         self._tick_rules = TICK_RULES[self.state]
         self._check_us = 0
         self._started = False
@@ -124,17 +124,17 @@ class Commander:
     @property
     def failsafe(self) -> bool:
         """Whether a failsafe chose the state."""
-        return self.situation.cause is not None or self.state is State.TERMINATED
+        return self.situation.cause is not None or self.state is CommanderState.TERMINATED
 
     @property
     def refusal(self) -> str:
         """Why the vehicle cannot be armed now; empty if it can."""
-        row = first_match(RULES[State.DISARMED, Event.ARM], self.situation)
+        row = first_match(RULES[CommanderState.DISARMED, Event.ARM], self.situation)
         if row is None or row.result is CommandResult.ACCEPTED:
             return ""
         return self._in_words(row)
 
-    def tick(self, seen: Observation) -> Row | None:
+    def tick(self, seen: Observation) -> CommanderRow | None:
         """Update the situation and apply the table once.
 
         Returns:
@@ -156,15 +156,15 @@ class Commander:
         now.landed = landed
         if not landed:
             now.airborne_us = now_us
-            now.flown = self.state is not State.DISARMED
+            now.flown = self.state is not CommanderState.DISARMED
         now.target_reached = target_reached
         for guard, rule in self._tick_rules:
             if guard(now):
                 self._follow(rule)
                 return rule
         row = None
-        if self.state is State.OFFBOARD and setpoint_lost(now):
-            row = self._react(Cause.SETPOINTS)
+        if self.state is CommanderState.OFFBOARD and setpoint_lost(now):
+            row = self._react(FailsafeCause.SETPOINTS)
         elif now_us >= self._check_us:
             row = self._check(now_us)
         if row is not None:
@@ -192,16 +192,16 @@ class Commander:
         now.fence_breached = fence_breached
         now.problem = problem
 
-    def _check(self, now_us: int) -> Row | None:
+    def _check(self, now_us: int) -> CommanderRow | None:
         self._check_us = now_us + _CHECK_PERIOD_US
-        cause = None if self.state is State.DISARMED else next_cause(self.situation)
+        cause = None if self.state is CommanderState.DISARMED else next_cause(self.situation)
         return None if cause is None else self._react(cause)
 
-    def _react(self, cause: Cause) -> Row | None:
+    def _react(self, cause: FailsafeCause) -> CommanderRow | None:
         self.situation.handled.add(cause)
         return first_match(RULES[self.state, cause], self.situation)
 
-    def handle(self, event: Trigger) -> Row:
+    def handle(self, event: Trigger) -> CommanderRow:
         """Take a command, between ticks; the row that matched has the answer."""
         row = first_match(RULES[self.state, event], self.situation)
         if row is None:  # the table has an answer to every command; a test sweeps it
@@ -209,7 +209,7 @@ class Commander:
         self._follow(row)
         return replace(row, text=self._in_words(row)) if row.guard is estimator_fails else row
 
-    def _in_words(self, row: Row) -> str:
+    def _in_words(self, row: CommanderRow) -> str:
         """A row's text; that of the estimator's condition is in the situation."""
         return f"{ARMING_DENIED}{self.situation.problem}" if row.guard is estimator_fails else row.text
 
@@ -262,13 +262,13 @@ class Commander:
             without_sticks=_WITHOUT_STICKS.get(whole("NAV_RCL_ACT"), Reaction.HOLD),
         )
 
-    def _follow(self, row: Row) -> None:
+    def _follow(self, row: CommanderRow) -> None:
         now = self.situation
         if row.intends is not None:
             now.intended = row.intends
         if row.target is None:
             return
-        if self.state is State.DISARMED:
+        if self.state is CommanderState.DISARMED:
             now.armed_us = now.now_us
             now.flown = not now.landed
             now.manual_missed = now.now_us - now.manual_us > now.timeouts.manual_us
@@ -282,22 +282,22 @@ class Commander:
         now.entered_us = now.now_us
 
 
-_LATER_STEPS = frozenset({State.FAILSAFE_RETURN, State.FAILSAFE_LAND})
+_LATER_STEPS = frozenset({CommanderState.FAILSAFE_RETURN, CommanderState.FAILSAFE_LAND})
 
 
-def _reactions(parameters: Parameters) -> dict[Cause, Reaction]:
+def _reactions(parameters: Parameters) -> dict[FailsafeCause, Reaction]:
     """The parameters' reaction to each cause."""
     whole = parameters.integer
     battery = whole("COM_LOW_BAT_ACT")
     return {
-        Cause.SETPOINTS: _OFFBOARD_LOSS[whole("COM_OBL_RC_ACT")],
-        Cause.GROUND_STATION: _LINK_LOSS[whole("NAV_DLL_ACT")],
-        Cause.MANUAL: _LINK_LOSS[whole("NAV_RCL_ACT")],
-        Cause.BATTERY_LOW: Reaction.WARN,
-        Cause.BATTERY_CRITICAL: _BATTERY_CRITICAL.get(battery, Reaction.WARN),
-        Cause.BATTERY_EMERGENCY: _BATTERY_EMERGENCY.get(battery, Reaction.WARN),
-        Cause.FENCE: _FENCE[whole("GF_ACTION")],
-        Cause.FLIGHT_TIME: Reaction.RETURN,
+        FailsafeCause.SETPOINTS: _OFFBOARD_LOSS[whole("COM_OBL_RC_ACT")],
+        FailsafeCause.GROUND_STATION: _LINK_LOSS[whole("NAV_DLL_ACT")],
+        FailsafeCause.MANUAL: _LINK_LOSS[whole("NAV_RCL_ACT")],
+        FailsafeCause.BATTERY_LOW: Reaction.WARN,
+        FailsafeCause.BATTERY_CRITICAL: _BATTERY_CRITICAL.get(battery, Reaction.WARN),
+        FailsafeCause.BATTERY_EMERGENCY: _BATTERY_EMERGENCY.get(battery, Reaction.WARN),
+        FailsafeCause.FENCE: _FENCE[whole("GF_ACTION")],
+        FailsafeCause.FLIGHT_TIME: Reaction.RETURN,
     }
 
 

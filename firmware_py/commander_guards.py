@@ -38,10 +38,10 @@ class Reaction(Enum):
 
 
 STICK_REACTIONS = frozenset({Reaction.STABILIZED, Reaction.ALTITUDE, Reaction.POSITION})
-"""Reactions after which a pilot flies by the sticks."""
+"""Reactions after which an operator flies by the sticks."""
 
 
-class Cause(Enum):
+class FailsafeCause(Enum):
     """What a failsafe reacts to."""
 
     __hash__ = object.__hash__  # an enumeration's own is not compiled, and rows are looked up in each tick
@@ -86,7 +86,7 @@ class Choices:
         without_sticks: replaces a reaction that needs the sticks when there is no manual control input.
     """
 
-    reactions: dict[Cause, Reaction] = field(default_factory=dict)
+    reactions: dict[FailsafeCause, Reaction] = field(default_factory=dict)
     arm_needs_ground_station: bool = False
     manual_ignored_in: frozenset[FlightMode] = frozenset()
     manual_disabled: bool = False
@@ -95,7 +95,7 @@ class Choices:
     tumbling_ends: bool = True
     without_sticks: Reaction = Reaction.RETURN
 
-    def reaction(self, cause: Cause) -> Reaction:
+    def reaction(self, cause: FailsafeCause) -> Reaction:
         """The reaction to a cause without manual control input."""
         chosen = self.reactions.get(cause, Reaction.NOTHING)
         return self.without_sticks if chosen in STICK_REACTIONS else chosen
@@ -157,9 +157,9 @@ class Situation:
     entered_us: int = 0
     armed_us: int = 0
     intended: FlightMode = FlightMode.HOLD
-    cause: Cause | None = None
+    cause: FailsafeCause | None = None
     follow_up: Reaction = Reaction.NOTHING
-    handled: set[Cause] = field(default_factory=set)
+    handled: set[FailsafeCause] = field(default_factory=set)
     timeouts: Timeouts = field(default_factory=Timeouts)
     choices: Choices = field(default_factory=Choices)
 
@@ -227,7 +227,7 @@ def setpoint_lost(now: Situation) -> bool:
 
 def offboard_back(now: Situation) -> bool:
     """Setpoints are received again after their loss."""
-    return now.cause is Cause.SETPOINTS and not setpoint_lost(now)
+    return now.cause is FailsafeCause.SETPOINTS and not setpoint_lost(now)
 
 
 def ground_station_lost(now: Situation) -> bool:
@@ -270,12 +270,12 @@ def hold_over_then(reaction: Reaction) -> Guard:
     return lambda now: now.follow_up is reaction and hold_over(now)
 
 
-def reacts(cause: Cause, reaction: Reaction) -> Guard:
+def reacts(cause: FailsafeCause, reaction: Reaction) -> Guard:
     """A guard: the parameters choose this reaction to a cause."""
     return lambda now: now.choices.reaction(cause) is reaction
 
 
-def reacts_with_sticks(cause: Cause, reaction: Reaction) -> Guard:
+def reacts_with_sticks(cause: FailsafeCause, reaction: Reaction) -> Guard:
     """The same for a reaction that needs manual control input, which is received."""
     return lambda now: now.choices.reactions.get(cause, Reaction.NOTHING) is reaction and not manual_lost(now)
 
@@ -350,7 +350,7 @@ UNARMABLE = frozenset(
 """Modes in which the vehicle cannot be armed, as in PX4."""
 
 
-def next_cause(now: Situation) -> Cause | None:
+def next_cause(now: Situation) -> FailsafeCause | None:
     """The most severe cause that exists and was not reacted to yet; removes causes that are over."""
     handled = now.handled
     for cause, holds in _CAUSES:
@@ -385,13 +385,13 @@ def _flight_time_over(now: Situation) -> bool:
     return limit_us is not None and now.flown and now.now_us - now.armed_us > limit_us
 
 
-_CAUSES: tuple[tuple[Cause, Guard], ...] = (
-    (Cause.POSITION, position_lost),
-    (Cause.BATTERY_EMERGENCY, _battery_at(_BATTERY_EMERGENCY)),
-    (Cause.BATTERY_CRITICAL, _battery_at(_BATTERY_CRITICAL)),
-    (Cause.FENCE, lambda now: now.fence_breached),
-    (Cause.MANUAL, _manual_gone),
-    (Cause.GROUND_STATION, _ground_station_gone),
-    (Cause.FLIGHT_TIME, _flight_time_over),
-    (Cause.BATTERY_LOW, _battery_at(_BATTERY_LOW)),
+_CAUSES: tuple[tuple[FailsafeCause, Guard], ...] = (
+    (FailsafeCause.POSITION, position_lost),
+    (FailsafeCause.BATTERY_EMERGENCY, _battery_at(_BATTERY_EMERGENCY)),
+    (FailsafeCause.BATTERY_CRITICAL, _battery_at(_BATTERY_CRITICAL)),
+    (FailsafeCause.FENCE, lambda now: now.fence_breached),
+    (FailsafeCause.MANUAL, _manual_gone),
+    (FailsafeCause.GROUND_STATION, _ground_station_gone),
+    (FailsafeCause.FLIGHT_TIME, _flight_time_over),
+    (FailsafeCause.BATTERY_LOW, _battery_at(_BATTERY_LOW)),
 )

@@ -79,7 +79,7 @@ class ControlCommand:
 
 
 @dataclass(slots=True)
-class VelocityCommand(ControlCommand):
+class VelocityFrdCommand(ControlCommand):
     """A velocity, an acceleration as feed-forward, and a yaw rate."""
 
     velocity_level_m_s: Vec3 = ZERO3
@@ -98,11 +98,11 @@ class VelocityCommand(ControlCommand):
             return self
         down_m_s, down_m_s2 = limit(down_m_s)
         velocity_m_s = (forward_m_s, right_m_s, down_m_s)
-        return VelocityCommand(velocity_m_s, self.yaw_rate_rad_s, (0.0, 0.0, down_m_s2))
+        return VelocityFrdCommand(velocity_m_s, self.yaw_rate_rad_s, (0.0, 0.0, down_m_s2))
 
     def straight_up(self) -> ControlCommand:
         """Its vertical velocity only."""
-        return VelocityCommand((0.0, 0.0, self.velocity_level_m_s[2]))
+        return VelocityFrdCommand((0.0, 0.0, self.velocity_level_m_s[2]))
 
 
 @dataclass(slots=True)

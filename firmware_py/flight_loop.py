@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from firmware_py.battery import BatteryMonitor
 from firmware_py.commander import Commander, Observation
-from firmware_py.commander_table import Event, Row, State, Trigger
+from firmware_py.commander_table import CommanderRow, CommanderState, Event, Trigger
 from firmware_py.commands import ControlCommand
 from firmware_py.estimation.ideal_estimator import IdealEstimator
 from firmware_py.estimation.report import StateEstimator
@@ -21,7 +21,7 @@ from firmware_py.guidance.modes import Guidance
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import LegKind
 from firmware_py.missions.store import MissionStore
-from firmware_py.navigator import Navigator
+from firmware_py.navigator import MissionNavigator
 from firmware_py.offboard_requests import SetpointQueue
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import Setpoint
@@ -41,24 +41,24 @@ _READY_PERIOD_US = 100_000  # of the pre-arm checks while armed
 
 _STAYS_ON_GROUND = frozenset(
     {
-        State.HOLD,
-        State.FAILSAFE_HOLD,
-        State.LAND,
-        State.FAILSAFE_LAND,
-        State.FAILSAFE_DESCEND,
-        State.RETURN,
-        State.FAILSAFE_RETURN,
+        CommanderState.HOLD,
+        CommanderState.FAILSAFE_HOLD,
+        CommanderState.LAND,
+        CommanderState.FAILSAFE_LAND,
+        CommanderState.FAILSAFE_DESCEND,
+        CommanderState.RETURN,
+        CommanderState.FAILSAFE_RETURN,
     }
 )
 """States that leave the ground only if their mode flies to a place above."""
 
 _AIRBORNE_STATES = {
-    State.TAKEOFF: LandedState.TAKEOFF,
-    State.LAND: LandedState.LANDING,
-    State.FAILSAFE_LAND: LandedState.LANDING,
-    State.FAILSAFE_DESCEND: LandedState.LANDING,
+    CommanderState.TAKEOFF: LandedState.TAKEOFF,
+    CommanderState.LAND: LandedState.LANDING,
+    CommanderState.FAILSAFE_LAND: LandedState.LANDING,
+    CommanderState.FAILSAFE_DESCEND: LandedState.LANDING,
 }
-_STOPPED_STATES = frozenset({State.DISARMED, State.TERMINATED})
+_STOPPED_STATES = frozenset({CommanderState.DISARMED, CommanderState.TERMINATED})
 _LEG_ENDS = {LegKind.RETURN: Event.MISSION_RETURNS, LegKind.DONE: Event.MISSION_DONE}
 
 
@@ -113,7 +113,7 @@ class FlightLoop:
         self._geo = GeoReference()
         self._commander = Commander()
         self._guidance = Guidance(airframe, self.parameters, control_period_s)
-        self._navigator = Navigator(self.missions, self.parameters)
+        self._navigator = MissionNavigator(self.missions, self.parameters)
         self._stabiliser = stabiliser
         self._lift_off = LiftOff()
         self._land_detector = LandDetector((airframe.hover_speed_rad_s / airframe.motor.max_speed_rad_s) ** 2)
@@ -122,8 +122,8 @@ class FlightLoop:
         self._now_us = 0  # advances also while samples are unusable
         self._checks_due_us = self._ready_due_us = 0
         self._motors_stopped = self._output_finite = True
-        self._state_entered = State.DISARMED
-        self._state_shown: State | None = None
+        self._state_entered = CommanderState.DISARMED
+        self._state_shown: CommanderState | None = None
         self._airborne = LandedState.IN_AIR
         self._configure()
 
@@ -159,7 +159,7 @@ class FlightLoop:
         row = commander.tick(seen)
         if row is not None:
             self._follow(row)
-        if commander.state is State.MISSION:
+        if commander.state is CommanderState.MISSION:
             self._advance_mission()
         self._refresh_status()
         if usable and not self._motors_stopped:
@@ -269,7 +269,7 @@ class FlightLoop:
             return stabiliser.idle()
         return stabiliser.step(state, lifting, grounded=lift_off.is_held)
 
-    def _follow(self, row: Row) -> None:
+    def _follow(self, row: CommanderRow) -> None:
         """Apply a row that matched."""
         if row.text:
             self.say(row.severity, row.text)
@@ -278,16 +278,16 @@ class FlightLoop:
         if row.severity == CRITICAL:
             self.flight.failsafes += ((self._now_us, row.text),)
         before, self._state_entered = self._state_entered, row.target
-        if before is State.DISARMED:
+        if before is CommanderState.DISARMED:
             self._leave_disarmed()
         self._motors_stopped = row.target in _STOPPED_STATES
-        self.estimator.stands = row.target is State.DISARMED
+        self.estimator.stands = row.target is CommanderState.DISARMED
         if self._motors_stopped:
             self.output = MotorOutput((0.0,) * len(self.airframe.rotors))
             self._output_finite = True
             self._lift_off.rest()
         self._navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
-        if row.target is State.OFFBOARD:
+        if row.target is CommanderState.OFFBOARD:
             self._guidance.accept(self.setpoints.take())
         self._enter(row.target, before, row.event)
 
@@ -302,17 +302,17 @@ class FlightLoop:
         self.flight.failsafes = ()
         self.flight.number += 1
 
-    def _enter(self, target: State, before: State, event: Trigger) -> None:
+    def _enter(self, target: CommanderState, before: CommanderState, event: Trigger) -> None:
         """Start the mode of a state; a state without motors changes no mode."""
-        if before is State.MISSION:
+        if before is CommanderState.MISSION:
             self._navigator.leave_mission()
         if self._motors_stopped:
             self._navigator.disarmed()
             return
         on_ground = self.status.landed_state is LandedState.ON_GROUND
-        if target is State.FAILSAFE_HOLD and before is State.TAKEOFF and on_ground:
+        if target is CommanderState.FAILSAFE_HOLD and before is CommanderState.TAKEOFF and on_ground:
             return  # as PX4: a take-off that has begun continues to its height and holds there
-        reached = before is State.TAKEOFF and event is Event.TICK
+        reached = before is CommanderState.TAKEOFF and event is Event.TICK
         self._guidance.enter(
             target,
             self.state,
@@ -320,15 +320,15 @@ class FlightLoop:
             keep_target=reached or event is Event.MISSION_DONE,
             orbit=self._commander.orbit,
         )
-        if target is State.MISSION:
+        if target is CommanderState.MISSION:
             self._navigator.enter_mission()
 
-    def _target_of(self, target: State) -> Vec3:
+    def _target_of(self, target: CommanderState) -> Vec3:
         """The target of a take-off or a return, NED metres; NaN for other states."""
-        if target in (State.RETURN, State.FAILSAFE_RETURN):
+        if target in (CommanderState.RETURN, CommanderState.FAILSAFE_RETURN):
             return self._navigator.return_place() or self._geo.home_ned_m
         here = self._geo.to_geodetic(self.state.position_ned_m)
-        if target is not State.TAKEOFF or here is None or self._geo.home is None:
+        if target is not CommanderState.TAKEOFF or here is None or self._geo.home is None:
             return NAN3
         altitude_m = self._commander.takeoff_altitude_m
         if isnan(altitude_m):
@@ -408,7 +408,7 @@ class FlightLoop:
         if state is not self._state_shown or intended is not status.intended_mode:
             self._state_shown = state
             self._airborne = _AIRBORNE_STATES.get(state, LandedState.IN_AIR)
-            status.armed = state is not State.DISARMED
+            status.armed = state is not CommanderState.DISARMED
             status.mode = commander.mode
             status.intended_mode = intended
             status.failsafe = commander.failsafe

@@ -6,7 +6,7 @@ from math import hypot, inf, isfinite
 
 from firmware_py.missions.checks import mission_faults
 from firmware_py.missions.executor import MissionExecutor
-from firmware_py.missions.flight import IssuedCommand, Leg, View
+from firmware_py.missions.flight import IssuedCommand, MissionLeg, VehicleView
 from firmware_py.missions.geofence import Geofence
 from firmware_py.missions.items import Do
 from firmware_py.missions.store import MissionStore
@@ -21,7 +21,7 @@ _OF_HOME_M = 10.0  # a rally point this near to home counts as home
 _HOME_OR_RALLY, _NOT_HOME, _MISSION_PATH, _NEAREST, _FEWEST_ITEMS = range(5)  # RTL_TYPE
 
 
-class Navigator:
+class MissionNavigator:
     """Combines mission, fence and rally points.
 
     Args:
@@ -31,12 +31,12 @@ class Navigator:
 
     def __init__(self, store: MissionStore, parameters: Parameters) -> None:
         self._store = store
-        self._view = View()
+        self._view = VehicleView()
         self._parameters = parameters
         self._executor = MissionExecutor(store, parameters)
         self._fence = Geofence(store, parameters)
         self._checked: tuple[int, int, bool] = (0, 0, False)
-        self._leg: Leg | None = None
+        self._leg: MissionLeg | None = None
         self._issued: list[IssuedCommand] = []
 
     def observe(self, state: VehicleState, geo: GeoReference, *, landed: bool) -> None:
@@ -75,7 +75,7 @@ class Navigator:
         """The motors have stopped."""
         self._executor.disarmed()
 
-    def next_leg(self) -> Leg | None:
+    def next_leg(self) -> MissionLeg | None:
         """The mission's leg from this tick on; None: unchanged."""
         leg = self._executor.step(self._view)
         if leg is self._leg:
@@ -115,7 +115,7 @@ def _breach_text(breach: str | None) -> str | None:
     return None if breach is None else f"Geofence violation: {breach}"
 
 
-def return_place(view: View, store: MissionStore, parameters: Parameters) -> Vec3 | None:
+def return_place(view: VehicleView, store: MissionStore, parameters: Parameters) -> Vec3 | None:
     """A return's destination by RTL_TYPE and PX4's rules, NED metres; None before home is known.
 
     Heights such as RTL_RETURN_ALT count from there. The types that follow the mission's own path (2 and 4)

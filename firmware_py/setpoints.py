@@ -15,7 +15,7 @@ from firmware_py.commands import (
     BodyRateCommand,
     ControlCommand,
     MotorCommand,
-    VelocityCommand,
+    VelocityFrdCommand,
 )
 from firmware_py.guidance.limits import (
     SpeedLimits,
@@ -192,13 +192,13 @@ class BodyVelocitySetpoint(Setpoint):
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
         """The velocity, with the yaw rate towards its yaw."""
         turn_rad_s = yaw_rate(state.yaw_rad, self.yaw_rad, self.yaw_rate_rad_s, limits)
-        return VelocityCommand(self.velocity_level_m_s, turn_rad_s)
+        return VelocityFrdCommand(self.velocity_level_m_s, turn_rad_s)
 
     def constant_command(self, limits: SpeedLimits) -> ControlCommand | None:
         """The command, unless a yaw is given."""
         if not isnan(self.yaw_rad):
             return None
-        return VelocityCommand(self.velocity_level_m_s, yaw_rate(0.0, nan, self.yaw_rate_rad_s, limits))
+        return VelocityFrdCommand(self.velocity_level_m_s, yaw_rate(0.0, nan, self.yaw_rate_rad_s, limits))
 
     @property
     def trajectory(self) -> TrajectorySetpoint:

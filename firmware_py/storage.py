@@ -20,7 +20,7 @@ _FORBIDDEN = frozenset(chr(code) for code in (*range(32), 127)) | {"\\", "/"}
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class StorageEntry:
     """A file or a folder.
 
     Attributes:
@@ -43,10 +43,10 @@ class Storage(Protocol):
     ENOSPC or EFBIG where a limit is reached. Nothing is changed then.
     """
 
-    def entry(self, path: Path) -> Entry:
+    def entry(self, path: Path) -> StorageEntry:
         """The file or folder at a path."""
 
-    def entries(self, path: Path) -> list[Entry]:
+    def entries(self, path: Path) -> list[StorageEntry]:
         """The contents of a folder, sorted by name."""
 
     def read(self, path: Path, offset: int, count: int) -> bytes:

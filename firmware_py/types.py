@@ -37,7 +37,7 @@ class VehicleState:
 
 @dataclass(frozen=True, slots=True)
 class ManualInput:
-    """A pilot's sticks, from MANUAL_CONTROL or RC channels.
+    """An operator's sticks, from MANUAL_CONTROL or RC channels.
 
     Attributes:
         time_us: vehicle time of reception.

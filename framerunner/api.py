@@ -10,7 +10,7 @@ from joblib import cpu_count
 from framerunner.errors import SettingError
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.plan import plan_flights
-from framerunner.evaluation.rows import Row
+from framerunner.evaluation.rows import EvaluationRow
 from framerunner.evaluation.runner import fly_all
 from framerunner.evaluation.statistics import Summary, summarise
 from framerunner.flying.lockstep import fly_lockstep
@@ -36,7 +36,7 @@ class Evaluation:
         summary: counts, rates with 95 % confidence intervals, spreads of times and errors, and causes.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[EvaluationRow, ...]
     summary: Summary
 
 

@@ -96,9 +96,9 @@ class FlightAbort:
             held_s = self._hold_s
             logger.warning("held for %g s; it lands now", held_s)
             self._end_us = None
-            # It is still in the hold that was requested here; a pilot's mode is left alone.
+            # It is still in the hold that was requested here; an operator's mode is left alone.
             problem = await self._land(demanded=True) or problem
-        if held_s is None or self._armed:  # a pilot may have it
+        if held_s is None or self._armed:  # an operator may have it
             return problem
         return f"{problem}; it landed later" if problem else f"it held for {held_s:g} s, then landed"
 
@@ -161,7 +161,7 @@ class FlightAbort:
                 self._armed = state.armed
                 if not state.armed or state.time_us > self._end_us:
                     return False
-                # A failsafe or a pilot who has taken it keeps it.
+                # A failsafe or an operator who has taken it keeps it.
                 ends_us = self._hold_end_us
                 if ends_us is not None and state.mode == self._held_mode and state.time_us > ends_us:
                     return True

@@ -12,7 +12,7 @@ from typing import Literal
 
 from framerunner.wire.mission_report import TransitionTaken
 from offboard.abort import FlightAbort
-from offboard.drone import Drone, DroneError, DroneState, LimitedCommand, VelocityCommand
+from offboard.drone import Drone, DroneError, DroneState, LimitedCommand, VelocityFluCommand
 from offboard.engine import MissionEngine, MissionRunError
 from offboard.limits import CONTEST, STILL, CommandLimits
 from offboard.mission import Mission
@@ -38,19 +38,19 @@ class Moment:
     """One tick of a flight, for displays and records.
 
     Attributes:
-        remark: in a pause, why the mission did not continue when the pilot last gave the drone back;
+        remark: in a pause, why the mission did not continue when the operator last gave the drone back;
             otherwise how box and caps have limited the mission's command, or that it hovers because there are
             no images; empty if it flies as commanded.
         navigation: the navigator's map and plan, renewed five times a second; None without a navigator.
     """
 
     state: DroneState
-    command: VelocityCommand  # as sent
+    command: VelocityFluCommand  # as sent
     detections: Detections  # of the latest image
     mission_state: str  # such as "red.turning"
     flight_time_s: float  # vehicle time since motors on; 0 before
     transition: TransitionTaken | None = None  # the one taken in this tick
-    paused: bool = False  # a pilot has the sticks; the mission waits
+    paused: bool = False  # an operator has the sticks; the mission waits
     remark: str = ""
     navigation: NavigationView | None = None
 
@@ -71,7 +71,7 @@ class MissionEnd:
     mission_state: str  # the state it was in
     flight_time_s: float  # vehicle time from motors on to its end
     ticks: int  # how many were flown
-    pauses: int = 0  # how often a pilot took the drone
+    pauses: int = 0  # how often an operator took the drone
     kept_in_box_s: float = 0.0  # vehicle time for which the command was changed to keep the drone in its box
 
     @property
@@ -95,8 +95,8 @@ async def fly_mission(
     """Connect, fly the mission, disconnect.
 
     If anything fails after the start (drone, camera, mission, time limit, Ctrl-C, the operator's stop),
-    commanding stops, hold or a landing is requested, as the rules say, and the outcome says why. A pilot who
-    takes the drone pauses the mission; it continues when he gives the drone back where that is safe.
+    commanding stops, hold or a landing is requested, as the rules say, and the outcome says why. An operator
+    who takes the drone pauses the mission; it continues when he gives the drone back where that is safe.
 
     Args:
         drone: not yet connected; closed at the end.
@@ -146,7 +146,7 @@ class _Flight:
     started_us: int | None = None
     now_us: int = 0
     ticks: int = 0
-    sent: VelocityCommand | None = None
+    sent: VelocityFluCommand | None = None
     kept_in_box_us: int = 0
     commanded_us: int = 0
     paused: bool = False
@@ -293,7 +293,7 @@ class _Flight:
         self.ticks += 1
         self._observe(state, limited, Detections())
 
-    def _command(self, command: VelocityCommand, state: DroneState) -> LimitedCommand:
+    def _command(self, command: VelocityFluCommand, state: DroneState) -> LimitedCommand:
         """Let the drone fly a command, as far as its limits allow."""
         limited = self.drone.command(command)
         if limited.kept_in_box:
@@ -343,7 +343,7 @@ class _Flight:
             )
         try:
             detections, camera_problem = self.perception.latest(state.time_us), ""
-        except CameraLostError as error:  # a pilot can fly without it, and it may return
+        except CameraLostError as error:  # an operator can fly without it, and it may return
             detections, camera_problem = Detections(), str(error)
         if state.offboard:
             self.remark = _why_not_continued(state) or camera_problem

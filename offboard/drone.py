@@ -31,7 +31,7 @@ class ResponsePrior(Enum):
 class DroneState:
     """The drone's state in arena axes (x forward, y left, z up, yaw counter-clockwise).
 
-    If `offboard` is false between `motors_on` and the end of commanding, a pilot has taken the drone.
+    If `offboard` is false between `motors_on` and the end of commanding, an operator has taken the drone.
     """
 
     time_us: int  # vehicle time, microseconds since its boot
@@ -58,7 +58,7 @@ class DroneState:
 
 
 @dataclass(frozen=True, slots=True)
-class VelocityCommand:
+class VelocityFluCommand:
     """A velocity in level axes turned with the yaw (forward, left, up; m/s), a yaw rate (rad/s, left)."""
 
     forward_m_s: float = 0.0
@@ -94,7 +94,7 @@ class Clip:
 class LimitedCommand:
     """A command within all limits, and what they have changed in it, in their order."""
 
-    command: VelocityCommand
+    command: VelocityFluCommand
     clips: tuple[Clip, ...] = ()
 
     @property
@@ -113,13 +113,13 @@ class Drone(Protocol):
 
     After `connect` and `ready`, iterate over `ticks()`; it gives the state at 20 Hz of *vehicle* time and
     raises `DroneError` when commanding must stop: link lost, state stale or not finite, disarmed by others,
-    or a mode that was not requested here and is no pilot's (a failsafe, most likely).
+    or a mode that was not requested here and is no operator's (a failsafe, most likely).
 
-    A pilot may take the vehicle, by choosing one of his modes, and give it back, by choosing offboard. In
+    An operator may take the vehicle, by choosing one of his modes, and give it back, by choosing offboard. In
     between the ticks continue, with `offboard` false, whatever the mode and whether armed or not, and no
     command is flown. The adapter keeps offboard possible while the ticks are iterated, by setpoints of zero
     velocity. Once a tick shows `offboard` again, the vehicle stands still until either `command` takes it
-    back or `refuse` lets it hold. An adapter whose vehicle no pilot can take never shows this.
+    back or `refuse` lets it hold. An adapter whose vehicle no operator can take never shows this.
     """
 
     @property
@@ -155,23 +155,24 @@ class Drone(Protocol):
         """Let the vehicle land by itself and wait until it is disarmed."""
 
     async def hold(self) -> None:
-        """Stop commanding permanently and request hold, unless a pilot or a failsafe has the vehicle."""
+        """Stop commanding permanently and request hold, unless an operator or a failsafe has the vehicle."""
 
     async def land_now(self, *, demanded: bool = False) -> None:
         """Stop commanding permanently and let the vehicle land where it is; returns when it is disarmed.
 
-        A vehicle that a pilot or a failsafe has is left to them, and this returns at once, unless it lands
-        already. A vehicle that cannot be brought to land gets a request for hold, as by `hold`; then its own
-        failsafe acts.
+        A vehicle that an operator or a failsafe has is left to them, and this returns at once, unless it
+        lands already. A vehicle that cannot be brought to land gets a request for hold, as by `hold`; then
+        its own failsafe acts.
 
         Args:
-            demanded: by the operator, who overrules a failsafe that does not land; a pilot keeps the vehicle.
+            demanded: by the operator, who overrules a failsafe that does not land; manual control keeps the
+                vehicle.
         """
 
     async def refuse(self) -> None:
-        """Let the vehicle that a pilot gave back hold, and wait until it is given back again."""
+        """Let the vehicle that an operator gave back hold, and wait until it is given back again."""
 
-    def command(self, command: VelocityCommand) -> LimitedCommand:
+    def command(self, command: VelocityFluCommand) -> LimitedCommand:
         """Set the velocity to fly from now on. Never blocks.
 
         Returns:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncGenerator
 from dataclasses import replace
 
-from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityCommand
+from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityFluCommand
 from offboard.mavsdk_drone import MavsdkDrone
 
 
@@ -55,7 +55,7 @@ class DryRunDrone(MavsdkDrone):
     async def refuse(self) -> None:
         """Nobody gives the vehicle back."""
 
-    def command(self, command: VelocityCommand) -> LimitedCommand:
+    def command(self, command: VelocityFluCommand) -> LimitedCommand:
         """Send the setpoint that would be flown."""
         limited = self._limits.limit(command, self._latest)
         if self._runs:

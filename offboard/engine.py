@@ -14,8 +14,8 @@ from framerunner.errors import UserError
 from framerunner.wire.mission_report import Plain, TransitionTaken
 from offboard.chart.expressions import names_in
 from offboard.chart.spec import RESUME, Transition, state_path
-from offboard.chart.table import Row
-from offboard.drone import DroneState, VelocityCommand
+from offboard.chart.table import ChartRow
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
 from offboard.navigation.view import NavigationView, Surroundings
@@ -64,7 +64,7 @@ class MissionEngine:
         self.pilot.limits = limits
         self._navigator = _new_navigator(mission, surroundings, limits)
         self.pilot._navigator = self._navigator
-        self._present: Row | None = None
+        self._present: ChartRow | None = None
         self._started_us = 0
         self._entered_us = 0
         self._last_us = 0
@@ -78,7 +78,7 @@ class MissionEngine:
 
     @property
     def has_navigator(self) -> bool:
-        """Whether the mission uses the map of frames."""
+        """Whether the mission uses the map of gates."""
         return self._navigator is not None
 
     @property
@@ -99,8 +99,8 @@ class MissionEngine:
         state: DroneState | None = None,
         *,
         images: Sequence[Detections] = (),
-        sent: VelocityCommand | None = None,
-    ) -> VelocityCommand:
+        sent: VelocityFluCommand | None = None,
+    ) -> VelocityFluCommand:
         """Run one step of the chart, at this vehicle time. After a pause this continues the mission.
 
         Args:
@@ -191,7 +191,7 @@ class MissionEngine:
                 memory[name] = first
 
     def _count_unseen(self, time_us: int) -> None:
-        """Update the time since the pilot's frame was wholly in view."""
+        """Update the time since the pilot's gate was wholly in view."""
         pilot, seen_us = self.pilot, self._seen_us
         if self._present is None or self._paused_us is not None:
             seen_us.update(dict.fromkeys(COLOURS, time_us))
@@ -204,7 +204,7 @@ class MissionEngine:
         self._started_us = time_us
         self._enter(self.mission.table.start, time_us)
 
-    def _step(self, present: Row, time_us: int) -> None:
+    def _step(self, present: ChartRow, time_us: int) -> None:
         pilot = self.pilot
         pilot.seconds_in_state = (time_us - self._entered_us) / 1e6
         pilot.seconds_in_mission = (time_us - self._started_us) / 1e6
@@ -217,7 +217,7 @@ class MissionEngine:
         for act in present.during:
             act(pilot)
 
-    def _resume(self, present: Row, paused_us: int, time_us: int) -> bool:
+    def _resume(self, present: ChartRow, paused_us: int, time_us: int) -> bool:
         """End a pause; True if the chart went to another state, which ends this tick."""
         self._paused_us = None
         self._started_us += time_us - paused_us
@@ -268,7 +268,7 @@ class MissionEngine:
 def _new_navigator(
     mission: Mission, surroundings: Surroundings | None, limits: CommandLimits
 ) -> Navigator | None:
-    """A navigator for a mission that uses the map of frames."""
+    """A navigator for a mission that uses the map of gates."""
     if mission.vision != "frames":
         return None
     from offboard.navigation.navigator import Navigator  # noqa: PLC0415 - it imports filterpy: a second

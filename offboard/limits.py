@@ -16,7 +16,7 @@ from math import hypot, inf
 
 from framerunner.errors import SettingError
 from framerunner.geometry.vectors import Vec3, turned
-from offboard.drone import Clip, DroneError, DroneState, LimitedCommand, LimitName, VelocityCommand
+from offboard.drone import Clip, DroneError, DroneState, LimitedCommand, LimitName, VelocityFluCommand
 from scenarios.models import Scenario
 
 FLOOR_M = 0.15  # minimum height of the drone's centre away from its start
@@ -26,14 +26,14 @@ REACTION_S = 0.6
 velocity within 0.6 s, as PX4 does with its default gains, over a link that takes 0.4 s, then stops at the
 side."""
 BRAKE_LEVEL_S = 0.8  # that distance, divided by this, is the speed allowed
-BRAKE_HEIGHT_S = 0.5  # likewise for height: frames hang low, so the drone must be allowed near the floor
+BRAKE_HEIGHT_S = 0.5  # likewise for height: gates hang low, so the drone must be allowed near the floor
 RETURN_M_S = 0.5  # maximum speed back into the box
 STALE_S = 0.5  # a position older than this is not used
 OUTSIDE_M = 0.3  # how far outside counts as not kept in
 NO_RETURN_S = 3.0  # vehicle time outside without coming nearer after which commanding ends
 _NEARER_M = 0.05
-STILL = VelocityCommand()
-Correction = Callable[[VelocityCommand, DroneState], VelocityCommand]
+STILL = VelocityFluCommand()
+Correction = Callable[[VelocityFluCommand, DroneState], VelocityFluCommand]
 logger = logging.getLogger(__name__)
 
 
@@ -61,7 +61,7 @@ class CommandLimits:
     yaw_rate_rad_s: float = 1.0
     level_m_s: float = inf
 
-    def limited(self, command: VelocityCommand) -> VelocityCommand:
+    def limited(self, command: VelocityFluCommand) -> VelocityFluCommand:
         """The command within the limits; an axis at its limit leaves the others as they are.
 
         A level velocity that is shortened as a whole keeps its direction; an infinite component becomes its
@@ -77,7 +77,7 @@ class CommandLimits:
                 level_m_s = hypot(forward_m_s, left_m_s)
             scale = most_m_s / level_m_s
             forward_m_s, left_m_s = scale * forward_m_s, scale * left_m_s
-        return VelocityCommand(
+        return VelocityFluCommand(
             forward_m_s,
             left_m_s,
             clamped(command.up_m_s, self.down_m_s, self.up_m_s),
@@ -183,7 +183,7 @@ class VelocityLimits:
         self._outside_m = 0.0
 
     def limit(
-        self, command: VelocityCommand, state: DroneState | None, correct: Correction | None = None
+        self, command: VelocityFluCommand, state: DroneState | None, correct: Correction | None = None
     ) -> LimitedCommand:
         """The command that may be sent now, and what was changed in it; call it once a tick.
 
@@ -215,7 +215,9 @@ class VelocityLimits:
                 self._tell_once(clip, state)
         return LimitedCommand(command, tuple(clips))
 
-    def _kept_in(self, command: VelocityCommand, state: DroneState, clips: list[Clip]) -> VelocityCommand:
+    def _kept_in(
+        self, command: VelocityFluCommand, state: DroneState, clips: list[Clip]
+    ) -> VelocityFluCommand:
         box = self.box
         if box is None:
             return command
@@ -251,8 +253,8 @@ class VelocityLimits:
 
 
 def _with_speeds(
-    command: VelocityCommand, limits: CommandLimits, name: LimitName, clips: list[Clip]
-) -> VelocityCommand:
+    command: VelocityFluCommand, limits: CommandLimits, name: LimitName, clips: list[Clip]
+) -> VelocityFluCommand:
     """The command within limits of its speeds; the same object if nothing exceeds them."""
     kept = limits.limited(command)
     if kept == command:
@@ -278,7 +280,7 @@ def outside(box: Box, state: DroneState) -> float:
     return hypot(*(max(a - p, p - b, 0.0) for a, p, b in zip(low, at, high, strict=True)))
 
 
-def confine(command: VelocityCommand, state: DroneState, box: Box) -> tuple[VelocityCommand, str]:
+def confine(command: VelocityFluCommand, state: DroneState, box: Box) -> tuple[VelocityFluCommand, str]:
     """Limit a command by the distances to the box's sides.
 
     Returns:

@@ -13,9 +13,9 @@ from mavsdk.asyncio import Mavsdk, MavsdkError
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
-from framerunner.geometry.axes import Alignment, Pose
+from framerunner.geometry.axes import ArenaAlignment, Pose
 from framerunner.wire.transports.urls import parse_url
-from offboard.drone import DroneError, DroneState, LimitedCommand, ResponsePrior, VelocityCommand
+from offboard.drone import DroneError, DroneState, LimitedCommand, ResponsePrior, VelocityFluCommand
 from offboard.limits import STILL, VelocityLimits
 from offboard.link.autopilots import open_dialect
 from offboard.link.companion import Companion
@@ -53,16 +53,17 @@ class MavsdkDrone:
     """A vehicle over MAVLink. What PX4 and ArduPilot do differently is in their dialects (`offboard/link/`).
 
     Axes: the vehicle is on `start_arena` when it connects; its telemetry there gives the transform between
-    its local axes and the arena's (see `Alignment`), so it must be disarmed then; see `followed` for resets.
+    its local axes and the arena's (see `ArenaAlignment`), so it must be disarmed then; see `followed` for
+    resets.
 
     Time: its clock is the time stamp of its ATTITUDE messages, which may run slower or faster than the
     wall's. Wall time is used only to find out whether link and app are alive.
 
     Safety: setpoints are sent by MAVSDK's own thread at 20 Hz, so a watchdog guards the app (see
-    `Watchdog`). While the vehicle is out of offboard during a flight, this class requests no mode; when a
-    pilot gives it back, `refuse` requests hold. While a pilot has it, a velocity of zero is sent with each
-    tick, because PX4 refuses offboard without setpoints; that ends when the app hangs, and with the link or
-    the flight.
+    `Watchdog`). While the vehicle is out of offboard during a flight, this class requests no mode; when an
+    operator gives it back, `refuse` requests hold. While an operator has it, a velocity of zero is sent with
+    each tick, because PX4 refuses offboard without setpoints; that ends when the app hangs, and with the link
+    or the flight.
 
     Args:
         url: udpin://, udpout://, tcpout://, tcpin:// or serial:// (see `parse_url`).
@@ -103,10 +104,10 @@ class MavsdkDrone:
         self._feed = TelemetryFeed()
         self._ticks = TickSource(self._feed)
         self._resets = ResetFeed()
-        self._sent = VelocityCommand()
+        self._sent = VelocityFluCommand()
         self._system_id = system_id
         self._advice = "give another address"
-        self._alignment: Alignment | None = None
+        self._alignment: ArenaAlignment | None = None
         self._mavsdk: Mavsdk | None = None
         self._dialect: Dialect | None = None  # from `connect` on
         self._telemetry: Any = None
@@ -117,7 +118,7 @@ class MavsdkDrone:
         self._corrects = corrects
         self._latest: DroneState | None = None
         self._commanding = False
-        self._pilot_has_it = False
+        self._flown_manually = False
         self._tlog_path: Path | None = None
         self._recorder: TlogRecorder | None = None
         self._companion: Companion | None = None
@@ -209,7 +210,7 @@ class MavsdkDrone:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
         await self._ticks.before_arming(self._telemetry, self._resets.request)
         self._resets.take()  # those until now are in the start's pose
-        self._alignment = Alignment(self._start_arena, pose_of(self._feed))
+        self._alignment = ArenaAlignment(self._start_arena, pose_of(self._feed))
         await self._ticks.begin()
 
     async def _wait_for_checks(self, limit_s: float) -> None:
@@ -236,7 +237,7 @@ class MavsdkDrone:
     async def ticks(self) -> AsyncGenerator[DroneState, None]:
         """States at 20 Hz of vehicle time; ticks that were not waited for are skipped."""
         while True:
-            command = self._sent if self._commanding and not self._pilot_has_it else None
+            command = self._sent if self._commanding and not self._flown_manually else None
             received = await self._ticks.next(STAND_STILL_S, command)
             if not received and not self._ticks.waits:
                 self._stand_still()
@@ -245,8 +246,8 @@ class MavsdkDrone:
             state = self._newest_state()
             self._check_state(state)
             self._latest = state
-            if self._pilot_has_it:
-                self._send(VelocityCommand())
+            if self._flown_manually:
+                self._send(VelocityFluCommand())
             elif self._commanding:
                 self._stream.repeat()
             yield state
@@ -269,16 +270,16 @@ class MavsdkDrone:
         self._feed.arming.acknowledge(self._feed.time_us + round(CONFIRM_S * 1e6))
         self._feed.take_samples()  # those until now are of no flight
         self._tracker.reset()
-        self._pilot_has_it = False
+        self._flown_manually = False
         self._commanding = True
 
     async def _stream_before_offboard(self) -> None:
         if self._feed.armed:  # a vehicle that somebody else has armed may be flying
             raise DroneError("the vehicle was armed by others before the flight; land and disarm it")
-        self._send(VelocityCommand())
+        self._send(VelocityFluCommand())
         for _ in range(round(STREAM_BEFORE_OFFBOARD_S / 0.05)):
             await self._ticks.next(0.05)
-            self._send(VelocityCommand())
+            self._send(VelocityFluCommand())
 
     async def _hold_on_ground(self) -> None:
         """Leave offboard when there will be no flight."""
@@ -319,13 +320,13 @@ class MavsdkDrone:
     async def land_now(self, *, demanded: bool = False) -> None:
         """Stop commanding permanently and let the vehicle land; see `Drone.land_now`."""
         self._stand_still()  # repeated until the vehicle leaves offboard
-        self._commanding = self._pilot_has_it = False
+        self._commanding = self._flown_manually = False
         if self._dialect is None:
             await self.hold()
             return
         await self._know_mode()
         modes, mode = self._dialect.kind.modes, self._feed.mode
-        if mode not in (modes.offboard, modes.land) and not (demanded and mode not in modes.pilot):
+        if mode not in (modes.offboard, modes.land) and not (demanded and mode not in modes.manual):
             await self.hold()
             return
         try:
@@ -336,7 +337,7 @@ class MavsdkDrone:
 
     async def hold(self) -> None:
         """Stop commanding permanently and request hold, unless the vehicle has left offboard already."""
-        self._commanding = self._pilot_has_it = False
+        self._commanding = self._flown_manually = False
         self._watchdog.stop()
         if self._dialect is None:
             return
@@ -344,7 +345,7 @@ class MavsdkDrone:
         modes = self._dialect.kind.modes
         if self._in_offboard:
             await self._leave_offboard()
-            if (mode := self._feed.mode) != modes.hold and mode not in modes.pilot:
+            if (mode := self._feed.mode) != modes.hold and mode not in modes.manual:
                 raise DroneError(f"the vehicle is in {mode} instead{self._feed.recent_texts()}")
         else:
             await asyncio.to_thread(self._stream.end)
@@ -384,15 +385,15 @@ class MavsdkDrone:
             "setpoints have ended, so the vehicle's failsafe for that has to act"
         )
 
-    def command(self, command: VelocityCommand) -> LimitedCommand:
-        """Set the velocity to fly; ignored without motors on, or while a pilot has the vehicle."""
+    def command(self, command: VelocityFluCommand) -> LimitedCommand:
+        """Set the velocity to fly; ignored without motors on, or while an operator has the vehicle."""
         latest = self._latest
         if not self._commanding:
             return LimitedCommand(STILL)
-        if self._pilot_has_it:
+        if self._flown_manually:
             if latest is None or not latest.offboard:
                 return LimitedCommand(STILL)
-            self._pilot_has_it = False
+            self._flown_manually = False
             self._tracker.reset()  # the vehicle was moved by others
         limited = self._limits.limit(command, latest, self._tracker.correct if self._corrects else None)
         self._send(limited.command)
@@ -426,8 +427,8 @@ class MavsdkDrone:
 
     def _stand_still(self) -> None:
         """Send a velocity of zero, because MAVSDK's thread would repeat the last one; from any thread."""
-        if self._commanding and not self._pilot_has_it:
-            self._send(VelocityCommand())
+        if self._commanding and not self._flown_manually:
+            self._send(VelocityFluCommand())
 
     @property
     def _stream(self) -> Dialect:
@@ -438,7 +439,7 @@ class MavsdkDrone:
     def _in_offboard(self) -> bool:
         return self._feed.mode == self._stream.kind.modes.offboard
 
-    def _send(self, command: VelocityCommand) -> None:
+    def _send(self, command: VelocityFluCommand) -> None:
         if not self._watchdog.tripped_after_s:
             self._sent = command
             self._stream.send(command)
@@ -478,21 +479,21 @@ class MavsdkDrone:
             raise DroneError("the vehicle's position, velocity or attitude is not finite")
         if self._commanding and self._feed.arming.is_overdue(state.time_us):
             raise DroneError(not_shown(self._feed, "arming"))
-        if not self._commanding or self._pilot_has_it:
+        if not self._commanding or self._flown_manually:
             return
-        leaves = not state.offboard and state.mode not in self._stream.kind.modes.pilot
+        leaves = not state.offboard and state.mode not in self._stream.kind.modes.manual
         if not state.armed or (leaves and not self._feed.armed):
             raise DroneError(f"the vehicle was disarmed by others{self._feed.recent_texts()}")
         if leaves:
             texts = self._feed.recent_texts()
             raise DroneError(f"the pilot or a failsafe took over: mode {state.mode}{texts}")
-        self._pilot_has_it = not state.offboard
+        self._flown_manually = not state.offboard
 
     def _stop_from_watchdog(self) -> None:
         """On the watchdog's thread: end the native stream and, in offboard, request hold or landing.
 
-        A vehicle that a pilot has must not be given back to a hung app, so the stream ends permanently. The
-        mode that is known is old when the whole process stood still: then nothing is requested here.
+        A vehicle that an operator has must not be given back to a hung app, so the stream ends permanently.
+        The mode that is known is old when the whole process stood still: then nothing is requested here.
         """
         with contextlib.suppress(Exception):  # without setpoints the vehicle's failsafe acts
             if self._watchdog.stood_still or not self._in_offboard:

@@ -13,10 +13,10 @@ from framerunner.files.extensions import extension_names, find_extension
 from framerunner.files.text_file import TextError, TextFault, read_text
 from framerunner.files.yaml_text import Place
 from offboard.chart.check import check
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.problems import (
     MissionError,
-    Problem,
+    MissionProblem,
     ProblemList,
     cut,
     did_you_mean,
@@ -24,7 +24,7 @@ from offboard.chart.problems import (
 )
 from offboard.chart.read import read_mission_file
 from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
-from offboard.chart.table import Table
+from offboard.chart.table import ChartTable
 from offboard.pilot import Pilot
 from offboard.pilot_file import PilotFile, PilotSource, class_of, find_pilot
 from scenarios.models import MissionClass
@@ -62,7 +62,7 @@ class Mission:
         spec: the expanded chart.
         pilot: what the mission was checked against: a contestant's file or a class.
         mission_class: by which limits it flies.
-        vision: how it sees frames.
+        vision: how it sees gates.
         detector: name of another package's detector that finds them; empty: the vision's own.
         remarks: the checker's warnings and advice.
     """
@@ -75,16 +75,16 @@ class Mission:
     mission_class: MissionClass = "contest"
     vision: Vision = "boxes"
     detector: str = ""
-    remarks: tuple[Problem, ...] = field(default=(), repr=False)
+    remarks: tuple[MissionProblem, ...] = field(default=(), repr=False)
 
     def __getstate__(self) -> dict[str, object]:
         """Only the fields: the table's functions cannot be pickled."""
         return {part.name: getattr(self, part.name) for part in fields(self)}
 
     @cached_property
-    def table(self) -> Table:
+    def table(self) -> ChartTable:
         """The chart as the engine runs it."""
-        return Table(self.spec)
+        return ChartTable(self.spec)
 
     @property
     def chart_text(self) -> str:

@@ -30,7 +30,7 @@ class CameraSilentError(CameraLostError):
         self.age_s = age_s
 
 
-class Camera(Protocol):
+class ImageSource(Protocol):
     """A source of images, such as an open `vision.types.CameraSource`."""
 
     def frames(self) -> AsyncIterator[CameraFrame]:
@@ -107,7 +107,9 @@ class CameraPerception:
         oldest_s: age of the oldest image that was used, seconds.
     """
 
-    def __init__(self, camera: Camera, detector: Detector | None = None, *, patient: bool = False) -> None:
+    def __init__(
+        self, camera: ImageSource, detector: Detector | None = None, *, patient: bool = False
+    ) -> None:
         self.oldest_s = 0.0
         self._patient = patient
         self._camera = camera

@@ -18,7 +18,7 @@ from pydantic.config import JsonDict
 
 from framerunner.errors import UserError
 from framerunner.geometry.vectors import Vec3, turned
-from offboard.drone import VelocityCommand
+from offboard.drone import VelocityFluCommand
 from offboard.limits import CONTEST, CommandLimits
 from scenarios.models import COLOURS, Colour
 from vision.types import Detection, Detections
@@ -226,7 +226,7 @@ class Pilot:
             raise PilotError("it uses the map of frames; add the line 'vision: frames' to the mission's file")
         return self._navigator
 
-    def _fly(self, command: VelocityCommand) -> None:
+    def _fly(self, command: VelocityFluCommand) -> None:
         """Command a velocity with motors on."""
         cmd = self.cmd
         cmd.on = True
@@ -234,7 +234,7 @@ class Pilot:
         cmd.rot_z = command.yaw_rate_rad_s
 
 
-def velocity_command(cmd: Command) -> VelocityCommand:
+def velocity_command(cmd: Command) -> VelocityFluCommand:
     """The command as a velocity, not limited yet.
 
     A rate may be infinite, and is then limited as in the paper's stabiliser: its navigator commands infinite
@@ -244,7 +244,7 @@ def velocity_command(cmd: Command) -> VelocityCommand:
     Raises:
         PilotError: a rate is no number.
     """
-    return VelocityCommand(
+    return VelocityFluCommand(
         _number("vel_x", cmd.vel_x),
         _number("vel_y", cmd.vel_y),
         _number("vel_z", cmd.vel_z),

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framerunner.geometry.vectors import Vec3, turned
-from offboard.drone import DroneState, ResponsePrior, VelocityCommand
+from offboard.drone import DroneState, ResponsePrior, VelocityFluCommand
 from offboard.second_lag import LAG_S as OWN_LAG_S
 from offboard.second_lag import SecondLag
 from offboard.slow_share import SlowShare
@@ -163,7 +163,7 @@ class ResponseEstimate:
             self._chosen, self._turning = list(_EXPECTED_LATE), False
             self.response = self._as_response()
 
-    def update(self, state: DroneState, sent: VelocityCommand | None, *, near_gate: bool = False) -> None:
+    def update(self, state: DroneState, sent: VelocityFluCommand | None, *, near_gate: bool = False) -> None:
         """Add a tick.
 
         Args:
@@ -375,7 +375,7 @@ class ResponseEstimate:
         )
 
 
-def _in_all_axes(command: VelocityCommand, yaw_rad: float) -> tuple[float, ...]:
+def _in_all_axes(command: VelocityFluCommand, yaw_rad: float) -> tuple[float, ...]:
     forward, left = command.forward_m_s, command.left_m_s
     return (*turned(forward, left, yaw_rad), forward, left, command.up_m_s, command.yaw_rate_rad_s)
 

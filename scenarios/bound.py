@@ -1,4 +1,4 @@
-"""A lower bound of the time of a try, for a pilot who knows the layout: a linear program.
+"""A lower bound of the time of a try, for somebody who knows the layout: a linear program.
 
 No drone whose motion stays within an envelope can complete a try of the scenario in less time;
 docs/bound.md has the proof.
@@ -11,7 +11,7 @@ from math import cos, inf, pi, sin
 from typing import TYPE_CHECKING
 
 from framerunner.geometry.vectors import Vec3
-from scenarios.models import COLOURS, Frame, Scenario, ScenarioError
+from scenarios.models import COLOURS, Gate, Scenario, ScenarioError
 from scenarios.touchdown import STANDING_TOLERANCE_M
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class Bound:
 
     Attributes:
         time_s: no try is shorter.
-        leg_times_s: to each frame, and to where the motors stop.
+        leg_times_s: to each gate, and to where the motors stop.
         points_arena_m: start, a point in each opening, and where the motors stop.
     """
 
@@ -96,22 +96,22 @@ class Bound:
     points_arena_m: tuple[Vec3, ...]
 
 
-def ordered_frames(scenario: Scenario) -> tuple[Frame, ...]:
-    """The frames in the order in which they must be crossed."""
-    return tuple(sorted(scenario.frames, key=lambda frame: COLOURS.index(frame.colour)))
+def ordered_gates(scenario: Scenario) -> tuple[Gate, ...]:
+    """The gates in the order in which they must be crossed."""
+    return tuple(sorted(scenario.frames, key=lambda gate: COLOURS.index(gate.colour)))
 
 
 def lower_bound(scenario: Scenario, start_m: Vec3, height_m: float, envelope: Envelope) -> Bound:
     """Compute the bound; takes some milliseconds.
 
     Args:
-        scenario: with at least one frame.
+        scenario: with at least one gate.
         start_m: centre of the drone when the motors start, arena axes.
         height_m: of the drone.
         envelope: of its motion.
 
     Raises:
-        ScenarioError: the scenario has no frames, or the linear program has no solution.
+        ScenarioError: the scenario has no gates, or the linear program has no solution.
     """
     from scipy.optimize import linprog  # noqa: PLC0415 - it takes 0.2 s, and most uses of scenarios need none
 
@@ -135,16 +135,16 @@ def lower_bound(scenario: Scenario, start_m: Vec3, height_m: float, envelope: En
 class _Program:
     """The linear program: the least sum of the legs' times.
 
-    Its variables: for each frame the offsets to the side and up from the opening's centre; x, y and z of the
+    Its variables: for each gate the offsets to the side and up from the opening's centre; x, y and z of the
     place where the motors stop; the length in plan and the time of each leg.
     """
 
     def __init__(self, scenario: Scenario, start_m: Vec3, height_m: float, envelope: Envelope) -> None:
         import numpy as np  # noqa: PLC0415 - most uses of scenarios need none
 
-        frames = ordered_frames(scenario)
-        legs = len(frames) + 1
-        self._stop = 2 * len(frames)
+        gates = ordered_gates(scenario)
+        legs = len(gates) + 1
+        self._stop = 2 * len(gates)
         self._lengths = slice(self._stop + 3, self._stop + 3 + legs)
         self.times = slice(self._stop + 3 + legs, self._stop + 3 + 2 * legs)
         self._count = self.times.stop
@@ -152,13 +152,13 @@ class _Program:
         self.cost[self.times] = 1.0
         resting_m = scenario.base.top_m + height_m / 2
         # x, y and z of each place are affine in the variables.
-        self._constant = np.array([start_m, *(frame.position_arena_m for frame in frames), (0.0, 0.0, 0.0)])
+        self._constant = np.array([start_m, *(gate.position_arena_m for gate in gates), (0.0, 0.0, 0.0)])
         self._linear = np.zeros((legs + 1, 3, self._count))
         self.bounds: list[tuple[float, float]] = []
-        for index, frame in enumerate(frames):
-            self._linear[index + 1, :2, 2 * index] = (-sin(frame.yaw_rad), cos(frame.yaw_rad))
+        for index, gate in enumerate(gates):
+            self._linear[index + 1, :2, 2 * index] = (-sin(gate.yaw_rad), cos(gate.yaw_rad))
             self._linear[index + 1, 2, 2 * index + 1] = 1.0
-            self.bounds += [(-size_m / 2, size_m / 2) for size_m in frame.opening_m]
+            self.bounds += [(-size_m / 2, size_m / 2) for size_m in gate.opening_m]
         self._linear[legs, :, self._stop : self._stop + 3] = np.eye(3)
         self.bounds += [*_stop_ranges(scenario, resting_m, envelope.fall), *[(0.0, inf)] * (2 * legs)]
 

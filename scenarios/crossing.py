@@ -1,4 +1,4 @@
-"""Where a try's path passes through frames' openings, and how long it is outside the arena."""
+"""Where a try's path passes through gates' openings, and how long it is outside the arena."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from math import cos, dist, hypot, sin
 from typing import Literal
 
 from framerunner.geometry.vectors import Vec3
-from scenarios.models import Arena, Frame
+from scenarios.models import Arena, Gate
 
 MAX_GAP_US = 1_000_000  # across a longer gap in the states no crossing counts
 _SLACK_RESERVE_M = 0.01  # of the distance to the nearest plane, so that rounding loses no passage
@@ -21,29 +21,29 @@ class Passage:
     """One passage through an opening."""
 
     fraction: float  # of the last step before the plane was met, 0 to 1
-    offset_m: float  # distance from the opening's centre, in the frame's plane
-    side: Side  # from which it came; the front is where the frame's normal (its local x axis) points
+    offset_m: float  # distance from the opening's centre, in the gate's plane
+    side: Side  # from which it came; the front is where the gate's normal (its local x axis) points
 
 
-class Gate:
-    """Follows a path past one frame.
+class GateWatch:
+    """Follows a path past one gate.
 
-    A step passes when its start is on one side of the frame's plane, its end on the other, and the straight
+    A step passes when its start is on one side of the gate's plane, its end on the other, and the straight
     line between meets the plane inside the opening. A point exactly in the plane belongs to the side the path
     came from, so touching the plane and going back is no passage, and a path cut into more steps passes as
     often as before. Only the drone's centre counts: what its edges touch is a contact.
     """
 
-    def __init__(self, frame: Frame) -> None:
-        width_m, height_m = frame.opening_m
+    def __init__(self, gate: Gate) -> None:
+        width_m, height_m = gate.opening_m
         self._half_width_m = width_m / 2
         self._half_height_m = height_m / 2
-        self._centre = frame.position_arena_m
-        self._cos = cos(frame.yaw_rad)
-        self._sin = sin(frame.yaw_rad)
-        self._offset_m = self._cos * frame.x_m + self._sin * frame.y_m
+        self._centre = gate.position_arena_m
+        self._cos = cos(gate.yaw_rad)
+        self._sin = sin(gate.yaw_rad)
+        self._offset_m = self._cos * gate.x_m + self._sin * gate.y_m
         self._side = 0  # 1 front, -1 back, 0 not known yet
-        self.distance_m = 0.0  # from the last point to the frame's plane; a shorter path cannot pass it
+        self.distance_m = 0.0  # from the last point to the gate's plane; a shorter path cannot pass it
 
     def restart(self, point_m: Vec3) -> None:
         """Start a new path at a point; it is not joined to the last one."""
@@ -121,13 +121,13 @@ class Boundary:
 class PathWatch:
     """Follows the path of one try, straight from state to state.
 
-    Frames and boundary are checked only when the drone may have reached the nearest of them since the last
+    Gates and boundary are checked only when the drone may have reached the nearest of them since the last
     check; this runs at 250 Hz.
     """
 
-    def __init__(self, arena: Arena, frames: Sequence[Frame]) -> None:
+    def __init__(self, arena: Arena, gates: Sequence[Gate]) -> None:
         self._boundary = Boundary(arena)
-        self._gates = tuple((frame.colour, Gate(frame)) for frame in frames)
+        self._gates = tuple((gate.colour, GateWatch(gate)) for gate in gates)
         self._inside = True
         self._slack_m = 0.0  # the drone can go this far before the next check
         self.length_m = 0.0
@@ -143,7 +143,7 @@ class PathWatch:
         """Follow the path by one step, from the last point to the next (arena axes, shape (3,)).
 
         Returns:
-            The frames it passes through, by colour.
+            The gates it passes through, by colour.
         """
         self.longest_gap_us = max(self.longest_gap_us, step_us)
         if step_us > MAX_GAP_US:

@@ -1,6 +1,6 @@
-"""What a scenario asks for instead of crossing all frames, and the watch that sees it done.
+"""What a scenario asks for instead of crossing all gates, and the watch that sees it done.
 
-Lessons use it: hover at a place, face a frame.
+Lessons use it: hover at a place, face a gate.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ class Goal(Part):
         return f"facing {self.face} from {least_m:g} to {most_m:g} m away for {self.seconds:g} s"
 
     def holds(self, position_m: Vec3, yaw_rad: float, centres_m: dict[str, Vec3]) -> bool:
-        """Whether the drone is there, or faces the frame, now.
+        """Whether the drone is there, or faces the gate, now.
 
         Args:
             position_m: of the drone's centre, arena axes, shape (3,).
             yaw_rad: heading, counter-clockwise from x.
-            centres_m: of the frames, by colour, arena axes.
+            centres_m: of the gates, by colour, arena axes.
         """
         if self.hold_m is not None:
             return dist(position_m, self.hold_m) <= self.radius_m
@@ -74,7 +74,7 @@ class GoalWatch:
 
     Args:
         goals: what is to be done.
-        centres_m: of the frames, by colour, arena axes.
+        centres_m: of the gates, by colour, arena axes.
 
     Attributes:
         times_us: when each was reached, as far as they are.

@@ -88,7 +88,7 @@ class Base(Part):
         return Solid("base", (self.x_m, self.y_m, self.top_m / 2), 0.0, (half_m, half_m, self.top_m / 2))
 
 
-class Start(Part):
+class StartPose(Part):
     """The drone's start pose; its height follows from what is under it."""
 
     x_m: Metres = Field(0.0, description="centre of the drone")
@@ -96,7 +96,7 @@ class Start(Part):
     yaw_rad: Radians = Field(0.0, description="heading, counter-clockwise from x")
 
 
-class UprightFrame(Part):
+class UprightGate(Part):
     """An upright rectangular frame floating in the arena; its normal is its local x axis."""
 
     colour: str
@@ -135,13 +135,13 @@ class UprightFrame(Part):
         return self
 
 
-class Frame(UprightFrame):
+class Gate(UprightGate):
     """A frame to be crossed."""
 
     colour: Colour = Field(description="pure red, green or blue; crossed in this order")
 
 
-class Decoy(UprightFrame):
+class Decoy(UprightGate):
     """A frame of another colour: to cross it means nothing, to touch it is a contact."""
 
     colour: DecoyColour = Field(description="pure cyan or magenta")
@@ -325,8 +325,8 @@ class Scenario(Part):
     description: str = Field("", description="what this scenario is and where its numbers come from")
     arena: Arena = Field(Arena(), description="the flying space")
     base: Base = Field(Base(), description="where to land")
-    start: Start = Field(Start(), description="the drone's start pose")
-    frames: tuple[Frame, ...] = Field((), description="at most one of each colour, in any order")
+    start: StartPose = Field(StartPose(), description="the drone's start pose")
+    frames: tuple[Gate, ...] = Field((), description="at most one of each colour, in any order")
     decoys: tuple[Decoy, ...] = Field((), description="frames that are not to be crossed, solid too")
     poles: tuple[Pole, ...] = Field((), description="obstacles that stand on the floor")
     walls: tuple[Wall, ...] = Field((), description="obstacles that stand on the floor")
@@ -347,8 +347,8 @@ class Scenario(Part):
     )
 
     @model_validator(mode="after")
-    def _goals_have_frames(self) -> Self:
-        colours = {frame.colour for frame in self.frames}
+    def _goals_have_gates(self) -> Self:
+        colours = {gate.colour for gate in self.frames}
         for index, goal in enumerate(self.goals):
             if goal.face is not None and goal.face not in colours:
                 message = "is the colour of no frame; add it to frames or face another"
@@ -356,8 +356,8 @@ class Scenario(Part):
         return self
 
     @model_validator(mode="after")
-    def _one_frame_a_colour(self) -> Self:
-        colours = [frame.colour for frame in self.frames]
+    def _one_gate_a_colour(self) -> Self:
+        colours = [gate.colour for gate in self.frames]
         for index, colour in enumerate(colours):
             if colour in colours[:index]:
                 message = "is used twice; give each frame its own colour"
@@ -416,8 +416,8 @@ class Scenario(Part):
         return f"{len(self.frames)} frames{''.join(others)}"
 
     @property
-    def all_frames(self) -> tuple[UprightFrame, ...]:
-        """Frames and decoys."""
+    def all_gates(self) -> tuple[UprightGate, ...]:
+        """Gates and decoys."""
         return (*self.frames, *self.decoys)
 
     @property
@@ -428,9 +428,9 @@ class Scenario(Part):
 
     @property
     def solid_names(self) -> frozenset[str]:
-        """Names in `TrueState.contacts` that count as contacts: colours of frames, `pole` and `wall`."""
-        frames, prisms = self.all_frames, self.prisms
-        return frozenset((*(each.colour for each in frames), *(each.name for each in prisms)))
+        """Names in `TrueState.contacts` that count as contacts: colours of gates, `pole` and `wall`."""
+        gates, prisms = self.all_gates, self.prisms
+        return frozenset((*(each.colour for each in gates), *(each.name for each in prisms)))
 
     def _placed(self) -> Iterator[tuple[Part, tuple[str | int, ...]]]:
         """All that is in the arena, with its path in the file."""
@@ -478,7 +478,7 @@ class TrueState:
     velocity_arena_m_s: Vec3
     attitude_arena: Quaternion  # unit quaternion (w, x, y, z), body FLU to arena
     motors_on: bool
-    contacts: tuple[str, ...] = ()  # what it touches: colours of frames, "pole", "wall", "base" or "floor"
+    contacts: tuple[str, ...] = ()  # what it touches: colours of gates, "pole", "wall", "base" or "floor"
     rate_frd_rad_s: Vec3 = ZERO3  # angular velocity, body axes forward, right, down; 0 if not known
     camera: CameraMotion | None = None  # of a camera on a gimbal; None: it is fixed to the drone
     crash: str = ""  # in simulation: why it cannot fly on, as the predicate to "the drone"; empty: it can

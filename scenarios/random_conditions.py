@@ -16,7 +16,7 @@ from scenarios.imaging.effects import (
     SURFACES,
     CameraEffects,
     Hall,
-    Lens,
+    LensDistortion,
     Patch,
     PatchColour,
     Surface,
@@ -33,8 +33,8 @@ _ALL = Range(low=1.0, high=1.0)
 _ALL_ROUND_RAD = Range(low=-3.141, high=3.141)
 _QUARTER_RAD = 1.57
 _QUAD = 4
-_BORDERS = 3  # every third patch is nothing but a border, in the proportions of a frame
-_FRAME_SHAPE = 0.22 / 0.42
+_BORDERS = 3  # every third patch is nothing but a border, in the proportions of a gate
+_GATE_SHAPE = 0.22 / 0.42
 _SLANT_RAD = Range(low=-0.3, high=0.3)
 
 _WindSpeed = Annotated[Range, within(0.0, MAX_WIND_M_S)]
@@ -122,7 +122,7 @@ class RandomEffects(Part):
     def _no_lens_folds_the_image(self) -> Self:
         for k1 in (self.k1.low, self.k1.high):
             for k2 in (self.k2.low, self.k2.high):
-                Camera(effects=CameraEffects(lens=Lens(k1=k1, k2=k2)))
+                Camera(effects=CameraEffects(lens=LensDistortion(k1=k1, k2=k2)))
         return self
 
     def draw(self, seed: int) -> CameraEffects:
@@ -134,7 +134,7 @@ class RandomEffects(Part):
 
         warmth = value("warmth")
         return CameraEffects(
-            lens=Lens(k1=value("k1"), k2=value("k2"), p1=value("p1"), p2=value("p2")),
+            lens=LensDistortion(k1=value("k1"), k2=value("k2"), p1=value("p1"), p2=value("p2")),
             exposure_s=value("exposure_s"),
             readout_s=value("readout_s"),
             vignetting=value("vignetting"),
@@ -224,7 +224,7 @@ class RandomClutter(Part):
             across_m=across,
             up_m=up,
             width_m=width,
-            height_m=round(width * _FRAME_SHAPE, 3) if is_border else height,
+            height_m=round(width * _GATE_SHAPE, 3) if is_border else height,
             turn_rad=turn,
             border_m=border if is_border else None,
         )

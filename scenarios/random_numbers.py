@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from framerunner.files.yaml_file import refusal
-from scenarios.models import Arena, ScenarioError, UprightFrame
+from scenarios.models import Arena, ScenarioError, UprightGate
 from scenarios.part import Part
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ _ARENA = Arena()
 PlaceX = Annotated[Range, within(-_ARENA.length_x_m / 2, _ARENA.length_x_m / 2)]
 PlaceY = Annotated[Range, within(-_ARENA.width_y_m / 2, _ARENA.width_y_m / 2)]
 FrameHeight = Annotated[
-    Range, within(UprightFrame.model_fields["outer_height_m"].default / 2, _ARENA.height_m)
+    Range, within(UprightGate.model_fields["outer_height_m"].default / 2, _ARENA.height_m)
 ]
 Heading = Annotated[Range, within(-tau, tau)]
 

@@ -68,7 +68,7 @@ class RandomWall(Part):
         return self
 
 
-class Obstacles(Part):
+class RandomObstacles(Part):
     """What else is in the arena, beside base and frames."""
 
     x_m: PlaceX = Field(description="centres of the obstacles")
@@ -99,8 +99,8 @@ class _Disc:
         return dist((self.x_m, self.y_m), (other.x_m, other.y_m)) - self.radius_m - other.radius_m
 
 
-def add_obstacles(scenario: Scenario, obstacles: Obstacles, seed: int) -> Scenario:
-    """Draw obstacles for a scenario that has base and frames, each kind from its own streams.
+def add_obstacles(scenario: Scenario, obstacles: RandomObstacles, seed: int) -> Scenario:
+    """Draw obstacles for a scenario that has base and gates, each kind from its own streams.
 
     The wall is placed first, then the poles, then the decoys: what needs most room, first. All of a kind are
     drawn again when one of them has no room: redrawing only that one would favour some places.
@@ -120,7 +120,7 @@ def add_obstacles(scenario: Scenario, obstacles: Obstacles, seed: int) -> Scenar
 class _Room:
     """What is free of things, seen from above."""
 
-    def __init__(self, scenario: Scenario, obstacles: Obstacles, seed: int) -> None:
+    def __init__(self, scenario: Scenario, obstacles: RandomObstacles, seed: int) -> None:
         base = scenario.base
         self._things: list[_Disc | Solid] = [_Disc(base.x_m, base.y_m, hypot(base.edge_m, base.edge_m) / 2)]
         self._things += [_Disc(one.x_m, one.y_m, one.outer_width_m / 2) for one in scenario.frames]

@@ -16,7 +16,7 @@ from framerunner.files.yaml_file import FileKind
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from scenarios.air import Wind
-from scenarios.models import COLOURS, Arena, Base, Camera, Frame, Light, Scenario, Start
+from scenarios.models import COLOURS, Arena, Base, Camera, Gate, Light, Scenario, StartPose
 from scenarios.part import Part
 from scenarios.random_conditions import RandomClutter, RandomEffects, RandomFault, RandomLight, RandomWind
 from scenarios.random_numbers import (
@@ -29,7 +29,7 @@ from scenarios.random_numbers import (
     PlaceY,
     random_stream,
 )
-from scenarios.random_obstacles import Obstacles, add_obstacles
+from scenarios.random_obstacles import RandomObstacles, add_obstacles
 
 _STEP_M = 0.05  # between the points of a way that are checked
 
@@ -55,22 +55,22 @@ class Closeness(Part):
     )
 
     def allows(self, centres_arena_m: Sequence[Vec3]) -> bool:
-        """Whether frames with these centres are as near as they should be, and no nearer."""
+        """Whether gates with these centres are as near as they should be, and no nearer."""
         gaps_m = [dist(*pair) for pair in itertools.combinations(centres_arena_m, 2)]
         if not self.apart_m < min(gaps_m) <= self.together_m:
             return False
         return all(_from_border_m(centre_m) <= self.border_m for centre_m in centres_arena_m)
 
-    def leaves_ways(self, base: Base, frames: Sequence[Frame]) -> bool:
-        """Whether each frame has a free straight way through it."""
+    def leaves_ways(self, base: Base, gates: Sequence[Gate]) -> bool:
+        """Whether each gate has a free straight way through it."""
         return all(
-            self._has_way(frame, [base.solid, *(other.hull for other in frames if other is not frame)])
-            for frame in frames
+            self._has_way(gate, [base.solid, *(other.hull for other in gates if other is not gate)])
+            for gate in gates
         )
 
-    def _has_way(self, frame: Frame, solids: Sequence[Solid]) -> bool:
-        x_m, y_m, z_m = frame.position_arena_m
-        along_x, along_y = cos(frame.yaw_rad), sin(frame.yaw_rad)
+    def _has_way(self, gate: Gate, solids: Sequence[Solid]) -> bool:
+        x_m, y_m, z_m = gate.position_arena_m
+        along_x, along_y = cos(gate.yaw_rad), sin(gate.yaw_rad)
         steps = ceil((self.before_m + self.behind_m) / _STEP_M)
         way_m = [min(step * _STEP_M - self.before_m, self.behind_m) for step in range(steps + 1)]
         ways = [
@@ -99,7 +99,7 @@ def _from_border_m(point_m: Vec3) -> float:
     )
 
 
-class Layout(Part):
+class RandomLayout(Part):
     """Where base, start and the three frames are; the drone starts on the base's centre."""
 
     x_m: PlaceX = Field(description="centres of base and frames")
@@ -120,13 +120,13 @@ class Level(Part):
         pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=60, description="small letters, digits, - and _"
     )
     description: str = Field("", description="what is hard about it")
-    layout: Layout = Field(description="places and headings of base, start and frames")
+    layout: RandomLayout = Field(description="places and headings of base, start and frames")
     closeness: Closeness | None = Field(
         None,
         description="how near each other and the arena's border frames are; layout.apart_m then counts from "
         "the base only",
     )
-    obstacles: Obstacles | None = Field(None, description="what else is in the arena")
+    obstacles: RandomObstacles | None = Field(None, description="what else is in the arena")
     wind: RandomWind | None = Field(None, description="how the air moves; by default it is still")
     faults: RandomFault | None = Field(None, description="what fails; by default nothing")
     camera: RandomEffects | None = Field(
@@ -176,13 +176,13 @@ def random_scenario(level: Level, seed: int) -> Scenario:
         LevelError: the seed is out of range, or the level's distances leave (nearly) no room.
     """
     yaw_rad = level.layout.start_yaw_rad.draw_value(random_stream(seed, "layout.start_yaw"))
-    base, frames = _draw_layout(level, seed)
+    base, gates = _draw_layout(level, seed)
     scenario = Scenario(
         name=f"{level.name}-{seed}",
         description=f"Random scenario of level {level.name}, seed {seed}.",
         base=base,
-        start=Start(x_m=base.x_m, y_m=base.y_m, yaw_rad=yaw_rad),
-        frames=frames,
+        start=StartPose(x_m=base.x_m, y_m=base.y_m, yaw_rad=yaw_rad),
+        frames=gates,
         wind=Wind() if level.wind is None else level.wind.draw(seed),
         faults=() if level.faults is None else (level.faults.draw(seed),),
         camera=Camera(effects=None if level.camera is None else level.camera.draw(seed)),
@@ -194,8 +194,8 @@ def random_scenario(level: Level, seed: int) -> Scenario:
     return scenario if level.obstacles is None else add_obstacles(scenario, level.obstacles, seed)
 
 
-def _draw_layout(level: Level, seed: int) -> tuple[Base, tuple[Frame, ...]]:
-    """Draw base and frames.
+def _draw_layout(level: Level, seed: int) -> tuple[Base, tuple[Gate, ...]]:
+    """Draw base and gates.
 
     All are drawn again when two are too near: redrawing only the last one would favour some layouts.
     """
@@ -216,17 +216,17 @@ def _draw_layout(level: Level, seed: int) -> tuple[Base, tuple[Frame, ...]]:
             (x - other_x) ** 2 + (y - other_y) ** 2 <= apart_steps_2 for (x, y), (other_x, other_y) in pairs
         ):
             continue
-        base_m, *frames_m = [(x / STEPS_PER_UNIT, y / STEPS_PER_UNIT) for x, y in places]
-        centres_m = [(x_m, y_m, layout.frame_z_m.draw_value(heights)) for x_m, y_m in frames_m]
+        base_m, *gates_m = [(x / STEPS_PER_UNIT, y / STEPS_PER_UNIT) for x, y in places]
+        centres_m = [(x_m, y_m, layout.frame_z_m.draw_value(heights)) for x_m, y_m in gates_m]
         if closeness is not None and not closeness.allows(centres_m):
             continue
         base = Base(x_m=base_m[0], y_m=base_m[1])
-        frames = tuple(
-            Frame(colour=colour, x_m=x_m, y_m=y_m, z_m=z_m, yaw_rad=layout.frame_yaw_rad.draw_value(yaws))
+        gates = tuple(
+            Gate(colour=colour, x_m=x_m, y_m=y_m, z_m=z_m, yaw_rad=layout.frame_yaw_rad.draw_value(yaws))
             for colour, (x_m, y_m, z_m) in zip(COLOURS, centres_m, strict=True)
         )
-        if closeness is None or closeness.leaves_ways(base, frames):
-            return base, frames
+        if closeness is None or closeness.leaves_ways(base, gates):
+            return base, gates
     room = " × ".join(f"{span.high - span.low:g}" for span in (layout.x_m, layout.y_m))
     near = "" if closeness is None else " with what closeness demands"
     raise LevelError(

@@ -22,7 +22,7 @@ from scenarios.touchdown import (
 from scenarios.verdict import TryFacts, judge
 
 PENALTY_S_PER_S = 1.0  # outside the arena time counts double
-CONTACT_GAP_US = 500_000  # a frame touched again sooner is still the same contact
+CONTACT_GAP_US = 500_000  # a gate touched again sooner is still the same contact
 TAKEN_OFF_M = 0.1  # rise that makes a take-off
 IN_AIR_M = 0.3  # height above ground at which a try that begins is already a flight
 REST_US = 300_000  # how long the drone must be still; a fall passes through zero speed for less
@@ -44,9 +44,9 @@ class Referee:
     continues the same try, and motors off without a take-off lets a new one begin. It is over with a crash,
     past the limit, or at rest after a flight: later states change nothing.
 
-    Crossings count while the motors are on. Only the first crossing of each frame counts; one crossed too
+    Crossings count while the motors are on. Only the first crossing of each gate counts; one crossed too
     early makes the order wrong, whatever follows. The order is red, green, blue, those that the scenario has.
-    In a scenario with goals no frame has to be crossed, and crossings are not noted: its goals count instead.
+    In a scenario with goals no gate has to be crossed, and crossings are not noted: its goals count instead.
 
     Args:
         scenario: what is flown.
@@ -61,8 +61,8 @@ class Referee:
         self._limit_us = round(scenario.try_limit_s * 1e6)
         self._boundary = Boundary(scenario.arena)
         crossable = () if scenario.goals else scenario.frames
-        self._frames = sorted(crossable, key=lambda frame: COLOURS.index(frame.colour))
-        self._expected = tuple(frame.colour for frame in self._frames)
+        self._gates = sorted(crossable, key=lambda gate: COLOURS.index(gate.colour))
+        self._expected = tuple(gate.colour for gate in self._gates)
         self._solids = scenario.solid_names
         self._ignored = 0
         self._over = False
@@ -73,10 +73,10 @@ class Referee:
 
     def _reset(self) -> None:
         """Forget the try, if there was one."""
-        self._path = PathWatch(self._scenario.arena, self._frames)
+        self._path = PathWatch(self._scenario.arena, self._gates)
         self._crash_watch = CrashWatch(self._scenario, self._envelope_m, self._floor_m)
         self._goals = GoalWatch(
-            self._scenario.goals, {frame.colour: frame.position_arena_m for frame in self._scenario.frames}
+            self._scenario.goals, {gate.colour: gate.position_arena_m for gate in self._scenario.frames}
         )
         self._start_us = 0
         self._start_height_m = 0.0
@@ -142,7 +142,7 @@ class Referee:
             self._still_since_us = None
 
     def _cross(self, colour: str, passage: Passage, step_us: int) -> None:
-        """Record a passage, if it is the first one through this frame."""
+        """Record a passage, if it is the first one through this gate."""
         if colour in self._crossings:
             return
         time_s = (self._time_us - self._start_us + passage.fraction * step_us) * 1e-6
@@ -155,7 +155,7 @@ class Referee:
         return next((colour for colour in self._expected if colour not in self._crossings), None)
 
     def _watch(self, state: TrueState) -> None:
-        """Look for contacts with frames and obstacles, and for crashes."""
+        """Look for contacts with gates and obstacles, and for crashes."""
         if state.contacts:
             self._count_contacts(state)
         crash = self._crash_watch.follow(state, self._taken_off)

@@ -48,8 +48,8 @@ class RefereeSnapshot:
     try_time_s: Seconds  # from motors on to motors off, or to now
     penalty_s: Seconds
     crossed: Annotated[tuple[Text, ...], Field(max_length=10)]  # colours
-    next_colour: Text | None  # the frame to cross next; None when all are crossed
-    contacts: int  # with frames and obstacles
+    next_colour: Text | None  # the gate to cross next; None when all are crossed
+    contacts: int  # with gates and obstacles
     inside: bool  # the drone is inside the arena
     motors_on: bool
     settled: bool  # motors off and at rest
@@ -107,7 +107,7 @@ class RefereeReport(_Record):
 
     @property
     def completed(self) -> bool:
-        """All frames crossed in order, and landed on the base within the limit."""
+        """All gates crossed in order, and landed on the base within the limit."""
         return self.verdict in (Verdict.CLEAN, Verdict.COMPLETED)
 
     @property
@@ -285,7 +285,7 @@ class Standing(_Record):
 
     scenario: str = Field(max_length=80)  # its name; "" if unknown
     source: str = Field("truth", max_length=40)  # of the referee's states: "truth" or "telemetry"
-    lift_m: Metres = 0.0  # how much higher than in the scenario the frames are
+    lift_m: Metres = 0.0  # how much higher than in the scenario the gates are
     time_us: int | None = None  # vehicle time
     local_frame: LocalFrame | None = None  # None while it is unknown
     stands_at: StandingPlace | None = (

@@ -9,7 +9,7 @@ from typing import Self
 from pydantic import Field
 
 from scenarios.goals import Goal
-from scenarios.models import COLOURS, Arena, Base, Camera, Colour, Origin, Scenario, ScenarioName, Start
+from scenarios.models import COLOURS, Arena, Base, Camera, Colour, Origin, Scenario, ScenarioName, StartPose
 from scenarios.part import Part
 
 _LAYOUT = {"frames", "decoys", "poles", "walls", "hall", "patches"}
@@ -22,7 +22,7 @@ class Task(Part):
     name: ScenarioName
     arena: Arena
     base: Base
-    start: Start
+    start: StartPose
     colours: tuple[Colour, ...] = Field(description="of the frames to cross, in order")
     camera: Camera
     try_limit_s: float
@@ -38,7 +38,7 @@ class Task(Part):
     @classmethod
     def of(cls, scenario: Scenario, *, show_layout: bool = False) -> Self:
         """The task of a scenario; for training with the layout."""
-        present = {frame.colour for frame in scenario.frames}
+        present = {gate.colour for gate in scenario.frames}
         shared = {name: getattr(scenario, name) for name in cls.model_fields.keys() & Scenario.model_fields}
         colours = tuple(colour for colour in COLOURS if colour in present)
         shown = scenario if show_layout else None

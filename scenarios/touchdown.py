@@ -73,7 +73,7 @@ class CrashWatch:
     """Detects a crash during one try.
 
     A crash is one of:
-    - hitting the floor or the base at more than 2 m/s downward (hitting a frame is a contact, no crash);
+    - hitting the floor or the base at more than 2 m/s downward (hitting a gate is a contact, no crash);
     - half a second upside-down;
     - after take-off, lying still on the floor for 5 s with the motors on, away from the base;
     - what the simulation says of it (`TrueState.crash`).

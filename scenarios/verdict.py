@@ -36,7 +36,7 @@ class TryFacts:
     motors_on: bool  # now
     settled: bool  # the motors are off and the drone is at rest
     timed_out: bool  # the try exceeded its limit
-    wrong_order: str  # which frame was crossed too early, or ""
+    wrong_order: str  # which gate was crossed too early, or ""
     crash: str  # what happened to the drone, or ""
     landing: Landing | None  # where it came to rest after a flight
 
@@ -45,14 +45,14 @@ def judge(facts: TryFacts, mission_state: str = "", ended: str | None = None) ->
     """Give the verdict.
 
     The first rule that holds decides:
-    1. `wrong order`: a frame was crossed too early, whatever followed.
+    1. `wrong order`: a gate was crossed too early, whatever followed.
     2. `crashed`: see `CrashWatch`; coming to rest on its side or back is a crash too.
     3. `timed out`: the try exceeded its limit.
-    4. `clean` or `completed`: all frames crossed in order, or all goals of the scenario reached, and standing
+    4. `clean` or `completed`: all gates crossed in order, or all goals of the scenario reached, and standing
        on the base with the motors off.
        Clean has neither contacts nor time outside.
     5. `aborted`: all else. Examples are a mission that was broken off, motors cut in the air without a crash,
-       landing beside the base, and landing with a frame not crossed.
+       landing beside the base, and landing with a gate not crossed.
 
     Args:
         facts: what the referee saw.

@@ -1,4 +1,4 @@
-"""The drone's camera: `Camera` makes images, `CameraFeed` takes them in simulated time.
+"""The drone's camera: `SimulatedCamera` makes images, `CameraFeed` takes them in simulated time.
 
 Without effects an image is what `Painter` paints. With them, it paints a canvas of twice the resolution, at
 several times of the exposure if the image moves much, and lens and sensor make the image of that
@@ -40,7 +40,7 @@ _MAX_EXPOSURES = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class ExposureMotion:
     """When an image is exposed, and how the drone moves then; all that effects need beside its pose."""
 
     time_us: int = 0
@@ -48,10 +48,10 @@ class Motion:
     rate_frd_rad_s: Vec3 = ZERO3
 
 
-STILL = Motion()
+STILL = ExposureMotion()
 
 
-class Camera:
+class SimulatedCamera:
     """The camera of a scenario. It has no state: the same pose, motion and time give the same image.
 
     Args:
@@ -87,7 +87,7 @@ class Camera:
         position_arena_m: Vec3,
         attitude_arena: Quaternion,
         drones: Sequence[Solid] = (),
-        motion: Motion = STILL,
+        motion: ExposureMotion = STILL,
         *,
         gimbal_arena: Quaternion | None = None,
     ) -> Image:
@@ -123,7 +123,7 @@ class Camera:
         return self._sensor.develop(light, motion.time_us)
 
     def _exposed(
-        self, position: Vec3, attitude: Quaternion, drones: Sequence[Solid], motion: Motion
+        self, position: Vec3, attitude: Quaternion, drones: Sequence[Solid], motion: ExposureMotion
     ) -> Image:
         """The mean of what is seen behind the lens during the exposure."""
         drift = None
@@ -153,14 +153,14 @@ class Camera:
     def _exposure_s(self) -> float:
         return 0.0 if self._effects is None else self._effects.exposure_s
 
-    def _exposures(self, motion: Motion) -> int:
+    def _exposures(self, motion: ExposureMotion) -> int:
         """At how many times within the exposure the canvas is painted."""
         rate = hypot(*motion.rate_frd_rad_s) + hypot(*motion.velocity_arena_m_s) / _NOMINAL_M
         blur_px = self._settings.focal_px * rate * self._exposure_s
         return min(_MAX_EXPOSURES, 1 + int(blur_px / _BLUR_STEP_PX))
 
     def _pose_at(
-        self, position: Vec3, attitude: Quaternion, motion: Motion, after_s: float
+        self, position: Vec3, attitude: Quaternion, motion: ExposureMotion, after_s: float
     ) -> tuple[Vec3, RotationRows]:
         """The camera's position and axes a short time later, with constant velocity and body rates."""
         x, y, z = position
@@ -209,7 +209,7 @@ class Exposure:
         time_us: of the exposure, simulated time.
     """
 
-    def __init__(self, camera: Camera, truth: TrueState, drones: Sequence[Solid]) -> None:
+    def __init__(self, camera: SimulatedCamera, truth: TrueState, drones: Sequence[Solid]) -> None:
         self.time_us = truth.time_us
         self._camera, self._truth, self._drones = camera, truth, drones
 
@@ -222,7 +222,7 @@ class Exposure:
             truth.position_arena_m,
             truth.attitude_arena,
             self._drones,
-            Motion(truth.time_us, truth.velocity_arena_m_s, rate),
+            ExposureMotion(truth.time_us, truth.velocity_arena_m_s, rate),
             gimbal_arena=None if gimbal is None else gimbal.attitude_arena,
         )
 
@@ -236,7 +236,7 @@ class CameraFeed:
     Exposures are on a grid of the camera's period that begins at 36 ms, each once; a rate above the control
     rate gives one image a tick. The navigator's ticks are 50 ms apart and begin at 0: with the default
     latency an image arrives 14 ms before one. That is recent, which the paper's navigator needs to keep its
-    height before a frame, and early enough that video and telemetry do not race.
+    height before a gate, and early enough that video and telemetry do not race.
 
     Args:
         scenario: camera settings and what is to be seen.
@@ -255,7 +255,7 @@ class CameraFeed:
         seed: int = 0,
         change: Change | None = None,
     ) -> None:
-        self._camera = Camera(scenario, seed)
+        self._camera = SimulatedCamera(scenario, seed)
         self._change = change
         self._drones = drones
         self._period_us = 1e6 / scenario.camera.rate_hz

@@ -22,14 +22,14 @@ import numpy.typing as npt
 
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
-from scenarios.models import Arena, Light, Scenario, UprightFrame
-from sitl.solids import frame_solids
+from scenarios.models import Arena, Light, Scenario, UprightGate
+from sitl.solids import gate_solids
 
 Bgr = tuple[int, int, int]
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-FRAME_BGR: dict[str, Bgr] = {"red": (0, 0, 255), "green": (0, 255, 0), "blue": (255, 0, 0)}
+GATE_BGR: dict[str, Bgr] = {"red": (0, 0, 255), "green": (0, 255, 0), "blue": (255, 0, 0)}
 DECOY_BGR: dict[str, Bgr] = {"cyan": (255, 255, 0), "magenta": (255, 0, 255)}
 # Neither decoys nor these pass the detector's colour test, lit, shaded or after JPEG.
 # The sky's are from the zenith down to the horizon.
@@ -44,7 +44,7 @@ BASE_MARK_BGR: Bgr = (238, 238, 238)
 DRONE_BGR: Bgr = (64, 62, 60)
 
 _MAT_M = 2.0  # edge of one mat of the tatami
-_DARKEST = 0.3  # share of its colour that every face keeps: a frame's colour must stay recognisable
+_DARKEST = 0.3  # share of its colour that every face keeps: a gate's colour must stay recognisable
 _SHADOW = 0.6  # brightness of the floor in a shadow
 _FLAT_M = 1e-7  # corners nearer to a plane than this lie on it
 _UP: Vec3 = (0.0, 0.0, 1.0)
@@ -62,7 +62,7 @@ class Face:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A base, a frame, a pole or a part of a wall."""
+    """A base, a gate, a pole or a part of a wall."""
 
     hull: Solid  # the box around it
     faces: tuple[Face, ...]  # in an order of painting: a later one is never hidden by an earlier one
@@ -76,15 +76,15 @@ class Scene:
     tatami: Face  # the arena's floor
     mats: tuple[Face, ...]  # every second mat of it, darker
     shadows: tuple[Face, ...]  # on the floor
-    bodies: tuple[Body, ...]  # base, frames, decoys, poles and walls
+    bodies: tuple[Body, ...]  # base, gates, decoys, poles and walls
 
 
 def build_scene(scenario: Scenario, light: Light | None = None) -> Scene:
     """Make the faces that the camera paints, in the scenario's light or another."""
     arena, base = scenario.arena, scenario.base.solid
     light = light or scenario.light
-    frames, prisms = scenario.all_frames, scenario.prisms
-    solids = [base, *(bar for frame in frames for bar in _overlapping_bars(frame))]
+    gates, prisms = scenario.all_gates, scenario.prisms
+    solids = [base, *(bar for gate in gates for bar in _overlapping_bars(gate))]
     shadows = [face for solid in solids for face in _shadow(solid, arena, light)]
     shadows += [face for prism in prisms for face in _long_shadow(prism, arena, light)]
     return Scene(
@@ -93,7 +93,7 @@ def build_scene(scenario: Scenario, light: Light | None = None) -> Scene:
         shadows=tuple(shadows),
         bodies=(
             _base_body(base, light),
-            *(_frame_body(frame, light) for frame in frames),
+            *(_gate_body(gate, light) for gate in gates),
             *(Body(prism, _upright_faces(prism, PRISM_BGR, light)) for prism in prisms),
         ),
     )
@@ -165,16 +165,16 @@ def _upright_faces(box: Solid, colour: Bgr, light: Light) -> tuple[Face, ...]:
     )
 
 
-def _frame_body(frame: UprightFrame, light: Light) -> Body:
-    """The faces of a frame's opening first, then those of its hull.
+def _gate_body(gate: UprightGate, light: Light) -> Body:
+    """The faces of a gate's opening first, then those of its hull.
 
     Whatever hides a part of the opening's faces from an eye lies on the hull, and the faces of the hull that
     an eye sees never hide one another, so this order is right from everywhere.
     """
-    colour = (FRAME_BGR | DECOY_BGR)[frame.colour]
-    box = frame.hull
+    colour = (GATE_BGR | DECOY_BGR)[gate.colour]
+    box = gate.hull
     outer = box.half_extents_m
-    inner: Vec3 = (outer[0], outer[1] - frame.bar_m, outer[2] - frame.bar_m)
+    inner: Vec3 = (outer[0], outer[1] - gate.bar_m, outer[2] - gate.bar_m)
     around = ((1, 1), (1, -1), (2, 1), (2, -1))
     faces = [
         _face(box, _side(inner, axis, sign), _normal(axis, -sign), colour, light) for axis, sign in around
@@ -204,10 +204,10 @@ def _side(half: Vec3, axis: int, sign: int) -> list[Vec3]:
     return corners
 
 
-def _overlapping_bars(frame: UprightFrame) -> list[Solid]:
-    """The four bars of a frame, all of full length, so that their shadows leave no gap between them."""
-    top, bottom, *sides = frame_solids(frame)
-    half_m = (frame.bar_m / 2, frame.bar_m / 2, frame.outer_height_m / 2)
+def _overlapping_bars(gate: UprightGate) -> list[Solid]:
+    """The four bars of a gate, all of full length, so that their shadows leave no gap between them."""
+    top, bottom, *sides = gate_solids(gate)
+    half_m = (gate.bar_m / 2, gate.bar_m / 2, gate.outer_height_m / 2)
     return [top, bottom, *(replace(side, half_extents_m=half_m) for side in sides)]
 
 

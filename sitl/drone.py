@@ -7,7 +7,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from types import MappingProxyType
 
-from firmware_py.mavlink.camera.model import CameraModel
+from firmware_py.mavlink.camera.model import FixedCamera
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.storage import Path, Storage
@@ -67,7 +67,7 @@ class ServedDrone:
             )
         storage = open_storage(settings.storage, settings.instance)
         camera = simulation.scenario.camera
-        model = CameraModel(camera.width_px, camera.height_px, camera.horizontal_fov_rad, camera.rate_hz)
+        model = FixedCamera(camera.width_px, camera.height_px, camera.horizontal_fov_rad, camera.rate_hz)
         self._album = CameraAlbum(storage, boot_unix_us, camera.rate_hz)
         self._recorder = flight_recorder(storage, boot_unix_us)
         self.node = MavlinkNode(

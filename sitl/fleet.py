@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from math import dist
 
 from framerunner.geometry.solids import Solid
-from scenarios.models import Scenario, Start, is_over_base
+from scenarios.models import Scenario, StartPose, is_over_base
 from sitl.world import World
 
 _SPACING_M = 1.5  # between starting positions, more for large drones
@@ -75,7 +75,7 @@ def side_by_side(scenario: Scenario, count: int, width_m: float) -> list[Scenari
     """The scenario once for each drone: the first at its start, the others around it on the floor.
 
     Positions are those of a square grid around the start, the nearest first, inside the arena, beside the
-    base, frames and obstacles, 1.5 m or more apart; all have the heading of the scenario.
+    base, gates and obstacles, 1.5 m or more apart; all have the heading of the scenario.
 
     Args:
         scenario: of the first drone.
@@ -100,7 +100,8 @@ def side_by_side(scenario: Scenario, count: int, width_m: float) -> list[Scenari
         raise ValueError(f"{scenario.name} has room for {len(places)}, not for {count} drones")
     yaw_rad = scenario.start.yaw_rad
     return [
-        scenario.model_copy(update={"start": Start(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)}) for x_m, y_m in places
+        scenario.model_copy(update={"start": StartPose(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)})
+        for x_m, y_m in places
     ]
 
 
@@ -121,6 +122,5 @@ def _has_room(scenario: Scenario, place: tuple[float, float], width_m: float) ->
     if any(prism.plan_distance_m(x_m, y_m) <= width_m for prism in scenario.prisms):
         return False
     return all(
-        dist(place, (frame.x_m, frame.y_m)) > frame.outer_width_m / 2 + width_m
-        for frame in scenario.all_frames
+        dist(place, (gate.x_m, gate.y_m)) > gate.outer_width_m / 2 + width_m for gate in scenario.all_gates
     )

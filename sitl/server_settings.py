@@ -97,7 +97,7 @@ class ServerSettings:
     storage: Path | None = None  # folder for the drones' files and logs; None: a temporary one
     shell: bool = False  # over MAVLink
     camera: bool = True  # a MAVLink camera component
-    show_layout: bool = False  # tell everybody who asks where the frames and obstacles are
+    show_layout: bool = False  # tell everybody who asks where the gates and obstacles are
     parameters: Path | None = None  # file for changed ones (drone 2: NAME-2.params); None: they are not kept
 
     @property

@@ -1,4 +1,4 @@
-"""The bars of frames as solid boxes, and the contact of solid boxes with the drone's box.
+"""The bars of gates as solid boxes, and the contact of solid boxes with the drone's box.
 
 Contact is found by the separating axis theorem on two boxes (Gottschalk, Lin, Manocha, "OBBTree", 1996):
 they overlap if and only if their projections overlap on all of 15 axes; the axis of least overlap is the
@@ -13,7 +13,7 @@ from math import cos, sin, sqrt
 from framerunner.geometry.rotations import RotationRows
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
-from scenarios.models import UprightFrame
+from scenarios.models import UprightGate
 
 _CYCLES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 
@@ -27,21 +27,21 @@ class Touch:
     point_arena_m: Vec3  # where they touch
 
 
-def frame_solids(frame: UprightFrame) -> tuple[Solid, ...]:
-    """The four bars of a frame: top, bottom, left, right (left and right between the others)."""
-    half_bar = frame.bar_m / 2
-    half_width, half_height = frame.outer_width_m / 2, frame.outer_height_m / 2
+def gate_solids(gate: UprightGate) -> tuple[Solid, ...]:
+    """The four bars of a gate: top, bottom, left, right (left and right between the others)."""
+    half_bar = gate.bar_m / 2
+    half_width, half_height = gate.outer_width_m / 2, gate.outer_height_m / 2
     level = half_height - half_bar
     side = half_width - half_bar
-    left_y, left_x = cos(frame.yaw_rad) * side, -sin(frame.yaw_rad) * side
-    x, y, z = frame.position_arena_m
+    left_y, left_x = cos(gate.yaw_rad) * side, -sin(gate.yaw_rad) * side
+    x, y, z = gate.position_arena_m
     horizontal: Vec3 = (half_bar, half_width, half_bar)
-    upright: Vec3 = (half_bar, half_bar, half_height - frame.bar_m)
+    upright: Vec3 = (half_bar, half_bar, half_height - gate.bar_m)
     return (
-        Solid(frame.colour, (x, y, z + level), frame.yaw_rad, horizontal),
-        Solid(frame.colour, (x, y, z - level), frame.yaw_rad, horizontal),
-        Solid(frame.colour, (x + left_x, y + left_y, z), frame.yaw_rad, upright),
-        Solid(frame.colour, (x - left_x, y - left_y, z), frame.yaw_rad, upright),
+        Solid(gate.colour, (x, y, z + level), gate.yaw_rad, horizontal),
+        Solid(gate.colour, (x, y, z - level), gate.yaw_rad, horizontal),
+        Solid(gate.colour, (x + left_x, y + left_y, z), gate.yaw_rad, upright),
+        Solid(gate.colour, (x - left_x, y - left_y, z), gate.yaw_rad, upright),
     )
 
 

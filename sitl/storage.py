@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path as DiskPath
 from tempfile import gettempdir
 
-from firmware_py.storage import Entry, Path, refuse, sound_name
+from firmware_py.storage import Path, StorageEntry, refuse, sound_name
 from framerunner.errors import UserError
 from sitl.temporary_folder import TemporaryFolder
 
@@ -105,14 +105,14 @@ class FolderStorage:
         """Bytes kept, and bytes that can be kept."""
         return self._usage.space
 
-    def entry(self, path: Path) -> Entry:
+    def entry(self, path: Path) -> StorageEntry:
         """The file or folder at a path."""
         if not path:
-            return Entry("", 0, True)
+            return StorageEntry("", 0, True)
         with self._parent(path) as place:
             return _entry_in(place, path)
 
-    def entries(self, path: Path) -> list[Entry]:
+    def entries(self, path: Path) -> list[StorageEntry]:
         """What a folder holds, by name; links, devices and names that cannot be listed are left out."""
         with self._folder(path) as place, os.scandir(place) as scan:
             found = [
@@ -256,12 +256,12 @@ class TemporaryStorage(FolderStorage):
         super().__init__(self._temporary.path, limits or StorageLimits(total_bytes=128 * MEBIBYTE))
 
 
-def _entry(name: str, found: os.stat_result) -> Entry:
+def _entry(name: str, found: os.stat_result) -> StorageEntry:
     folder = stat.S_ISDIR(found.st_mode)
-    return Entry(name, 0 if folder else found.st_size, folder, int(found.st_mtime))
+    return StorageEntry(name, 0 if folder else found.st_size, folder, int(found.st_mtime))
 
 
-def _entry_in(place: int, path: Path) -> Entry:
+def _entry_in(place: int, path: Path) -> StorageEntry:
     """The entry of a file or folder in its parent; anything else is refused."""
     found = os.stat(path[-1], dir_fd=place, follow_symlinks=False)
     if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):

@@ -51,7 +51,7 @@ class SimulatedVehicle(ABC):
     """
 
     autopilot_name = ""  # of a genuine autopilot; empty: our own flies
-    has_transmitter = False  # a pilot's remote control, which can fail
+    has_transmitter = False  # an operator's remote control, which can fail
 
     def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
         self.scenario, self.seed = scenario, seed

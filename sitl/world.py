@@ -1,4 +1,4 @@
-"""The simulated world: one drone, ground, base, frames, obstacles and wind, advanced in fixed steps."""
+"""The simulated world: one drone, ground, base, gates, obstacles and wind, advanced in fixed steps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from framerunner.vehicle.measurements import MotorSpeeds, Sensors
 from scenarios.models import Scenario, TrueState, is_over_base, start_position
 from sitl.air.wind import SimulatedWind
 from sitl.dynamics import Dynamics, DynamicsError
-from sitl.solids import frame_solids, touch
+from sitl.solids import gate_solids, touch
 
 PHYSICS_RATE_HZ = 500
 STEPS_PER_CONTROL = 2
@@ -73,7 +73,7 @@ class World:
         self._acceleration_m_s2 = _ACCELERATION_MARGIN * (full_thrust_m_s2 + GRAVITY_M_S2 + wind_m_s2)
         self._base_top_m = scenario.base.top_m
         self._base_level_m = scenario.base.top_m - self._half_m[2]  # a centre on the base is higher than this
-        self._groups = [_Group(frame.position_arena_m, frame_solids(frame)) for frame in scenario.all_frames]
+        self._groups = [_Group(gate.position_arena_m, gate_solids(gate)) for gate in scenario.all_gates]
         self._prisms = scenario.prisms
         base = scenario.base.solid
         self._base = _Group(base.centre_arena_m, (base,))

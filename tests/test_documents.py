@@ -26,7 +26,7 @@ from framerunner.vehicle.airframe import load_airframe
 from offboard.mission import load_mission, new_mission
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.exploration import Explorer
-from offboard.navigation.frames.frame_map import FrameMap
+from offboard.navigation.gates.gate_map import GateMap
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.pose_history import PoseHistory
 from offboard.navigation.search.likelihood import Glimpses
@@ -49,7 +49,7 @@ def names_of_the_map():
         time_us=0, position_age_s=0.0, x=-3.0, y=-3.0, z=1.0, velocity_arena_m_s=(0.0, 0.0, 0.0)
     )
     state.attitude_arena, state.camera_attitude_arena = level, None
-    classes = (CameraModel, Explorer, FrameMap, ObstacleMap, PoseHistory)
+    classes = (CameraModel, Explorer, GateMap, ObstacleMap, PoseHistory)
     return {
         **{each.__name__: each for each in classes},
         "scenario": scenario,

@@ -1,4 +1,4 @@
-"""Where the bars of a frame begin and end across, in the columns and rows of an image that they cross."""
+"""Where the bars of a gate begin and end across, in the columns and rows of an image that they cross."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vision.calibration.lens import Lens
-from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats, Point, Segment, Sides
-from vision.patch import BACKGROUND, OWN, Labels, Patch
+from vision.gate_model import BAR_M, GATE_HEIGHT_M, GATE_WIDTH_M, Floats, Point, Segment, Sides
+from vision.patch import BACKGROUND, OWN, ImagePatch, Labels
 
 Flags = npt.NDArray[np.bool_]
 
@@ -23,7 +23,7 @@ _SLACK_PX, _SLACK_SHARE = 2.5, 1.5  # a bar may look wider than expected by this
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BarEdges:
-    """The edges of a frame's bars, pixels from the optical axis; a row for each side.
+    """The edges of a gate's bars, pixels from the optical axis; a row for each side.
 
     A side that is nearer to a column than to a row of the image is steep. It is measured in rows t, the
     others in columns t. What is measured there counts towards the opening: the column (row if not steep)
@@ -70,7 +70,7 @@ Widths = list[tuple[float, float]]
 """Half the width of each bar's image at the start and the end of its side, across the bar."""
 
 
-def find_edges(patch: Patch, sides: Sides, half_px: Widths) -> BarEdges:
+def find_edges(patch: ImagePatch, sides: Sides, half_px: Widths) -> BarEdges:
     """Find the edges of all four bars.
 
     Args:
@@ -200,13 +200,13 @@ def expected_widths(sides: Sides, spread_px: float) -> Widths:
     height_right, height_left = right or left, left or right
     if height_right is None or height_left is None:  # as if seen from the front
         width = max(top or 0.0, bottom or 0.0)
-        height_right = height_left = width * FRAME_HEIGHT_M / FRAME_WIDTH_M
+        height_right = height_left = width * GATE_HEIGHT_M / GATE_WIDTH_M
     cosine = 0.7
     if top is not None and bottom is not None:
-        seen = (top + bottom) / (height_right + height_left) * FRAME_HEIGHT_M / FRAME_WIDTH_M
+        seen = (top + bottom) / (height_right + height_left) * GATE_HEIGHT_M / GATE_WIDTH_M
         cosine = min(1.0, seen)
     turned = cosine + sqrt(1.0 - cosine * cosine)
-    share = BAR_M / FRAME_HEIGHT_M / 2.0
+    share = BAR_M / GATE_HEIGHT_M / 2.0
     at_right, at_left = share * max(height_right, 2.0), share * max(height_left, 2.0)
     level = 1.15  # seen from somewhat above or below
     return [

@@ -1,8 +1,8 @@
-"""The axes of a frame's bars in an image, as straight lines fitted to the bars' edges.
+"""The axes of a gate's bars in an image, as straight lines fitted to the bars' edges.
 
 The bars are square rods. Seen from anywhere, the middle of a rod's image is nearly the image of its axis, and
-a blur, a threshold or pixels painted too large widen both its edges alike. So each side of a frame is
-measured as the middle of its bar; the four axes are a rectangle in the frame's middle plane. Where only the
+a blur, a threshold or pixels painted too large widen both its edges alike. So each side of a gate is
+measured as the middle of its bar; the four axes are a rectangle in the gate's middle plane. Where only the
 outer edge is seen (the opening is too small in the image, or hidden), half the bar's width is added to it.
 """
 
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vision.bar_edges import BarEdges, Flags
-from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats
+from vision.gate_model import GATE_HEIGHT_M, GATE_WIDTH_M, Floats
 
 _QUANTISATION = 1.0 / 12.0  # variance of a rounded number
 _LEAST_VARIANCE = 4e-4
@@ -64,7 +64,7 @@ class Meeting(NamedTuple):
 
 
 def fit_lines(edges: BarEdges, focal_px: float, offsets: Floats | None = None) -> BarLines:
-    """Fit the axes of a frame's bars; None where nothing of a bar is seen.
+    """Fit the axes of a gate's bars; None where nothing of a bar is seen.
 
     Args:
         edges: of the bars.
@@ -203,7 +203,7 @@ def _variances(
 
 
 def _balance(lines: BarLines, focal_px: float) -> None:
-    """Draw the slopes of opposite sides together as far as perspective cannot part them: far frames."""
+    """Draw the slopes of opposite sides together as far as perspective cannot part them: far gates."""
     for one, other in ((0, 2), (3, 1)):
         a, b = lines[one], lines[other]
         if a is None or b is None or a.steep != b.steep:
@@ -211,10 +211,10 @@ def _balance(lines: BarLines, focal_px: float) -> None:
         between = 0.5 * (a.along - b.along)
         apart_px = abs(a.at - b.at - (a.slope + b.slope) * between)
         long_px = max(a.last - a.first, b.last - b.first) + 2.0
-        # The frame's ends differ in depth by no more than its width (height for the upright bars), and its
+        # The gate's ends differ in depth by no more than its width (height for the upright bars), and its
         # distance is to the focal length as its size to its image.
-        height_px, deep_m = (apart_px, FRAME_WIDTH_M) if one == 0 else (long_px, 0.6 * FRAME_HEIGHT_M)
-        parted_px = 0.5 * deep_m * apart_px * height_px / (FRAME_HEIGHT_M * focal_px)
+        height_px, deep_m = (apart_px, GATE_WIDTH_M) if one == 0 else (long_px, 0.6 * GATE_HEIGHT_M)
+        parted_px = 0.5 * deep_m * apart_px * height_px / (GATE_HEIGHT_M * focal_px)
         prior = (2.0 * parted_px / long_px) ** 2
         share = 1.0 / (prior + a.var_slope + b.var_slope)
         gain = (a.slope - b.slope) * share

@@ -1,4 +1,4 @@
-"""Which pixels have the colour of a frame or an obstacle, whatever the light: masks by colour.
+"""Which pixels have the colour of a gate or an obstacle, whatever the light: masks by colour.
 
 A pure colour keeps its hue and its saturation under any brightness of light, so the tests compare channels
 with each other. Every test begins with saturating subtractions of whole planes, which take microseconds, and
@@ -37,7 +37,7 @@ HUE_SLACK = 12
 VIOLET_RED = (0.25, 0.7)
 """Where red is between green (0) and blue (1) in the obstacles' colour."""
 MIN_VIOLET_EXCESS = 15
-"""Obstacles may be darker than frames, as a few wrong pixels of theirs do less harm."""
+"""Obstacles may be darker than gates, as a few wrong pixels of theirs do less harm."""
 MIN_PIXELS = 8
 """A colour with fewer pixels than this is not looked at."""
 
@@ -71,7 +71,7 @@ def split_planes(image: Image) -> list[Plane]:
 
 
 def find_colours(image: Image) -> list[ColourMask]:
-    """Find the pixels of all colours that frames and obstacles have.
+    """Find the pixels of all colours that gates and obstacles have.
 
     Args:
         image: BGR, shape (height, width, 3), uint8.

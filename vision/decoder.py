@@ -9,8 +9,8 @@ import numpy as np
 
 from vision.jpeg import ImageError, jpeg_structure
 from vision.types import Image
-from vision.worker import DECODE_LIMIT_S, Request
-from vision.worker_process import WorkerEndedError, WorkerProcess
+from vision.worker import DECODE_LIMIT_S, WorkerRequest
+from vision.worker_process import CameraProcess, WorkerEndedError
 
 
 class ImageDecoder:
@@ -26,7 +26,7 @@ class ImageDecoder:
 
     def __init__(self, size_px: tuple[int, int] | None = None) -> None:
         self._size_px = size_px
-        self._worker = WorkerProcess()
+        self._worker = CameraProcess()
 
     async def decode_jpeg(self, data: bytes) -> Image:
         """Decode a JPEG to BGR; raises `ImageError` if no camera sends it, or it takes too long."""
@@ -45,7 +45,7 @@ class ImageDecoder:
         try:
             await self._worker.start()
             async with asyncio.timeout(DECODE_LIMIT_S):
-                image = (await self._worker.request(Request.DECODE, data)).image
+                image = (await self._worker.request(WorkerRequest.DECODE, data)).image
         except TimeoutError:
             raise ImageError(f"one that takes longer than {DECODE_LIMIT_S:g} s to decode") from None
         except WorkerEndedError as error:

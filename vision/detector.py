@@ -6,8 +6,8 @@ Navigation Systems", Electronics 2021, 10, 7, and their published implementation
 Choices where the sources leave room:
 
 - The colour test for red, |g - b| < 20 and r - g > 50, is used for green and blue with r -> g -> b -> r.
-- Distance and angle are given for a frame *wholly* in view, as the paper says: its box touches no border of
-  the image. The published code looks at the top and bottom rows only, so that a frame cut off at a side
+- Distance and angle are given for a gate *wholly* in view, as the paper says: its box touches no border of
+  the image. The published code looks at the top and bottom rows only, so that a gate cut off at a side
   seems narrower than it is and its angle is far too large.
 - A box one pixel high (l = 0) has no measurable size: neither distance nor angle.
 """
@@ -21,10 +21,10 @@ import cv2
 from vision.colour_regions import Plane, split_planes
 from vision.types import NOT_SEEN, Detection, Detections, Image
 
-FRAME_HEIGHT_M = 0.23
-"""Height of a frame in the paper's formulas (the frame itself is 0.22 m high)."""
-FRAME_WIDTH_M = 0.43
-"""Width of a frame in the paper's formulas (the frame itself is 0.42 m wide)."""
+GATE_HEIGHT_M = 0.23
+"""Height of a gate in the paper's formulas (the gate itself is 0.22 m high)."""
+GATE_WIDTH_M = 0.43
+"""Width of a gate in the paper's formulas (the gate itself is 0.42 m wide)."""
 MIN_EXCESS = 50
 """The shown channel must exceed the next one by more than this."""
 MAX_GREY_GAP = 20
@@ -32,7 +32,7 @@ MAX_GREY_GAP = 20
 
 
 def detect(image: Image, time_us: int | None = None, *, focal_px: float | None = None) -> Detections:
-    """Find the frames of all three colours.
+    """Find the gates of all three colours.
 
     Args:
         image: BGR, shape (height, width, 3), uint8.
@@ -76,9 +76,9 @@ def measure(
     if not whole or length <= 0:
         return Detection(n, s, e, w)
     middle = s + length / 2
-    distance_m = FRAME_HEIGHT_M / length * hypot(focal_px, middle)
+    distance_m = GATE_HEIGHT_M / length * hypot(focal_px, middle)
     apparent_width = e - w
-    full_width = max(FRAME_WIDTH_M / FRAME_HEIGHT_M * length, apparent_width)
+    full_width = max(GATE_WIDTH_M / GATE_HEIGHT_M * length, apparent_width)
     return Detection(n, s, e, w, distance_m, degrees(acos(apparent_width / full_width)))
 
 

@@ -13,7 +13,7 @@ from vision.calibration.colours import correct_colours
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.detector import detect
-from vision.frame_finder import PAINTED_SPREAD_PX, SMOOTH_SPREAD_PX, FrameFinder
+from vision.gate_finder import PAINTED_SPREAD_PX, SMOOTH_SPREAD_PX, GateFinder
 from vision.types import Detections, Image, Vision
 
 OWN_DETECTORS: tuple[Vision, ...] = get_args(Vision)
@@ -66,7 +66,7 @@ def new_detector(
     if rendered:
         spread_px = SMOOTH_SPREAD_PX if smooth else PAINTED_SPREAD_PX
     lens = None if calibration is None or calibration.is_ideal else Lens(calibration)
-    return FrameFinder(focal_px, spread_px, lens).find
+    return GateFinder(focal_px, spread_px, lens).find
 
 
 def others_detector(made_by: str | DetectorMaker, calibration: Calibration) -> Detector:

@@ -1,8 +1,8 @@
-"""First estimates of the four outer edges of a frame, from the outline of its pixels.
+"""First estimates of the four outer edges of a gate, from the outline of its pixels.
 
-The convex hull of a frame's pixels is nearly a quadrilateral: rounding to pixels and the bars' thickness add
+The convex hull of a gate's pixels is nearly a quadrilateral: rounding to pixels and the bars' thickness add
 short edges. The edge whose removal, by prolonging its neighbours, adds the least area goes first, until four
-are left. Edges along the image's border belong to no frame: what they cut off is not known.
+are left. Edges along the image's border belong to no gate: what they cut off is not known.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vision.calibration.lens import Lens
-from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Point, Segment, Sides
+from vision.gate_model import BAR_M, GATE_HEIGHT_M, GATE_WIDTH_M, Point, Segment, Sides
 from vision.patch import Box
 
 _MIN_COLUMNS, _MIN_ROWS = 2, 4  # between the centres of the outermost pixels
@@ -77,7 +77,7 @@ def outer_sides(
 
 
 def sides_by_opening(mask: npt.NDArray[np.uint8], box: Box, lens: Lens | None = None) -> list[Sides]:
-    """First estimates of a frame's outer edges by its opening: the holes of a region together.
+    """First estimates of a gate's outer edges by its opening: the holes of a region together.
 
     Args:
         mask: pixels of its colour, of the whole image.
@@ -107,7 +107,7 @@ def sides_by_opening(mask: npt.NDArray[np.uint8], box: Box, lens: Lens | None = 
 def _around(opening: Sides) -> Sides:
     """The outer edges around an opening: its corners, moved by a bar's width along both its sides."""
     corners = [side[0] for side in opening if side is not None]
-    across, down = (2.0 * BAR_M / (size_m - 2.0 * BAR_M) for size_m in (FRAME_WIDTH_M, FRAME_HEIGHT_M))
+    across, down = (2.0 * BAR_M / (size_m - 2.0 * BAR_M) for size_m in (GATE_WIDTH_M, GATE_HEIGHT_M))
     moved: list[Point] = []
     for k, (x, y) in enumerate(corners):
         # Corner k is where side k - 1 ends and side k begins; 0 and 2 of the sides are the long ones.

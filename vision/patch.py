@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from vision.calibration.lens import Lens
 from vision.colour_regions import ColourMask
-from vision.frame_model import Point
+from vision.gate_model import Point
 
 Labels = npt.NDArray[np.uint8]
 Box = tuple[int, int, int, int]  # column, row, columns, rows
@@ -28,7 +28,7 @@ _BESIDE_COLUMNS = np.array([0, 0, 0, -1, 1])[:, None, None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Patch:
+class ImagePatch:
     """A part of an image around a region, with a margin.
 
     Attributes:
@@ -75,7 +75,7 @@ class Patch:
                 return False
         return True
 
-    def in_front(self) -> Patch:
+    def in_front(self) -> ImagePatch:
         """The same as if the region were in front of all else."""
         return replace(self, labels=np.bitwise_and(self.labels, np.uint8(OWN | OUTSIDE)))
 
@@ -107,7 +107,9 @@ class Support:
     empty: list[float]  # pixels of nothing that could hide it; the rest is hidden or outside the image
 
 
-def cut_patch(mask: ColourMask, others: Sequence[ColourMask], box: Box, lens: Lens | None = None) -> Patch:
+def cut_patch(
+    mask: ColourMask, others: Sequence[ColourMask], box: Box, lens: Lens | None = None
+) -> ImagePatch:
     """Cut the part of an image around a box, for a region of one colour beside others."""
     height, width = mask.mask.shape
     column, row, columns, rows = box
@@ -122,4 +124,4 @@ def cut_patch(mask: ColourMask, others: Sequence[ColourMask], box: Box, lens: Le
         if left < x1 and top < y1 and left + wide > x0 and top + high > y0:
             inside |= other.mask[y0:y1, x0:x1] & FOREIGN
     origin = ((width - 1) / 2 - column + margin, (height - 1) / 2 - row + margin)
-    return Patch(labels, origin, (width / 2, height / 2), lens)
+    return ImagePatch(labels, origin, (width / 2, height / 2), lens)

@@ -18,8 +18,8 @@ from vision.decoder import ImageDecoder
 from vision.jpeg import JPEG_START, ImageError
 from vision.streams.reconnecting import ReconnectingSource, ReopenableSource
 from vision.types import CameraError, CameraFrame, CameraSource, shown_url
-from vision.worker import Problem, Reply, Request
-from vision.worker_process import Answer, WorkerEndedError, WorkerProcess
+from vision.worker import Problem, WorkerReply, WorkerRequest
+from vision.worker_process import CameraProcess, WorkerAnswer, WorkerEndedError
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
 MAX_FILE_BYTES = 64 * 1024 * 1024
@@ -134,7 +134,7 @@ class CaptureSource:
         self._name = _name_of(str(url))
         self._hint = _HINTS.get(str(url).partition("://")[0].lower(), "")
         self._timeout_s = timeout_s
-        self._worker = WorkerProcess()
+        self._worker = CameraProcess()
 
     async def __aenter__(self) -> Self:
         """Open the camera; raises `CameraError` if that fails, also after `timeout_s`."""
@@ -154,11 +154,11 @@ class CaptureSource:
         settings = f"{round(self._timeout_s * 1000)} {self._url}".encode()
         try:
             async with asyncio.timeout(self._timeout_s):
-                answer = await self._request(Request.OPEN, settings)
+                answer = await self._request(WorkerRequest.OPEN, settings)
         except TimeoutError:
             problem = f"did not open within {self._timeout_s:g} s{self._hint}"
             raise CameraError(f"{self._name}: {problem}") from None
-        if answer.reply is not Reply.OPENED:
+        if answer.reply is not WorkerReply.OPENED:
             raise CameraError(f"{self._name}: {_PROBLEMS[answer.problem]}")
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
@@ -169,12 +169,12 @@ class CaptureSource:
         while True:
             try:
                 async with asyncio.timeout_at(deadline_s):
-                    answer = await self._request(Request.NEXT)
+                    answer = await self._request(WorkerRequest.NEXT)
             except TimeoutError:
                 raise CameraError(f"{self._name}: no image for {self._timeout_s:g} s{hint}") from None
-            if answer.reply is Reply.END_OF_FILE:
+            if answer.reply is WorkerReply.END_OF_FILE:
                 return
-            if answer.reply is Reply.END_OF_STREAM:
+            if answer.reply is WorkerReply.END_OF_STREAM:
                 raise CameraError(f"{self._name}: the stream ended")
             if answer.image is None:
                 self.bad_frames += 1
@@ -183,7 +183,7 @@ class CaptureSource:
             yield CameraFrame(answer.image, None, answer.received_s)
             deadline_s = loop.time() + self._timeout_s
 
-    async def _request(self, kind: Request, data: bytes = b"") -> Answer:
+    async def _request(self, kind: WorkerRequest, data: bytes = b"") -> WorkerAnswer:
         try:
             return await self._worker.request(kind, data)
         except WorkerEndedError:

@@ -18,7 +18,7 @@ from framerunner.geometry.vectors import Vec3
 
 Image = npt.NDArray[np.uint8]
 Vision = Literal["boxes", "frames"]
-"""How frames are detected: the paper's box of each colour, or by contour and shape."""
+"""How gates are detected: the paper's box of each colour, or by contour and shape."""
 M: JsonDict = {"unit": "m"}
 PX: JsonDict = {"unit": "px"}
 DEG: JsonDict = {"unit": "deg"}
@@ -66,10 +66,10 @@ NOT_SEEN = Detection()
 
 
 @dataclass(frozen=True, slots=True)
-class FrameCorner:
-    """A corner of a frame's outer outline: pixels from the optical axis, with standard deviations.
+class GateCorner:
+    """A corner of a gate's outer outline: pixels from the optical axis, with standard deviations.
 
-    It is the corner of the rectangle in the frame's middle plane, 0.42 x 0.22 m, half the bars' depth behind
+    It is the corner of the rectangle in the gate's middle plane, 0.42 x 0.22 m, half the bars' depth behind
     their front.
     """
 
@@ -80,8 +80,8 @@ class FrameCorner:
 
 
 @dataclass(frozen=True, slots=True)
-class FramePose:
-    """A pose of a frame that explains its outline, in the camera's axes: forward, left, up."""
+class GatePose:
+    """A pose of a gate that explains its outline, in the camera's axes: forward, left, up."""
 
     position_flu_m: Vec3  # from the camera to the opening's centre
     normal_flu: Vec3  # unit vector, perpendicular to the opening, on the side from which it is seen
@@ -89,17 +89,17 @@ class FramePose:
 
 
 @dataclass(frozen=True, slots=True)
-class FrameSighting:
-    """One frame in one image."""
+class GateSighting:
+    """One gate in one image."""
 
-    colour: str  # red, green, blue, or the colour of a frame that is no part of the task
-    corners: tuple[FrameCorner | None, FrameCorner | None, FrameCorner | None, FrameCorner | None]
+    colour: str  # red, green, blue, or the colour of a gate that is no part of the task
+    corners: tuple[GateCorner | None, GateCorner | None, GateCorner | None, GateCorner | None]
     """Upper left, upper right, lower right and lower left as seen; None if it is not sure where one is.
 
     A corner that is hidden or outside the image is sure where two sides that are seen lead to it.
     """
     whole: bool  # nothing of it is hidden or outside the image
-    poses: tuple[FramePose, ...]  # none if too little is seen; else one or two, the better one first
+    poses: tuple[GatePose, ...]  # none if too little is seen; else one or two, the better one first
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,8 +125,8 @@ class Detections:
         int | None,
         Field(description="vehicle time of the image; None if not known", json_schema_extra={"unit": "µs"}),
     ] = None
-    frames: tuple[FrameSighting, ...] = ()  # by shape; only from the frame finder
-    obstacle_edges: tuple[ObstacleEdge, ...] = ()  # from left to right; only from the frame finder
+    frames: tuple[GateSighting, ...] = ()  # by shape; only from the gate finder
+    obstacle_edges: tuple[ObstacleEdge, ...] = ()  # from left to right; only from the gate finder
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,11 +55,11 @@ REQUEST = struct.Struct("<BI")  # kind, and the number of bytes that follow
 ANSWER = struct.Struct("<BIId")
 """Kind, width and height (pixels), monotonic time of capture or arrival (seconds).
 
-With `Reply.NOT_OPENED` the first number is a `Problem`.
+With `WorkerReply.NOT_OPENED` the first number is a `Problem`.
 """
 
 
-class Request(IntEnum):
+class WorkerRequest(IntEnum):
     """What the process is to do."""
 
     DECODE = 1  # an image file follows
@@ -67,7 +67,7 @@ class Request(IntEnum):
     NEXT = 3  # the next image of what was opened
 
 
-class Reply(IntEnum):
+class WorkerReply(IntEnum):
     """What an answer means."""
 
     IMAGE = 1
@@ -132,7 +132,7 @@ class _Capture:
         threading.Thread(target=self._read, daemon=True).start()
         return True
 
-    def next(self) -> tuple[Reply, Image | None, float]:
+    def next(self) -> tuple[WorkerReply, Image | None, float]:
         """Wait for an image that has not been taken yet, or the end."""
         with self._changed:
             while not self._changed.wait_for(
@@ -142,8 +142,8 @@ class _Capture:
                     os._exit(0)
             taken, self._latest = self._latest, None
         if taken is None:
-            return (Reply.END_OF_FILE if self._is_file else Reply.END_OF_STREAM), None, 0.0
-        return Reply.IMAGE, *taken
+            return (WorkerReply.END_OF_FILE if self._is_file else WorkerReply.END_OF_STREAM), None, 0.0
+        return WorkerReply.IMAGE, *taken
 
     def _captured_s(self) -> float | None:
         """Monotonic time of the image read last; None while it is not known. A file's is when it was read."""
@@ -265,25 +265,25 @@ def _serve(link: socket.socket, memory: mmap.mmap) -> None:
     """Answer requests until the parent has ended."""
     capture: _Capture | None = None
     pixels = np.frombuffer(memory, np.uint8)
-    link.sendall(ANSWER.pack(Reply.READY, 0, 0, 0.0))
+    link.sendall(ANSWER.pack(WorkerReply.READY, 0, 0, 0.0))
     while True:
         kind, length = REQUEST.unpack(_received(link, REQUEST.size))
         data = _received(link, length)
-        reply, image, received_s = Reply.NO_IMAGE, None, 0.0
+        reply, image, received_s = WorkerReply.NO_IMAGE, None, 0.0
         height, width = 0, 0
-        if kind == Request.DECODE:
+        if kind == WorkerRequest.DECODE:
             image = _decoded(data)
-        elif kind == Request.OPEN:
+        elif kind == WorkerRequest.OPEN:
             limit_ms, _, url = data.decode().partition(" ")
             capture = None  # the one before has ended; it is closed before the next one is opened
             capture = _Capture(url, int(limit_ms))
-            reply = Reply.OPENED if capture.start() else Reply.NOT_OPENED
+            reply = WorkerReply.OPENED if capture.start() else WorkerReply.NOT_OPENED
             width = capture.problem
         elif capture is not None:
             reply, image, received_s = capture.next()
         if image is not None:
             fits = image.ndim == 3 and image.shape[2] == 3 and image.size <= MAX_IMAGE_BYTES
-            reply = Reply.IMAGE if fits else Reply.NO_IMAGE
+            reply = WorkerReply.IMAGE if fits else WorkerReply.NO_IMAGE
             if fits:
                 height, width = image.shape[:2]
                 pixels[: image.size] = image.reshape(-1)

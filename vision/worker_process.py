@@ -18,7 +18,7 @@ from typing import BinaryIO, cast
 import numpy as np
 
 from vision.types import Image
-from vision.worker import ANSWER, MAX_IMAGE_BYTES, REQUEST, Problem, Reply, Request
+from vision.worker import ANSWER, MAX_IMAGE_BYTES, REQUEST, Problem, WorkerReply, WorkerRequest
 
 _START_LIMIT_S = 10.0
 
@@ -28,16 +28,16 @@ class WorkerEndedError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class WorkerAnswer:
     """What the process has answered."""
 
-    reply: Reply
-    image: Image | None  # BGR, shape (height, width, 3), uint8; None unless `reply` is `Reply.IMAGE`
+    reply: WorkerReply
+    image: Image | None  # BGR, shape (height, width, 3), uint8; None unless `reply` is `WorkerReply.IMAGE`
     received_s: float  # monotonic wall time at which a captured image arrived, seconds
-    problem: Problem = Problem.UNKNOWN  # with `Reply.NOT_OPENED`
+    problem: Problem = Problem.UNKNOWN  # with `WorkerReply.NOT_OPENED`
 
 
-class WorkerProcess:
+class CameraProcess:
     """The process as its parent sees it. There is none before `start` and after `end`."""
 
     def __init__(self) -> None:
@@ -59,7 +59,7 @@ class WorkerProcess:
             async with asyncio.timeout(_START_LIMIT_S):
                 await self._answer()
 
-    async def request(self, kind: Request, data: bytes = b"") -> Answer:
+    async def request(self, kind: WorkerRequest, data: bytes = b"") -> WorkerAnswer:
         """Send one request and wait for its answer. Cancelling the wait ends the process.
 
         Raises:
@@ -97,7 +97,7 @@ class WorkerProcess:
                 raise WorkerEndedError(f"the process that decodes images {problem}: {error}") from error
             raise
 
-    async def _answer(self) -> Answer:
+    async def _answer(self) -> WorkerAnswer:
         """Wait for the next answer."""
         assert self._link is not None
         answer = bytearray()
@@ -126,20 +126,20 @@ class WorkerProcess:
             self._link = ours
             self._memory = mmap.mmap(file.fileno(), MAX_IMAGE_BYTES, prot=mmap.PROT_READ)
 
-    def _checked(self, answer: bytes) -> Answer:
+    def _checked(self, answer: bytes) -> WorkerAnswer:
         """Check an answer: an image may have taken control of the process."""
         assert self._memory is not None
         kind, width, height, received_s = ANSWER.unpack(answer)
         size_fits = 0 < width * height * 3 <= MAX_IMAGE_BYTES
-        known = kind in tuple(Reply) and (kind != Reply.NOT_OPENED or width in tuple(Problem))
-        if not known or (kind == Reply.IMAGE and not size_fits):
+        known = kind in tuple(WorkerReply) and (kind != WorkerReply.NOT_OPENED or width in tuple(Problem))
+        if not known or (kind == WorkerReply.IMAGE and not size_fits):
             raise WorkerEndedError("the process that decodes images sent an invalid answer")
         image: Image | None = None
-        if kind == Reply.IMAGE:
+        if kind == WorkerReply.IMAGE:
             shared = np.frombuffer(self._memory, np.uint8, width * height * 3)
             image = shared.reshape(height, width, 3).copy()
-        problem = Problem(width) if kind == Reply.NOT_OPENED else Problem.UNKNOWN
-        return Answer(Reply(kind), image, received_s, problem)
+        problem = Problem(width) if kind == WorkerReply.NOT_OPENED else Problem.UNKNOWN
+        return WorkerAnswer(WorkerReply(kind), image, received_s, problem)
 
 
 def _shared_file() -> BinaryIO:

@@ -92,7 +92,7 @@ class Job:
     camera_flu_m: Vec3 = (0.0, 0.0, 0.0)  # position on the drone; the camera looks forward
     arena_m: tuple[float, float] = (10.0, 10.0)  # extent of the floor along x and y
     sun_direction: Vec3 = (0.0, 0.0, -1.0)  # in which its light travels
-    boxes: tuple[Box, ...] = ()  # base and frames
+    boxes: tuple[Box, ...] = ()  # base and gates
     goals: tuple[Goal, ...] = ()  # in order of time; the first is the start
     image_file: str = ""  # for the last image (NumPy's format); empty: it is not saved
 

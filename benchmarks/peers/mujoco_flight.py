@@ -3,7 +3,7 @@
 Variants:
     default: MuJoCo's own quality: shadows from a map of 4096 × 4096, four samples a pixel.
     alike: as plain as our painter: one sample a pixel, shadows from a map of 1024 × 1024 (a pixel is a
-        centimetre, a frame's bar two).
+        centimetre, a gate's bar two).
     fastest: one sample a pixel, no shadows, no sky, no ground beyond the floor.
 """
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from firmware_py.commands import FlightLimits, VelocityCommand
+from firmware_py.commands import FlightLimits, VelocityFrdCommand
 from firmware_py.control.design import design
 from firmware_py.control.mixer import Mixer
 from firmware_py.types import MotorOutput, VehicleState
@@ -85,7 +85,7 @@ class LevelLaw:
         r = state.angular_rate_frd_rad_s[2]
         self._xi_yaw -= sign * self._k_yaw * (1.0 - _WEIGHT_YAW) * r / self._ki_yaw
 
-    def step(self, state: VehicleState, command: VelocityCommand, grounded: bool) -> MotorOutput:
+    def step(self, state: VehicleState, command: VelocityFrdCommand, grounded: bool) -> MotorOutput:
         """Return the motor commands for one control period.
 
         Args:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import radians
 
-from firmware_py.commands import ControlCommand, FlightLimits, VelocityCommand
+from firmware_py.commands import ControlCommand, FlightLimits, VelocityFrdCommand
 from firmware_py.control.level_law import LevelLaw
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.vector_law import VectorLaw
@@ -56,7 +56,7 @@ class Stabiliser:
             command: what to follow.
             grounded: the vehicle still touches the ground; what is learnt in flight is held.
         """
-        if type(command) is VelocityCommand:
+        if type(command) is VelocityFrdCommand:
             if self._law is not self._velocity_law:
                 self._change(self._velocity_law, state)
             return self._velocity_law.step(state, command, grounded)

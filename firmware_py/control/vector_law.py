@@ -18,7 +18,7 @@ from firmware_py.commands import (
     FlightLimits,
     MotorCommand,
     TiltCommand,
-    VelocityCommand,
+    VelocityFrdCommand,
 )
 from firmware_py.control.design import design_bandwidths
 from firmware_py.control.mixer import Mixer
@@ -201,7 +201,7 @@ class VectorLaw:
         return output
 
     def _target(self, state: VehicleState, command: ControlCommand, m: Rotation, drag: Vec3) -> _Target:
-        if type(command) is VelocityCommand:
+        if type(command) is VelocityFrdCommand:
             return self._follow_velocity(state, command, m, drag)
         if type(command) is AccelerationCommand:
             forward, right, down = command.acceleration_level_m_s2
@@ -219,7 +219,7 @@ class VectorLaw:
         raise TypeError(f"not a command of the stabiliser: {type(command).__name__}")
 
     def _follow_velocity(
-        self, state: VehicleState, command: VelocityCommand, m: Rotation, drag: Vec3
+        self, state: VehicleState, command: VelocityFrdCommand, m: Rotation, drag: Vec3
     ) -> _Target:
         north, east, down = state.velocity_ned_m_s
         cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)

@@ -31,7 +31,7 @@ def is_still(imu: ImuSample) -> bool:
     return abs(sqrt(x * x + y * y + z * z) - GRAVITY_M_S2) <= _MAX_FORCE_DIFFERENCE_M_S2
 
 
-class Alignment:
+class ImuAlignment:
     """Averages the IMU, and the heading from whatever measures it, until both are known.
 
     Attributes:

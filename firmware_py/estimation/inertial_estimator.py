@@ -12,7 +12,7 @@ from math import atan2, isfinite, sqrt
 
 from firmware_py.estimation.aiding.aid import NEVER_US
 from firmware_py.estimation.aiding.all import Aiding, Sample
-from firmware_py.estimation.alignment import Alignment, is_still
+from firmware_py.estimation.alignment import ImuAlignment, is_still
 from firmware_py.estimation.error_state import ATTITUDE, POSITION, VELOCITY
 from firmware_py.estimation.output import OutputPredictor
 from firmware_py.estimation.report import IMU, NO_FIX, NO_HEIGHT, NOT_ALIGNED, EstimatorReport, Sensor
@@ -61,7 +61,7 @@ class InertialEstimator:
         self.stands = True
         self._settings = settings
         self._field = field_ned_gauss
-        self._alignment: Alignment | None = Alignment()
+        self._alignment: ImuAlignment | None = ImuAlignment()
         self._output = OutputPredictor()
         self._waiting: list[tuple[int, int, Sample]] = []
         self._arrivals = 0

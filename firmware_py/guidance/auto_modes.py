@@ -12,7 +12,7 @@ from firmware_py.guidance.mode import Mode, ModeEntry, TrajectoryMode
 from firmware_py.guidance.orbit import OrbitYaw
 from firmware_py.guidance.sticks import StickSettings
 from firmware_py.guidance.trajectory import passing_speed
-from firmware_py.missions.flight import Leg
+from firmware_py.missions.flight import MissionLeg
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.types import VehicleState
@@ -66,7 +66,7 @@ class HoldMode(TrajectoryMode):
         trajectory.go((north_m, east_m, down_m), yaw_rad, speed_m_s)
         self._show_target(state)
 
-    def fly_leg(self, state: VehicleState, leg: Leg, *, begins: bool) -> None:
+    def fly_leg(self, state: VehicleState, leg: MissionLeg, *, begins: bool) -> None:
         """Fly to a leg's target, and past it if there is a next one."""
         self.go_to(state, leg.target_ned_m, leg.yaw_rad, leg.speed_m_s, begins=begins)
         if leg.next_ned_m is not None:

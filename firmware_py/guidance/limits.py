@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, hypot, inf, isnan, nan, radians, remainder, sin, sqrt, tau
 
-from firmware_py.commands import VelocityCommand
+from firmware_py.commands import VelocityFrdCommand
 from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
 from framerunner.geometry.vectors import Vec3
@@ -170,10 +170,10 @@ def velocity_command(
     yaw_rad: float,
     limits: SpeedLimits,
     yaw_rate_rad_s: float = nan,
-) -> VelocityCommand:
+) -> VelocityFrdCommand:
     """The command for a velocity, which is limited, and a yaw."""
     velocity_m_s = level(state, limits.clip(*velocity_ned_m_s))
-    return VelocityCommand(velocity_m_s, yaw_rate(state.yaw_rad, yaw_rad, yaw_rate_rad_s, limits))
+    return VelocityFrdCommand(velocity_m_s, yaw_rate(state.yaw_rad, yaw_rad, yaw_rate_rad_s, limits))
 
 
 def velocity_towards(target: Vec3, place: Vec3, velocity: Vec3, limits: SpeedLimits) -> Vec3:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import atan2, hypot
 from typing import ClassVar
 
-from firmware_py.commands import ControlCommand, VelocityCommand
+from firmware_py.commands import ControlCommand, VelocityFrdCommand
 from firmware_py.guidance.limits import SpeedLimits, clamp, level_pair, yaw_rate
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.guidance.trajectory import Trajectory
@@ -28,7 +28,7 @@ class ModeContext:
         limits: speeds, accelerations and gains.
         period_s: of control.
         trajectory: of automatic modes.
-        sticks: a pilot's newest input.
+        sticks: an operator's newest input.
         home_ned_m: heights of return, landing and following count from it, shape (3,).
         region_ned_m: a place to look at while flying to targets and in hold, shape (3,); None: none.
     """
@@ -128,7 +128,7 @@ class TrajectoryMode(Mode):
 
     def _follow(
         self, state: VehicleState, velocity_ned_m_s: Vec3, yaw_rad: float, turn_rad_s: float = 0.0
-    ) -> VelocityCommand:
+    ) -> VelocityFrdCommand:
         """The command for a velocity, with the reference point's acceleration, and a yaw."""
         context = self._context
         limits = context.limits
@@ -137,7 +137,7 @@ class TrajectoryMode(Mode):
             state, limits.clip(*velocity_ned_m_s), context.trajectory.reference.acceleration_ned_m_s2
         )
         turn_rad_s = yaw_rate(state.yaw_rad, yaw_rad, turn_rad_s, limits)
-        return VelocityCommand(velocity, clamp(turn_rad_s, -max_rad_s, max_rad_s), acceleration)
+        return VelocityFrdCommand(velocity, clamp(turn_rad_s, -max_rad_s, max_rad_s), acceleration)
 
     def _show_target(self, state: VehicleState) -> None:
         trajectory = self._context.trajectory

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import nan
 
-from firmware_py.commander_table import State
+from firmware_py.commander_table import CommanderState
 from firmware_py.commands import ControlCommand
 from firmware_py.guidance.auto_modes import (
     DescendMode,
@@ -20,7 +20,7 @@ from firmware_py.guidance.mode import Mode, ModeContext, ModeEntry
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.guidance.sticks import AcroMode, AltitudeMode, PositionMode, StabilizedMode
 from firmware_py.guidance.trajectory import YawMode
-from firmware_py.missions.flight import Leg, LegKind
+from firmware_py.missions.flight import LegKind, MissionLeg
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import Setpoint
 from firmware_py.types import VehicleState
@@ -70,24 +70,24 @@ class Guidance:
         self._offboard = OffboardMode(context, airframe, parameters)
         stabilized = StabilizedMode(context, airframe, parameters)
         returning = ReturnMode(context, airframe, parameters)
-        self._modes: dict[State, Mode] = {
-            State.MANUAL: stabilized,
-            State.STABILIZED: stabilized,
-            State.ACRO: AcroMode(context, airframe, parameters),
-            State.ALTITUDE: AltitudeMode(context, airframe, parameters),
-            State.POSITION: PositionMode(context, airframe, parameters),
-            State.HOLD: hold,
-            State.FAILSAFE_HOLD: hold,
-            State.MISSION: hold,  # until its first leg
-            State.TAKEOFF: TakeoffMode(context, airframe, parameters),
-            State.LAND: land,
-            State.FAILSAFE_LAND: land,
-            State.FAILSAFE_DESCEND: DescendMode(context, airframe, parameters),
-            State.RETURN: returning,
-            State.FAILSAFE_RETURN: returning,
-            State.ORBIT: OrbitMode(context, airframe, parameters),
-            State.FOLLOW: self.follow,
-            State.OFFBOARD: self._offboard,
+        self._modes: dict[CommanderState, Mode] = {
+            CommanderState.MANUAL: stabilized,
+            CommanderState.STABILIZED: stabilized,
+            CommanderState.ACRO: AcroMode(context, airframe, parameters),
+            CommanderState.ALTITUDE: AltitudeMode(context, airframe, parameters),
+            CommanderState.POSITION: PositionMode(context, airframe, parameters),
+            CommanderState.HOLD: hold,
+            CommanderState.FAILSAFE_HOLD: hold,
+            CommanderState.MISSION: hold,  # until its first leg
+            CommanderState.TAKEOFF: TakeoffMode(context, airframe, parameters),
+            CommanderState.LAND: land,
+            CommanderState.FAILSAFE_LAND: land,
+            CommanderState.FAILSAFE_DESCEND: DescendMode(context, airframe, parameters),
+            CommanderState.RETURN: returning,
+            CommanderState.FAILSAFE_RETURN: returning,
+            CommanderState.ORBIT: OrbitMode(context, airframe, parameters),
+            CommanderState.FOLLOW: self.follow,
+            CommanderState.OFFBOARD: self._offboard,
         }
         self.mode: Mode = hold
         self.command_down_m_s = 0.0
@@ -110,7 +110,7 @@ class Guidance:
 
     def enter(
         self,
-        flown: State,
+        flown: CommanderState,
         state: VehicleState,
         *,
         target_ned_m: Vec3 = NAN3,
@@ -129,12 +129,12 @@ class Guidance:
         begins, self.mode = self.mode is not self._hold, self._hold
         self._hold.go_to(state, target_ned_m, yaw_rad, speed_m_s, begins=begins)
 
-    def fly_leg(self, state: VehicleState, leg: Leg) -> None:
+    def fly_leg(self, state: VehicleState, leg: MissionLeg) -> None:
         """Fly a leg of a mission."""
         if leg.kind is LegKind.TAKEOFF:
-            self.enter(State.TAKEOFF, state, target_ned_m=leg.target_ned_m)
+            self.enter(CommanderState.TAKEOFF, state, target_ned_m=leg.target_ned_m)
         elif leg.kind is LegKind.LAND:
-            self.enter(State.LAND, state, target_ned_m=leg.target_ned_m)
+            self.enter(CommanderState.LAND, state, target_ned_m=leg.target_ned_m)
         else:
             begins, self.mode = self.mode is not self._hold, self._hold
             self._hold.fly_leg(state, leg, begins=begins)

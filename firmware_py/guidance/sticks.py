@@ -1,4 +1,4 @@
-"""Manual modes: what a pilot's sticks command in each."""
+"""Manual modes: what an operator's sticks command in each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from firmware_py.commands import (
     BodyRateCommand,
     ControlCommand,
     TiltCommand,
-    VelocityCommand,
+    VelocityFrdCommand,
 )
 from firmware_py.guidance.limits import acceleration_limits, level_pair
 from firmware_py.guidance.mode import Mode, ModeEntry
@@ -194,6 +194,6 @@ class PositionMode(AltitudeMode):
         velocity, acceleration = level_pair(
             state, limits.clip(*velocity_ned_m_s), reference.acceleration_ned_m_s2
         )
-        return VelocityCommand(
+        return VelocityFrdCommand(
             velocity, settings.without_dead_zone(sticks.yaw) * settings.yaw_rate_rad_s, acceleration
         )

@@ -1,4 +1,4 @@
-"""A pilot's sticks: MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, and RC_CHANNELS with the latter's channels."""
+"""An operator's sticks: MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, and RC_CHANNELS with the latter's channels."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera.component import CameraComponent, Streaming
-from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink, VideoStream
+from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CaptureSink, FixedCamera, VideoStream
 from firmware_py.mavlink.commands.flight import FlightCommands
 from firmware_py.mavlink.commands.gripper import GripperService
 from firmware_py.mavlink.commands.maintenance import FailureSink, MaintenanceCommands
@@ -67,7 +67,7 @@ class NodeOptions:
     firmware_files: Mapping[str, bytes] | None = None
     shell: bool = False  # whether SERIAL_CONTROL is answered
     log_text: Callable[[int, StatusText], None] | None = None  # called with vehicle time and each text
-    camera: CameraModel | None = None
+    camera: FixedCamera | None = None
     captures: CaptureSink | None = None  # keeps pictures and records video; by default they are only counted
     switch_video: Callable[[bool], None] | None = None  # starts and stops the streams in RTP
     gimbal: GimbalDevice | None = None  # carries the camera

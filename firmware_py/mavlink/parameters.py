@@ -14,7 +14,7 @@ from __future__ import annotations
 from struct import pack, unpack
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Service, VehicleCommand
 from firmware_py.parameters import Parameter, ParameterError
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import Message, mavlink
@@ -151,7 +151,7 @@ class ParameterService(_ParameterProtocol):
             HASH_NAME.encode(), value, mavlink.MAV_PARAM_TYPE_UINT32, len(parameters), _HASH_INDEX
         )
 
-    def _preflight_storage(self, command: Command) -> CommandResult:
+    def _preflight_storage(self, command: VehicleCommand) -> CommandResult:
         """Save the parameters, or reset them to their defaults.
 
         Loading does nothing, as they are loaded at start, and neither does resetting calibrations, as there

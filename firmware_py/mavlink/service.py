@@ -24,7 +24,7 @@ Entry = TypeVar("Entry")
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class VehicleCommand:
     """A COMMAND_LONG or COMMAND_INT; NaN means "not given"."""
 
     link: Link  # on which it was received
@@ -38,7 +38,7 @@ class Command:
     repeated: bool = False  # it was sent before, and no acknowledgement was received
 
     @classmethod
-    def from_long(cls, link: Link, message: Message) -> Command:
+    def from_long(cls, link: Link, message: Message) -> VehicleCommand:
         """The command of a COMMAND_LONG."""
         p5, p6, p7 = message.param5, message.param6, message.param7
         params = (message.param1, message.param2, message.param3, message.param4)
@@ -47,7 +47,7 @@ class Command:
         return cls(link, params, p5, p6, p7, params_567=(p5, p6, p7), sender=sender, repeated=repeated)
 
     @classmethod
-    def from_int(cls, link: Link, message: Message) -> Command:
+    def from_int(cls, link: Link, message: Message) -> VehicleCommand:
         """The command of a COMMAND_INT."""
         return cls(
             link,
@@ -80,7 +80,7 @@ class Command:
 Handler = Callable[[Link, Message], None]
 """Takes a message received on a link."""
 
-CommandHandler = Callable[[Command], CommandResult | None]
+CommandHandler = Callable[[VehicleCommand], CommandResult | None]
 """Executes a command; None: it is not acknowledged."""
 
 MissionCommandHandler = Callable[[SevenParams], CommandResult]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import atan2, dist, hypot, isfinite, nan, radians, remainder, tau
 
-from firmware_py.missions.flight import IssuedCommand, View
+from firmware_py.missions.flight import IssuedCommand, VehicleView
 from firmware_py.missions.items import ROI_LOCATION, ROI_WPNEXT, Do, MissionItem
 from firmware_py.types import WARNING, StatusText
 from framerunner.geometry.vectors import ZERO3, Vec3
@@ -49,7 +49,7 @@ class RegionOfInterest:
         self._to_target = False
         self._offset_rad = 0.0
 
-    def change(self, item: MissionItem, view: View) -> None:
+    def change(self, item: MissionItem, view: VehicleView) -> None:
         """Take the region of an item."""
         self.release()
         match item.command:
@@ -63,7 +63,7 @@ class RegionOfInterest:
             case Do.SET_ROI | Do.NAV_ROI if item.params[0] == ROI_WPNEXT:
                 self._to_target = True
 
-    def yaw_rad(self, view: View, target_ned_m: Vec3, min_distance_m: float) -> float:
+    def yaw_rad(self, view: VehicleView, target_ned_m: Vec3, min_distance_m: float) -> float:
         """The yaw towards the region; NaN without one, and nearer to it than the minimum distance."""
         place_ned_m = target_ned_m if self._to_target else self._place_ned_m
         if place_ned_m is None:
@@ -74,7 +74,7 @@ class RegionOfInterest:
             return nan
         return remainder(atan2(east_m, north_m) + self._offset_rad, tau)
 
-    def _look_at(self, item: MissionItem, view: View) -> None:
+    def _look_at(self, item: MissionItem, view: VehicleView) -> None:
         place_ned_m = view.place_of(item)
         if isfinite(place_ned_m[0]):
             self._place_ned_m = place_ned_m
@@ -95,7 +95,7 @@ class MissionActions:
         self._taken = 0
         self._repeating = False
 
-    def perform(self, item: MissionItem, view: View) -> None:
+    def perform(self, item: MissionItem, view: VehicleView) -> None:
         """Perform an item; one that only controls the order of items, such as a jump, does nothing."""
         command = item.command
         if command in REGIONS:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import hypot, isnan
 
-from firmware_py.missions.flight import View
+from firmware_py.missions.flight import VehicleView
 from firmware_py.missions.geofence import Geofence
 from firmware_py.missions.items import Do, MissionItem
 from firmware_py.missions.route import jump_of
@@ -18,7 +18,7 @@ _MIN_GATE_DISTANCE_M = 0.05
 
 
 def mission_faults(
-    items: Sequence[MissionItem], view: View, parameters: Parameters, fence: Geofence
+    items: Sequence[MissionItem], view: VehicleView, parameters: Parameters, fence: Geofence
 ) -> tuple[bool, list[StatusText]]:
     """Check a mission.
 
@@ -49,7 +49,7 @@ def mission_faults(
     return not faults, [StatusText(CRITICAL, text) for text in texts]
 
 
-def _item_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
+def _item_faults(items: Sequence[MissionItem], view: VehicleView) -> Iterator[str]:
     if items[0].command == Do.LAND and view.landed:
         yield "Mission rejected: starts with landing"
     for item in items:
@@ -62,7 +62,7 @@ def _item_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
             yield f"Mission rejected: item {item.seq + 1} jumps to item {target + 1} of {len(items)}"
 
 
-def _takeoff_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
+def _takeoff_faults(items: Sequence[MissionItem], view: VehicleView) -> Iterator[str]:
     """A take-off must be before all other places and lead upwards."""
     home_down_m = view.home_ned_m[2] if view.home_ned_m is not None else 0.0
     place_seen = False
@@ -75,7 +75,7 @@ def _takeoff_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
         place_seen = place_seen or item.has_place or item.command == Do.CONDITION_GATE
 
 
-def _gate_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
+def _gate_faults(items: Sequence[MissionItem], view: VehicleView) -> Iterator[str]:
     """A gate and the places before and after it must differ, to have a direction."""
     before: MissionItem | None = None
     for item in items:
@@ -89,7 +89,7 @@ def _gate_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
         before = item
 
 
-def _fence_faults(items: Sequence[MissionItem], view: View, fence: Geofence) -> Iterator[str]:
+def _fence_faults(items: Sequence[MissionItem], view: VehicleView, fence: Geofence) -> Iterator[str]:
     for item in items:
         if not item.has_place:
             continue
@@ -102,7 +102,9 @@ def _fence_faults(items: Sequence[MissionItem], view: View, fence: Geofence) -> 
             return
 
 
-def _first_place_warnings(items: Sequence[MissionItem], view: View, parameters: Parameters) -> Iterator[str]:
+def _first_place_warnings(
+    items: Sequence[MissionItem], view: VehicleView, parameters: Parameters
+) -> Iterator[str]:
     limit_m, home_ned_m = parameters.value("MIS_DIST_1WP"), view.home_ned_m
     first = next((item for item in items if item.has_place), None)
     if limit_m <= 0.0 or first is None or home_ned_m is None:

@@ -8,7 +8,7 @@ from math import hypot, isfinite, isnan, nan, radians, remainder, tau
 
 from firmware_py.missions import route
 from firmware_py.missions.actions import MissionActions
-from firmware_py.missions.flight import IssuedCommand, Leg, LegKind, View
+from firmware_py.missions.flight import IssuedCommand, LegKind, MissionLeg, VehicleView
 from firmware_py.missions.items import Do, MissionItem
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
@@ -56,7 +56,7 @@ class Arrival:
         own_m = item.params[1] if item.command == Do.WAYPOINT else nan
         return own_m if isfinite(own_m) and own_m > 0.0 else self.radius_m
 
-    def has_climbed(self, leg: Leg, view: View) -> bool:
+    def has_climbed(self, leg: MissionLeg, view: VehicleView) -> bool:
         """Whether the vehicle is high enough; for a very low climb, half of it must be done."""
         if view.landed:
             return False
@@ -67,7 +67,7 @@ class Arrival:
                 tolerance_m = above_home_m / 2.0
         return view.position_ned_m[2] < leg.target_ned_m[2] + tolerance_m
 
-    def is_there(self, leg: Leg, view: View) -> bool:
+    def is_there(self, leg: MissionLeg, view: VehicleView) -> bool:
         """Whether the vehicle is at the leg's target."""
         north_m, east_m, down_m = leg.target_ned_m
         here_ned_m = view.position_ned_m
@@ -76,7 +76,7 @@ class Arrival:
             and hypot(north_m - here_ned_m[0], east_m - here_ned_m[1]) <= leg.radius_m
         )
 
-    def has_arrived(self, leg: Leg, view: View) -> bool:
+    def has_arrived(self, leg: MissionLeg, view: VehicleView) -> bool:
         """Whether the vehicle was in the air at the target and has reached its heading."""
         if self._since_us < 0:
             if view.landed or not self.is_there(leg, view):
@@ -91,14 +91,14 @@ class Arrival:
             )
         return self._heading_reached
 
-    def has_waited(self, item: MissionItem, view: View) -> bool:
+    def has_waited(self, item: MissionItem, view: VehicleView) -> bool:
         """Whether the item's waiting time is over, since the arrival or else since the first call."""
         if self._since_us < 0:
             self._since_us = view.time_us
         return view.time_us - self._since_us >= item.hold_us
 
 
-def is_behind(gate_ned_m: Vec3, leg: Leg, view: View) -> bool:
+def is_behind(gate_ned_m: Vec3, leg: MissionLeg, view: VehicleView) -> bool:
     """Whether the vehicle has passed a gate on its path to the leg's target."""
     along_north_m, along_east_m = leg.target_ned_m[0] - gate_ned_m[0], leg.target_ned_m[1] - gate_ned_m[1]
     north_m = view.position_ned_m[0] - gate_ned_m[0]
@@ -122,8 +122,8 @@ class _Phase(Enum):
 class MissionExecutor:
     """Decides what to fly next. `enter` at mode entry, `step` each tick, `leave` at mode exit.
 
-    A step in which nothing changes makes a few comparisons and returns the same `Leg` again. One item is
-    begun or ended per step.
+    A step in which nothing changes makes a few comparisons and returns the same `MissionLeg` again. One item
+    is begun or ended per step.
     """
 
     def __init__(self, store: MissionStore, parameters: Parameters) -> None:
@@ -132,7 +132,7 @@ class MissionExecutor:
         self._arrival = Arrival(parameters)
         self._actions = MissionActions()
         self._jumps: dict[int, int] = {}
-        self._leg = Leg(LegKind.DONE, ZERO3)
+        self._leg = MissionLeg(LegKind.DONE, ZERO3)
         self._item: MissionItem | None = None
         self._phase = _Phase.OVER
         self._seen = (-1, -1)
@@ -144,7 +144,7 @@ class MissionExecutor:
         self._left_at = 0
         self._replay: tuple[int, MissionItem] | None = None  # an item, and the trigger to repeat behind it
 
-    def enter(self, view: View) -> None:
+    def enter(self, view: VehicleView) -> None:
         """Begin, or continue at the current item; from below its place, climb to its height first."""
         store = self._store
         self._arrival.configure(self._parameters)
@@ -158,12 +158,12 @@ class MissionExecutor:
             self._jumps.clear()
         self._restart = False
         self._climb_first = True
-        self._leg = Leg(LegKind.HOLD, view.position_ned_m)
+        self._leg = MissionLeg(LegKind.HOLD, view.position_ned_m)
         if self._begin_mission(view):
             self._resume()
             self._begin_item(view)
 
-    def step(self, view: View) -> Leg:
+    def step(self, view: VehicleView) -> MissionLeg:
         """The leg to fly now."""
         store = self._store
         if self._seen != (store.mission.version, store.selections):
@@ -196,7 +196,7 @@ class MissionExecutor:
 
     # Beginning and changing the mission
 
-    def _begin_mission(self, view: View) -> bool:
+    def _begin_mission(self, view: VehicleView) -> bool:
         """Whether there is a mission to fly; if not, the vehicle stays where it is."""
         store = self._store
         self._seen = (store.mission.version, store.selections)
@@ -232,7 +232,7 @@ class MissionExecutor:
             self._replay = (store.current, trigger)
         self._left_at = 0
 
-    def _change(self, view: View) -> None:
+    def _change(self, view: VehicleView) -> None:
         """Begin another mission, or another item, while this one is flown."""
         if self._store.mission.version != self._seen[0]:
             self._jumps.clear()
@@ -241,7 +241,7 @@ class MissionExecutor:
         if self._begin_mission(view):
             self._begin_item(view)
 
-    def _move_home(self, view: View) -> None:
+    def _move_home(self, view: VehicleView) -> None:
         """Adapt a height above home to a new home."""
         before, self._home_ned_m = self._home_ned_m, view.home_ned_m
         if before is None or view.home_ned_m is None or self._item is None or not self._item.is_relative:
@@ -252,7 +252,7 @@ class MissionExecutor:
 
     # Beginning an item
 
-    def _begin_item(self, view: View) -> None:
+    def _begin_item(self, view: VehicleView) -> None:
         item = self._item = self._store.mission.items[self._store.current]
         self._arrival.begin()
         self._phase = _Phase.ITEM
@@ -266,14 +266,16 @@ class MissionExecutor:
             self._gate_ned_m = None if onward is None else self._target_of(item, view)
             if onward is not None:
                 target_ned_m = self._target_of(onward, view)
-                self._leg = Leg(LegKind.FLY, target_ned_m, nan, self._speed_m_s, self._arrival.radius_m)
+                self._leg = MissionLeg(
+                    LegKind.FLY, target_ned_m, nan, self._speed_m_s, self._arrival.radius_m
+                )
         elif item.command == Do.CHANGE_SPEED:
             self._speed_m_s = route.commanded_speed(item)
             self._leg = replace(self._leg, speed_m_s=self._speed_m_s)
         else:
             self._actions.perform(item, view)
 
-    def _begin_place(self, item: MissionItem, view: View) -> None:
+    def _begin_place(self, item: MissionItem, view: VehicleView) -> None:
         """Climb first if necessary, else fly to the item's place."""
         climb_first, self._climb_first = self._climb_first, False
         here_ned_m, target_ned_m = view.position_ned_m, self._target_of(item, view)
@@ -290,13 +292,13 @@ class MissionExecutor:
             self._actions.say(INFO, f"Climb to {above_home_m:.1f} meters above home")
             kind = LegKind.TAKEOFF if view.landed else LegKind.FLY
             self._phase = _Phase.CLIMB
-            self._leg = Leg(
+            self._leg = MissionLeg(
                 kind, (here_ned_m[0], here_ned_m[1], down_m), nan, self._speed_m_s, self._arrival.radius_m
             )
             return
         self._fly_to(item, target_ned_m, view)
 
-    def _fly_to(self, item: MissionItem, target_ned_m: Vec3, view: View) -> None:
+    def _fly_to(self, item: MissionItem, target_ned_m: Vec3, view: VehicleView) -> None:
         yaw_deg = item.params[3] if item.command in _YAWING else nan
         if item.command == Do.LOITER_TO_ALT and view.position_ned_m[2] != target_ned_m[2]:
             self._phase = _Phase.APPROACH  # the height is changed only at the place
@@ -311,7 +313,7 @@ class MissionExecutor:
                 target_ned_m[1] if isnan(east_m) else east_m,
                 down_m if isfinite(down_m) else target_ned_m[2],
             )
-        self._leg = Leg(
+        self._leg = MissionLeg(
             LegKind.FLY,
             target_ned_m,
             remainder(radians(yaw_deg), tau) if isfinite(yaw_deg) else nan,
@@ -320,7 +322,7 @@ class MissionExecutor:
             next_ned_m,
         )
 
-    def _begin_landing(self, target_ned_m: Vec3, view: View) -> None:
+    def _begin_landing(self, target_ned_m: Vec3, view: VehicleView) -> None:
         """Land at the target; from farther away, fly there first at the present height."""
         here_ned_m = view.position_ned_m
         north_m, east_m, _ = target_ned_m
@@ -328,14 +330,14 @@ class MissionExecutor:
             down_m = self._leg.target_ned_m[2] if self._leg.kind is LegKind.FLY else here_ned_m[2]
             self._phase = _Phase.APPROACH
             place_ned_m = (north_m, east_m, down_m)
-            self._leg = Leg(LegKind.FLY, place_ned_m, nan, self._speed_m_s, self._arrival.radius_m)
+            self._leg = MissionLeg(LegKind.FLY, place_ned_m, nan, self._speed_m_s, self._arrival.radius_m)
         else:
             self._phase = _Phase.ITEM
-            self._leg = Leg(LegKind.LAND, (north_m, east_m, here_ned_m[2]))
+            self._leg = MissionLeg(LegKind.LAND, (north_m, east_m, here_ned_m[2]))
 
     # Ending an item
 
-    def _is_done(self, item: MissionItem, view: View) -> bool:
+    def _is_done(self, item: MissionItem, view: VehicleView) -> bool:
         """Whether the present phase of the item is over."""
         if self._phase is _Phase.CLIMB:
             return self._arrival.has_climbed(self._leg, view)
@@ -356,7 +358,7 @@ class MissionExecutor:
                 done = True
         return done
 
-    def _go_on(self, item: MissionItem, view: View) -> None:
+    def _go_on(self, item: MissionItem, view: VehicleView) -> None:
         """Begin the next phase of the item, or the next item."""
         if self._phase is _Phase.CLIMB:
             self._phase = _Phase.ITEM
@@ -366,7 +368,9 @@ class MissionExecutor:
             self._phase = _Phase.ITEM
             target_ned_m = self._target_of(item, view)
             if item.command == Do.LAND:
-                self._leg = Leg(LegKind.LAND, (target_ned_m[0], target_ned_m[1], view.position_ned_m[2]))
+                self._leg = MissionLeg(
+                    LegKind.LAND, (target_ned_m[0], target_ned_m[1], view.position_ned_m[2])
+                )
             else:
                 self._leg = replace(self._leg, target_ned_m=target_ned_m)
             return
@@ -376,7 +380,7 @@ class MissionExecutor:
             return
         self._begin_next(item, view)
 
-    def _begin_next(self, item: MissionItem, view: View) -> None:
+    def _begin_next(self, item: MissionItem, view: VehicleView) -> None:
         store = self._store
         found = None
         if store.current + 1 < len(store.mission.items):
@@ -385,14 +389,14 @@ class MissionExecutor:
             store.finished = found is None
             store.current = store.current if found is None else found
             self._item, self._phase = None, _Phase.OVER
-            self._leg = Leg(LegKind.RETURN, view.position_ned_m)
+            self._leg = MissionLeg(LegKind.RETURN, view.position_ned_m)
         elif found is None:
             self._end(view, finished=True)
         else:
             store.current = found
             self._begin_item(view)
 
-    def _end(self, view: View, *, finished: bool) -> None:
+    def _end(self, view: VehicleView, *, finished: bool) -> None:
         """Stay: at the target flown to, else here."""
         if finished:
             self._actions.say(INFO, f"Mission finished, {'landed' if view.landed else 'loitering'}")
@@ -401,9 +405,9 @@ class MissionExecutor:
         flown_to = self._leg.kind is LegKind.FLY and not view.landed
         target_ned_m = self._leg.target_ned_m if flown_to else view.position_ned_m
         self._item, self._phase = None, _Phase.OVER
-        self._leg = Leg(LegKind.DONE, target_ned_m, self._leg.yaw_rad, self._speed_m_s)
+        self._leg = MissionLeg(LegKind.DONE, target_ned_m, self._leg.yaw_rad, self._speed_m_s)
 
-    def _look(self, view: View) -> None:
+    def _look(self, view: VehicleView) -> None:
         """Yaw towards the region of interest; not while climbing, taking off or landing."""
         if self._phase is not _Phase.ITEM or self._leg.kind is not LegKind.FLY:
             return
@@ -413,7 +417,7 @@ class MissionExecutor:
         if not abs(remainder(yaw_rad - self._leg.yaw_rad, tau)) <= _SAME_YAW_RAD:  # also if it was NaN
             self._leg = replace(self._leg, yaw_rad=yaw_rad)
 
-    def _target_of(self, item: MissionItem, view: View) -> Vec3:
+    def _target_of(self, item: MissionItem, view: VehicleView) -> Vec3:
         """The item's place; what it does not give is the vehicle's position, or the height of its leg."""
         north_m, east_m, down_m = view.place_of(item)
         if isnan(north_m):

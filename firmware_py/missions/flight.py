@@ -14,7 +14,7 @@ SevenParams = tuple[float, float, float, float, float, float, float]
 
 
 @dataclass(slots=True)
-class View:
+class VehicleView:
     """The vehicle's state for missions; one object, updated in place.
 
     Attributes:
@@ -67,7 +67,7 @@ class LegKind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Leg:
+class MissionLeg:
     """What to fly now; the same object until something changes.
 
     Attributes:

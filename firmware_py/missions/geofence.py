@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import hypot, isfinite
 
-from firmware_py.missions.flight import View
+from firmware_py.missions.flight import VehicleView
 from firmware_py.missions.items import CIRCLES, POLYGONS, Do, MissionItem
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
@@ -87,7 +87,7 @@ def vertex_count(item: MissionItem) -> int:
     return int(count + 0.5) if isfinite(count) and count >= 0.0 else 0
 
 
-def shapes_of(items: Sequence[MissionItem], view: View) -> Iterator[Shape]:
+def shapes_of(items: Sequence[MissionItem], view: VehicleView) -> Iterator[Shape]:
     """The shapes of a valid fence in the local frame; none without a projection."""
     if view.projection is None:
         return
@@ -126,14 +126,14 @@ class Geofence:
         self._shapes: tuple[Shape, ...] = ()
         self._texts: list[StatusText] = []
 
-    def check(self, view: View) -> str | None:
+    def check(self, view: VehicleView) -> str | None:
         """The breach of the vehicle; with GF_PREDICT, of the place where it can stop."""
         self._prepare(view)
         if self._braking is None:
             return self._breach(view.position_ned_m, view)
         return self._breach(_stopping_place(view, *self._braking), view)
 
-    def breach_at(self, position_ned_m: Vec3, view: View) -> str | None:
+    def breach_at(self, position_ned_m: Vec3, view: VehicleView) -> str | None:
         """The breach of a place in the local frame."""
         self._prepare(view)
         return self._breach(position_ned_m, view)
@@ -143,7 +143,7 @@ class Geofence:
         texts, self._texts = self._texts, []
         return texts
 
-    def _breach(self, position_ned_m: Vec3, view: View) -> str | None:
+    def _breach(self, position_ned_m: Vec3, view: VehicleView) -> str | None:
         home_ned_m = view.home_ned_m
         if home_ned_m is not None:
             north_m, east_m, down_m = position_ned_m
@@ -156,7 +156,7 @@ class Geofence:
                 return f"{'outside' if shape.keep_in else 'inside'} {shape.name}"
         return None
 
-    def _prepare(self, view: View) -> None:
+    def _prepare(self, view: VehicleView) -> None:
         """Apply the plan and the parameters when they have changed."""
         if self._parameters.version != self._parameters_version:
             self._configure()
@@ -189,7 +189,9 @@ class Geofence:
             self._braking = (value("MPC_ACC_HOR"), value("MPC_ACC_DOWN_MAX"), value("MPC_JERK_AUTO"))
 
 
-def _stopping_place(view: View, horizontal_m_s2: float, downward_m_s2: float, jerk_m_s3: float) -> Vec3:
+def _stopping_place(
+    view: VehicleView, horizontal_m_s2: float, downward_m_s2: float, jerk_m_s3: float
+) -> Vec3:
     """Where the vehicle comes to rest if it brakes now; a descent is ignored, no fence is below.
 
     The distance is v^2 / (2 a) and, for the time in which the acceleration builds up, v a / j.

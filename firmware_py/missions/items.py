@@ -17,7 +17,7 @@ class PlanType(IntEnum):
     RALLY = 2
 
 
-class Frame(IntEnum):
+class MavFrame(IntEnum):
     """The frames that an item may have."""
 
     GLOBAL = 0
@@ -27,8 +27,8 @@ class Frame(IntEnum):
     GLOBAL_RELATIVE_ALT_INT = 6
 
 
-GLOBAL_FRAMES = frozenset(Frame) - {Frame.MISSION}
-RELATIVE_FRAMES = frozenset({Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT})
+GLOBAL_FRAMES = frozenset(MavFrame) - {MavFrame.MISSION}
+RELATIVE_FRAMES = frozenset({MavFrame.GLOBAL_RELATIVE_ALT, MavFrame.GLOBAL_RELATIVE_ALT_INT})
 
 
 class Do(IntEnum):
@@ -115,7 +115,7 @@ class MissionItem:
 
     Attributes:
         seq: its index in the plan, from 0.
-        frame: `Frame`.
+        frame: `MavFrame`.
         command: `Do`.
         params: params 1 to 4.
         x: latitude in degrees in a global frame, else param 5; NaN: not given.

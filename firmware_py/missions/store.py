@@ -12,7 +12,7 @@ _REACHED_KEPT = 100
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class StoredPlan:
     """The items of one upload.
 
     Attributes:
@@ -38,7 +38,7 @@ class MissionStore:
     """
 
     def __init__(self) -> None:
-        self._plans = [Plan() for _ in PlanType]
+        self._plans = [StoredPlan() for _ in PlanType]
         self._reached: deque[int] = deque(maxlen=_REACHED_KEPT)
         self.current = 0
         self.selections = 0
@@ -46,22 +46,22 @@ class MissionStore:
         self.started = False
         self.finished = False
 
-    def plan(self, plan_type: PlanType) -> Plan:
+    def plan(self, plan_type: PlanType) -> StoredPlan:
         """The plan of a type."""
         return self._plans[plan_type]
 
     @property
-    def mission(self) -> Plan:
+    def mission(self) -> StoredPlan:
         """The mission."""
         return self._plans[PlanType.MISSION]
 
     @property
-    def fence(self) -> Plan:
+    def fence(self) -> StoredPlan:
         """The fence."""
         return self._plans[PlanType.FENCE]
 
     @property
-    def rally(self) -> Plan:
+    def rally(self) -> StoredPlan:
         """The rally points."""
         return self._plans[PlanType.RALLY]
 
@@ -86,7 +86,7 @@ class MissionStore:
         old = self._plans[plan_type]
         if kept and identity == old.opaque_id:
             return identity
-        self._plans[plan_type] = Plan(kept, identity, old.version + 1)
+        self._plans[plan_type] = StoredPlan(kept, identity, old.version + 1)
         if plan_type is PlanType.MISSION:
             wanted = self.current if current is None else current
             self.current = max(0, min(wanted, len(kept) - 1))

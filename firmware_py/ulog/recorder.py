@@ -13,8 +13,8 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.telemetry.connection import FOLLOWED_PX4_VERSION, OWN_VERSION, packed_version
 from firmware_py.storage import LOG_SUFFIX, Path, Storage
 from firmware_py.types import WARNING, StatusText
-from firmware_py.ulog import messages
-from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged, Sample
+from firmware_py.ulog import ulog_messages
+from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged, LogSample
 
 _FLUSH_US = 1_000_000
 _LOG_FOLDER: Path = ("log",)
@@ -87,11 +87,11 @@ class UlogRecorder:
     def hear_text(self, time_us: int, said: StatusText) -> None:
         """Log a status text of a vehicle time; between flights it is dropped."""
         if self.path is not None:
-            self._buffer += messages.logged_text(time_us, said.severity, said.text)
+            self._buffer += ulog_messages.logged_text(time_us, said.severity, said.text)
 
     def _log_parameter(self, name: str, value: float) -> None:
         if self.path is not None and self._recorded is not None:
-            self._buffer += messages.parameter(self._recorded.parameters.declaration(name), value)
+            self._buffer += ulog_messages.parameter(self._recorded.parameters.declaration(name), value)
 
     def _begin(self, autopilot: Autopilot) -> None:
         if self._recorded is None:
@@ -122,25 +122,25 @@ class UlogRecorder:
         parameters = autopilot.parameters
         own = ".".join(map(str, OWN_VERSION))
         system_id = parameters.integer("MAV_SYS_ID")
-        parts = [messages.file_header(time_us)]
+        parts = [ulog_messages.file_header(time_us)]
         parts += [
-            messages.text_information("sys_name", "PX4"),
-            messages.text_information("ver_hw", "PX4_SITL"),
-            messages.text_information("ver_hw_subtype", f"framerunner {autopilot.airframe.name}"),
-            messages.text_information("ver_sw", f"framerunner {own}"),
-            messages.number_information("ver_sw_release", packed_version(FOLLOWED_PX4_VERSION)),
-            messages.text_information("sys_os_name", "framerunner"),
-            messages.number_information("sys_os_ver_release", packed_version(OWN_VERSION)),
-            messages.text_information("sys_uuid", f"66726d72{system_id:08x}"),
-            messages.number_information("ver_data_format", _GPS_DATA_FORMAT),
-            messages.number_information("time_ref_utc", 0, "int32_t"),
+            ulog_messages.text_information("sys_name", "PX4"),
+            ulog_messages.text_information("ver_hw", "PX4_SITL"),
+            ulog_messages.text_information("ver_hw_subtype", f"framerunner {autopilot.airframe.name}"),
+            ulog_messages.text_information("ver_sw", f"framerunner {own}"),
+            ulog_messages.number_information("ver_sw_release", packed_version(FOLLOWED_PX4_VERSION)),
+            ulog_messages.text_information("sys_os_name", "framerunner"),
+            ulog_messages.number_information("sys_os_ver_release", packed_version(OWN_VERSION)),
+            ulog_messages.text_information("sys_uuid", f"66726d72{system_id:08x}"),
+            ulog_messages.number_information("ver_data_format", _GPS_DATA_FORMAT),
+            ulog_messages.number_information("time_ref_utc", 0, "int32_t"),
         ]
         parts += [each.topic.definition() for each in LOGGED]
         for declared in parameters.declarations:
             value = parameters.value(declared.name)
-            parts.append(messages.parameter(declared, value))
+            parts.append(ulog_messages.parameter(declared, value))
             if value != declared.default:
-                parts.append(messages.parameter_default(declared))
+                parts.append(ulog_messages.parameter_default(declared))
         parts += [each.topic.subscription() for each in LOGGED]
         return b"".join(parts)
 
@@ -151,10 +151,10 @@ class UlogRecorder:
         self._flush(autopilot)
         self.path = None
 
-    def _sample(self, autopilot: Autopilot, time_us: int) -> Sample:
+    def _sample(self, autopilot: Autopilot, time_us: int) -> LogSample:
         unix_us = self._boot_unix_us + time_us if self._boot_unix_us else 0
         report = autopilot.estimator.report()
-        return Sample(autopilot, time_us, unix_us, autopilot.global_position(), report)
+        return LogSample(autopilot, time_us, unix_us, autopilot.global_position(), report)
 
     def _log_due(self, autopilot: Autopilot, time_us: int) -> None:
         sample = self._sample(autopilot, time_us)
@@ -165,7 +165,7 @@ class UlogRecorder:
                 self._log(each, sample)
         self._due_us = min(self._next_us)
 
-    def _log(self, logged: Logged, sample: Sample) -> None:
+    def _log(self, logged: Logged, sample: LogSample) -> None:
         values = logged.collect(sample)
         if values is not None:
             self._buffer += logged.topic.header

@@ -16,7 +16,7 @@ from firmware_py.mavlink.telemetry.condition import pulses_us
 from firmware_py.mavlink.telemetry.health import accuracy_m, solution_flags
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint
 from firmware_py.status import NAVIGATION_STATES, LandedState
-from firmware_py.ulog.messages import Topic
+from firmware_py.ulog.ulog_messages import Topic
 from framerunner.vehicle.atmosphere import pressure_altitude_m
 from framerunner.vehicle.geodesy import GeodeticPoint
 
@@ -37,7 +37,7 @@ _AIDED_BY = {
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class LogSample:
     """One sample of the autopilot, with values that several topics need.
 
     Attributes:
@@ -73,7 +73,7 @@ def accuracies_and_ratios(report: EstimatorReport) -> Values:
     )
 
 
-def gps(sample: Sample) -> Values | None:
+def gps(sample: LogSample) -> Values | None:
     """Values of vehicle_gps_position."""
     fix = sample.report.latest.gps
     if fix is None:
@@ -105,7 +105,7 @@ def gps(sample: Sample) -> Values | None:
     )
 
 
-def air_data(sample: Sample) -> Values | None:
+def air_data(sample: LogSample) -> Values | None:
     """Values of vehicle_air_data."""
     pressure = sample.report.latest.barometer
     if pressure is None:
@@ -121,13 +121,13 @@ def air_data(sample: Sample) -> Values | None:
     )
 
 
-def magnetometer(sample: Sample) -> Values | None:
+def magnetometer(sample: LogSample) -> Values | None:
     """Values of vehicle_magnetometer."""
     field = sample.report.latest.magnetometer
     return None if field is None else (sample.time_us, field.time_us, *field.field_frd_gauss)
 
 
-def sensor_combined(sample: Sample) -> Values | None:
+def sensor_combined(sample: LogSample) -> Values | None:
     """Values of sensor_combined: the IMU as measured."""
     imu = sample.report.latest.imu
     if imu is None:
@@ -146,16 +146,16 @@ _ROTARY_WING = 1
 _ESTIMATOR_IN_AIR = 1 << 7  # of estimator_status.control_mode_flags
 
 
-Collector = Callable[[Sample], Values | None]
+Collector = Callable[[LogSample], Values | None]
 """From a sample to values in the topic's order; None: nothing to log."""
 
 
-def _attitude(sample: Sample) -> Values:
+def _attitude(sample: LogSample) -> Values:
     time_us = sample.time_us
     return (time_us, time_us, *sample.autopilot.state.attitude, 0.0, 0.0, 0.0, 0.0, 0)
 
 
-def _attitude_setpoint(sample: Sample) -> Values | None:
+def _attitude_setpoint(sample: LogSample) -> Values | None:
     followed = sample.autopilot.status.setpoint
     if not isinstance(followed, AttitudeSetpoint):
         return None
@@ -163,22 +163,22 @@ def _attitude_setpoint(sample: Sample) -> Values | None:
     return (sample.time_us, yaw_rate_rad_s, *followed.attitude, 0.0, 0.0, -followed.thrust)
 
 
-def _rates_setpoint(sample: Sample) -> Values | None:
+def _rates_setpoint(sample: LogSample) -> Values | None:
     followed = sample.autopilot.status.setpoint
     if not isinstance(followed, BodyRateSetpoint):
         return None
     return (sample.time_us, *followed.rate_frd_rad_s, 0.0, 0.0, -followed.thrust)
 
 
-def _angular_velocity(sample: Sample) -> Values:
+def _angular_velocity(sample: LogSample) -> Values:
     return (sample.time_us, sample.time_us, *sample.autopilot.state.angular_rate_frd_rad_s)
 
 
-def _thrust_setpoint(sample: Sample) -> Values:
+def _thrust_setpoint(sample: LogSample) -> Values:
     return (sample.time_us, sample.time_us, 0.0, 0.0, -sample.autopilot.output.throttle)
 
 
-def _actuator_motors(sample: Sample) -> Values:
+def _actuator_motors(sample: LogSample) -> Values:
     """Thrust of each motor as a share of full thrust; NaN while disarmed, as PX4's."""
     autopilot = sample.autopilot
     speeds, full_rad_s = autopilot.output.speeds_rad_s, autopilot.airframe.motor.max_speed_rad_s
@@ -187,14 +187,14 @@ def _actuator_motors(sample: Sample) -> Values:
     return (sample.time_us, sample.time_us, *shares, *[nan] * (_MOTORS - len(shares)), 0)
 
 
-def _actuator_outputs(sample: Sample) -> Values:
+def _actuator_outputs(sample: LogSample) -> Values:
     """Pulses in microseconds, as SERVO_OUTPUT_RAW."""
     pulses = pulses_us(sample.autopilot)
     count = len(pulses)
     return (sample.time_us, count, *pulses, *[0.0] * (_OUTPUTS - count))
 
 
-def _local_position(sample: Sample) -> Values | None:
+def _local_position(sample: LogSample) -> Values | None:
     state, origin = sample.autopilot.state, sample.autopilot.status.origin
     if origin is None:
         return None
@@ -227,7 +227,7 @@ def _local_quality(report: EstimatorReport) -> Values:
     )
 
 
-def _local_position_setpoint(sample: Sample) -> Values:
+def _local_position_setpoint(sample: LogSample) -> Values:
     followed = sample.autopilot.status.setpoint.trajectory
     return (
         sample.time_us,
@@ -242,7 +242,7 @@ def _local_position_setpoint(sample: Sample) -> Values:
     )
 
 
-def _global_position(sample: Sample) -> Values | None:
+def _global_position(sample: LogSample) -> Values | None:
     place = sample.place
     if place is None:
         return None
@@ -260,13 +260,13 @@ def _global_position(sample: Sample) -> Values | None:
     )
 
 
-def _land_detected(sample: Sample) -> Values:
+def _land_detected(sample: LogSample) -> Values:
     landed = sample.autopilot.status.landed_state is LandedState.ON_GROUND
     low_throttle = sample.autopilot.output.throttle < 0.1
     return (sample.time_us, False, landed, landed, landed, low_throttle)
 
 
-def _battery(sample: Sample) -> Values:
+def _battery(sample: LogSample) -> Values:
     battery = sample.autopilot.battery
     warning = max(battery.warning - 1, 0)  # MAV_BATTERY_CHARGE_STATE counts from 1
     return (
@@ -283,7 +283,7 @@ def _battery(sample: Sample) -> Values:
     )
 
 
-def _vehicle_status(sample: Sample) -> Values:
+def _vehicle_status(sample: LogSample) -> Values:
     autopilot = sample.autopilot
     status, flight = autopilot.status, autopilot.flight
     return (
@@ -304,7 +304,7 @@ def _vehicle_status(sample: Sample) -> Values:
     )
 
 
-def _estimator_status(sample: Sample) -> Values:
+def _estimator_status(sample: LogSample) -> Values:
     flying = sample.autopilot.status.landed_state is not LandedState.ON_GROUND
     report = sample.report
     return (

@@ -16,7 +16,14 @@ from rich.table import Table
 
 from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.errors import SettingError, write_advice
-from vision.calibration.board import MIN_COVERAGE, SAME_VIEW, Board, CalibrationReport, View, coverage_of
+from vision.calibration.board import (
+    MIN_COVERAGE,
+    SAME_VIEW,
+    BoardView,
+    CalibrationReport,
+    CharucoBoard,
+    coverage_of,
+)
 from vision.calibration.model import CalibrationError
 from vision.sources import IMAGE_SUFFIXES, FolderSource, open_source
 from vision.types import CameraError, Image
@@ -28,12 +35,12 @@ MAX_VIEWS = 60
 class Collection:
     """Views that differ, and what was left out."""
 
-    views: list[View] = field(default_factory=list)
+    views: list[BoardView] = field(default_factory=list)
     images: int = 0
     without_board: int = 0
     similar: int = 0
 
-    def add(self, board: Board, image: Image, name: str) -> bool:
+    def add(self, board: CharucoBoard, image: Image, name: str) -> bool:
         """Look at an image; whether it is a new view."""
         self.images += 1
         view = board.find(image, name)
@@ -48,7 +55,7 @@ class Collection:
 
 
 async def collect(
-    board: Board, sources: Sequence[str], wanted: int, say: Callable[[str], None]
+    board: CharucoBoard, sources: Sequence[str], wanted: int, say: Callable[[str], None]
 ) -> Collection:
     """Look for the board in images until there are as many different views as wanted, or no more images.
 
@@ -74,7 +81,7 @@ async def collect(
 
 
 async def _collect_from(
-    source: str, collection: Collection, board: Board, wanted: int, say: Callable[[str], None]
+    source: str, collection: Collection, board: CharucoBoard, wanted: int, say: Callable[[str], None]
 ) -> None:
     image = image_in(source)
     if image is not None:
@@ -114,7 +121,7 @@ _WELL_COVERED = 12  # corners in a cell
 _FOREIGN = (".yaml", ".yml", ".xml", ".json")  # a calibration of ROS or OpenCV
 
 
-def write_board(board: Board, path: Path) -> None:
+def write_board(board: CharucoBoard, path: Path) -> None:
     """Write the board as a PNG file.
 
     Raises:
@@ -130,7 +137,7 @@ def write_board(board: Board, path: Path) -> None:
 
 
 def calibrate(
-    board: Board, sources: Sequence[str], wanted: int, out: Path, say: Callable[[str], None]
+    board: CharucoBoard, sources: Sequence[str], wanted: int, out: Path, say: Callable[[str], None]
 ) -> None:
     """Calibrate a camera, print how good it is, and write the file.
 

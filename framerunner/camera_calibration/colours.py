@@ -1,4 +1,4 @@
-"""Learns the colours of real frames from images of their paint, and keeps them in the calibration file."""
+"""Learns the colours of real gates from images of their paint, and keeps them in the calibration file."""
 
 from __future__ import annotations
 

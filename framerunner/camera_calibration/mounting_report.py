@@ -32,7 +32,7 @@ from vision.calibration.mounting import (
     missing_for,
     movement_of,
 )
-from vision.calibration.sightings import Motion, MotionReport, Values, sightings_of
+from vision.calibration.sightings import MotionReport, PoseSpline, Values, sightings_of
 from vision.detectors import new_detector
 from vision.types import Detections
 
@@ -59,8 +59,8 @@ class MountingSearch:
     """What is known of the mounting after some movement.
 
     Attributes:
-        fit: None if no frame was seen often enough.
-        movement: of the drone while frames were seen.
+        fit: None if no gate was seen often enough.
+        movement: of the drone while gates were seen.
         missing: what must still be done, in words; empty if the angles are known.
     """
 
@@ -86,7 +86,7 @@ def search_mounting(
         position_flu_m: of the camera from the drone's centre, as measured by hand.
         stamped: whether images have the time of their exposure; else it is that of their arrival.
     """
-    motion, delay_s = Motion(reports), 0.0 if stamped else CAMERA_DELAY_S
+    motion, delay_s = PoseSpline(reports), 0.0 if stamped else CAMERA_DELAY_S
     half_height_px = calibration.height_px / 2
     seen = sightings_of(images, motion, half_height_px, calibration.readout_s, delay_s)
     known = Values((0.0, 0.0, 0.0), position_flu_m, delay_s)
@@ -122,7 +122,7 @@ def _tell(search: MountingSearch, fit: MountingFit, say: Callable[[str], None]) 
     """Say what was found and how exactly it is known."""
     movement, found, std = search.movement, fit.values, fit.std
     say(
-        f"{movement.sightings} sightings of {_counted(movement.frames, 'frame')}; turned by "
+        f"{movement.sightings} sightings of {_counted(movement.gates, 'frame')}; turned by "
         f"{movement.turn_deg:.0f} degrees, {movement.approach_m:.1f} m nearer and farther; corners fit "
         f"within {fit.rms_px:.2f} px RMS"
     )

@@ -61,7 +61,7 @@ def _bound_one(scenario: str, mission_class: MissionClass, out: Path | None) -> 
     from framerunner.flying.feasible import feasible
     from framerunner.flying.plan import FlightPlan
     from framerunner.runs import check_plot_format
-    from scenarios.bound import ordered_frames
+    from scenarios.bound import ordered_gates
     from scenarios.loader import load_scenario
 
     if out is not None:
@@ -73,7 +73,7 @@ def _bound_one(scenario: str, mission_class: MissionClass, out: Path | None) -> 
     head = f"{loaded.name}, class {mission_class}"
     print(f"{head}: no try is shorter than {least.time_s:.2f} s")
     print(f"{'':12}{'x':>8}{'y':>8}{'z':>8}{'leg (s)':>10}")
-    names = ["start", *(frame.colour for frame in ordered_frames(loaded)), "motors off"]
+    names = ["start", *(gate.colour for gate in ordered_gates(loaded)), "motors off"]
     legs = ["", *(f"{leg_s:10.2f}" for leg_s in least.leg_times_s)]
     for name, (x, y, z), leg in zip(names, least.points_arena_m, legs, strict=True):
         print(f"{name:12}{x:8.2f}{y:8.2f}{z:8.2f}{leg}")

@@ -13,7 +13,7 @@ from framerunner.commands import ShowLayout, WholeNumber, check_range, say
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
-    from vision.calibration.board import Board
+    from vision.calibration.board import CharucoBoard
 
 app = App(name="camera")
 calibration = App(name="calibrate")
@@ -291,10 +291,10 @@ def extrinsics(
     return 0
 
 
-def _board(options: BoardOptions) -> Board:
+def _board(options: BoardOptions) -> CharucoBoard:
     """Check the options."""
     columns, rows, square, marker = astuple(options)
-    from vision.calibration.board import Board
+    from vision.calibration.board import CharucoBoard
 
     check_range("--columns", columns, 4, 20)
     check_range("--rows", rows, 3, 20)
@@ -305,4 +305,4 @@ def _board(options: BoardOptions) -> Board:
         )
     if columns * rows > 200:
         raise SettingError(f"--columns {columns} --rows {rows}: more than 200 squares; use fewer")
-    return Board(columns, rows, square, marker)
+    return CharucoBoard(columns, rows, square, marker)

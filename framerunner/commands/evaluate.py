@@ -26,24 +26,26 @@ from framerunner.commands.options.flight import (
     Response,
     program_of,
 )
-from framerunner.commands.options.rules import Rule, check_rules, given_in, words_of
+from framerunner.commands.options.rules import OptionRule, check_rules, given_in, words_of
 from framerunner.errors import SettingError
 from framerunner.evaluation import COUNT, SEED
 from sitl.autopilots import TITLES
 
 if TYPE_CHECKING:
     from framerunner.evaluation.backends import Pool
-    from framerunner.evaluation.plan import Plan
+    from framerunner.evaluation.plan import EvaluationPlan
     from framerunner.evaluation.runner import GenuineUse
     from framerunner.flying.simulator_process import GenuineAutopilot
 
 _GENUINE_SPEED, _MAX_GENUINE_SPEED = 4.0, 100.0
 _RULES = (
     ONE_AUTOPILOT,
-    Rule("speed", "is for flights with --px4 or --ardupilot; leave it out", needs=GENUINE),
-    Rule("response", "changes our autopilot's flights; leave it out with {found}", excludes=GENUINE),
+    OptionRule("speed", "is for flights with --px4 or --ardupilot; leave it out", needs=GENUINE),
+    OptionRule("response", "changes our autopilot's flights; leave it out with {found}", excludes=GENUINE),
     *(
-        Rule("backend", f"{TITLES[name]} is started on this machine; leave it out with {{found}}", (name,))
+        OptionRule(
+            "backend", f"{TITLES[name]} is started on this machine; leave it out with {{found}}", (name,)
+        )
         for name in GENUINE
     ),
 )
@@ -175,14 +177,14 @@ def evaluate(
     return evaluation.evaluate(settings)
 
 
-def _sensing_by(plan: Plan, sensors: str | None) -> Plan:
+def _sensing_by(plan: EvaluationPlan, sensors: str | None) -> EvaluationPlan:
     """The plan with drones that have another sensor suite."""
     if sensors is None:
         return plan
     return plan.sensing_by(sensors, [with_sensors(each, sensors) for each in plan.scenarios])
 
 
-def _flown_by(plan: Plan, response: str | None, use: GenuineUse | None) -> Plan:
+def _flown_by(plan: EvaluationPlan, response: str | None, use: GenuineUse | None) -> EvaluationPlan:
     """The plan with a vehicle that answers late, or that a genuine autopilot flies."""
     if response is not None:
         from framerunner.commands.options.named_numbers import response_of
@@ -191,7 +193,7 @@ def _flown_by(plan: Plan, response: str | None, use: GenuineUse | None) -> Plan:
     return plan if use is None else _plan_for_genuine(plan, use.autopilot)
 
 
-def _plan_for_genuine(plan: Plan, autopilot: GenuineAutopilot) -> Plan:
+def _plan_for_genuine(plan: EvaluationPlan, autopilot: GenuineAutopilot) -> EvaluationPlan:
     """A plan for an autopilot, without scenarios with a fault of the link; says what is changed.
 
     Raises:

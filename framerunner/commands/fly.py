@@ -45,7 +45,7 @@ from framerunner.commands.options.hardware import (
     hardware_of,
     with_dry_limit,
 )
-from framerunner.commands.options.rules import Rule, check_rules, for_each, given_in
+from framerunner.commands.options.rules import OptionRule, check_rules, for_each, given_in
 from framerunner.errors import SettingError
 from framerunner.flying.output import OutputSettings
 from framerunner.preflight.settings import HardwareSettings
@@ -110,23 +110,25 @@ class SimulationOptions:
 
 _DRONE, _SIMULATION, _OWN, _OUTPUT = DroneOptions(), SimulationOptions(), GenuineOptions(), OutputSettings()
 _RULES = (
-    Rule("simulator", "is for a drone that is running already; name it with --drone", needs=("drone",)),
+    OptionRule("simulator", "is for a drone that is running already; name it with --drone", needs=("drone",)),
     ONE_AUTOPILOT,
     *for_each(GENUINE, "flies a simulator that is started; leave it out with --drone", excludes=("drone",)),
     *for_each(GENUINE, "it is another process; leave out --lockstep", excludes=("lockstep",)),
-    Rule("drone", "needs the URL of its camera too; add --camera", needs=("camera", "simulator")),
-    Rule("camera", "needs the URL of its drone too; add --drone", needs=("drone",)),
+    OptionRule("drone", "needs the URL of its camera too; add --camera", needs=("camera", "simulator")),
+    OptionRule("camera", "needs the URL of its drone too; add --drone", needs=("drone",)),
     *for_each(
         ("speed", "instance"), "is for the simulated drone; leave it out with --drone", excludes=("drone",)
     ),
-    Rule(
+    OptionRule(
         "lockstep",
         "flies a simulated drone in this process; leave out {found}",
         excludes=("drone", "speed", "instance"),
     ),
-    Rule("monitor", "shows flights in real time; leave it out with --lockstep", excludes=("lockstep",)),
-    Rule("wait-for-viewer", "is for a monitor that is opened; add --monitor as well", needs=("monitor",)),
-    Rule(
+    OptionRule("monitor", "shows flights in real time; leave it out with --lockstep", excludes=("lockstep",)),
+    OptionRule(
+        "wait-for-viewer", "is for a monitor that is opened; add --monitor as well", needs=("monitor",)
+    ),
+    OptionRule(
         "seed",
         "is for a flight in lockstep, or with --px4 or --ardupilot; add one of them or leave it out, which "
         "is seed 0",
@@ -135,8 +137,8 @@ _RULES = (
     *for_each(
         ("sensors", "fault"), "is for a simulated drone; leave it out with --drone", excludes=("drone",)
     ),
-    Rule("response", "is for a simulated vehicle in lockstep; add --lockstep", needs=("lockstep",)),
-    Rule("drone-limits", "is for a drone given by --drone; leave it out", needs=("drone",)),
+    OptionRule("response", "is for a simulated vehicle in lockstep; add --lockstep", needs=("lockstep",)),
+    OptionRule("drone-limits", "is for a drone given by --drone; leave it out", needs=("drone",)),
     *HARDWARE_RULES,
 )
 """Which options exclude or need which others; the first rule that is broken is told."""

@@ -12,7 +12,7 @@ from framerunner.commands import check_range
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
-    from framerunner.mocap.facts import Origin, SendSettings
+    from framerunner.mocap.facts import RoomOrigin, SendSettings
 
 
 @Parameter(name="*")
@@ -107,8 +107,8 @@ def _settings(sending: Sending, forward: float) -> SendSettings:
     )
 
 
-def _origin(text: str) -> Origin:
-    from framerunner.mocap.facts import Origin
+def _origin(text: str) -> RoomOrigin:
+    from framerunner.mocap.facts import RoomOrigin
 
     try:
         latitude, longitude, altitude = (float(part) for part in text.split(","))
@@ -123,7 +123,7 @@ def _origin(text: str) -> Origin:
         raise SettingError(
             f"--origin {text}: latitude and longitude 0 mean that none is known; give the room's"
         )
-    return Origin(latitude, longitude, altitude)
+    return RoomOrigin(latitude, longitude, altitude)
 
 
 def _send(

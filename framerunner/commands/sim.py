@@ -23,7 +23,7 @@ from framerunner.commands import (
     with_sensors,
 )
 from framerunner.commands.genuine import ardupilot_server, px4_server
-from framerunner.commands.options.rules import Rule, check_rules, given_in
+from framerunner.commands.options.rules import OptionRule, check_rules, given_in
 from framerunner.errors import SettingError
 from framerunner.extras import install_advice, is_installed
 from framerunner.files.text_file import TextError, read_text
@@ -68,7 +68,7 @@ class Onboard:
 
 @Parameter(name="*", group=Group("Connections", sort_key=1))
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Connections:
+class SimulatorConnections:
     """Where the simulator listens and sends.
 
     Attributes:
@@ -114,7 +114,7 @@ class FlownBy:
     transmitter: str | None = None
 
 
-def _rules_for(name: Literal["px4", "ardupilot"]) -> tuple[Rule, ...]:
+def _rules_for(name: Literal["px4", "ardupilot"]) -> tuple[OptionRule, ...]:
     """What the drone does not have if a genuine autopilot flies it."""
     title = TITLES[name]
     remotes = ("onboard-remote", "ground-remote") if name == "px4" else ()
@@ -126,9 +126,9 @@ def _rules_for(name: Literal["px4", "ardupilot"]) -> tuple[Rule, ...]:
     }
     chosen = f"autopilot {name}"
     return (
-        Rule(name, f"is for {title}; add --{chosen}", needs=(chosen,)),
+        OptionRule(name, f"is for {title}; add --{chosen}", needs=(chosen,)),
         *(
-            Rule(option, f"{why}; leave it out with {{found}}", excludes=(chosen,), shows_value=False)
+            OptionRule(option, f"{why}; leave it out with {{found}}", excludes=(chosen,), shows_value=False)
             for option, why in reasons.items()
         ),
     )
@@ -137,7 +137,7 @@ def _rules_for(name: Literal["px4", "ardupilot"]) -> tuple[Rule, ...]:
 _RULES = (
     *_rules_for("px4"),
     *_rules_for("ardupilot"),
-    Rule("transmitter", "is for PX4; add --autopilot px4", needs=("autopilot px4",)),
+    OptionRule("transmitter", "is for PX4; add --autopilot px4", needs=("autopilot px4",)),
 )
 
 
@@ -181,7 +181,7 @@ def sim(
     count: WholeNumber = 1,
     seed: WholeNumber = 0,
     fault: Faults = (),
-    connections: Connections | None = None,
+    connections: SimulatorConnections | None = None,
     onboard: Onboard | None = None,
     flown_by: FlownBy | None = None,
     monitor: bool = False,
@@ -225,7 +225,11 @@ def sim(
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, _MAX_INSTANCES - 1)
     check_range("--count", count, 1, _MAX_INSTANCES - instance)
-    chosen, onboard, flown_by = connections or Connections(), onboard or Onboard(), flown_by or FlownBy()
+    chosen, onboard, flown_by = (
+        connections or SimulatorConnections(),
+        onboard or Onboard(),
+        flown_by or FlownBy(),
+    )
     given = given_in(chosen, onboard, flown_by)
     given |= {name: True for name, is_given in (("count", count != 1), ("monitor", monitor)) if is_given}
     check_rules(_RULES, given)
@@ -286,7 +290,7 @@ def _monitor(scenario: str, video_port: int | None, count: int) -> MonitorProces
 
 
 def _settings(
-    chosen: Connections, onboard: Onboard, speed: float, instance: int, count: int
+    chosen: SimulatorConnections, onboard: Onboard, speed: float, instance: int, count: int
 ) -> ServerSettings:
     check_range("--video-port", chosen.video_port, 1, 65536 - count)
 

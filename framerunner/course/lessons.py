@@ -60,7 +60,7 @@ class Lesson:
         number: from 1.
         name: `1_take_off` and so on.
         text: what it says.
-        scenario: what is flown; reaching its goals, or crossing its frames, and landing passes the lesson.
+        scenario: what is flown; reaching its goals, or crossing its gates, and landing passes the lesson.
         start: mission to start from, YAML; it flies, but does not pass.
         solution: a mission that passes, YAML.
     """

@@ -34,7 +34,7 @@ from framerunner.course.progress import (
     checked_name,
     progress_csv,
 )
-from framerunner.editing.messages import MAX_TEXT, StartBatch
+from framerunner.editing.editor_messages import MAX_TEXT, StartBatch
 from framerunner.editing.service import EditingService, EditingSettings
 from framerunner.editing.words import Language, Said, language_of, reason, say
 from framerunner.errors import UserError

@@ -304,7 +304,7 @@ def _failsafes(record: Record) -> Checks:
 
 
 def _position(record: Record) -> Checks:
-    """Whether the position is accurate to a part of a frame's opening."""
+    """Whether the position is accurate to a part of a gate's opening."""
     status = record.latest.get("ESTIMATOR_STATUS")
     if status is None:
         yield note("position", "it does not report what its estimate is made from")

@@ -10,7 +10,7 @@ from framerunner.wire.dialect import mavlink
 from framerunner.wire.session.record import Record
 from offboard.safety.check import Check, Checks
 
-CHALLENGE_HEIGHT_M = 3.0  # frames are at up to 2 m, the mission climbs from them
+CHALLENGE_HEIGHT_M = 3.0  # gates are at up to 2 m, the mission climbs from them
 CHALLENGE_REACH_M = 8.0
 _HIGH = 0.5  # of an innovation to what its gate lets pass; PX4 does not arm above it
 

@@ -8,12 +8,12 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from framerunner.editing import messages
+from framerunner.editing import editor_messages
 from framerunner.editing.places import find_scenario
 from framerunner.editing.session_runs import keep_result
 from framerunner.evaluation.backends import Pool
-from framerunner.evaluation.plan import Plan, plan_level
-from framerunner.evaluation.rows import Row
+from framerunner.evaluation.plan import EvaluationPlan, plan_level
+from framerunner.evaluation.rows import EvaluationRow
 from framerunner.evaluation.runner import Terms, fly_all
 from framerunner.flying.cause import lost_in
 from framerunner.runs.track import Track
@@ -27,14 +27,14 @@ from scenarios.verdict import Verdict
 _RANKS = {verdict: rank for rank, verdict in enumerate(reversed(Verdict))}
 
 
-def fly_batch(task: messages.BatchTask, mission: Mission, tell: Callable[[BaseModel], None]) -> None:
+def fly_batch(task: editor_messages.BatchTask, mission: Mission, tell: Callable[[BaseModel], None]) -> None:
     """Fly all of a batch; each flight is told as it ends.
 
     Raises:
         UserError: a scenario or level is not known.
     """
     plan = _plan(task.start, mission)
-    tell(messages.BatchStarted(tag=task.start.tag, batch=task.batch, count=len(plan)))
+    tell(editor_messages.BatchStarted(tag=task.start.tag, batch=task.batch, count=len(plan)))
     scenarios = {scenario.name: scenario for scenario in plan.scenarios}
     ranks: dict[str, float] = {}
     completed = 0
@@ -49,7 +49,7 @@ def fly_batch(task: messages.BatchTask, mission: Mission, tell: Callable[[BaseMo
         tell(flight)
     order = tuple(sorted(ranks, key=ranks.__getitem__))
     tell(
-        messages.BatchEnded(
+        editor_messages.BatchEnded(
             batch=task.batch,
             flown=len(ranks),
             completed=completed,
@@ -60,27 +60,27 @@ def fly_batch(task: messages.BatchTask, mission: Mission, tell: Callable[[BaseMo
     )
 
 
-def _plan(start: messages.StartBatch, mission: Mission) -> Plan:
+def _plan(start: editor_messages.StartBatch, mission: Mission) -> EvaluationPlan:
     """Only names of the package are looked up, and no files."""
     if start.scenarios:
         scenarios = [find_scenario(name) for name in dict.fromkeys(start.scenarios)]
-        return Plan("scenarios", "scenarios", scenarios, mission, [0] * len(scenarios))
+        return EvaluationPlan("scenarios", "scenarios", scenarios, mission, [0] * len(scenarios))
     if start.level not in LEVEL_FILES.names():
         known = ", ".join(LEVEL_FILES.names())
         raise LevelError(f"level '{start.level}': is not known; there are {known}")
     return plan_level(start.level, start.first_seed, start.count, mission)
 
 
-def rank_of(row: Row) -> float:
+def rank_of(row: EvaluationRow) -> float:
     """Failures first: by verdict, the worst first; of one verdict the flights that took longest."""
     verdict = Verdict(row.verdict)
     part = 0.0 if verdict is Verdict.ERROR else 1.0 / (1.0 + max(row.total_time_s, 0.0))
     return _RANKS[verdict] + part
 
 
-def _flight(batch: str, row: Row, scenario: Scenario, replay: str) -> messages.Flight:
+def _flight(batch: str, row: EvaluationRow, scenario: Scenario, replay: str) -> editor_messages.Flight:
     track = row.track or Track()
-    return messages.Flight(
+    return editor_messages.Flight(
         batch=batch,
         scenario=row.scenario,
         seed=row.seed or 0,
@@ -100,12 +100,12 @@ def _flight(batch: str, row: Row, scenario: Scenario, replay: str) -> messages.F
     )
 
 
-def _track(track: Track) -> messages.FlownTrack:
+def _track(track: Track) -> editor_messages.FlownTrack:
     states = tuple(dict.fromkeys(track.mission_state))
     numbers = {state: number for number, state in enumerate(states)}
     columns: list[Any] = [tuple(finite(list(each))) for each in (track.time_s, track.x, track.y, track.z)]
     time_s, x, y, z = columns
-    return messages.FlownTrack(
+    return editor_messages.FlownTrack(
         time_s=time_s,
         x=x,
         y=y,

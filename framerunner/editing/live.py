@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 from pydantic import BaseModel
 
 from framerunner.child_process import ChildProcess
-from framerunner.editing import messages
+from framerunner.editing import editor_messages
 from framerunner.editing.places import find_scenario
 from framerunner.editing.words import Said, reason
 from framerunner.errors import UserError
@@ -63,9 +63,9 @@ class LiveFlight:
         self._tell = tell
         self._flying: asyncio.Task[None] | None = None
         self._last_line = ""
-        self.latest: messages.Live | None = None
+        self.latest: editor_messages.Live | None = None
 
-    async def start(self, request: messages.StartLive) -> Said | None:
+    async def start(self, request: editor_messages.StartLive) -> Said | None:
         """Start a flight; returns why not, or None."""
         if self._flying is not None and not self._flying.done():
             return Said("live.busy")
@@ -92,7 +92,7 @@ class LiveFlight:
         if self.stop() and self._flying is not None:
             await asyncio.gather(self._flying, return_exceptions=True)
 
-    async def _fly(self, request: messages.StartLive, instance: int, links: tuple[str, ...]) -> None:
+    async def _fly(self, request: editor_messages.StartLive, instance: int, links: tuple[str, ...]) -> None:
         text, stopped = "", False
         with TemporaryDirectory(prefix="framerunner-live-", ignore_cleanup_errors=True) as folder:
             try:
@@ -109,7 +109,7 @@ class LiveFlight:
             finally:
                 self._show(request, "stopped" if stopped else "ended", text[:_MAX_REASON])
 
-    async def _run(self, request: messages.StartLive, arguments: list[str]) -> str:
+    async def _run(self, request: editor_messages.StartLive, arguments: list[str]) -> str:
         """Fly to the end; returns the program's error, "" if it flew."""
         problem = ""
 
@@ -125,7 +125,7 @@ class LiveFlight:
         return problem or how
 
     def _arguments(
-        self, request: messages.StartLive, folder: Path, instance: int, links: tuple[str, ...]
+        self, request: editor_messages.StartLive, folder: Path, instance: int, links: tuple[str, ...]
     ) -> list[str]:
         """Write what is flown to files, so that it is what was checked; returns the command's words."""
         scenario, mission = folder / "scenario.yaml", folder / "mission.yaml"
@@ -155,8 +155,10 @@ class LiveFlight:
                 continue
         return ""
 
-    def _show(self, request: messages.StartLive, state: messages.LiveState, text: str = "") -> None:
-        shown = messages.Live(state=state, scenario=request.scenario, speed=request.speed, text=text)
+    def _show(
+        self, request: editor_messages.StartLive, state: editor_messages.LiveState, text: str = ""
+    ) -> None:
+        shown = editor_messages.Live(state=state, scenario=request.scenario, speed=request.speed, text=text)
         self.latest = shown
         self._tell(shown)
 

@@ -11,7 +11,7 @@ def find_scenario(name: str) -> Scenario:
     """A scenario of the package, a lesson's, or a random one such as "calm-17".
 
     Args:
-        name: as `framerunner.editing.messages` accepts it, which is no path.
+        name: as `framerunner.editing.editor_messages` accepts it, which is no path.
 
     Raises:
         ScenarioError: there is none.

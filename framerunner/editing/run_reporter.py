@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Mapping
 
-from framerunner.editing.messages import Contact, Ended, Now, Taken
+from framerunner.editing.editor_messages import Contact, Ended, Now, Taken
 from framerunner.flying.cause import lost_in
 from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.run_control import RunStanding
@@ -31,7 +31,7 @@ class RunReporter:
         run: id of the flight.
         tell: takes the messages.
         clock: seconds that never go back.
-        solids: names of frames and obstacles, to touch which is told.
+        solids: names of gates and obstacles, to touch which is told.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class RunReporter:
             self._trail.append(_numbers(state.time_us / 1e6, state.x, state.y, state.z))
 
     def see_truth(self, truth: TrueState) -> None:
-        """Note when the motors start, and the first contact with each frame and obstacle."""
+        """Note when the motors start, and the first contact with each gate and obstacle."""
         if self._began_us is None and truth.motors_on:
             self._began_us = truth.time_us
         for name in truth.contacts:

@@ -15,18 +15,18 @@ from typing import Protocol
 
 from pydantic import BaseModel, ValidationError
 
-from framerunner.editing import messages
+from framerunner.editing import editor_messages
 from framerunner.editing.live import LiveFlight, LiveSettings
 from framerunner.editing.session_runs import forget_old
 from framerunner.editing.waiting_queue import WaitingQueue
 from framerunner.editing.words import Language, Said, say
-from framerunner.editing.workers import WorkerPool, WorkerProcess
+from framerunner.editing.workers import FlightProcess, WorkerPool
 
 _MAX_OWN_RUNS = 4  # flights under control of one page
 _MAX_WAITING = 300
 _SPARE_S = 2.0  # after a start, until a worker is made ready for the next one
 _KEPT_JOBS = 8  # that are over, for pages that are opened again
-_MAX_KEPT_LINES = messages.MAX_COUNT + 10
+_MAX_KEPT_LINES = editor_messages.MAX_COUNT + 10
 logger = logging.getLogger(__name__)
 
 
@@ -83,13 +83,13 @@ class _Job:
     def __init__(self, name: str, *, is_batch: bool, language: Language) -> None:
         self.name = name
         self.language = language  # of who started it
-        self.worker = WorkerProcess()  # never started, until one is taken
+        self.worker = FlightProcess()  # never started, until one is taken
         self.is_batch = is_batch
         self.task: BaseModel | None = None
         self.watchers: set[Watcher] = set()
         self.asked: dict[int, tuple[Watcher, int]] = {}
         self.kept: list[str] = []
-        self.flown: list[messages.Flight] = []
+        self.flown: list[editor_messages.Flight] = []
         self.count = 0
         self.over = False
         self.cancelled = False
@@ -137,24 +137,24 @@ class EditingService:
             _put(watcher, self._live.latest)
         self._prepare()
 
-    async def do(self, request: messages.Request, watcher: Watcher) -> None:
+    async def do(self, request: editor_messages.Request, watcher: Watcher) -> None:
         """Carry out a request; its answer is put to the watcher."""
-        if isinstance(request, messages.Start | messages.StartBatch):
+        if isinstance(request, editor_messages.Start | editor_messages.StartBatch):
             await self._start(request, watcher)
             return
-        if isinstance(request, messages.StartLive | messages.StopLive):
+        if isinstance(request, editor_messages.StartLive | editor_messages.StopLive):
             await self._do_live(request, watcher)
             return
-        name = request.batch if isinstance(request, messages.Cancel) else request.run
+        name = request.batch if isinstance(request, editor_messages.Cancel) else request.run
         job = self._jobs.get(name)
         if job is None:
             _refuse(watcher, request.tag, Said("flight.unknown", name=name))
-        elif isinstance(request, messages.Watch):
+        elif isinstance(request, editor_messages.Watch):
             self._watch(job, request, watcher)
-        elif isinstance(request, messages.Cancel) or (
-            isinstance(request, messages.Stop) and job in self._queues[job.is_batch]
+        elif isinstance(request, editor_messages.Cancel) or (
+            isinstance(request, editor_messages.Stop) and job in self._queues[job.is_batch]
         ):
-            _put(watcher, messages.Done(tag=request.tag))
+            _put(watcher, editor_messages.Done(tag=request.tag))
             self._cancel(job)
         elif job.over or job.is_batch:
             why = Said("flight.is_batch" if job.is_batch else "flight.over")
@@ -185,17 +185,19 @@ class EditingService:
         while self._tasks:  # they may begin others, to end a worker
             await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    async def _do_live(self, request: messages.StartLive | messages.StopLive, watcher: Watcher) -> None:
+    async def _do_live(
+        self, request: editor_messages.StartLive | editor_messages.StopLive, watcher: Watcher
+    ) -> None:
         if self._live is None:
             _refuse(watcher, request.tag, Said("live.none_here"))
             return
         refusal: Said | None
-        if isinstance(request, messages.StartLive):
+        if isinstance(request, editor_messages.StartLive):
             refusal = await self._live.start(request)
         else:
             refusal = None if self._live.stop() else Said("live.none")
         if refusal is None:
-            _put(watcher, messages.Done(tag=request.tag))
+            _put(watcher, editor_messages.Done(tag=request.tag))
         else:
             _refuse(watcher, request.tag, refusal)
 
@@ -204,8 +206,10 @@ class EditingService:
         for page in self._pages:
             page.put(line)
 
-    async def _start(self, request: messages.Start | messages.StartBatch, watcher: Watcher) -> None:
-        is_batch = isinstance(request, messages.StartBatch)
+    async def _start(
+        self, request: editor_messages.Start | editor_messages.StartBatch, watcher: Watcher
+    ) -> None:
+        is_batch = isinstance(request, editor_messages.StartBatch)
         refusal = self._no_room(watcher, is_batch=is_batch)
         if refusal is not None:
             _refuse(watcher, request.tag, refusal)
@@ -218,14 +222,14 @@ class EditingService:
             "processor_s": settings.processor_s,
             "memory_bytes": settings.memory_bytes,
         }
-        task: messages.RunTask | messages.BatchTask
+        task: editor_messages.RunTask | editor_messages.BatchTask
         start = request.model_copy(update={"tag": 1})  # the job's first
-        if isinstance(start, messages.StartBatch):
-            task = messages.BatchTask.model_validate(
+        if isinstance(start, editor_messages.StartBatch):
+            task = editor_messages.BatchTask.model_validate(
                 {**common, "batch": name, "start": start, "jobs": settings.jobs}
             )
         else:
-            task = messages.RunTask.model_validate({**common, "run": name, "start": start})
+            task = editor_messages.RunTask.model_validate({**common, "run": name, "start": start})
         job = self._jobs[name] = _Job(name, is_batch=is_batch, language=request.language)
         job.task = task
         job.watchers.add(watcher)
@@ -242,7 +246,7 @@ class EditingService:
             asyncio.get_running_loop().call_later(_SPARE_S, self._prepare)
         for job, place, seconds in queue.waiting():
             for watcher, tag in job.asked.values():
-                _put(watcher, messages.Waiting(tag=tag, run=job.name, place=place, seconds=seconds))
+                _put(watcher, editor_messages.Waiting(tag=tag, run=job.name, place=place, seconds=seconds))
 
     def _cancel(self, job: _Job) -> None:
         """End a job, or take it out of its queue."""
@@ -277,12 +281,12 @@ class EditingService:
         waiting = len(self._queues[is_batch])
         return Said("flight.full", count=waiting) if waiting >= _MAX_WAITING else None
 
-    def _watch(self, job: _Job, request: messages.Watch, watcher: Watcher) -> None:
+    def _watch(self, job: _Job, request: editor_messages.Watch, watcher: Watcher) -> None:
         job.watchers.add(watcher)
         for line in job.kept:
             watcher.put(line)
         if job.over or job.is_batch:
-            _put(watcher, messages.Done(tag=request.tag))
+            _put(watcher, editor_messages.Done(tag=request.tag))
         else:
             job.worker.send(request.model_copy(update={"tag": job.ask(watcher, request.tag)}))
 
@@ -305,7 +309,7 @@ class EditingService:
                 how = Said("flight.silent", seconds=self._settings.silent_s)
                 job.worker.kill()
             if is_ready:
-                worker, job.worker = job.worker, WorkerProcess()  # the next one's, from now on
+                worker, job.worker = job.worker, FlightProcess()  # the next one's, from now on
                 self._workers.give_back(worker)
             else:
                 how = await job.worker.ended() or how
@@ -331,35 +335,40 @@ class EditingService:
             if line is None:
                 return False
             try:
-                message = messages.FROM_WORKER.validate_json(line)
+                message = editor_messages.FROM_WORKER.validate_json(line)
             except ValidationError:
                 logger.error("a worker of the editor told %.200r", line)
                 continue
-            if isinstance(message, messages.Ready):
+            if isinstance(message, editor_messages.Ready):
                 return True
             self._take(job, message)
 
-    def _take(self, job: _Job, message: messages.FromWorker) -> None:
+    def _take(self, job: _Job, message: editor_messages.FromWorker) -> None:
         match message:
-            case messages.Done() | messages.Refused() | messages.Started() | messages.BatchStarted():
+            case (
+                editor_messages.Done()
+                | editor_messages.Refused()
+                | editor_messages.Started()
+                | editor_messages.BatchStarted()
+            ):
                 watcher, tag = job.asked.pop(message.tag, (None, 0))
-                if isinstance(message, messages.BatchStarted):
+                if isinstance(message, editor_messages.BatchStarted):
                     job.count = message.count
                     job.kept.append(message.model_copy(update={"tag": 0}).model_dump_json())
-                if isinstance(message, messages.Refused) and not message.run:
+                if isinstance(message, editor_messages.Refused) and not message.run:
                     job.over = job.refused = True
                 if watcher is not None:
                     _put(watcher, message.model_copy(update={"tag": tag}))
-            case messages.Changed():
+            case editor_messages.Changed():
                 asker, tag = job.asked.pop(message.tag, (None, 0))
                 for watcher in job.watchers:
                     _put(watcher, message.model_copy(update={"tag": tag if watcher is asker else 0}))
-            case messages.Now():
+            case editor_messages.Now():
                 job.tell(message)
-            case messages.Ended() | messages.BatchEnded():
+            case editor_messages.Ended() | editor_messages.BatchEnded():
                 job.over = True
                 job.tell(message, keep=True)
-            case messages.Flight():
+            case editor_messages.Flight():
                 job.flown.append(message)
                 job.tell(message, keep=True)
 
@@ -371,13 +380,15 @@ class EditingService:
             why = Said("flight.ended_process", how=why)
         text = say(why, job.language)
         if not job.is_batch:
-            ended = messages.Ended(run=job.name, text=text, lost_in="", result=None, counts={}, spans=())
+            ended = editor_messages.Ended(
+                run=job.name, text=text, lost_in="", result=None, counts={}, spans=()
+            )
             job.tell(ended, keep=True)
             return
         order = tuple(each.scenario for each in sorted(job.flown, key=lambda each: each.rank))
         completed = sum(each.completed for each in job.flown)
         job.tell(
-            messages.BatchEnded(
+            editor_messages.BatchEnded(
                 batch=job.name,
                 flown=len(job.flown),
                 completed=completed,
@@ -403,7 +414,7 @@ class EditingService:
 
 
 def _refuse(watcher: Watcher, tag: int, why: Said, *, run: str = "") -> None:
-    _put(watcher, messages.Refused(tag=tag, text=say(why, watcher.language), run=run))
+    _put(watcher, editor_messages.Refused(tag=tag, text=say(why, watcher.language), run=run))
 
 
 def _put(watcher: Watcher, message: BaseModel) -> None:

@@ -41,8 +41,8 @@ The server tells:
     batch_started {tag, batch, count}
 
 Ids of transitions are those of `offboard.chart.spec.transition_id`, such as `red.turning/2`, `red/then` and
-`red/resume`. `framerunner.editing.messages` has all fields. A mission is text, loaded by the checker of
-missions; only the server's command line can name a Python file. Flights are simulated in processes with
+`red/resume`. `framerunner.editing.editor_messages` has all fields. A mission is text, loaded by the checker
+of missions; only the server's command line can name a Python file. Flights are simulated in processes with
 limits of processor time and memory; what nobody watches for half a minute is ended.
 """
 
@@ -58,17 +58,17 @@ from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket
 
 from framerunner.course.lessons import load_lessons
-from framerunner.editing import messages
+from framerunner.editing import editor_messages
 from framerunner.editing.service import EditingService, EditingSettings
 from framerunner.editing.words import Language, Said, language_of, say
 from framerunner.monitor.access import Visitor
-from framerunner.monitor.channel import Channel, PageMessageError, Terms, refuse
+from framerunner.monitor.channel import Channel, ChannelTerms, PageMessageError, refuse
 from scenarios.loader import list_scenarios
 from scenarios.random_scenarios import LEVEL_FILES
 
-_FROM_PAGE: Terms[messages.Request] = Terms(
-    messages.REQUEST,
-    max_bytes=4 * messages.MAX_TEXT,
+_FROM_PAGE: ChannelTerms[editor_messages.Request] = ChannelTerms(
+    editor_messages.REQUEST,
+    max_bytes=4 * editor_messages.MAX_TEXT,
     max_waiting=1000,
 )
 
@@ -93,8 +93,8 @@ class EditingRouter:
                 "scenarios": list_scenarios(),
                 "lessons": [lesson.name for lesson in load_lessons()],
                 "levels": LEVEL_FILES.names(),
-                "max_text": messages.MAX_TEXT,
-                "max_count": messages.MAX_COUNT,
+                "max_text": editor_messages.MAX_TEXT,
+                "max_count": editor_messages.MAX_COUNT,
             }
 
         @router.websocket("/ws/editing")
@@ -106,13 +106,13 @@ class EditingRouter:
             await websocket.accept()
             page = EditorPage(websocket, language)
 
-            async def take(request: messages.Request) -> None:
+            async def take(request: editor_messages.Request) -> None:
                 visitor = who(websocket)
-                is_live = isinstance(request, messages.StartLive | messages.StopLive)
+                is_live = isinstance(request, editor_messages.StartLive | editor_messages.StopLive)
                 if not (visitor.may_teach if is_live else visitor.may_learn):
                     # A flight in the simulator is seen on all pages, and is a try of the contest.
                     why = Said("access.live" if is_live and visitor.may_learn else "access.fly")
-                    page.send(messages.Refused(tag=request.tag, text=say(why, language)))
+                    page.send(editor_messages.Refused(tag=request.tag, text=say(why, language)))
                     return
                 await self._service.do(request.model_copy(update={"language": language}), page)
 
@@ -129,7 +129,7 @@ class EditingRouter:
             await self._service.close()
 
 
-class EditorPage(Channel[messages.Request, BaseModel]):
+class EditorPage(Channel[editor_messages.Request, BaseModel]):
     """One browser's WebSocket; a watcher of the service. `language` is that of the page."""
 
     def __init__(self, websocket: WebSocket, language: Language) -> None:
@@ -140,5 +140,5 @@ class EditorPage(Channel[messages.Request, BaseModel]):
         """Answer a message that is no request; what a person has typed may be the reason."""
         tag = 0
         with contextlib.suppress(ValidationError):
-            tag = messages.TAGGED.validate_json(text).tag
-        self.send(messages.Refused(tag=tag, text=str(problem)))
+            tag = editor_messages.TAGGED.validate_json(text).tag
+        self.send(editor_messages.Refused(tag=tag, text=str(problem)))

@@ -1,4 +1,4 @@
-"""What the editor's server says to its pages: a table for each language; see `offboard.chart.messages`."""
+"""What the editor's server says to its pages: tables by language; see `offboard.chart.mission_texts`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from starlette.requests import HTTPConnection
 
 from framerunner.errors import UserError
 from offboard.authoring import EDIT_SPANISH, SPANISH, EditError
-from offboard.chart.messages import ENGLISH, Message
+from offboard.chart.mission_texts import ENGLISH, Message
 from offboard.chart.problems import MAX_REPORTED, MissionError
 
 Language = Literal["en", "es"]

@@ -21,7 +21,7 @@ from typing import TextIO
 from pydantic import BaseModel, ValidationError
 
 from framerunner.child_process import end_with_standard_input, limit_resources
-from framerunner.editing import messages
+from framerunner.editing import editor_messages
 from framerunner.editing.batch import fly_batch
 from framerunner.editing.places import find_scenario
 from framerunner.editing.run_reporter import RunReporter
@@ -51,14 +51,14 @@ def main() -> int:
     cv2.setNumThreads(1)
     tell = _teller(output)
     while line := sys.stdin.readline():  # until it is not needed any more
-        task = messages.TASK.validate_json(line)
-        if isinstance(task, messages.RunTask):
+        task = editor_messages.TASK.validate_json(line)
+        if isinstance(task, editor_messages.RunTask):
             _carry_out(task, tell)
             return 0  # orders may follow that come too late
         code = _in_child(partial(_carry_out, task, tell))
         if code:
             return code
-        tell(messages.Ready())
+        tell(editor_messages.Ready())
     return 0
 
 
@@ -85,14 +85,14 @@ def _in_child(do: Callable[[], None]) -> int:
     return code
 
 
-def _carry_out(task: messages.RunTask | messages.BatchTask, tell: Tell) -> None:
-    flights = 1 if isinstance(task, messages.RunTask) else task.start.count + len(task.start.scenarios)
+def _carry_out(task: editor_messages.RunTask | editor_messages.BatchTask, tell: Tell) -> None:
+    flights = 1 if isinstance(task, editor_messages.RunTask) else task.start.count + len(task.start.scenarios)
     limit_resources(task.memory_bytes, round(task.processor_s) * flights + _SPARE_S)
     tag = task.start.tag
     try:
         pilot = None if task.pilot is None else find_pilot(task.pilot)
         mission = mission_from_text(task.start.text, pilot)
-        if isinstance(task, messages.BatchTask):
+        if isinstance(task, editor_messages.BatchTask):
             fly_batch(task, mission, tell)
         else:
             _ControlledRun(task, mission, pilot, tell).fly(sys.stdin)
@@ -100,13 +100,13 @@ def _carry_out(task: messages.RunTask | messages.BatchTask, tell: Tell) -> None:
         tell(refusal(tag, error, task.start.language))
 
 
-def refusal(tag: int, error: UserError, language: Language, run: str = "") -> messages.Refused:
+def refusal(tag: int, error: UserError, language: Language, run: str = "") -> editor_messages.Refused:
     """Why a mission is not flown: its first problem, and all of them."""
     lines = reasons(error, language)
     text = lines[0]
     if len(lines) > 1:
         text = say(Said("flight.more", first=text, count=len(lines) - 1), language)
-    return messages.Refused(
+    return editor_messages.Refused(
         tag=tag, text=text, lines=lines if isinstance(error, MissionError) else (), run=run
     )
 
@@ -115,7 +115,7 @@ class _ControlledRun:
     """A flight that follows orders."""
 
     def __init__(
-        self, task: messages.RunTask, mission: Mission, pilot: PilotSource | None, tell: Tell
+        self, task: editor_messages.RunTask, mission: Mission, pilot: PilotSource | None, tell: Tell
     ) -> None:
         start = task.start
         _check_breaks(start.break_on, mission)
@@ -129,7 +129,7 @@ class _ControlledRun:
     def fly(self, orders: TextIO) -> None:
         """Fly to the end; this process ends when there can be no more orders."""
         layout = self._plan.scenario.model_dump(mode="json")
-        self._tell(messages.Started(tag=self._task.start.tag, run=self._task.run, layout=layout))
+        self._tell(editor_messages.Started(tag=self._task.start.tag, run=self._task.run, layout=layout))
         threading.Thread(target=self._take_orders, args=(orders,), daemon=True).start()
         folder = None if self._task.keep is None else Path(self._task.keep)
         kept = KeptFlight(folder, self._plan, self._task.start.text)
@@ -153,42 +153,42 @@ class _ControlledRun:
     def _take_orders(self, orders: Iterator[str]) -> None:
         for line in orders:
             try:
-                self._carry_out(messages.ORDER.validate_json(line))
+                self._carry_out(editor_messages.ORDER.validate_json(line))
             except ValidationError:  # the server has checked it
                 continue
         os._exit(1)
 
-    def _carry_out(self, order: messages.Order) -> None:
+    def _carry_out(self, order: editor_messages.Order) -> None:
         """Answer an order, then give it: what it does may be told at once and follows the answer."""
-        if isinstance(order, messages.Change):
+        if isinstance(order, editor_messages.Change):
             self._change(order)
             return
         try:
-            if isinstance(order, messages.BreakOn):
+            if isinstance(order, editor_messages.BreakOn):
                 _check_breaks(order.states, self._mission)
         except UserError as error:
             self._tell(refusal(order.tag, error, order.language, self._task.run))
             return
-        self._tell(messages.Done(tag=order.tag))
+        self._tell(editor_messages.Done(tag=order.tag))
         control = self._control
         match order:
-            case messages.Watch():
+            case editor_messages.Watch():
                 self._reporter.tell_all()
                 control.tell()
-            case messages.Pause():
+            case editor_messages.Pause():
                 control.pause()
-            case messages.GoOn():
+            case editor_messages.GoOn():
                 control.go_on()
-            case messages.Step():
+            case editor_messages.Step():
                 control.step(order.ticks)
-            case messages.Speed():
+            case editor_messages.Speed():
                 control.set_speed(order.speed)
-            case messages.BreakOn():
+            case editor_messages.BreakOn():
                 control.break_on(order.states)
-            case messages.Stop():
+            case editor_messages.Stop():
                 control.stop()
 
-    def _change(self, order: messages.Change) -> None:
+    def _change(self, order: editor_messages.Change) -> None:
         run = self._task.run
         try:
             mission = mission_from_text(order.text, self._pilot)
@@ -198,12 +198,12 @@ class _ControlledRun:
 
         def changed(why_not: str, ids: Mapping[str, str]) -> None:
             if why_not:
-                self._tell(messages.Refused(tag=order.tag, text=why_not, run=run))
+                self._tell(editor_messages.Refused(tag=order.tag, text=why_not, run=run))
                 return
             renamed = dict(ids)
             self._mission = mission
             self._reporter.rename(renamed)
-            self._tell(messages.Changed(run=run, tag=order.tag, ids=renamed))
+            self._tell(editor_messages.Changed(run=run, tag=order.tag, ids=renamed))
 
         self._control.change(mission, changed)
 

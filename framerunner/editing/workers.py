@@ -25,7 +25,7 @@ _IDLE_S = 120.0  # without a batch, after which a worker that has flown one is e
 logger = logging.getLogger(__name__)
 
 
-class WorkerProcess:
+class FlightProcess:
     """`framerunner.editing.worker`; what is sent first is its task; `kill` ends all its processes."""
 
     def __init__(self) -> None:
@@ -125,11 +125,11 @@ class WorkerPool:
     def __init__(self, max_idle: int, keep: Callable[[Coroutine[None, None, None]], None]) -> None:
         self._max_idle = max_idle
         self._keep = keep
-        self._spare: WorkerProcess | None = None
-        self._idle: list[WorkerProcess] = []
+        self._spare: FlightProcess | None = None
+        self._idle: list[FlightProcess] = []
         self._closed = False
 
-    def take(self) -> WorkerProcess:
+    def take(self) -> FlightProcess:
         """One that is ready, else a new one, which is not started yet."""
         if self._spare is not None:
             self._idle.append(self._spare)
@@ -138,9 +138,9 @@ class WorkerPool:
             worker = self._idle.pop(0)
             if worker.usable:
                 return worker
-        return WorkerProcess()
+        return FlightProcess()
 
-    def give_back(self, worker: WorkerProcess) -> None:
+    def give_back(self, worker: FlightProcess) -> None:
         """Keep a worker that takes another batch, for a while."""
 
         def end() -> None:
@@ -157,10 +157,10 @@ class WorkerPool:
     def prepare(self) -> None:
         """Start a spare one, unless there is one."""
         if self._spare is None and not self._closed:
-            self._spare = WorkerProcess()
+            self._spare = FlightProcess()
             self._keep(self._start(self._spare))
 
-    async def _start(self, spare: WorkerProcess) -> None:
+    async def _start(self, spare: FlightProcess) -> None:
         try:
             await spare.start()
         except OSError as error:

@@ -10,7 +10,7 @@ from statistics import fmean, stdev
 
 from framerunner.errors import SettingError
 from framerunner.evaluation.plan import Identity
-from framerunner.evaluation.rows import Row
+from framerunner.evaluation.rows import EvaluationRow
 from framerunner.evaluation.statistics import CONFIDENCE, Rate, wilson
 from framerunner.evaluation.store import EvaluationFolder
 from scenarios.verdict import Verdict
@@ -22,8 +22,8 @@ _RANK = {Verdict.CLEAN: 2, Verdict.COMPLETED: 1}
 class Pair:
     """The flights of one scenario in both evaluations."""
 
-    before: Row
-    after: Row
+    before: EvaluationRow
+    after: EvaluationRow
 
     @property
     def change(self) -> int:

@@ -12,8 +12,8 @@ from rich.console import Console
 from framerunner.errors import SettingError
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
-from framerunner.evaluation.plan import Plan
-from framerunner.evaluation.rows import Row, csv_text
+from framerunner.evaluation.plan import EvaluationPlan
+from framerunner.evaluation.rows import EvaluationRow, csv_text
 from framerunner.evaluation.runner import GenuineUse, Terms, fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
@@ -40,7 +40,7 @@ class EvaluationSettings:
         genuine: the genuine autopilot that flies; None: our own.
     """
 
-    plan: Plan
+    plan: EvaluationPlan
     pool: Pool
     out: Path
     again: bool
@@ -89,7 +89,7 @@ def _fly_missing(settings: EvaluationSettings, folder: EvaluationFolder) -> None
     if kept == len(plan):
         return
     scenarios = {scenario.name: scenario for scenario in plan.scenarios}
-    not_kept: tuple[Row, SettingError] | None = None
+    not_kept: tuple[EvaluationRow, SettingError] | None = None
     tasks, terms = plan.tasks(frozenset(folder.done)), Terms(genuine=settings.genuine)
     with (
         EvaluationProgress(len(plan), list(folder.rows().values())) as progress,
@@ -137,7 +137,7 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
     return code
 
 
-def _print_flown(settings: EvaluationSettings, folder: EvaluationFolder, last: Row) -> None:
+def _print_flown(settings: EvaluationSettings, folder: EvaluationFolder, last: EvaluationRow) -> None:
     """Print what was flown until a flight could not be written, with that flight."""
     rows = [row for row in folder.rows().values() if row.scenario != last.scenario]
     flown = f"{len(rows) + 1} of {len(settings.plan)} flights"

@@ -18,7 +18,7 @@ from framerunner.errors import SettingError
 from framerunner.evaluation import COUNT, SEED
 from framerunner.files.yaml_file import SUFFIXES
 from framerunner.flying.plan import FlightPlan
-from framerunner.flying.response import Response
+from framerunner.flying.response import ResponseDelay
 from framerunner.vehicle.airframe import AirframeError, load_airframe
 from offboard.mission import Mission
 from offboard.pilot import Pilot
@@ -88,7 +88,7 @@ class Identity:
 
 
 @dataclass(frozen=True)
-class Plan:
+class EvaluationPlan:
     """What is to be flown.
 
     Attributes:
@@ -106,7 +106,7 @@ class Plan:
     scenarios: Sequence[Scenario]
     mission: Mission
     seeds: Sequence[int]
-    response: Response | None = None
+    response: ResponseDelay | None = None
     autopilot: str = ""
 
     def __len__(self) -> int:
@@ -134,16 +134,16 @@ class Plan:
         """A folder whose name depends on the identity, so that the same command finds it again."""
         return Path("runs") / f"evaluate-{self.label}-{self.mission.name}-{self.identity.sha256[:6]}"
 
-    def answering_late(self, response: Response) -> Plan:
+    def answering_late(self, response: ResponseDelay) -> EvaluationPlan:
         """The same flights by a vehicle that answers late."""
         return replace(self, title=f"{self.title}, response {response}", response=response)
 
-    def sensing_by(self, suite: str, scenarios: Sequence[Scenario]) -> Plan:
+    def sensing_by(self, suite: str, scenarios: Sequence[Scenario]) -> EvaluationPlan:
         """The same flights by drones with another sensor suite, which these scenarios have."""
         label = f"{self.label}-{Path(suite).stem}"
         return replace(self, title=f"{self.title}, sensors {suite}", label=label, scenarios=scenarios)
 
-    def flown_by(self, autopilot: str, scenarios: Sequence[Scenario]) -> Plan:
+    def flown_by(self, autopilot: str, scenarios: Sequence[Scenario]) -> EvaluationPlan:
         """The flights of these scenarios, changed for a genuine autopilot, of which some may be missing."""
         seeds = dict(zip((each.name for each in self.scenarios), self.seeds, strict=True))
         return replace(
@@ -162,7 +162,7 @@ class Plan:
                 yield FlightPlan(scenario, self.mission, seed, response=self.response)
 
 
-def plan_level(level: str | Path, first_seed: int, count: int, mission: Mission) -> Plan:
+def plan_level(level: str | Path, first_seed: int, count: int, mission: Mission) -> EvaluationPlan:
     """Plan `count` random scenarios of a level, name or file, with consecutive seeds.
 
     Raises:
@@ -177,7 +177,7 @@ def plan_level(level: str | Path, first_seed: int, count: int, mission: Mission)
     scenarios = [random_scenario(loaded, seed) for seed in seeds]
     last = f" to {first_seed + count - 1}" if count > 1 else ""
     title = f"level {loaded.name}, seed{'s' if last else ''} {first_seed}{last}"
-    return Plan(title, f"{loaded.name}-{first_seed}-{count}", _checked(scenarios), mission, seeds)
+    return EvaluationPlan(title, f"{loaded.name}-{first_seed}-{count}", _checked(scenarios), mission, seeds)
 
 
 def plan_flights(
@@ -186,7 +186,7 @@ def plan_flights(
     first_seed: int | None,
     count: int | None,
     mission: Mission,
-) -> Plan:
+) -> EvaluationPlan:
     """Plan given scenarios, or those of a level; seed and count are of the level.
 
     Raises:
@@ -211,7 +211,7 @@ def plan_flights(
     )
 
 
-def plan_files(sources: Sequence[str | Path | Scenario], mission: Mission) -> Plan:
+def plan_files(sources: Sequence[str | Path | Scenario], mission: Mission) -> EvaluationPlan:
     """Plan given scenarios: names, files, folders of scenario files, or scenarios.
 
     Raises:
@@ -232,7 +232,9 @@ def plan_files(sources: Sequence[str | Path | Scenario], mission: Mission) -> Pl
     title = ", ".join(map(_shown, sources)) if len(sources) <= 4 else f"{len(sources)} scenarios"
     stem = Path(_shown(sources[0])).stem.lower() if len(sources) == 1 else ""
     label = re.sub(r"[^a-z0-9_-]+", "-", stem).strip("-")
-    return Plan(title, label[:40] or "scenarios", _checked(scenarios), mission, [0] * len(scenarios))
+    return EvaluationPlan(
+        title, label[:40] or "scenarios", _checked(scenarios), mission, [0] * len(scenarios)
+    )
 
 
 def _shown(source: str | Path | Scenario) -> str:

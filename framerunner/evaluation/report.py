@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from framerunner.evaluation.compare import Comparison
-from framerunner.evaluation.rows import Row
+from framerunner.evaluation.rows import EvaluationRow
 from framerunner.evaluation.statistics import Summary, crossing_offsets_m, mean_seconds_in_state
 from framerunner.evaluation.store import REPORT, EvaluationFolder
 from framerunner.evaluation.terminal import comparison_lines, spread_cells
@@ -49,7 +49,7 @@ VERDICT_COLOURS = {
     "wrong order": "#aa4499",
     "error": "#222222",
 }
-_FRAME_COLOURS = {"red": "#cc3311", "green": "#228833", "blue": "#3355bb"}
+_GATE_COLOURS = {"red": "#cc3311", "green": "#228833", "blue": "#3355bb"}
 _INK, _FAINT = "#262626", "#6b6b6b"
 # Colours of charts that are those of the page, which has others in the dark.
 _IN_PAGE = {
@@ -66,7 +66,7 @@ _MAX_STATES = 14
 class Failure:
     """What the page shows of a flight that was not clean: a command flies it again, a plot is a data URI."""
 
-    row: Row
+    row: EvaluationRow
     command: str
     plot: str | None
     traceback: str
@@ -180,7 +180,7 @@ def _failures(
     return groups
 
 
-def _track_plot(folder: EvaluationFolder, row: Row) -> str | None:
+def _track_plot(folder: EvaluationFolder, row: EvaluationRow) -> str | None:
     """The track as a PNG in a data URI; None if it is not known."""
     track = folder.track(row.scenario)
     if len(track) == 0:
@@ -194,7 +194,7 @@ def _track_plot(folder: EvaluationFolder, row: Row) -> str | None:
     return f"data:image/png;base64,{b64encode(png.getvalue()).decode()}"
 
 
-def _traceback(folder: EvaluationFolder, row: Row) -> str:
+def _traceback(folder: EvaluationFolder, row: EvaluationRow) -> str:
     if row.verdict is not Verdict.ERROR:
         return ""
     try:
@@ -203,7 +203,7 @@ def _traceback(folder: EvaluationFolder, row: Row) -> str:
         return ""
 
 
-def _time_chart(rows: Sequence[Row]) -> str:
+def _time_chart(rows: Sequence[EvaluationRow]) -> str:
     """Histogram of try times by verdict, of all flights without an error."""
     times: dict[str, list[float]] = {verdict: [] for verdict in VERDICT_COLOURS}
     for row in rows:
@@ -220,15 +220,15 @@ def _time_chart(rows: Sequence[Row]) -> str:
     return _svg(figure, "time")
 
 
-def _offset_chart(rows: Sequence[Row]) -> str:
-    """Histogram of the crossings' distances from the frame's centre, by colour."""
+def _offset_chart(rows: Sequence[EvaluationRow]) -> str:
+    """Histogram of the crossings' distances from the gate's centre, by colour."""
     offsets = {colour: crossing_offsets_m(rows, colour) for colour in COLOURS}
     colours = [colour for colour in COLOURS if offsets[colour]]
     figure, axes = _new_chart(2.9)
     if colours:
         step_m = 0.01 if max(max(offsets[colour]) for colour in colours) > 0.05 else 0.005
         labels = [f"{colour} ({len(offsets[colour])})" for colour in colours]
-        fills = [_FRAME_COLOURS[colour] for colour in colours]
+        fills = [_GATE_COLOURS[colour] for colour in colours]
         _histogram(axes, [offsets[colour] for colour in colours], step_m, labels, fills)
     _name_axes(axes, "distance from the opening's middle (m)", "crossings")
     return _svg(figure, "offset")
@@ -251,7 +251,7 @@ def _name_axes(axes: Axes, across: str, up: str) -> None:
     axes.set_xlim(left=0.0)
 
 
-def _state_chart(rows: Sequence[Row]) -> str:
+def _state_chart(rows: Sequence[EvaluationRow]) -> str:
     """Mean seconds in each kind of state, of flights that landed in time and of those that failed."""
     flown = [row for row in rows if row.verdict is not Verdict.ERROR]
     groups = {

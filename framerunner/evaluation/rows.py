@@ -27,7 +27,7 @@ _COLUMNS_OF_ERRORS = (
 )
 
 
-class Row(FlightResult):
+class EvaluationRow(FlightResult):
     """The result of a flight of an evaluation; the verdict is `error` if a fault of the program ended it.
 
     Attributes:
@@ -50,7 +50,7 @@ class Row(FlightResult):
         return json.dumps(self.model_dump(mode="json", include=set(COLUMNS)), allow_nan=False)
 
 
-def csv_text(rows: Iterable[Row]) -> str:
+def csv_text(rows: Iterable[EvaluationRow]) -> str:
     """The rows as comma-separated values with a header line; the same for the same flights.
 
     Lists are joined by ";", times in states are written "turning=2.5;crossing=4", unknown values are empty.
@@ -63,7 +63,7 @@ def csv_text(rows: Iterable[Row]) -> str:
     return text.getvalue()
 
 
-def _cell(row: Row, name: str) -> str:
+def _cell(row: EvaluationRow, name: str) -> str:
     if row.verdict is Verdict.ERROR and name not in _COLUMNS_OF_ERRORS:
         return ""  # it did not end, so its numbers are no results
     value = getattr(row, name)

@@ -23,7 +23,7 @@ from types import FrameType
 from typing import Any, TypeVar
 
 from framerunner.evaluation.backends import Pool, Workers, is_lost_worker, open_pool
-from framerunner.evaluation.rows import Row
+from framerunner.evaluation.rows import EvaluationRow
 from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
@@ -88,7 +88,9 @@ class _Task:
     terms: Terms
 
 
-def fly_all(tasks: Iterable[FlightPlan], pool: Pool, terms: Terms = NO_LIMITS) -> Generator[Row, None, None]:
+def fly_all(
+    tasks: Iterable[FlightPlan], pool: Pool, terms: Terms = NO_LIMITS
+) -> Generator[EvaluationRow, None, None]:
     """Fly all plans.
 
     Only a few are taken from `tasks` at a time, and nothing is kept of those that have ended. If a worker
@@ -127,7 +129,7 @@ def fly_all(tasks: Iterable[FlightPlan], pool: Pool, terms: Terms = NO_LIMITS) -
 
 def _fly_in_pool(
     waiting: Iterator[FlightPlan], workers: Workers, running: dict[str, FlightPlan], terms: Terms
-) -> Iterator[Row]:
+) -> Iterator[EvaluationRow]:
     """Fly in the pool; `running` gets the plans that were sent and whose rows have not been received."""
     from joblib import delayed
 
@@ -164,7 +166,7 @@ class _Packer:
         return _Task(replace(plan, mission=None), self._packed, os.getpid(), self._terms)
 
 
-def fly_alone(plan: FlightPlan, terms: Terms = NO_LIMITS) -> Row:
+def fly_alone(plan: FlightPlan, terms: Terms = NO_LIMITS) -> EvaluationRow:
     """Fly in a new process, which may die."""
     context = get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
@@ -173,7 +175,7 @@ def fly_alone(plan: FlightPlan, terms: Terms = NO_LIMITS) -> Row:
         process.start()
     sender.close()
     try:
-        row: Row = receiver.recv()
+        row: EvaluationRow = receiver.recv()
     except EOFError:
         process.join()
         ending = _ending(process.exitcode)
@@ -197,7 +199,7 @@ def _send_flight(task: _Task, sender: Connection) -> None:
         sender.send(row)
 
 
-def _fly_in_worker(task: _Task) -> Row:
+def _fly_in_worker(task: _Task) -> EvaluationRow:
     _prepare_process()
     if os.getppid() == task.sender:
         _end_with(task.sender)
@@ -274,7 +276,7 @@ def processor_limit(limit_s: float | None) -> Iterator[None]:
         signal.signal(signal.SIGPROF, before)
 
 
-def fly_task(plan: FlightPlan, terms: Terms = NO_LIMITS) -> Row:
+def fly_task(plan: FlightPlan, terms: Terms = NO_LIMITS) -> EvaluationRow:
     """Fly a plan with a mission.
 
     Args:
@@ -303,14 +305,16 @@ def fly_task(plan: FlightPlan, terms: Terms = NO_LIMITS) -> Row:
     _keep_imports()
     has_track = terms.whole or flown.result.verdict is not Verdict.CLEAN
     track = thinned(flown.track) if has_track else None
-    return Row(**dict(flown.result), track=track, transitions={} if chart is None else dict(chart.counts))
+    return EvaluationRow(
+        **dict(flown.result), track=track, transitions={} if chart is None else dict(chart.counts)
+    )
 
 
-def _error_row(plan: FlightPlan, error: BaseException) -> Row:
+def _error_row(plan: FlightPlan, error: BaseException) -> EvaluationRow:
     """The row of a flight that a fault of the program ended."""
     text = " ".join(str(error).split())
     kind = type(error).__name__
-    return Row(
+    return EvaluationRow(
         scenario=plan.scenario.name,
         mission="" if plan.mission is None else plan.mission.name,
         mission_class="contest" if plan.mission is None else plan.mission.mission_class,

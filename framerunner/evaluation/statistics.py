@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import fmean, quantiles
 
-from framerunner.evaluation.rows import Row
+from framerunner.evaluation.rows import EvaluationRow
 from scenarios.models import COLOURS
 from scenarios.verdict import Verdict
 
@@ -45,12 +45,12 @@ class Spread:
 
 
 @dataclass(frozen=True, slots=True)
-class Cause:
-    """Flights that were not clean, with the verdict and the `Row.ended_in` in common."""
+class FailureCause:
+    """Flights that were not clean, with the verdict and the `EvaluationRow.ended_in` in common."""
 
     verdict: str
     ended_in: str
-    rows: tuple[Row, ...]
+    rows: tuple[EvaluationRow, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Summary:
         verdicts: by verdict, best first; only those that occurred.
         try_time_s: of flights that landed; None if none did.
         times_bound: the same, each as a multiple of its bound; None if no bound is known.
-        offset_m: of crossings, by the frame's colour; only those that were crossed.
+        offset_m: of crossings, by the gate's colour; only those that were crossed.
         landing_error_m: of flights that landed; None if none did.
         penalised: flights that were outside the arena.
         seconds_in_state: mean over all flights without an error, by kind of state, longest first.
@@ -81,7 +81,7 @@ class Summary:
     landing_error_m: Spread | None
     penalised: Rate
     seconds_in_state: dict[str, float]
-    causes: tuple[Cause, ...]
+    causes: tuple[FailureCause, ...]
     faults_as_expected: Rate | None = None
 
 
@@ -108,7 +108,7 @@ def spread(numbers: Sequence[float]) -> Spread | None:
     return Spread(len(numbers), fmean(numbers), tenths[0], tenths[4], tenths[8])
 
 
-def summarise(rows: Sequence[Row]) -> Summary:
+def summarise(rows: Sequence[EvaluationRow]) -> Summary:
     """Count an evaluation's flights."""
     counts = Counter(row.verdict for row in rows)
     landed = [row for row in rows if row.completed]
@@ -129,13 +129,13 @@ def summarise(rows: Sequence[Row]) -> Summary:
     )
 
 
-def _faults_as_expected(rows: Sequence[Row]) -> Rate | None:
+def _faults_as_expected(rows: Sequence[EvaluationRow]) -> Rate | None:
     judged = [row.fault_outcome == "as expected" for row in rows if row.fault_outcome]
     return wilson(sum(judged), len(judged)) if judged else None
 
 
-def crossing_offsets_m(rows: Iterable[Row], colour: str) -> list[float]:
-    """How far from the centre of the frame of a colour it was crossed, in all flights that crossed it."""
+def crossing_offsets_m(rows: Iterable[EvaluationRow], colour: str) -> list[float]:
+    """How far from the centre of the gate of a colour it was crossed, in all flights that crossed it."""
     return [
         offset_m
         for row in rows
@@ -144,7 +144,7 @@ def crossing_offsets_m(rows: Iterable[Row], colour: str) -> list[float]:
     ]
 
 
-def mean_seconds_in_state(rows: Sequence[Row]) -> dict[str, float]:
+def mean_seconds_in_state(rows: Sequence[EvaluationRow]) -> dict[str, float]:
     """Mean time in each kind of state, longest first, over all flights, also those that never entered it."""
     sums: Counter[str] = Counter()
     for row in rows:
@@ -152,15 +152,15 @@ def mean_seconds_in_state(rows: Sequence[Row]) -> dict[str, float]:
     return {state: seconds / len(rows) for state, seconds in sums.most_common()}
 
 
-def causes(rows: Iterable[Row]) -> tuple[Cause, ...]:
+def causes(rows: Iterable[EvaluationRow]) -> tuple[FailureCause, ...]:
     """Flights that were not clean by verdict and end, failures first, then most frequent first."""
-    groups: dict[tuple[str, str], list[Row]] = {}
+    groups: dict[tuple[str, str], list[EvaluationRow]] = {}
     for row in rows:
         if row.verdict is not Verdict.CLEAN:
             groups.setdefault((row.verdict, row.ended_in), []).append(row)
-    found = [Cause(verdict, ended_in, tuple(group)) for (verdict, ended_in), group in groups.items()]
+    found = [FailureCause(verdict, ended_in, tuple(group)) for (verdict, ended_in), group in groups.items()]
     return tuple(sorted(found, key=_order))
 
 
-def _order(cause: Cause) -> tuple[bool, int, str, str]:
+def _order(cause: FailureCause) -> tuple[bool, int, str, str]:
     return cause.rows[0].completed, -len(cause.rows), cause.verdict, cause.ended_in

@@ -18,17 +18,17 @@ from pydantic import TypeAdapter
 
 from framerunner.errors import SettingError, write_advice
 from framerunner.evaluation.plan import Identity
-from framerunner.evaluation.rows import Row
+from framerunner.evaluation.rows import EvaluationRow
 from framerunner.files.text_file import replace_file
 from framerunner.runs.track import Track
-from offboard.navigation.view import FrameEstimate
+from offboard.navigation.view import GateEstimate
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 
 FORMAT = 2
 IDENTITY, FLIGHTS, LOCK = "evaluation.json", "flights.jsonl", ".lock"
 RESULTS, REPORT = "results.csv", "report.html"
-_ESTIMATES = TypeAdapter(tuple[FrameEstimate, ...])
+_ESTIMATES = TypeAdapter(tuple[GateEstimate, ...])
 _FOLDERS = ("scenarios", "tracks", "errors")
 _FILES = (IDENTITY, FLIGHTS, RESULTS, REPORT)
 _PART = re.compile(r"^\.?(.+?)(?:\.[0-9a-f]{8})?\.part$")  # what a killed program left of `replace_file`
@@ -56,7 +56,7 @@ class EvaluationFolder:
         """The traceback of a flight that a fault of the program ended."""
         return self.path / "errors" / f"{name}.txt"
 
-    def keep(self, scenario: Scenario, row: Row) -> None:
+    def keep(self, scenario: Scenario, row: EvaluationRow) -> None:
         """Write a flight so that it survives a kill and a power cut.
 
         Its line is written last, so a flight that has a line has all its files.
@@ -78,7 +78,7 @@ class EvaluationFolder:
                 os.fsync(file.fileno())
         self.done.add(row.scenario)
 
-    def rows(self) -> dict[str, Row]:
+    def rows(self) -> dict[str, EvaluationRow]:
         """All rows by scenario, in the scenarios' order, without tracks."""
         found, _ = _read_rows(self.path / FLIGHTS, self.identity)
         return {name: found[name] for name in self.identity.scenarios if name in found}
@@ -194,15 +194,15 @@ def _repair(file: Path, identity: Identity) -> set[str]:
     return set(rows)
 
 
-def _read_rows(file: Path, identity: Identity) -> tuple[dict[str, Row], bool]:
+def _read_rows(file: Path, identity: Identity) -> tuple[dict[str, EvaluationRow], bool]:
     """Return the rows, and whether all lines were complete."""
-    rows: dict[str, Row] = {}
+    rows: dict[str, EvaluationRow] = {}
     is_complete = True
     try:
         with file.open("rb") as lines:
             for line in lines:
                 try:
-                    row = Row.model_validate_json(line)
+                    row = EvaluationRow.model_validate_json(line)
                 except ValueError:
                     is_complete = False
                     continue

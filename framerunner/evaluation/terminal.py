@@ -10,7 +10,7 @@ from rich import box
 from rich.table import Table
 
 from framerunner.evaluation.compare import Comparison
-from framerunner.evaluation.rows import Row
+from framerunner.evaluation.rows import EvaluationRow
 from framerunner.evaluation.statistics import Spread, Summary
 from framerunner.terminal import ProgressLine, table_console
 from scenarios.verdict import Verdict
@@ -25,7 +25,7 @@ class EvaluationProgress(ProgressLine):
     It counts `total` flights, of which those in `kept` were flown before.
     """
 
-    def __init__(self, total: int, kept: Sequence[Row]) -> None:
+    def __init__(self, total: int, kept: Sequence[EvaluationRow]) -> None:
         super().__init__(line_s=5.0, total=total, done=len(kept))
         self._total = total
         self._rows = self._kept = len(kept)
@@ -33,7 +33,7 @@ class EvaluationProgress(ProgressLine):
         self._simulated_s = 0.0
         self._live.update(self._task, description=self.text())
 
-    def add(self, row: Row) -> None:
+    def add(self, row: EvaluationRow) -> None:
         """Count a flight that has ended."""
         self._rows += 1
         self._verdicts[row.verdict] += 1

@@ -1,4 +1,4 @@
-"""The arena in perspective: floor, base, frames, obstacles, the drone and its trail.
+"""The arena in perspective: floor, base, gates, obstacles, the drone and its trail.
 
 Painted from back to front at twice the size and then reduced, so that edges are smooth and nothing shows
 through the seams between faces.
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from framerunner.film import style
 from framerunner.film.style import Bgr
 from framerunner.film.timeline import Floats, Instant, Timeline
-from framerunner.film.viewpoint import Viewpoint
+from framerunner.film.viewpoint import FilmCamera
 from framerunner.runs.plots import STATE_COLOURS
 from framerunner.vehicle.airframe import Airframe, load_airframe
 from scenarios.models import Light
@@ -68,7 +68,7 @@ class ArenaView:
         self._canvas = self._paper.copy()
         self._pen = max(1.0, FINE * size_px[1] / 430)  # pixels of a line's width at the usual size
 
-    def paint(self, instant: Instant, viewpoint: Viewpoint, film_s: float) -> Image:
+    def paint(self, instant: Instant, viewpoint: FilmCamera, film_s: float) -> Image:
         """Paint an instant of the flight; the time of the film turns the rotors.
 
         Returns:
@@ -86,7 +86,7 @@ class ArenaView:
         self._solids_and_trail(view, instant, film_s)
         return np.asarray(cv2.resize(self._canvas, self._size_px, interpolation=cv2.INTER_AREA), np.uint8)
 
-    def _solids_and_trail(self, view: Viewpoint, instant: Instant, film_s: float) -> None:
+    def _solids_and_trail(self, view: FilmCamera, instant: Instant, film_s: float) -> None:
         """Paint the faces, and each piece of the trail where it belongs among them."""
         centre = np.array(instant.position_arena_m)
         points = np.concatenate((self._timeline.trail_m[: instant.trail], centre[None]))
@@ -111,7 +111,7 @@ class ArenaView:
                 for patch in patches:
                     self._patch(view, patch)
 
-    def _faces(self, view: Viewpoint, numbers: Iterable[int]) -> None:
+    def _faces(self, view: FilmCamera, numbers: Iterable[int]) -> None:
         for number in numbers:
             face = self._tree.faces[number]
             if float(np.dot(view.eye_m - face.corners_arena_m[0], face.normal_arena)) > 0.0:
@@ -120,7 +120,7 @@ class ArenaView:
                 else:
                     self._fill(view, face.corners_arena_m, face.colour)
 
-    def _patch(self, view: Viewpoint, patch: _Patch) -> None:
+    def _patch(self, view: FilmCamera, patch: _Patch) -> None:
         outline = view.polygon(patch.corners_m)
         if len(outline) < 3:
             return
@@ -144,15 +144,13 @@ class ArenaView:
         )
         under[:] = cv2.addWeighted(over, opacity, under, 1.0 - opacity, 0.0)
 
-    def _stems(self, view: Viewpoint) -> None:
-        """Thin lines from the frames down to the floor, which show where they are."""
-        for frame in self._timeline.scenario.all_frames:
-            below_m = frame.z_m - frame.outer_height_m / 2
-            self._line(
-                view, np.array([(frame.x_m, frame.y_m, 0.0), (frame.x_m, frame.y_m, below_m)]), style.STEM
-            )
+    def _stems(self, view: FilmCamera) -> None:
+        """Thin lines from the gates down to the floor, which show where they are."""
+        for gate in self._timeline.scenario.all_gates:
+            below_m = gate.z_m - gate.outer_height_m / 2
+            self._line(view, np.array([(gate.x_m, gate.y_m, 0.0), (gate.x_m, gate.y_m, below_m)]), style.STEM)
 
-    def _drop_shadow(self, view: Viewpoint, centre_m: Floats) -> None:
+    def _drop_shadow(self, view: FilmCamera, centre_m: Floats) -> None:
         """The drone's shadow straight below it, and a line down to it."""
         x, y, z = centre_m
         base = self._timeline.scenario.base
@@ -167,7 +165,7 @@ class ArenaView:
             self._fill_translucent(outline, style.mixed(style.SHADOW, (40, 50, 60), 0.5), 0.55)
         self._line(view, np.array([(x, y, 0.0), (x, y, z)]), style.mixed(style.STEM, (40, 50, 60), 0.4))
 
-    def _line(self, view: Viewpoint, ends_m: Floats, colour: Bgr) -> None:
+    def _line(self, view: FilmCamera, ends_m: Floats, colour: Bgr) -> None:
         pixels = view.project(ends_m)
         if np.isfinite(pixels).all():
             self._polyline(pixels, colour, max(1, round(1.2 * self._pen)))
@@ -176,7 +174,7 @@ class ArenaView:
         line = [style.fixed_point(pixels)]
         cv2.polylines(self._canvas, line, False, colour, width, cv2.LINE_AA, style.SUBPIXEL_BITS)
 
-    def _fill(self, view: Viewpoint, corners_m: Floats, colour: Bgr) -> None:
+    def _fill(self, view: FilmCamera, corners_m: Floats, colour: Bgr) -> None:
         outline = view.polygon(corners_m)
         if len(outline) > 2:
             cv2.fillConvexPoly(

@@ -9,10 +9,10 @@ import numpy as np
 
 from framerunner.film import style
 from framerunner.film.arena_view import ArenaView, state_colour
-from framerunner.film.style import Bgr, Box, Letters
+from framerunner.film.style import Bgr, Letters, PixelBox
 from framerunner.film.timeline import Instant, Timeline
 from framerunner.film.viewpoint import Flyby
-from framerunner.recording.messages import box_edges
+from framerunner.recording.recording_messages import box_edges
 from scenarios.models import COLOURS
 from scenarios.result import FlightResult
 from vision.types import Detection, Detections, Image
@@ -31,7 +31,7 @@ class FilmPainter:
         self._arena = ArenaView(timeline, (view.width, view.height))
         self._letters = Letters()
         self._camera = _CameraView(self._layout.camera, self._letters, self._layout.unit)
-        present = {frame.colour for frame in timeline.scenario.frames}
+        present = {gate.colour for gate in timeline.scenario.frames}
         self._colours = [colour for colour in COLOURS if colour in present]
         self._paper = np.full((size_px[1], size_px[0], 3), style.PAPER, np.uint8)
         self._draw_strip()
@@ -94,7 +94,7 @@ class FilmPainter:
             self._letters.write(image, beside, f"{metres + 0.0:.2f}", 20 * unit, style.INK)
 
     def _write_figures(self, image: Image, instant: Instant, over: bool) -> None:
-        """Write the time, a chip for each frame, and the speed or, at the end, the verdict."""
+        """Write the time, a chip for each gate, and the speed or, at the end, the verdict."""
         unit, box = self._layout.unit, self._layout.figures
         middle = box.y + box.height / 2
         time_s = max(0.0, instant.time_s)
@@ -114,7 +114,7 @@ class FilmPainter:
         self._draw_chips(image, (x, right), instant)
 
     def _draw_chips(self, image: Image, span: tuple[float, float], instant: Instant) -> None:
-        """Draw a chip for each frame: an outline until it is crossed, then filled, with the time."""
+        """Draw a chip for each gate: an outline until it is crossed, then filled, with the time."""
         if not self._colours:
             return
         unit, box = self._layout.unit, self._layout.figures
@@ -125,7 +125,7 @@ class FilmPainter:
             left, top = span[0] + number * (width + gap), middle - height / 2
             when_s = instant.crossed.get(colour)
             crossed = when_s is not None
-            ink = style.FRAME[colour]
+            ink = style.GATE[colour]
             _pill(
                 image, (left, top), (width, height), ink if crossed else style.mixed(ink, style.WHITE, 0.35)
             )
@@ -180,7 +180,7 @@ class FilmPainter:
 class _CameraView:
     """Paints the camera's image and its detections into a box, as large as it fits; `unit` as in `Layout`."""
 
-    def __init__(self, box: Box, letters: Letters, unit: float) -> None:
+    def __init__(self, box: PixelBox, letters: Letters, unit: float) -> None:
         self._box = box
         self._letters = letters
         self._unit = unit

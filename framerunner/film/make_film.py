@@ -86,7 +86,7 @@ def _scenario(folder: Path) -> Scenario:
 
 
 def _lifted(scenario: Scenario, flight: CollectedFlight) -> Scenario:
-    """The scenario with the frames' heights of this flight."""
+    """The scenario with the gates' heights of this flight."""
     lift_m = 0.0 if flight.result is None else flight.result.lift_m
     return FlightPlan(scenario, lift_m=lift_m).layout if abs(lift_m) < 10.0 else scenario
 

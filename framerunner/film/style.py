@@ -48,8 +48,8 @@ STEM = bgr("#a5997a")
 WHITE: Bgr = (255, 255, 255)
 GOOD = bgr("#1d7f4e")
 BAD = bgr("#b3372f")
-FRAME: dict[str, Bgr] = {"red": bgr("#ee1c1c"), "green": bgr("#12b436"), "blue": bgr("#1f3df5")}
-"""Of chips: a little less saturated than the frames themselves, so that text on them is legible."""
+GATE: dict[str, Bgr] = {"red": bgr("#ee1c1c"), "green": bgr("#12b436"), "blue": bgr("#1f3df5")}
+"""Of chips: a little less saturated than the gates themselves, so that text on them is legible."""
 
 
 def fixed_point(pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.int32]:
@@ -61,7 +61,7 @@ def fixed_point(pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.int32]:
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class PixelBox:
     """A part of the image, whole pixels; width and height are at least 1."""
 
     x: int
@@ -81,7 +81,7 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class ImageLayout:
     """The parts of the image.
 
     Attributes:
@@ -94,33 +94,35 @@ class Layout:
     """
 
     unit: float
-    view: Box
-    camera: Box
-    state: Box
-    figures: Box
-    strip: Box
+    view: PixelBox
+    camera: PixelBox
+    state: PixelBox
+    figures: PixelBox
+    strip: PixelBox
 
 
-def lay_out(width_px: int, height_px: int, camera_ratio: float) -> Layout:
+def lay_out(width_px: int, height_px: int, camera_ratio: float) -> ImageLayout:
     """Divide an image; `camera_ratio` is width over height of the camera's images."""
     wide = width_px / height_px >= _WIDE
     unit = min(width_px / 960, height_px / 540) if wide else min(width_px / 600, height_px / 760)
     margin, strip_height, figures_height = round(16 * unit), max(3, round(10 * unit)), round(76 * unit)
     body = height_px - strip_height - figures_height
-    strip = Box(0, height_px - strip_height, width_px, strip_height)
-    figures = Box(0, body, width_px, figures_height)
+    strip = PixelBox(0, height_px - strip_height, width_px, strip_height)
+    figures = PixelBox(0, body, width_px, figures_height)
     if wide:
         side = round(0.405 * width_px)
         camera_width = side - margin
         camera_height = min(round(camera_width / camera_ratio), round(0.66 * body))
-        camera = Box(width_px - side, margin, camera_width, camera_height)
-        state = Box(camera.x, camera.bottom, camera_width, body - camera.bottom)
-        return Layout(unit, Box(0, 0, width_px - side - margin, body), camera, state, figures, strip)
-    view = Box(0, 0, width_px, round(0.6 * body))
+        camera = PixelBox(width_px - side, margin, camera_width, camera_height)
+        state = PixelBox(camera.x, camera.bottom, camera_width, body - camera.bottom)
+        return ImageLayout(
+            unit, PixelBox(0, 0, width_px - side - margin, body), camera, state, figures, strip
+        )
+    view = PixelBox(0, 0, width_px, round(0.6 * body))
     height = body - view.height - margin
-    camera = Box(margin, view.bottom, min(round(height * camera_ratio), round(0.5 * width_px)), height)
-    state = Box(camera.right + margin, view.bottom, width_px - camera.right - 2 * margin, height)
-    return Layout(unit, view, camera, state, figures, strip)
+    camera = PixelBox(margin, view.bottom, min(round(height * camera_ratio), round(0.5 * width_px)), height)
+    state = PixelBox(camera.right + margin, view.bottom, width_px - camera.right - 2 * margin, height)
+    return ImageLayout(unit, view, camera, state, figures, strip)
 
 
 class Letters:

@@ -59,7 +59,7 @@ class Timeline:
 
     Args:
         flight: all that was recorded of it.
-        scenario: where it was flown, with the frames' real heights.
+        scenario: where it was flown, with the gates' real heights.
 
     Raises:
         RecordingError: no moment has a position.

@@ -24,7 +24,7 @@ _DISTANCE_SMOOTHING_S = 2.5  # film time
 
 
 @dataclass(frozen=True, slots=True)
-class Viewpoint:
+class FilmCamera:
     """A pinhole camera.
 
     Attributes:
@@ -59,10 +59,10 @@ class Viewpoint:
         pixels: Floats = self.focal_px * seen[:, :2] / seen[:, 2:] + np.array(self.centre_px)
         return pixels
 
-    def scaled(self, factor: float) -> Viewpoint:
+    def scaled(self, factor: float) -> FilmCamera:
         """The same camera with an image that is `factor` times as large."""
         u, v = self.centre_px
-        return Viewpoint(self.eye_m, self.axes, self.focal_px * factor, (u * factor, v * factor))
+        return FilmCamera(self.eye_m, self.axes, self.focal_px * factor, (u * factor, v * factor))
 
 
 class Flyby:
@@ -91,12 +91,12 @@ class Flyby:
         reach = round(_DISTANCE_SMOOTHING_S * _SAMPLES / max(film_s, 1.0))
         self._distances_m = _smoothed(np.array(needed), reach)
 
-    def at(self, time_s: float) -> Viewpoint:
+    def at(self, time_s: float) -> FilmCamera:
         """The viewpoint at a time of the flight, seconds since motors on."""
         axes, target = self._axes(time_s), self._target(time_s)
         distance_m = float(np.interp(time_s, self._samples_s, self._distances_m))
         centre = (self._size_px[0] / 2, _CENTRE * self._size_px[1])
-        return Viewpoint(target - distance_m * axes[2], axes, self._focal_px, centre)
+        return FilmCamera(target - distance_m * axes[2], axes, self._focal_px, centre)
 
     def _target(self, time_s: float) -> Floats:
         flown = self._timeline.mean_position(time_s, _SMOOTHING_S * self._speed)
@@ -130,12 +130,12 @@ def _smoothed(needed_m: Floats, reach: int) -> Floats:
 
 
 def _always_visible(timeline: Timeline) -> Floats:
-    """Points that must always be in the image: around base, frames and obstacles, or the arena's corners."""
+    """Points that must always be in the image: around base, gates and obstacles, or the arena's corners."""
     scenario = timeline.scenario
     points = [(scenario.base.x_m, scenario.base.y_m, z_m) for z_m in (0.0, scenario.base.top_m + 0.3)]
     points += [corner for prism in scenario.prisms for corner in prism.corners()]
-    for frame in scenario.all_frames:
-        points += [(frame.x_m, frame.y_m, z_m) for z_m in (0.0, frame.z_m + frame.outer_height_m)]
+    for gate in scenario.all_gates:
+        points += [(gate.x_m, gate.y_m, z_m) for z_m in (0.0, gate.z_m + gate.outer_height_m)]
     if not scenario.frames:
         half_x, half_y = scenario.arena.length_x_m / 2, scenario.arena.width_y_m / 2
         points += [(x * half_x, y * half_y, 0.0) for x in (-1, 1) for y in (-1, 1)]

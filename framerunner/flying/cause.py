@@ -11,11 +11,11 @@ from offboard.app import MissionEnd, Moment
 from offboard.navigation.view import NavigationView
 from offboard.safety.operator import STOPPED
 from scenarios.crossing import Boundary
-from scenarios.models import COLOURS, Frame, Scenario
+from scenarios.models import COLOURS, Gate, Scenario
 from scenarios.result import FlightResult, RefereeReport
 from scenarios.verdict import Verdict
 
-SAME_FRAME_M = 1.0  # an estimate of a frame's colour that is farther away is of something else
+SAME_GATE_M = 1.0  # an estimate of a gate's colour that is farther away is of something else
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Flown:
     """What is known of a flight that is over.
 
     Attributes:
-        layout: the frames and obstacles where they truly were.
+        layout: the gates and obstacles where they truly were.
         report: of the referee.
         end: how the mission ended.
         track: its times count from motors on.
@@ -80,31 +80,31 @@ class CauseWatch:
         more = (
             f", then {len(others)} more contacts" if len(others) > 1 else ", then one more" if others else ""
         )
-        frame = next((frame for frame in flown.layout.frames if frame.colour == name), None)
-        known = "" if frame is None else self._error_of_map(frame, time_s, flown.began_us)
+        gate = next((gate for gate in flown.layout.frames if gate.colour == name), None)
+        known = "" if gate is None else self._error_of_map(gate, time_s, flown.began_us)
         return f"touched {name} {_at(flown.track, time_s)}{known}{more}"
 
-    def _error_of_map(self, frame: Frame, time_s: float, began_us: int | None) -> str:
-        """How far the navigator's estimate of a frame was off at a time."""
+    def _error_of_map(self, gate: Gate, time_s: float, began_us: int | None) -> str:
+        """How far the navigator's estimate of a gate was off at a time."""
         if began_us is None or not self._views:
             return ""
         number = bisect_right(self._views, began_us + round(time_s * 1e6), key=lambda seen: seen[0])
-        estimates = self._views[max(number - 1, 0)][1].frames
-        own = [estimate for estimate in estimates if estimate.colour == frame.colour]
-        true_m = frame.position_arena_m
+        estimates = self._views[max(number - 1, 0)][1].gates
+        own = [estimate for estimate in estimates if estimate.colour == gate.colour]
+        true_m = gate.position_arena_m
         nearest = min(own, key=lambda estimate: dist(estimate.position_m, true_m), default=None)
-        if nearest is None or dist(nearest.position_m, true_m) > SAME_FRAME_M:
+        if nearest is None or dist(nearest.position_m, true_m) > SAME_GATE_M:
             return ", which was not on the map"
-        off_deg = degrees(abs(remainder(nearest.yaw_rad - frame.yaw_rad, pi)))
+        off_deg = degrees(abs(remainder(nearest.yaw_rad - gate.yaw_rad, pi)))
         off_cm = 100 * dist(nearest.position_m, true_m)
         return f", which the map had {off_cm:.1f} cm and {off_deg:.1f}° off"
 
     def _hindrance(self, flown: Flown) -> str:
-        """What the navigator lacked to cross the next frame or to fly home."""
+        """What the navigator lacked to cross the next gate or to fly home."""
         if not self._views:
             return ""
         crossed = flown.report.frames_crossed
-        wanted = [frame.colour for frame in flown.layout.frames if frame.colour not in crossed]
+        wanted = [gate.colour for gate in flown.layout.frames if gate.colour not in crossed]
         troubles = [view.trouble for _, view in self._views]
         began = [now for now, before in zip(troubles, ["", *troubles], strict=False) if now and now != before]
         last = began[-1] if began else ""
@@ -113,7 +113,7 @@ class CauseWatch:
         if not wanted:
             return words
         colour = min(wanted, key=COLOURS.index)
-        if not any(seen.colour == colour for _, view in self._views for seen in view.frames):
+        if not any(seen.colour == colour for _, view in self._views for seen in view.gates):
             return f"{colour} was never on the map"
         return words
 
@@ -149,9 +149,9 @@ def _outside(flown: Flown) -> str:
 
 
 def _wrong_order(flown: Flown) -> str:
-    """The first frame that was crossed too early."""
+    """The first gate that was crossed too early."""
     report = flown.report
-    order = [colour for colour in COLOURS if any(frame.colour == colour for frame in flown.layout.frames)]
+    order = [colour for colour in COLOURS if any(gate.colour == colour for gate in flown.layout.frames)]
     for wanted, colour, time_s in zip(order, report.frames_crossed, report.crossing_times_s, strict=False):
         if colour != wanted:
             return f"crossed {colour} before {wanted} {_at(flown.track, time_s)}"

@@ -45,7 +45,7 @@ def bound_of(plan: FlightPlan, mission_class: MissionClass) -> Bound:
 
     Raises:
         EnvelopeError: there is no envelope of this airframe, or the scenario has wind.
-        ScenarioError: the scenario has no frames.
+        ScenarioError: the scenario has no gates.
     """
     airframe = plan.scenario.airframe
     envelope = ENVELOPES.get((airframe, mission_class))

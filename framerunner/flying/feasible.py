@@ -1,4 +1,4 @@
-"""A fast flight that is possible for a pilot who knows the layout, to compare with the bound."""
+"""A fast flight that is possible for somebody who knows the layout, to compare with the bound."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from framerunner.flying.plan import FlightPlan, airframe_limits
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from offboard.limits import CONTEST
-from offboard.navigation.goals import FlightStyle, Gate, Motion, Obstacles, Point, Refusal, style_of
+from offboard.navigation.goals import FlightStyle, Motion, Obstacles, PathGate, Point, Refusal, style_of
 from offboard.navigation.path import Path
 from offboard.navigation.planning import plan as plan_path
-from scenarios.bound import ordered_frames
+from scenarios.bound import ordered_gates
 from scenarios.models import MissionClass
 
 AROUND_S = 0.1
@@ -47,15 +47,15 @@ def feasible(plan: FlightPlan, mission_class: MissionClass) -> Feasible | str:
 
 
 def feasible_path(plan: FlightPlan, mission_class: MissionClass) -> Path | Refusal:
-    """The navigator's own plan through all frames and back, with the layout known.
+    """The navigator's own plan through all gates and back, with the layout known.
 
     Returns:
         The path from standing on the base to where the motors stop just above it, or why there is none.
     """
     scenario = plan.layout
     x_m, y_m, z_m, yaw_rad = plan.start_pose
-    gates = tuple(Gate(frame.position_arena_m, frame.yaw_rad) for frame in ordered_frames(scenario))
-    decoys = tuple(Gate(decoy.position_arena_m, decoy.yaw_rad) for decoy in scenario.decoys)
+    gates = tuple(PathGate(gate.position_arena_m, gate.yaw_rad) for gate in ordered_gates(scenario))
+    decoys = tuple(PathGate(decoy.position_arena_m, decoy.yaw_rad) for decoy in scenario.decoys)
     ceiling_m = scenario.arena.height_m
     solids = [solid for pole in scenario.poles for solid in pole.solids(ceiling_m)]
     solids += [solid for wall in scenario.walls for solid in wall.solids(ceiling_m)]
@@ -72,7 +72,7 @@ def feasible_path(plan: FlightPlan, mission_class: MissionClass) -> Path | Refus
 
 
 def _style(plan: FlightPlan, mission_class: MissionClass) -> FlightStyle:
-    """The navigator's own, changed for a pilot who knows where the frames are and need not see them."""
+    """The navigator's own, changed for somebody who knows where the gates are and need not see them."""
     limits = CONTEST if mission_class == "contest" else airframe_limits(plan.airframe)
     usual = style_of(limits)
     return replace(

@@ -69,7 +69,7 @@ class Judge:
 
 
 class TelemetryJudge(Judge):
-    """A referee that sees the drone's telemetry, and so no contacts with frames."""
+    """A referee that sees the drone's telemetry, and so no contacts with gates."""
 
     source = "telemetry"
 
@@ -213,7 +213,7 @@ async def choose_judge(
         named: whether the user named the simulator, which must then answer.
 
     Returns:
-        The judge, and the plan with its start and its frames' heights as the simulator has them.
+        The judge, and the plan with its start and its gates' heights as the simulator has them.
 
     Raises:
         SettingError: the named simulator does not judge this scenario.

@@ -22,11 +22,11 @@ from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_ve
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
 from framerunner.flying.response import LateResponse
-from framerunner.geometry.axes import Alignment, Pose
+from framerunner.geometry.axes import ArenaAlignment, Pose
 from framerunner.geometry.rotations import normalized, quaternion_from_euler
 from framerunner.geometry.vectors import Vec3
 from offboard.arming import Arming
-from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityCommand
+from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityFluCommand
 from offboard.limits import STILL, VelocityLimits
 from offboard.link.gimbal import GimbalAttitude
 from scenarios.models import TrueState
@@ -120,7 +120,7 @@ class LockstepDrone:
         self._response = response
         self._limits = limits or VelocityLimits()
         self._latest: DroneState | None = None
-        self._alignment: Alignment | None = None
+        self._alignment: ArenaAlignment | None = None
         self._heartbeat_us = 0
         self._position_us = POSITION_PHASE_US
         self._received = _Received()
@@ -130,7 +130,7 @@ class LockstepDrone:
         self._sample: DroneState | None = None
         self._arming = Arming()
         self._mode = FlightMode.HOLD
-        self._command = VelocityCommand()
+        self._command = VelocityFluCommand()
         self._commanding = False
         self._resend_us = _NEVER_US
         self._link = FaultyLink(simulation)
@@ -150,7 +150,7 @@ class LockstepDrone:
             )
         if not self._received.position_us:
             self._received.update(self._autopilot, self._autopilot.state.time_us)
-        self._alignment = Alignment(
+        self._alignment = ArenaAlignment(
             self._start_arena,
             Pose(self._received.position_ned_m, _received_angle(self._autopilot.state.yaw_rad)),
         )
@@ -194,7 +194,7 @@ class LockstepDrone:
 
     async def motors_on(self, *, confirmed: bool = True) -> None:
         """Enter offboard with zero setpoints, which a heartbeat confirms, then arm; see `Drone.motors_on`."""
-        self._send(VelocityCommand())
+        self._send(VelocityFluCommand())
         self._pass(STREAM_BEFORE_OFFBOARD_US)
         self._confirm(
             "offboard mode",
@@ -242,9 +242,9 @@ class LockstepDrone:
         if self._mode in (FlightMode.OFFBOARD, FlightMode.LAND) or demanded:
             await self.land()
 
-    refuse = hold  # no pilot takes this drone, so none gives it back
+    refuse = hold  # no operator takes this drone, so none gives it back
 
-    def command(self, command: VelocityCommand) -> LimitedCommand:
+    def command(self, command: VelocityFluCommand) -> LimitedCommand:
         """Set the velocity to fly from now on. Without motors on it is ignored."""
         if not self._commanding:
             return LimitedCommand(STILL)
@@ -272,7 +272,7 @@ class LockstepDrone:
         if self._response is not None:
             self._response.reset()
 
-    def _send(self, command: VelocityCommand) -> None:
+    def _send(self, command: VelocityFluCommand) -> None:
         self._command = command
         state = self._autopilot.state
         self._resend_us = state.time_us + RESEND_US
@@ -350,7 +350,7 @@ class LockstepDrone:
         if not self._pass(CONFIRM_LIMIT_US, until=shown):
             raise _not_shown(what, self._mode, self._arming, self._autopilot)
 
-    def _reported_state(self, alignment: Alignment) -> DroneState:
+    def _reported_state(self, alignment: ArenaAlignment) -> DroneState:
         """The state as telemetry shows it: heading now, position and mode as of their last messages."""
         state = self._autopilot.state
         yaw_rad = _received_angle(state.yaw_rad)

@@ -7,9 +7,9 @@ from math import isfinite
 
 from framerunner.geometry.vectors import Vec3
 from framerunner.wire.mission_report import MapDocument, MappedFrame
-from offboard.navigation.view import FrameEstimate, NavigationView
+from offboard.navigation.view import GateEstimate, NavigationView
 
-MAX_FRAMES = 24  # of a map: with the path some 1.5 kB compressed
+MAX_GATES = 24  # of a map: with the path some 1.5 kB compressed
 MAX_POINTS = 30  # of a path
 _MAX_TEXT = 80
 _MM = 3  # decimals of metres; of radians one more
@@ -18,30 +18,30 @@ _MM = 3  # decimals of metres; of radians one more
 def map_document(view: NavigationView, mission_crc: int = 0, time_us: int = 0) -> MapDocument:
     """A navigator's map and plan, as docs/monitor-channels.md has it.
 
-    Frames without a place are left out; an unknown standard deviation is None. A path of more points than
+    Gates without a place are left out; an unknown standard deviation is None. A path of more points than
     `MAX_POINTS` has some of them left out.
     """
-    frames = [_frame(frame) for frame in view.frames if has_place(frame)]
+    gates = [_frame(gate) for gate in view.gates if has_place(gate)]
     points = [point for point in view.path_m if all(map(isfinite, point))]
     path = tuple(_rounded(point) for point in _thinned(points))
-    return MapDocument(mission_crc, time_us, view.goal[:_MAX_TEXT], tuple(frames[:MAX_FRAMES]), path)
+    return MapDocument(mission_crc, time_us, view.goal[:_MAX_TEXT], tuple(gates[:MAX_GATES]), path)
 
 
-def has_place(frame: FrameEstimate) -> bool:
-    """Whether a frame's position and yaw are finite."""
-    return all(map(isfinite, (*frame.position_m, frame.yaw_rad)))
+def has_place(gate: GateEstimate) -> bool:
+    """Whether a gate's position and yaw are finite."""
+    return all(map(isfinite, (*gate.position_m, gate.yaw_rad)))
 
 
-def _frame(frame: FrameEstimate) -> MappedFrame:
+def _frame(gate: GateEstimate) -> MappedFrame:
     return MappedFrame(
-        colour=frame.colour[:_MAX_TEXT],
-        p=_rounded(frame.position_m),
-        yaw=round(frame.yaw_rad, _MM + 1),
-        std=_rounded(frame.position_std_m) if all(map(isfinite, frame.position_std_m)) else None,
-        yaw_std=round(frame.yaw_std_rad, _MM + 1) if isfinite(frame.yaw_std_rad) else None,
-        certain=frame.certain,
-        ambiguous=frame.ambiguous,
-        views=frame.views,
+        colour=gate.colour[:_MAX_TEXT],
+        p=_rounded(gate.position_m),
+        yaw=round(gate.yaw_rad, _MM + 1),
+        std=_rounded(gate.position_std_m) if all(map(isfinite, gate.position_std_m)) else None,
+        yaw_std=round(gate.yaw_std_rad, _MM + 1) if isfinite(gate.yaw_std_rad) else None,
+        certain=gate.certain,
+        ambiguous=gate.ambiguous,
+        views=gate.views,
     )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
-from framerunner.flying.response import Response
+from framerunner.flying.response import ResponseDelay
 from framerunner.vehicle.airframe import Airframe, load_airframe
 from offboard.limits import CONTEST, Box, Caps, CommandLimits, VelocityLimits, flight_box
 from offboard.navigation.view import Surroundings
@@ -31,9 +31,9 @@ class FlightPlan:
 
     Attributes:
         scenario: the layout, as declared.
-        mission: the chart that flies; None if an agent or a pilot flies.
+        mission: the chart that flies; None if an agent or an operator flies.
         seed: of everything random; None in real time, which does not repeat.
-        lift_m: how much higher than declared the frames and the ceiling are. A drone that starts from the
+        lift_m: how much higher than declared the gates and the ceiling are. A drone that starts from the
             floor, without a base, measures heights from there, and its app takes that for the base's top.
             Lifted by the base's height, everything is as high above the real floor as the scenario says.
         drone_limits: of a real drone, for a mission of the class `open`; None: those of the airframe.
@@ -48,7 +48,7 @@ class FlightPlan:
     seed: int | None = 0
     lift_m: float = 0.0
     drone_limits: CommandLimits | None = None
-    response: Response | None = None
+    response: ResponseDelay | None = None
     calibration: Calibration | None = None
     caps: Caps | None = None
     detector: str | DetectorMaker | None = None
@@ -78,13 +78,13 @@ class FlightPlan:
 
     @cached_property
     def layout(self) -> Scenario:
-        """The scenario with its frames, ceiling and tops of obstacles `lift_m` higher than declared."""
+        """The scenario with its gates, ceiling and tops of obstacles `lift_m` higher than declared."""
         scenario, lift_m = self.scenario, self.lift_m
         if not lift_m:
             return scenario
         return scenario.model_copy(
             update={
-                "frames": tuple(_raised(frame, "z_m", lift_m) for frame in scenario.frames),
+                "frames": tuple(_raised(gate, "z_m", lift_m) for gate in scenario.frames),
                 "decoys": tuple(_raised(decoy, "z_m", lift_m) for decoy in scenario.decoys),
                 "poles": tuple(_raised(pole, "height_m", lift_m) for pole in scenario.poles),
                 "walls": tuple(_raised(wall, "height_m", lift_m) for wall in scenario.walls),
@@ -98,9 +98,9 @@ class FlightPlan:
         layout, camera = self.layout, self.camera
         if not layout.frames:
             return Surroundings(layout.arena, layout.base, camera)
-        frame = layout.frames[0]  # all are of one size, which the rules tell
-        size_m = (frame.outer_width_m, frame.outer_height_m)
-        return Surroundings(layout.arena, layout.base, camera, size_m, frame.bar_m)
+        gate = layout.frames[0]  # all are of one size, which the rules tell
+        size_m = (gate.outer_width_m, gate.outer_height_m)
+        return Surroundings(layout.arena, layout.base, camera, size_m, gate.bar_m)
 
     @property
     def camera(self) -> Camera:
@@ -144,7 +144,7 @@ class FlightPlan:
     def corrects_commands(self) -> bool:
         """Whether commands are corrected on their way to a vehicle that answers late.
 
-        A mission that sees frames by shape corrects its own.
+        A mission that sees gates by shape corrects its own.
         """
         return self.mission is not None and self.mission.vision == "boxes"
 

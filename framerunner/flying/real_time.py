@@ -33,7 +33,7 @@ if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow t
     from framerunner.preflight.settings import HardwareSettings
     from offboard.link.process_guard import ProcessGuard
     from offboard.mavsdk_drone import MavsdkDrone
-    from offboard.perception import Camera, CameraPerception
+    from offboard.perception import CameraPerception, ImageSource
 
 SLOW_FACTOR = 0.95  # of the requested speed; below, vehicle time had to wait
 
@@ -297,7 +297,7 @@ class _RealTimeFlight:
             self._records.see_frame(replace(frame, time_us=time_us))
             reporter.see_frame(frame)
 
-        source: Camera
+        source: ImageSource
         if self._vehicle.sitl is not None:
             source = self._vehicle.sitl.clock.images
         else:

@@ -20,7 +20,7 @@ WANDER_PERIODS_S = (8.0, 15.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Response:
+class ResponseDelay:
     """How late a vehicle answers.
 
     Attributes:
@@ -47,7 +47,7 @@ class LateResponse:
         seed: of the wander in height.
     """
 
-    def __init__(self, response: Response, seed: int) -> None:
+    def __init__(self, response: ResponseDelay, seed: int) -> None:
         self._lag_s = response.lag_s
         self._dead_us = round(response.dead_time_s * 1e6)
         random = Random(seed)

@@ -20,7 +20,7 @@ from framerunner.child_process import ChildProcess
 from framerunner.errors import SettingError, UserError
 from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate, single
 from framerunner.wire.simulator_api import SimulatorApi
-from offboard.drone import DroneError, VelocityCommand
+from offboard.drone import DroneError, VelocityFluCommand
 from offboard.perception import IMAGES_KEPT, CameraPerception
 from sitl.autopilots import TITLES, WARNING
 from sitl.autopilots.process import may_use_real_time
@@ -211,7 +211,9 @@ class SimulatorClock:
         """Stop vehicle time; returns that of the last control tick, microseconds."""
         return (await self._granted(Grant(0))).time_us
 
-    async def advance(self, tick_us: int, command: VelocityCommand | None, *, at_once: bool = False) -> None:
+    async def advance(
+        self, tick_us: int, command: VelocityFluCommand | None, *, at_once: bool = False
+    ) -> None:
         """Grant time up to a tick and the control period after it; then wait for the images.
 
         Args:
@@ -267,7 +269,7 @@ class SimulatorClock:
         self._answers.put_nowait(None)
 
 
-def _sent(command: VelocityCommand) -> Velocity:
+def _sent(command: VelocityFluCommand) -> Velocity:
     """A command as the autopilot receives it."""
     forward, right, down = single((command.forward_m_s, -command.left_m_s, -command.up_m_s))
     return (forward, right, down, sent_yaw_rate(-command.yaw_rate_rad_s))

@@ -43,7 +43,7 @@ class Pose:
 ORIGIN = Pose((0.0, 0.0, 0.0), 0.0)
 
 
-class Alignment:
+class ArenaAlignment:
     """Transforms a vehicle's local NED frame into arena axes: a rotation about the vertical and a shift.
 
     One pose known in both axes gives both, such as that of a drone that stands on its start. Real hardware's

@@ -16,7 +16,7 @@ from gymnasium.error import ResetNeeded
 from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from framerunner.gym.flight import SteppedFlight, final_reward
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from scenarios.loader import load_scenario
 from scenarios.models import COLOURS, Camera, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
@@ -179,12 +179,12 @@ def _scenario(scenario: str | Path | Scenario) -> Scenario:
     return scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
 
 
-def _command(action: Action) -> VelocityCommand:
+def _command(action: Action) -> VelocityFluCommand:
     rates = [float(rate) for rate in np.asarray(action).reshape(-1)]
     if len(rates) != 4 or not all(map(isfinite, rates)):
         raise SettingError(f"action {action!r}: must be four finite numbers, forward, left, up, yaw rate")
     forward, left, up, yaw_rate = (min(max(rate, -1.0), 1.0) for rate in rates)
-    return VelocityCommand(forward, left, up, yaw_rate)
+    return VelocityFluCommand(forward, left, up, yaw_rate)
 
 
 def observation_space(camera: Camera, *, image: bool) -> spaces.Dict:

@@ -6,7 +6,7 @@ from collections.abc import Coroutine
 
 from framerunner.flying.lockstep import LockstepVehicle
 from framerunner.flying.plan import FlightPlan
-from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.drone import DroneError, DroneState, VelocityFluCommand
 from scenarios.models import is_over_base
 from scenarios.referee import Referee
 from scenarios.result import RefereeReport
@@ -16,11 +16,11 @@ from vision.types import Detections, Image
 TAKEN_OFF_M = 0.3  # above the start; from there on a descent to the base is a landing
 STOP_ABOVE_BASE_M = 0.1  # of the drone's underside; there the motors are stopped
 # Rewards.
-CROSSING = 1.0  # for each frame crossed in order
-LANDING = 2.0  # on the base after all frames
-CONTACT = -0.2  # for each contact with a frame
+CROSSING = 1.0  # for each gate crossed in order
+LANDING = 2.0  # on the base after all gates
+CONTACT = -0.2  # for each contact with a gate
 OUTSIDE_PER_S = -0.05  # for each second outside the arena
-FAILURE = -1.0  # for a crash, or a frame crossed in the wrong order
+FAILURE = -1.0  # for a crash, or a gate crossed in the wrong order
 
 
 class SteppedFlight:
@@ -31,12 +31,12 @@ class SteppedFlight:
         self._plan = plan
         self._drone, self._perception = vehicle.drone, vehicle.perception
         self._taken_off = False
-        self._frames = len({frame.colour for frame in plan.scenario.frames})
+        self._gates = len({gate.colour for gate in plan.scenario.frames})
         self._crossed = self._contacts = 0
         self._penalty_s = 0.0
         self.referee: Referee = vehicle.simulation.referee
         self.ended = ""  # why the drone can no longer be flown; empty while it can
-        self.failed_order = False  # a frame was crossed in the wrong order
+        self.failed_order = False  # a gate was crossed in the wrong order
         run_through(self._drone.ready())
         run_through(self._drone.motors_on(confirmed=False))
         self.state: DroneState = self._drone.next_state()  # by telemetry, as of the present tick
@@ -60,7 +60,7 @@ class SteppedFlight:
         """What the latest image showed."""
         return self._perception.latest(self.state.time_us)
 
-    def step(self, command: VelocityCommand) -> None:
+    def step(self, command: VelocityFluCommand) -> None:
         """Fly a velocity within the limits for a tick of 50 ms, or land; see `_is_landing`."""
         try:
             if self._is_landing(command):
@@ -90,10 +90,10 @@ class SteppedFlight:
             self._crossed = len(now.crossed)
         return reward
 
-    def _is_landing(self, command: VelocityCommand) -> bool:
+    def _is_landing(self, command: VelocityFluCommand) -> bool:
         """Whether to stop the motors now, as the paper's navigator does just above the base.
 
-        That is when all frames are crossed and the drone, which has taken off, is `STOP_ABOVE_BASE_M` above
+        That is when all gates are crossed and the drone, which has taken off, is `STOP_ABOVE_BASE_M` above
         the base or lower, and is commanded to descend.
         """
         state = self.state
@@ -104,7 +104,7 @@ class SteppedFlight:
             and self._taken_off
             and underside_m < base.top_m + STOP_ABOVE_BASE_M
             and is_over_base(base, state.x, state.y)
-            and len(self.referee.crossed) == self._frames
+            and len(self.referee.crossed) == self._gates
         )
 
 

@@ -19,8 +19,8 @@ from framerunner.mocap.facts import (
     Facts,
     SendSettings,
 )
-from framerunner.mocap.messages import odometry, vision_position
-from framerunner.mocap.poses import Pose
+from framerunner.mocap.pose_messages import odometry, vision_position
+from framerunner.mocap.poses import MeasuredPose
 from framerunner.wire.ardupilot_messages import (
     EKF_STATUS_REPORT_ID,
     EXTERNAL_NAVIGATION,
@@ -86,7 +86,7 @@ class ArduPilotPoses:
     estimator = "EKF_STATUS_REPORT"
     needs_origin = True
 
-    def pose_message(self, pose: Pose, stamp_us: int, settings: SendSettings) -> Message:
+    def pose_message(self, pose: MeasuredPose, stamp_us: int, settings: SendSettings) -> Message:
         """ODOMETRY in FRD if the source has velocities, else VISION_POSITION_ESTIMATE."""
         if pose.velocity_ned_m_s is None:
             return vision_position(pose, stamp_us, settings)

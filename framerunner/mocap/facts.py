@@ -14,7 +14,7 @@ VISION = int(mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION)
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
+class RoomOrigin:
     """Where on Earth the room's origin is."""
 
     latitude_deg: float
@@ -42,7 +42,7 @@ class SendSettings:
     position_sigma_m: float = 0.005
     attitude_sigma_rad: float = 0.01
     velocity_sigma_m_s: float = 0.05
-    origin: Origin | None = None
+    origin: RoomOrigin | None = None
 
 
 @dataclass(frozen=True, slots=True)

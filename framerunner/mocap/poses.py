@@ -52,7 +52,7 @@ class Axes(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class MeasuredPose:
     """A pose in the vehicle's axes.
 
     Attributes:
@@ -87,7 +87,7 @@ class PoseRecord(BaseModel):
     frame: Axes | None = None
     name: str | None = None
 
-    def pose(self, axes: Axes) -> Pose:
+    def pose(self, axes: Axes) -> MeasuredPose:
         """The pose in the vehicle's axes; `axes` are those of a record that names none.
 
         Raises:
@@ -101,15 +101,15 @@ class PoseRecord(BaseModel):
         if self.vx is not None and self.vy is not None and self.vz is not None:
             velocity = (self.vx, self.vy, self.vz)
         time_s = nan if self.time_s is None else self.time_s
-        return in_ned(Pose(time_s, (self.x, self.y, self.z), attitude, velocity), self.frame or axes)
+        return in_ned(MeasuredPose(time_s, (self.x, self.y, self.z), attitude, velocity), self.frame or axes)
 
 
-def in_ned(pose: Pose, axes: Axes) -> Pose:
+def in_ned(pose: MeasuredPose, axes: Axes) -> MeasuredPose:
     """A pose whose vectors and attitude are in some axes, in NED and FRD."""
     if axes is Axes.NED:
         return pose
     velocity = pose.velocity_ned_m_s
-    return Pose(
+    return MeasuredPose(
         pose.time_s,
         _vector(pose.position_ned_m, axes),
         _attitude(pose.attitude, axes),
@@ -133,7 +133,7 @@ def _attitude(attitude: Quaternion, axes: Axes) -> Quaternion:
     return flip_quaternion(attitude)
 
 
-def with_forward(pose: Pose, turn_deg: float) -> Pose:
+def with_forward(pose: MeasuredPose, turn_deg: float) -> MeasuredPose:
     """The pose of a vehicle whose forward axis is turned from the body's first one.
 
     Args:
@@ -160,7 +160,7 @@ def parse_line(line: str | bytes) -> PoseRecord:
         raise PoseError(str(error)) from None
 
 
-def read_poses(path: Path, axes: Axes, name: str | None) -> list[Pose]:
+def read_poses(path: Path, axes: Axes, name: str | None) -> list[MeasuredPose]:
     """All poses of a file: CSV if its name ends in .csv, else lines of JSON.
 
     Raises:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from framerunner.mocap.facts import DELAY_S, FAR_M, NEAR_M, VISION, Facts, SendSettings
-from framerunner.mocap.messages import odometry
-from framerunner.mocap.poses import Pose
+from framerunner.mocap.pose_messages import odometry
+from framerunner.mocap.poses import MeasuredPose
 from framerunner.wire.dialect import Message, mavlink
 from offboard.safety.check import Checks, good, note
 
@@ -39,7 +39,7 @@ class Px4Poses:
     estimator = "ESTIMATOR_STATUS"
     needs_origin = False
 
-    def pose_message(self, pose: Pose, stamp_us: int, settings: SendSettings) -> Message:
+    def pose_message(self, pose: MeasuredPose, stamp_us: int, settings: SendSettings) -> Message:
         """ODOMETRY in NED."""
         return odometry(pose, stamp_us, settings, mavlink.MAV_FRAME_LOCAL_NED)
 

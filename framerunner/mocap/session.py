@@ -10,7 +10,7 @@ from framerunner.mocap.facts import Facts, SendSettings, Unused
 from framerunner.mocap.motion import MotionCheck, PoseComparison, SentPose
 from framerunner.mocap.poses import with_forward
 from framerunner.mocap.sources import PoseSource, TimedPose
-from framerunner.mocap.vehicle import Vehicle
+from framerunner.mocap.vehicle import PoseVehicle
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.transports.vehicle_link import VehicleLink
 
@@ -50,7 +50,7 @@ class MocapSession:
         zero_s: float = 0.0,
     ) -> None:
         self._link, self._source, self._settings, self._say = link, source, settings, say
-        self.vehicle = Vehicle(settings.rate_hz if source.needs_truth else 0.0, settings.origin, zero_s)
+        self.vehicle = PoseVehicle(settings.rate_hz if source.needs_truth else 0.0, settings.origin, zero_s)
         self.sent = self.dropouts = 0
         self.longest_gap_s = 0.0
         self.unused = Unused()

@@ -16,7 +16,7 @@ from framerunner.extras import install_advice, is_installed
 from framerunner.geometry.rotations import multiply, normalized
 from framerunner.geometry.vectors import Quaternion, Vec3
 from framerunner.mocap.capture import KINDS
-from framerunner.mocap.poses import Axes, Pose, PoseError, parse_line, read_poses
+from framerunner.mocap.poses import Axes, MeasuredPose, PoseError, parse_line, read_poses
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.transports.sockets import UdpSocket, bind_udp
 from framerunner.wire.transports.urls import UrlRules, parse_url
@@ -36,7 +36,7 @@ _STREAM = UrlRules("bad source '{}'", "udpin://0.0.0.0:9870, poses.csv, sitl, op
 class TimedPose:
     """A pose and when it was taken, in seconds of this program's clock."""
 
-    pose: Pose
+    pose: MeasuredPose
     taken_s: float
     vehicle_time_us: int | None = None  # if the source gives it in vehicle time
 
@@ -273,7 +273,7 @@ class SitlSource(PoseSource):
         north_m, east_m, down_m = (value + self._random.gauss(0.0, sigma_m) for value in position)
         half = [self._random.gauss(0.0, sigma_rad / 2.0) for _ in range(3)]
         attitude = normalized(multiply(truth.attitude, (1.0, half[0], half[1], half[2])))
-        pose = Pose(truth.time_us / 1e6, (north_m, east_m, down_m), attitude, truth.velocity_ned_m_s)
+        pose = MeasuredPose(truth.time_us / 1e6, (north_m, east_m, down_m), attitude, truth.velocity_ned_m_s)
         self._taken.append(TimedPose(pose, now_s, truth.time_us or None))
 
     def poll(self, now_s: float) -> list[TimedPose]:

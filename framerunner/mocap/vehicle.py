@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from statistics import median
 
 from framerunner.mocap.dialects import PoseDialect, dialect_of
-from framerunner.mocap.facts import Origin
+from framerunner.mocap.facts import RoomOrigin
 from framerunner.wire.ardupilot_messages import add_ardupilot_messages
 from framerunner.wire.dialect import (
     Message,
@@ -31,7 +31,7 @@ _STATE_S = 5.0  # for which a state counts that is requested twice a second
 _LOW = 0.6  # share of the wanted rate
 
 
-class Vehicle(Record):
+class PoseVehicle(Record):
     """The session with the vehicle, and what it has sent.
 
     Times in seconds are those of this program's clock, whose zero is its start.
@@ -48,7 +48,7 @@ class Vehicle(Record):
     """
 
     def __init__(
-        self, needs_truth_hz: float = 0.0, origin: Origin | None = None, zero_s: float = 0.0
+        self, needs_truth_hz: float = 0.0, origin: RoomOrigin | None = None, zero_s: float = 0.0
     ) -> None:
         super().__init__(heartbeat="companion")
         self.answers = 0

@@ -55,7 +55,7 @@ class ChannelEndError(UserError):
 
 
 @dataclass(frozen=True, slots=True)
-class Terms(Generic[In]):
+class ChannelTerms(Generic[In]):
     """What a page may send, and how much may wait for it.
 
     Attributes:
@@ -96,7 +96,7 @@ class Channel(Generic[In, Out]):
         terms: what it may send, and how much may wait for it.
     """
 
-    def __init__(self, websocket: WebSocket, terms: Terms[In]) -> None:
+    def __init__(self, websocket: WebSocket, terms: ChannelTerms[In]) -> None:
         self._websocket = websocket
         self._terms = terms
         self._events: deque[str] = deque()

@@ -1,7 +1,7 @@
 """Deadlines and limits of connections, below HTTP: uvicorn has none for a request that is not finished.
 
-Each connection has a `Gate` between the socket and uvicorn's protocol. It closes connections whose request is
-not received or whose client does not read the answer, and refuses those that are too many.
+Each connection has a `ConnectionLimiter` between the socket and uvicorn's protocol. It closes connections
+whose request is not received or whose client does not read the answer, and refuses those that are too many.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ class Connections:
         if open_files != resource.RLIM_INFINITY:
             total = min(total, max(open_files - _OTHER_FILES, open_files // 2))
         self._places = Places(total, min(limits.per_address, total))
-        self._gates: dict[Peer, Gate] = {}
+        self._gates: dict[Peer, ConnectionLimiter] = {}
 
-    def enter(self, peer: Peer, gate: Gate) -> str:
+    def enter(self, peer: Peer, gate: ConnectionLimiter) -> str:
         """Add a connection. Returns "" or, if it is refused, one line with the reason."""
         problem = "" if self._is_proxy(peer[0]) else self._places.take(peer[0])
         if not problem:
@@ -73,7 +73,7 @@ class Connections:
         return watched
 
 
-class Gate(asyncio.Protocol):
+class ConnectionLimiter(asyncio.Protocol):
     """Passes data between a connection and the server's protocol; the other arguments are uvicorn's."""
 
     def __init__(
@@ -212,7 +212,7 @@ class Gate(asyncio.Protocol):
 class _Watched:
     """The transport that the server's protocol gets: reports a new protocol and closing to the gate."""
 
-    def __init__(self, transport: asyncio.Transport, gate: Gate) -> None:
+    def __init__(self, transport: asyncio.Transport, gate: ConnectionLimiter) -> None:
         self._transport = transport
         self._gate = gate
 

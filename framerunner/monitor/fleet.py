@@ -14,7 +14,7 @@ from framerunner.monitor.ports import Equipment
 from framerunner.monitor.vehicle.camera import host_of
 from framerunner.monitor.vehicle.commands import OWN_SYSTEM, Answer, Sticks
 from framerunner.monitor.vehicle.tries import TryEvent
-from framerunner.monitor.vehicle.vehicle import Vehicle, VehicleCallbacks
+from framerunner.monitor.vehicle.vehicle import MonitoredVehicle, VehicleCallbacks
 from framerunner.wire.dialect import Message, ground_station_heartbeat, is_vehicle
 from scenarios.models import Scenario
 
@@ -30,7 +30,7 @@ T = TypeVar("T")
 _log = logging.getLogger(__name__)
 
 
-class Fleet:
+class MonitoredFleet:
     """State of the drones on one link, and their commands; belongs to the loop on which `run` runs.
 
     Args:
@@ -42,7 +42,7 @@ class Fleet:
 
     def __init__(self, equipment: Equipment) -> None:
         self._equipment = equipment
-        self._vehicles: dict[int, Vehicle] = {}
+        self._vehicles: dict[int, MonitoredVehicle] = {}
         self._watchers: dict[object, Callable[[JsonMessage], None]] = {}
         self._try_watchers: list[Callable[[TryEvent], None]] = []
         self._texts: deque[JsonMessage] = deque(maxlen=_MAX_TEXTS)
@@ -161,13 +161,13 @@ class Fleet:
             self.notice(None, "warning", f"more than {_MAX_DRONES} drones; the others are not shown")
         return False
 
-    def _add(self, system: int, now_s: float) -> Vehicle:
+    def _add(self, system: int, now_s: float) -> MonitoredVehicle:
         def publish_try(event: TryEvent) -> None:
             self._call_all(self._try_watchers, event, f"a try that {event.kind}")
 
         notice = partial(self.notice, system)
         callbacks = VehicleCallbacks(self._link.send, self._publish, notice, publish_try)
-        vehicle = Vehicle(system, self._equipment, callbacks, now_s, host_of(self._link.url))
+        vehicle = MonitoredVehicle(system, self._equipment, callbacks, now_s, host_of(self._link.url))
         self._vehicles[system] = vehicle
         self._vehicles = dict(sorted(self._vehicles.items()))
         self.notice(system, "info", f"drone {system} is heard")

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 from starlette.websockets import WebSocket
 
 from framerunner.monitor.addresses import Places, client_address
-from framerunner.monitor.channel import TRY_LATER_CODE, Channel, Terms, close
+from framerunner.monitor.channel import TRY_LATER_CODE, Channel, ChannelTerms, close
 from framerunner.monitor.live_messages import LiveMessage
 from framerunner.wire import finite_json
 
 if TYPE_CHECKING:
-    from framerunner.monitor.fleet import Fleet
+    from framerunner.monitor.fleet import MonitoredFleet
     from framerunner.monitor.server import Monitor
 
 POSE_HZ = 20
@@ -43,7 +43,7 @@ class Viewer(Channel[None, LiveMessage]):
     """
 
     def __init__(self, websocket: WebSocket, kinds: Iterable[str] = ()) -> None:
-        super().__init__(websocket, Terms(None, max_waiting=MAX_PENDING))
+        super().__init__(websocket, ChannelTerms(None, max_waiting=MAX_PENDING))
         self.address = client_address(websocket.scope)
         self._kinds = frozenset(kinds)
 
@@ -60,7 +60,7 @@ class Viewer(Channel[None, LiveMessage]):
 class LiveChannel:
     """All viewers of a fleet, and the task that sends them its state."""
 
-    def __init__(self, fleet: Fleet) -> None:
+    def __init__(self, fleet: MonitoredFleet) -> None:
         self._fleet = fleet
         self._viewers: set[Viewer] = set()
         self._places = Places(MAX_VIEWERS, MAX_VIEWERS_PER_ADDRESS)

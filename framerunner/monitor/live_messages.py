@@ -145,7 +145,7 @@ class Detections(TypedDict):
 
 
 class MappedFrame(TypedDict):
-    """A frame as a navigator estimates it."""
+    """A gate as a navigator estimates it."""
 
     colour: str
     p: Vector

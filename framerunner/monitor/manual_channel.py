@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, TypeAdapter
 from starlette.websockets import WebSocket
 
-from framerunner.monitor.channel import Channel, PageModel, Terms, refuse
+from framerunner.monitor.channel import Channel, ChannelTerms, PageModel, refuse
 from framerunner.monitor.manual_control import Browser, Clock, ControlMessage, ManualControl, Order, Reply
 from framerunner.monitor.vehicle.commands import Answer, Sticks
 
 if TYPE_CHECKING:
-    from framerunner.monitor.fleet import Fleet
+    from framerunner.monitor.fleet import MonitoredFleet
     from framerunner.monitor.server import Monitor
 
 UNNAMED = "another window"
@@ -41,7 +41,9 @@ class SticksMessage(PageModel):
 
 FromPage = Annotated[SticksMessage | Order, Field(discriminator="kind")]
 ToPage = Reply | ControlMessage
-FROM_PAGE: Terms[FromPage] = Terms(TypeAdapter(FromPage), max_bytes=1000)  # a page sends some 80
+FROM_PAGE: ChannelTerms[FromPage] = ChannelTerms(
+    TypeAdapter(FromPage), max_bytes=1000
+)  # a page sends some 80
 
 
 def register(monitor: Monitor) -> None:
@@ -106,7 +108,7 @@ class ManualControls:
         clock: time; that of the machine by default.
     """
 
-    def __init__(self, fleet: Fleet, clock: Clock | None = None) -> None:
+    def __init__(self, fleet: MonitoredFleet, clock: Clock | None = None) -> None:
         self._fleet = fleet
         self._clock = clock or Clock(time.monotonic)
         self._controls: dict[int, ManualControl] = {}

@@ -15,7 +15,7 @@ from framerunner.monitor.channel import PageModel
 from framerunner.monitor.vehicle.commands import Answer, Sticks
 
 if TYPE_CHECKING:
-    from framerunner.monitor.fleet import Fleet
+    from framerunner.monitor.fleet import MonitoredFleet
 
 SILENT_S = 0.5  # without sticks from the browser; then the drone holds
 ABANDONED_S = 5.0  # of silence, after which another browser may take manual control
@@ -185,7 +185,9 @@ class ManualControl:
         control: whether its sticks control the drone.
     """
 
-    def __init__(self, drone_id: int, fleet: Fleet, changed: Callable[[int], None], clock: Clock) -> None:
+    def __init__(
+        self, drone_id: int, fleet: MonitoredFleet, changed: Callable[[int], None], clock: Clock
+    ) -> None:
         self.holder: Browser | None = None
         self.control = Control.NONE
         self._id = drone_id

@@ -25,7 +25,7 @@ from framerunner.monitor.channel import (
     TRY_LATER_CODE,
     Channel,
     ChannelEndError,
-    Terms,
+    ChannelTerms,
     close,
     encoded,
     refuse,
@@ -51,7 +51,7 @@ _MAX_UNSENT_BYTES = 1 << 16
 _TRIAL_S = 1.0
 REFUSED = "another flight has tried to connect and was refused; end this one first"
 
-_FROM_PAGE: Terms[PageDemand] = Terms(
+_FROM_PAGE: ChannelTerms[PageDemand] = ChannelTerms(
     TypeAdapter(PageDemand),
     max_bytes=500,  # a page sends some 80
     always=lambda demand: demand.kind == "stop",  # a stop is taken in any case

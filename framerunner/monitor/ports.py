@@ -18,8 +18,8 @@ if TYPE_CHECKING:  # slow to import
     from framerunner.monitor.access import Visitor
 
 
-class Referee(Protocol):
-    """Judges a flight by its states; `scenarios.referee.Referee` is one."""
+class RefereePort(Protocol):
+    """Judges a flight by its states; `scenarios.referee.RefereePort` is one."""
 
     def update(self, state: TrueState) -> None:
         """Take the next state."""
@@ -77,7 +77,7 @@ class RunNotReadError(RunError):
     """A run that has to be read before its images can be had."""
 
 
-class Extension(Protocol):
+class ServerExtension(Protocol):
     """Addresses of the server that another room adds, such as the editor's flights."""
 
     def router(self, who: Callable[[HTTPConnection], Visitor]) -> APIRouter:
@@ -108,12 +108,12 @@ class Equipment:
     """
 
     open_link: Callable[[], VehicleLink]
-    make_referee: Callable[[Scenario], Referee]
+    make_referee: Callable[[Scenario], RefereePort]
     scenario: Scenario | None
     list_scenarios: Callable[[], Sequence[str]]
     load_scenario: Callable[[str], Scenario]
     runs: RunLibrary | None
     start_pose: Callable[[Scenario], tuple[float, float, float, float]] | None = None
     camera_hosts: tuple[str, ...] = ()
-    extensions: tuple[Extension, ...] = ()
+    extensions: tuple[ServerExtension, ...] = ()
     scenario_argument: Callable[[str], str] = str

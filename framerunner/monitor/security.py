@@ -37,7 +37,7 @@ _HEADERS = {
 }
 
 
-class Guard:
+class SecurityMiddleware:
     """ASGI middleware before all other.
 
     Args:

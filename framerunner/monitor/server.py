@@ -21,11 +21,11 @@ from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from framerunner.monitor.access import Access, Role, Secrets, SessionFile, session_path
 from framerunner.monitor.addresses import Places
-from framerunner.monitor.connections import Connections, Gate
-from framerunner.monitor.fleet import Fleet
+from framerunner.monitor.connections import ConnectionLimiter, Connections
+from framerunner.monitor.fleet import MonitoredFleet
 from framerunner.monitor.pages.static_files import StaticBundles
 from framerunner.monitor.ports import Equipment
-from framerunner.monitor.security import Guard
+from framerunner.monitor.security import SecurityMiddleware
 from framerunner.monitor.settings import BACKLOG, MonitorSettings
 from framerunner.monitor.tls import OnlyTls, TlsProtocol
 from framerunner.monitor.visitors.peers import is_own_connection
@@ -70,7 +70,7 @@ class Monitor:
 
     settings: MonitorSettings
     equipment: Equipment
-    fleet: Fleet
+    fleet: MonitoredFleet
     access: Access
     place: tuple[str, int]
     web: FastAPI
@@ -129,8 +129,8 @@ def assemble(
     web = FastAPI(title="framerunner", docs_url=None, redoc_url=None, openapi_url=None)
     if settings.certificate is not None:
         web.add_middleware(OnlyTls, port=place[1])
-    web.add_middleware(Guard, local_only=local_only, limits=settings.limits)
-    monitor = Monitor(settings, equipment, Fleet(equipment), access, place, web)
+    web.add_middleware(SecurityMiddleware, local_only=local_only, limits=settings.limits)
+    monitor = Monitor(settings, equipment, MonitoredFleet(equipment), access, place, web)
     web.mount("/static", StaticBundles())
     for name in MODULES:
         import_module(name).register(monitor)
@@ -152,7 +152,7 @@ def make_server(
     connections = Connections(settings.limits, is_proxy)
     if proxies:
         web = cast(ASGIApp, ProxyHeadersMiddleware(cast(Any, web), [str(each) for each in proxies]))
-    gate: Callable[..., asyncio.Protocol] = partial(Gate, connections)
+    gate: Callable[..., asyncio.Protocol] = partial(ConnectionLimiter, connections)
     if tls is not None:
         knocking = Places(settings.limits.total, settings.limits.per_address)
         gate = partial(TlsProtocol, tls, connections, knocking)

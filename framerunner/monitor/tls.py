@@ -23,7 +23,7 @@ from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from framerunner.monitor.addresses import Places
-from framerunner.monitor.connections import Connections, Gate
+from framerunner.monitor.connections import ConnectionLimiter, Connections
 from framerunner.monitor.settings import ConnectionLimits, MonitorError
 from framerunner.monitor.urls import url_of
 from framerunner.wire.transports.urls import is_loopback
@@ -171,7 +171,7 @@ def _try(server_context: ssl.SSLContext, path: Path) -> dict[str, Any]:
 
 
 class TlsProtocol(asyncio.Protocol):
-    """Takes a connection until its first byte tells TLS from plain HTTP, then gives it to a `Gate`.
+    """Takes a connection until its first byte tells TLS from plain HTTP, then hands it to a limiter.
 
     Connections whose handshake is not complete have a limit and a deadline of their own, as the gate does not
     see them yet.
@@ -180,7 +180,7 @@ class TlsProtocol(asyncio.Protocol):
         context: of the certificate.
         connections: those of the server.
         knocking: places of connections whose handshake is not complete.
-        for_gate: arguments of `Gate`; they are uvicorn's.
+        for_gate: arguments of `ConnectionLimiter`; they are uvicorn's.
     """
 
     def __init__(
@@ -193,7 +193,7 @@ class TlsProtocol(asyncio.Protocol):
         self._context = context
         self._limits: ConnectionLimits = connections.limits
         self._knocking = knocking
-        self._make_gate = partial(Gate, connections, **for_gate)
+        self._make_gate = partial(ConnectionLimiter, connections, **for_gate)
         self._loop = asyncio.get_running_loop()
         self._transport: asyncio.Transport | None = None
         self._address: str | None = None  # None: has no place

@@ -22,8 +22,8 @@ from framerunner.wire.mjpeg import (
     JPEG_START,
     STREAM_HEADERS,
     STREAM_START,
+    MjpegPart,
     MjpegReader,
-    Part,
     StreamError,
     write_part,
 )
@@ -42,7 +42,7 @@ _FRAME_HEAD = struct.Struct("<qI")  # time of exposure in microseconds or -1, le
 _log = logging.getLogger(__name__)
 
 
-class DroneVideo:
+class VideoRelay:
     """The newest image of one drone, updated while there are viewers.
 
     Args:
@@ -51,8 +51,8 @@ class DroneVideo:
 
     def __init__(self, find_url: Callable[[], str | None]) -> None:
         self._find_url = find_url
-        self._latest: Part | None = None
-        self._before: Part | None = None  # the last one when the last viewer left
+        self._latest: MjpegPart | None = None
+        self._before: MjpegPart | None = None  # the last one when the last viewer left
         self._arrived = asyncio.Event()
         self._places = Places(MAX_VIEWERS, MAX_VIEWERS_PER_ADDRESS)
         self._fetching: asyncio.Task[None] | None = None
@@ -61,7 +61,7 @@ class DroneVideo:
         """Why there is no place for another viewer from an address, in one line; "" if there is."""
         return self._places.problem(address)
 
-    async def images(self, address: str, *, kept: bool = False) -> AsyncGenerator[Part, None]:
+    async def images(self, address: str, *, kept: bool = False) -> AsyncGenerator[MjpegPart, None]:
         """The newest images as they are received, without end; none if there is no place for the viewer.
 
         Args:
@@ -73,7 +73,7 @@ class DroneVideo:
         if self._fetching is None:
             self._before, self._latest = self._latest or self._before, None
             self._fetching = asyncio.create_task(self._fetch())
-        last: Part | None = None
+        last: MjpegPart | None = None
         try:
             if kept and self._latest is None and self._before is not None:
                 yield self._before
@@ -131,16 +131,16 @@ def can_be_forwarded(url: str | None) -> bool:
 
 def register(monitor: Monitor) -> None:
     """Add `/video/ID`, `/video/ID/frames` and `/video/ID/image.jpg`."""
-    videos: dict[int, DroneVideo] = {}
+    videos: dict[int, VideoRelay] = {}
 
-    def add(path: str, answer: Callable[[DroneVideo, str], Awaitable[Response]]) -> None:
+    def add(path: str, answer: Callable[[VideoRelay, str], Awaitable[Response]]) -> None:
         @monitor.web.get(path)
         async def respond(request: Request, drone_id: int) -> Response:
             problem = _problem(monitor, drone_id)
             if problem:
                 return PlainTextResponse(f"{problem}\n", 404)
             if drone_id not in videos:
-                videos[drone_id] = DroneVideo(lambda: monitor.fleet.video_url(drone_id))
+                videos[drone_id] = VideoRelay(lambda: monitor.fleet.video_url(drone_id))
             address = client_address(request.scope)
             problem = videos[drone_id].problem(address)
             if problem:
@@ -170,7 +170,7 @@ def _problem(monitor: Monitor, drone_id: int) -> str:
     return ""
 
 
-async def _stream(video: DroneVideo, address: str) -> Response:
+async def _stream(video: VideoRelay, address: str) -> Response:
     """The images as an MJPEG stream."""
 
     async def parts() -> AsyncGenerator[bytes, None]:
@@ -182,7 +182,7 @@ async def _stream(video: DroneVideo, address: str) -> Response:
     return StreamingResponse(parts(), headers=STREAM_HEADERS)
 
 
-async def _frames(video: DroneVideo, address: str) -> Response:
+async def _frames(video: VideoRelay, address: str) -> Response:
     """Each image as time of exposure, length and JPEG."""
 
     async def parts() -> AsyncGenerator[bytes, None]:
@@ -195,7 +195,7 @@ async def _frames(video: DroneVideo, address: str) -> Response:
     return StreamingResponse(parts(), media_type="application/octet-stream", headers=headers)
 
 
-async def _image(video: DroneVideo, address: str) -> Response:
+async def _image(video: VideoRelay, address: str) -> Response:
     """The newest image."""
     async with aclosing(video.images(address)) as images:
         try:

@@ -15,7 +15,7 @@ from framerunner.doctor.checks import examine
 from framerunner.doctor.listen import listen
 from framerunner.errors import UserError
 from framerunner.flying.plan import FlightPlan
-from framerunner.geometry.axes import Alignment, Pose
+from framerunner.geometry.axes import ArenaAlignment, Pose
 from framerunner.preflight.check_names import CHECK_NAMES, RENAMED, REPLACED
 from framerunner.preflight.kept import OPTION, KeptState, write_kept
 from framerunner.preflight.link import open_client
@@ -266,7 +266,7 @@ def fence_vertices(record: Record, plan: FlightPlan, fence: FlightFence) -> tupl
     if origin is None or attitude is None or position is None:
         return None
     start = Pose(plan.start_pose[:3], plan.start_pose[3])
-    alignment = Alignment(start, Pose(position.position_ned_m, attitude.yaw_ned_rad))
+    alignment = ArenaAlignment(start, Pose(position.position_ned_m, attitude.yaw_ned_rad))
     projection = LocalProjection(GeodeticPoint(origin.latitude / 1e7, origin.longitude / 1e7, 0.0))
     points = [projection.to_geodetic(corner) for corner in fence.corners_ned_m(alignment)]
     return tuple((degrees_e7(each.latitude_deg), degrees_e7(each.longitude_deg)) for each in points)

@@ -88,7 +88,7 @@ class CollectedFlight:
         result: None if the flight left none.
         moments: every tick, in order of time; at least one.
         images: of the camera.
-        crossings: of frames, in order of time.
+        crossings: of gates, in order of time.
         began_us: vehicle time of motors on, from which the referee counts, microseconds; of the first
             tick if the motors were never on.
         mission_is_known: whether states and commands are the mission's; a MAVLink log contains neither.

@@ -26,7 +26,7 @@ class RecordedImage:
 
 @dataclass(frozen=True, slots=True)
 class Crossed:
-    """The drone crossed the frame of a colour, at a vehicle time in microseconds."""
+    """The drone crossed the gate of a colour, at a vehicle time in microseconds."""
 
     time_us: int
     colour: str

@@ -41,14 +41,14 @@ from framerunner.recording.schemas import (
 from framerunner.runs.run_files import RESULT
 from framerunner.wire.mission_report import Plain, TransitionTaken, plain_value
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityCommand
-from offboard.navigation.view import FrameEstimate, NavigationView
+from offboard.drone import DroneState, VelocityFluCommand
+from offboard.navigation.view import GateEstimate, NavigationView
 from scenarios.result import FlightResult, ResultError
 from vision.jpeg import JPEG_START, MAX_PIXELS, ImageError, jpeg_structure
 from vision.types import Detection, Detections, Image
 
 _MAX_TEXT_BYTES = 1_000_000  # of a message that is no image
-_MAX_FRAMES = 100  # of a map, and points of a path, that are kept
+_MAX_GATES = 100  # of a map, and points of a path, that are kept
 _MAX_PATH = 1000
 _MAX_IDS = 100  # of the transitions of one tick
 _PNG_START = b"\x89PNG\r\n\x1a\n"
@@ -154,7 +154,7 @@ class _EventBuilder:
 
     def __init__(self) -> None:
         self._state = ""
-        self._command = VelocityCommand()
+        self._command = VelocityFluCommand()
         self._detections = Detections()
         self._transition: TransitionTaken | None = None
         self._navigation: NavigationView | None = None
@@ -178,16 +178,16 @@ class _EventBuilder:
             return Crossed(time_us, str(message["colour"]))
         if topic == SETPOINT:
             names = ("forward_m_s", "left_m_s", "up_m_s", "yaw_rate_rad_s")
-            self._command = VelocityCommand(*(float(message[name]) for name in names))
+            self._command = VelocityFluCommand(*(float(message[name]) for name in names))
         elif topic == DETECTIONS:
             self._detections = _detections(message)
         elif topic == MISSION:
             self._state = str(message["state"])
             self._transition = _transition(time_us, message)
         elif topic == MAP:
-            frames = tuple(map(_frame_estimate, message["frames"][:_MAX_FRAMES]))
+            gates = tuple(map(_gate_estimate, message["frames"][:_MAX_GATES]))
             view = self._navigation or NavigationView()
-            self._navigation = replace(view, frames=frames, goal=str(message["goal"]))
+            self._navigation = replace(view, gates=gates, goal=str(message["goal"]))
         elif topic == PATH:
             path_m = tuple(_vector(pose["position"]) for pose in message["poses"][:_MAX_PATH])
             self._navigation = replace(self._navigation or NavigationView(), path_m=path_m)
@@ -215,10 +215,10 @@ def _drone_state(time_us: int, message: Json) -> DroneState:
     )
 
 
-def _frame_estimate(message: Json) -> FrameEstimate:
+def _gate_estimate(message: Json) -> GateEstimate:
     """An unknown standard deviation is infinite."""
     std = message.get("position_std_m")
-    return FrameEstimate(
+    return GateEstimate(
         str(message["colour"]),
         _vector(message["position_arena_m"]),
         float(message["yaw_rad"]),

@@ -16,7 +16,7 @@ import cv2
 from mcap.writer import CompressionType, Writer
 
 from framerunner.files.text_file import read_text
-from framerunner.recording import messages, schemas
+from framerunner.recording import recording_messages, schemas
 from framerunner.recording.events import RecordingError
 from framerunner.runs import run_files
 from offboard.app import Moment
@@ -92,9 +92,9 @@ class FlightRecording:
             self._detect(moment.detections, time_us)
         if moment.navigation is not None:
             self._navigate(moment.navigation, time_us)
-        self._write(schemas.SETPOINT, time_us, messages.setpoint(moment))
-        self._write(schemas.TRANSFORM, time_us, messages.transform(moment.state))
-        self._write(schemas.TELEMETRY, time_us, messages.telemetry(moment))
+        self._write(schemas.SETPOINT, time_us, recording_messages.setpoint(moment))
+        self._write(schemas.TRANSFORM, time_us, recording_messages.transform(moment.state))
+        self._write(schemas.TELEMETRY, time_us, recording_messages.telemetry(moment))
 
     def see_image(self, time_us: int, image: Image) -> None:
         """Record a raw image, without loss.
@@ -119,7 +119,7 @@ class FlightRecording:
             self.see_image(time_us, frame.image)
         else:
             self._size_px = (frame.image.shape[1], frame.image.shape[0])
-            self._write(schemas.IMAGE, time_us, messages.image(frame.jpeg, "jpeg", time_us))
+            self._write(schemas.IMAGE, time_us, recording_messages.image(frame.jpeg, "jpeg", time_us))
 
     def finish(self, result: FlightResult, track_time_s: Sequence[float]) -> None:
         """Add what is known only after the flight: crossings, the verdict, and the result as an attachment.
@@ -132,7 +132,7 @@ class FlightRecording:
         end_us = self._now_us or 0
         if self._first_us is not None and track_time_s:
             began_us = self._first_us - round(track_time_s[0] * 1e6)
-            self._cross_frames(result, began_us)
+            self._cross_gates(result, began_us)
             self._log(end_us, "referee", result.reason)
         self._attach(run_files.RESULT, "application/json", result.text(), end_us)
 
@@ -168,32 +168,36 @@ class FlightRecording:
     def _write_scene(self, time_us: int) -> None:
         """Write what does not change, before all else, at the time of the first message."""
         self._scene_written = True
-        self._write(schemas.SCENE, time_us, messages.scene(self._scenario, time_us))
-        self._write(schemas.TRANSFORM, time_us, messages.camera_transform(self._scenario, time_us))
-        self._write(schemas.CALIBRATION, time_us, messages.calibration(self._scenario, time_us))
+        self._write(schemas.SCENE, time_us, recording_messages.scene(self._scenario, time_us))
+        self._write(schemas.TRANSFORM, time_us, recording_messages.camera_transform(self._scenario, time_us))
+        self._write(schemas.CALIBRATION, time_us, recording_messages.calibration(self._scenario, time_us))
 
     def _enter_state(self, moment: Moment) -> None:
         time_us = moment.state.time_us
         previous_s = (time_us - self._state_since_us) / 1e6 if self._state else 0.0
-        self._write(schemas.MISSION, time_us, messages.mission_state(moment, self._state, previous_s))
+        self._write(
+            schemas.MISSION, time_us, recording_messages.mission_state(moment, self._state, previous_s)
+        )
         previous = f" after {previous_s:.2f} s in {self._state}" if self._state else ""
         self._log(time_us, "mission", f"{moment.mission_state}{previous}")
         self._state, self._state_since_us = moment.mission_state, time_us
 
     def _detect(self, seen: Detections, time_us: int) -> None:
         self._detections = seen
-        self._write(schemas.DETECTIONS, time_us, messages.detections(seen, time_us))
+        self._write(schemas.DETECTIONS, time_us, recording_messages.detections(seen, time_us))
         image_us = time_us if seen.time_us is None else seen.time_us
-        self._write(schemas.ANNOTATIONS, image_us, messages.boxes(seen, image_us, self._size_px))
+        self._write(schemas.ANNOTATIONS, image_us, recording_messages.boxes(seen, image_us, self._size_px))
 
     def _navigate(self, view: NavigationView, time_us: int) -> None:
         """Write what of the map and the plan has changed."""
         last, self._navigation = self._navigation, view
-        if (view.frames, view.goal) != (last.frames, last.goal):
-            self._write(schemas.MAP, time_us, messages.frame_map(view, time_us))
-            self._write(schemas.MAP_SCENE, time_us, messages.map_scene(view, self._scenario, time_us))
+        if (view.gates, view.goal) != (last.gates, last.goal):
+            self._write(schemas.MAP, time_us, recording_messages.gate_map(view, time_us))
+            self._write(
+                schemas.MAP_SCENE, time_us, recording_messages.map_scene(view, self._scenario, time_us)
+            )
         if view.path_m != last.path_m:
-            self._write(schemas.PATH, time_us, messages.path(view, time_us))
+            self._write(schemas.PATH, time_us, recording_messages.path(view, time_us))
 
     def _keep_compressed(self) -> None:
         """Write the last raw image.
@@ -203,9 +207,9 @@ class FlightRecording:
         if self._compressing is not None:
             time_us, data = self._compressing
             self._compressing = None
-            self._write(schemas.IMAGE, time_us, messages.image(data.result(), "png", time_us))
+            self._write(schemas.IMAGE, time_us, recording_messages.image(data.result(), "png", time_us))
 
-    def _cross_frames(self, result: FlightResult, began_us: int) -> None:
+    def _cross_gates(self, result: FlightResult, began_us: int) -> None:
         rows = zip(
             result.frames_crossed,
             result.crossing_times_s,
@@ -215,13 +219,17 @@ class FlightRecording:
         )
         for colour, time_s, offset_m, side in rows:
             time_us = began_us + round(time_s * 1e6)
-            self._write(schemas.CROSSING, time_us, messages.crossing(time_us, colour, time_s, offset_m, side))
+            self._write(
+                schemas.CROSSING,
+                time_us,
+                recording_messages.crossing(time_us, colour, time_s, offset_m, side),
+            )
             self._log(time_us, "referee", f"crossed {colour}, {100 * offset_m:.1f} cm off its centre")
 
     def _log(self, time_us: int, name: str, text: str) -> None:
-        self._write(schemas.LOG, time_us, messages.log(time_us, name, text))
+        self._write(schemas.LOG, time_us, recording_messages.log(time_us, name, text))
 
-    def _write(self, topic: str, time_us: int, message: messages.Message) -> None:
+    def _write(self, topic: str, time_us: int, message: recording_messages.Message) -> None:
         if self.problem:
             return
         if not self._scene_written:

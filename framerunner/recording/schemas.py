@@ -200,7 +200,7 @@ _VALUE = _object(
     text=_field("string", "its value then, if it was neither"),
 )
 
-_MAPPED_FRAME = _object(
+_MAPPED_GATE = _object(
     "framerunner.MappedFrame",
     optional=("position_std_m", "yaw_std_rad"),
     colour=_STRING,
@@ -270,7 +270,7 @@ _OWN = (
         "framerunner.Map",
         timestamp=_TIME,
         goal=_field("string", "what the navigator does, such as cross red"),
-        frames=_array(_MAPPED_FRAME),
+        frames=_array(_MAPPED_GATE),
     ),
 )
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import cv2
 
 from framerunner.flying.plan import FlightPlan
-from framerunner.geometry.axes import Alignment, Pose
+from framerunner.geometry.axes import ArenaAlignment, Pose
 from framerunner.recording.events import Crossed, Event, RecordedImage, RecordingError, time_of_event
 from framerunner.runs.run_files import RunFiles
 from framerunner.wire.dialect import Message, is_vehicle, mavlink
 from framerunner.wire.px4_modes import OFFBOARD, px4_name
 from framerunner.wire.vehicle_telemetry import AttitudeReport, PositionReport, VehicleTelemetry
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from scenarios.models import Scenario
 from scenarios.result import FlightResult
 from vision.jpeg import MAX_PIXELS
@@ -137,7 +137,7 @@ class _Ticks:
     def __init__(self, start: Pose) -> None:
         self._start = start
         self._telemetry = VehicleTelemetry()
-        self._alignment: Alignment | None = None
+        self._alignment: ArenaAlignment | None = None
         self._arm_command_us = -_ARM_US
         self._armed_us = 0
         self._next_us = 0
@@ -169,7 +169,7 @@ class _Ticks:
         telemetry = self._telemetry
         ned = Pose(position.position_ned_m, position.yaw_ned_rad)
         if self._alignment is None:
-            self._alignment = Alignment(self._start, ned)
+            self._alignment = ArenaAlignment(self._start, ned)
         pose = self._alignment.pose(ned)
         mode = px4_name(telemetry.custom_mode) if telemetry.is_px4 else telemetry.mode_name.upper()
         state = DroneState(
@@ -183,4 +183,4 @@ class _Ticks:
             attitude_arena=self._alignment.attitude(attitude.attitude_ned),
         )
         flight_time_s = max(0.0, (position.time_us - self._armed_us) / 1e6) if self._armed_us else 0.0
-        return Moment(state, VelocityCommand(), Detections(), mode.lower(), flight_time_s)
+        return Moment(state, VelocityFluCommand(), Detections(), mode.lower(), flight_time_s)

@@ -22,15 +22,15 @@ from matplotlib.ticker import MaxNLocator
 from framerunner.geometry.vectors import Vec3
 from framerunner.runs import PlotError, check_plot_format
 from framerunner.runs.track import Track
-from offboard.navigation.view import FrameEstimate
-from scenarios.models import Frame, Scenario, UprightFrame, start_position
+from offboard.navigation.view import GateEstimate
+from scenarios.models import Gate, Scenario, UprightGate, start_position
 from scenarios.result import FlightResult
 
 _Dash = Literal["-"] | tuple[float, Sequence[float]]
 _Styles = Mapping[str, tuple[str, _Dash]]
 _View = Callable[[float, float, float], tuple[float, float]]
 
-FRAME_COLOURS = {
+GATE_COLOURS = {
     "red": "#ff0000",
     "green": "#00ff00",
     "blue": "#0000ff",
@@ -55,9 +55,9 @@ STATE_COLOURS = (
 # With more kinds of states than colours, the colours are used again with another dash.
 DASHES: tuple[_Dash, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (4, 1, 1, 1)))
 
-_OTHER_FRAME = "#7a7a7a"  # an estimated one that is no part of the task
-_FRAME_SIZE_M = (0.42, 0.22)  # outer width and height of a frame that the scenario does not have
-_AROUND = 1.35  # an estimate's outline is so much larger: around the true frame where it is right
+_OTHER_GATE = "#7a7a7a"  # an estimated one that is no part of the task
+_GATE_SIZE_M = (0.42, 0.22)  # outer width and height of a gate that the scenario does not have
+_AROUND = 1.35  # an estimate's outline is so much larger: around the true gate where it is right
 _ESTIMATE_DASH = (0, (3, 1.5))
 _INK = "#262626"
 _FAINT = "#6b6b6b"
@@ -80,13 +80,13 @@ def _from_the_side(x: float, y: float, z: float) -> tuple[float, float]:
 
 
 def draw_scenario(scenario: Scenario) -> Figure:
-    """Return a scenario from above and from the side, its frames with their heights."""
+    """Return a scenario from above and from the side, its gates with their heights."""
     figure, top, side, notes = _new_figure()
-    _draw_top(top, scenario, {frame.colour: f"{frame.colour}, {frame.z_m:g} m" for frame in scenario.frames})
+    _draw_top(top, scenario, {gate.colour: f"{gate.colour}, {gate.z_m:g} m" for gate in scenario.frames})
     _draw_side(side, scenario)
-    for frame in scenario.frames:
-        right_m = frame.x_m + frame.outer_width_m * abs(sin(frame.yaw_rad)) / 2
-        _label(side, f"{frame.z_m:g} m", (right_m, frame.z_m), (6, 0), va="center", fontsize=8)
+    for gate in scenario.frames:
+        right_m = gate.x_m + gate.outer_width_m * abs(sin(gate.yaw_rad)) / 2
+        _label(side, f"{gate.z_m:g} m", (right_m, gate.z_m), (6, 0), va="center", fontsize=8)
     _set_limits(top, side, scenario, Track())
     _write_title(figure, scenario.name, f"{scenario.contents}; try limit {scenario.try_limit_s:g} s")
     _write_numbers(notes, scenario)
@@ -100,7 +100,7 @@ def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) ->
     """
     figure, top, side, notes = _new_figure()
     times_s = {} if result is None else result.times_s
-    _draw_top(top, scenario, {frame.colour: _crossing_label(frame, times_s) for frame in scenario.frames})
+    _draw_top(top, scenario, {gate.colour: _crossing_label(gate, times_s) for gate in scenario.frames})
     _draw_side(side, scenario)
     _draw_estimates(top, side, scenario, track.estimates)
     spent_s = track.seconds_in_state()
@@ -122,7 +122,7 @@ def draw_paths(
 ) -> Figure:
     """Return paths through a scenario (arena axes) from above and from the side, each by its name."""
     figure, top, side, notes = _new_figure()
-    _draw_top(top, scenario, {frame.colour: frame.colour for frame in scenario.frames})
+    _draw_top(top, scenario, {gate.colour: gate.colour for gate in scenario.frames})
     _draw_side(side, scenario)
     lines = []
     for (name, points), colour, dash in zip(paths.items(), STATE_COLOURS, DASHES, strict=False):
@@ -175,7 +175,7 @@ def _new_figure() -> tuple[Figure, Axes, Axes, Axes]:
 
 
 def _draw_top(axes: Axes, scenario: Scenario, labels: dict[str, str]) -> None:
-    """Draw the arena from above: floor, base, obstacles, frames with their labels, and start."""
+    """Draw the arena from above: floor, base, obstacles, gates with their labels, and start."""
     arena, base, start = scenario.arena, scenario.base, scenario.start
     corner = (-arena.length_x_m / 2, -arena.width_y_m / 2)
     axes.add_patch(Rectangle(corner, arena.length_x_m, arena.width_y_m, fc=_FLOOR, ec=_FLOOR_EDGE, zorder=0))
@@ -186,10 +186,10 @@ def _draw_top(axes: Axes, scenario: Scenario, labels: dict[str, str]) -> None:
         corners = [prism.to_arena((x, y, 0.0))[:2] for x, y in ((-a, -b), (a, -b), (a, b), (-a, b))]
         axes.add_patch(Polygon(corners, closed=True, fc=_PRISM, ec=_INK, lw=0.6, zorder=2))
     for decoy in scenario.decoys:
-        _draw_frame_from_above(axes, decoy)
-    for frame in scenario.frames:
-        _draw_frame_from_above(axes, frame)
-        _label_frame_from_above(axes, frame, labels[frame.colour])
+        _draw_gate_from_above(axes, decoy)
+    for gate in scenario.frames:
+        _draw_gate_from_above(axes, gate)
+        _label_gate_from_above(axes, gate, labels[gate.colour])
     length_m = 0.09 * min(arena.length_x_m, arena.width_y_m)
     _arrow(axes, (start.x_m, start.y_m), start.yaw_rad, length_m, colour=_INK, lw=1.6, zorder=5)
     axes.plot(start.x_m, start.y_m, marker="o", ms=5, color=_INK, zorder=5)
@@ -197,28 +197,28 @@ def _draw_top(axes: Axes, scenario: Scenario, labels: dict[str, str]) -> None:
     _label(axes, "start", below, (0, -4), ha="center", va="top", fontsize=9)
 
 
-def _draw_frame_from_above(axes: Axes, frame: UprightFrame) -> None:
-    """Draw a frame as a bar and its normal as an arrow; a decoy has none."""
-    c, s = cos(frame.yaw_rad), sin(frame.yaw_rad)
-    colour = FRAME_COLOURS[frame.colour]
-    half = frame.outer_width_m / 2
-    depth = max(frame.bar_m, frame.outer_width_m / 6) / 2  # a bar's true depth would be a hairline
+def _draw_gate_from_above(axes: Axes, gate: UprightGate) -> None:
+    """Draw a gate as a bar and its normal as an arrow; a decoy has none."""
+    c, s = cos(gate.yaw_rad), sin(gate.yaw_rad)
+    colour = GATE_COLOURS[gate.colour]
+    half = gate.outer_width_m / 2
+    depth = max(gate.bar_m, gate.outer_width_m / 6) / 2  # a bar's true depth would be a hairline
     corners = [(-depth, -half), (depth, -half), (depth, half), (-depth, half)]
-    outline = [(frame.x_m + c * a - s * b, frame.y_m + s * a + c * b) for a, b in corners]
+    outline = [(gate.x_m + c * a - s * b, gate.y_m + s * a + c * b) for a, b in corners]
     axes.add_patch(Polygon(outline, closed=True, fc=colour, ec=_INK, lw=0.6, zorder=4))
-    if isinstance(frame, Frame):
-        length_m = 2 * frame.outer_width_m
-        _arrow(axes, (frame.x_m, frame.y_m), frame.yaw_rad, length_m, colour=colour, lw=1.3, zorder=3)
+    if isinstance(gate, Gate):
+        length_m = 2 * gate.outer_width_m
+        _arrow(axes, (gate.x_m, gate.y_m), gate.yaw_rad, length_m, colour=colour, lw=1.3, zorder=3)
 
 
-def _label_frame_from_above(axes: Axes, frame: Frame, label: str) -> None:
-    """Write beside the end of a frame's bar."""
-    c, s = cos(frame.yaw_rad), sin(frame.yaw_rad)
-    half = frame.outer_width_m / 2
+def _label_gate_from_above(axes: Axes, gate: Gate, label: str) -> None:
+    """Write beside the end of a gate's bar."""
+    c, s = cos(gate.yaw_rad), sin(gate.yaw_rad)
+    half = gate.outer_width_m / 2
     # Of the bar's two ends, the one that points away from the arena's middle has more room.
-    outward = 1.0 if -s * frame.x_m + c * frame.y_m >= 0 else -1.0
+    outward = 1.0 if -s * gate.x_m + c * gate.y_m >= 0 else -1.0
     right, up = -s * outward, c * outward
-    end = (frame.x_m + right * half, frame.y_m + up * half)
+    end = (gate.x_m + right * half, gate.y_m + up * half)
     ha = "left" if right > 0.3 else "right" if right < -0.3 else "center"
     va = "bottom" if up > 0.3 else "top" if up < -0.3 else "center"
     _label(axes, label, end, (right * 7, up * 7), ha=ha, va=va, fontsize=9)
@@ -235,37 +235,37 @@ def _draw_side(axes: Axes, scenario: Scenario) -> None:
         across = [x for x, _, _ in prism.corners()]
         corner, width = (min(across), 0.0), max(across) - min(across)
         axes.add_patch(Rectangle(corner, width, 2 * prism.half_extents_m[2], fc=_PRISM, alpha=0.3, zorder=1))
-    for frame in scenario.all_frames:
-        # Seen along y, a frame's width shrinks with its yaw; never to nothing, its bars have a depth.
-        width = frame.outer_width_m * abs(sin(frame.yaw_rad)) + frame.bar_m * abs(cos(frame.yaw_rad))
-        corner = (frame.x_m - width / 2, frame.z_m - frame.outer_height_m / 2)
-        for colour, line_width in ((_INK, 2.4), (FRAME_COLOURS[frame.colour], 1.5)):
+    for gate in scenario.all_gates:
+        # Seen along y, a gate's width shrinks with its yaw; never to nothing, its bars have a depth.
+        width = gate.outer_width_m * abs(sin(gate.yaw_rad)) + gate.bar_m * abs(cos(gate.yaw_rad))
+        corner = (gate.x_m - width / 2, gate.z_m - gate.outer_height_m / 2)
+        for colour, line_width in ((_INK, 2.4), (GATE_COLOURS[gate.colour], 1.5)):
             outline = Rectangle(
-                corner, width, frame.outer_height_m, fill=False, ec=colour, lw=line_width, zorder=4
+                corner, width, gate.outer_height_m, fill=False, ec=colour, lw=line_width, zorder=4
             )
             axes.add_patch(outline)
 
 
-def _draw_estimates(top: Axes, side: Axes, scenario: Scenario, estimates: Sequence[FrameEstimate]) -> None:
-    """Draw frames as the navigator knew them: outlines around the true ones, ellipses of two deviations."""
+def _draw_estimates(top: Axes, side: Axes, scenario: Scenario, estimates: Sequence[GateEstimate]) -> None:
+    """Draw gates as the navigator knew them: outlines around the true ones, ellipses of two deviations."""
     sizes_m: dict[str, tuple[float, float]] = {
-        frame.colour: (frame.outer_width_m, frame.outer_height_m) for frame in scenario.all_frames
+        gate.colour: (gate.outer_width_m, gate.outer_height_m) for gate in scenario.all_gates
     }
-    for frame in estimates:
-        x, y, z = frame.position_m
-        if not all(map(isfinite, (x, y, z, frame.yaw_rad))):
+    for gate in estimates:
+        x, y, z = gate.position_m
+        if not all(map(isfinite, (x, y, z, gate.yaw_rad))):
             continue
-        colour = FRAME_COLOURS.get(frame.colour, _OTHER_FRAME)
-        width, height = (_AROUND * size for size in sizes_m.get(frame.colour, _FRAME_SIZE_M))
+        colour = GATE_COLOURS.get(gate.colour, _OTHER_GATE)
+        width, height = (_AROUND * size for size in sizes_m.get(gate.colour, _GATE_SIZE_M))
         style: dict[str, Any] = {"fill": False, "ec": colour, "lw": 0.9, "ls": _ESTIMATE_DASH, "zorder": 7}
-        c, s = cos(frame.yaw_rad), sin(frame.yaw_rad)
+        c, s = cos(gate.yaw_rad), sin(gate.yaw_rad)
         corners = [(-0.2, -0.5), (0.2, -0.5), (0.2, 0.5), (-0.2, 0.5)]
         outline = [(x + width * (c * a - s * b), y + width * (s * a + c * b)) for a, b in corners]
         top.add_patch(Polygon(outline, closed=True, **style))
         seen_width = width * abs(s) + 0.1 * width * abs(c)
         side.add_patch(Rectangle((x - seen_width / 2, z - height / 2), seen_width, height, **style))
-        if all(map(isfinite, frame.position_std_m)):
-            std_x, std_y, std_z = frame.position_std_m
+        if all(map(isfinite, gate.position_std_m)):
+            std_x, std_y, std_z = gate.position_std_m
             for axes, at, axis_lengths in ((top, (x, y), (std_x, std_y)), (side, (x, z), (std_x, std_z))):
                 across, up = (4 * std for std in axis_lengths)
                 axes.add_patch(Ellipse(at, across, up, fc=colour, ec="none", alpha=0.18, zorder=2))
@@ -335,9 +335,9 @@ def _draw_marks(axes: Axes, view: _View, track: Track, times_s: Mapping[str, flo
         axes.plot(*end, **_END_MARK, mew=1.0, zorder=7)
 
 
-def _crossing_label(frame: Frame, times_s: Mapping[str, float]) -> str:
-    time_s = times_s.get(frame.colour)
-    return f"{frame.colour}\nnot crossed" if time_s is None else f"{frame.colour}\n{time_s:.1f} s"
+def _crossing_label(gate: Gate, times_s: Mapping[str, float]) -> str:
+    time_s = times_s.get(gate.colour)
+    return f"{gate.colour}\nnot crossed" if time_s is None else f"{gate.colour}\n{time_s:.1f} s"
 
 
 def _set_limits(top: Axes, side: Axes, scenario: Scenario, track: Track) -> None:
@@ -414,15 +414,15 @@ def _write_title(figure: Figure, title: str, subtitle: str) -> None:
 
 
 def _write_numbers(axes: Axes, scenario: Scenario) -> None:
-    """Write a table of the poses of start and frames."""
+    """Write a table of the poses of start and gates."""
     start, ground_m = scenario.start, start_position(scenario)[2]
     rows = [
         f"{'':6}{'x':>8}{'y':>8}{'z':>8}{'yaw':>8}   opening",
         f"{'start':6}{start.x_m:8.2f}{start.y_m:8.2f}{ground_m:8.2f}{start.yaw_rad:8.2f}",
     ]
-    for frame in scenario.frames:
-        width, height = frame.opening_m
-        pose = f"{frame.x_m:8.2f}{frame.y_m:8.2f}{frame.z_m:8.2f}{frame.yaw_rad:8.2f}"
-        rows.append(f"{frame.colour:6}{pose}   {width:.2f} × {height:.2f}")
+    for gate in scenario.frames:
+        width, height = gate.opening_m
+        pose = f"{gate.x_m:8.2f}{gate.y_m:8.2f}{gate.z_m:8.2f}{gate.yaw_rad:8.2f}"
+        rows.append(f"{gate.colour:6}{pose}   {width:.2f} × {height:.2f}")
     rows.append("\nmetres and radians; a frame's yaw is that of its normal")
     axes.text(0, 0.95, "\n".join(rows), va="top", fontsize=8, family="monospace", color=_INK, linespacing=1.5)

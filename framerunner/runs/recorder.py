@@ -20,7 +20,7 @@ from vision.types import CameraFrame, Image
 
 if TYPE_CHECKING:
     from framerunner.recording.mcap_writer import FlightRecording
-    from offboard.perception import Camera
+    from offboard.perception import ImageSource
 
 _MAX_WAITING_BYTES = 12 << 20  # of images that wait to be compressed: 50 of 320 x 240 pixels
 
@@ -30,7 +30,7 @@ class FlightRecorder:
 
     Attributes:
         latest: tick; None before the first.
-        paused: a pilot has had the sticks.
+        paused: an operator has had the sticks.
     """
 
     def __init__(self) -> None:
@@ -141,7 +141,7 @@ class RecordingCamera:
 
     def __init__(
         self,
-        source: Camera,
+        source: ImageSource,
         path: Path | None,
         rate_hz: float,
         on_frame: Callable[[CameraFrame], None] | None = None,

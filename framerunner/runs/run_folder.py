@@ -140,7 +140,7 @@ class RunFolder(RunFiles):
 def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: FlightResult) -> bool:
     """Write `result.json` and `track.png`; report on standard error what could not be written.
 
-    The scenario must have its frames where they were in this flight. Returns whether `result.json` is there.
+    The scenario must have its gates where they were in this flight. Returns whether `result.json` is there.
     """
 
     def plot() -> None:

@@ -1,4 +1,4 @@
-"""Where a drone was during a flight, and where its navigator believed the frames to be."""
+"""Where a drone was during a flight, and where its navigator believed the gates to be."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from math import isfinite
 from framerunner.geometry.vectors import Vec3
 from framerunner.wire.mission_report import TransitionTaken
 from offboard.app import Moment
-from offboard.navigation.view import FrameEstimate
+from offboard.navigation.view import GateEstimate
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class Track:
         y: see x.
         z: see x.
         mission_state: the state's id at each sample, such as "red.turning"; "" where there is none.
-        estimates: the frames as the navigator knew them at the end; empty without a navigator.
+        estimates: the gates as the navigator knew them at the end; empty without a navigator.
 
     Raises:
         ValueError: the sequences have different lengths.
@@ -35,7 +35,7 @@ class Track:
     y: Sequence[float] = ()
     z: Sequence[float] = ()
     mission_state: Sequence[str] = ()
-    estimates: Sequence[FrameEstimate] = ()
+    estimates: Sequence[GateEstimate] = ()
 
     def __post_init__(self) -> None:
         lengths = {name: len(getattr(self, name)) for name in ("time_s", "x", "y", "z", "mission_state")}
@@ -94,7 +94,7 @@ class TrackRecorder:
         self._y: list[float] = []
         self._z: list[float] = []
         self._mission_state: list[str] = []
-        self._estimates: Sequence[FrameEstimate] = ()
+        self._estimates: Sequence[GateEstimate] = ()
 
     def see(self, moment: Moment) -> None:
         """Add a tick."""
@@ -105,7 +105,7 @@ class TrackRecorder:
         self._z.append(state.z)
         self._mission_state.append(moment.mission_state)
         if moment.navigation is not None:
-            self._estimates = moment.navigation.frames
+            self._estimates = moment.navigation.gates
 
     def track(self, began_us: int | None) -> Track:
         """Return the track so far; times count from `began_us`, vehicle time, or from the first tick."""

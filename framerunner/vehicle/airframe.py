@@ -61,7 +61,7 @@ class Motor(_Part):
     radius_m: float = Field(0.05, ge=0.005, le=5)
 
 
-class Drag(_Part):
+class DragSpec(_Part):
     """Quadratic drag in body axes: F = -k v|v|, M = -k w|w|."""
 
     force_n_s2_m2: tuple[_DragCoefficient, _DragCoefficient, _DragCoefficient] = Field(
@@ -84,7 +84,7 @@ class AirEffects(_Part):
     ground_effect: bool = Field(False, description="thrust increases near base and floor")
 
 
-class Contact(_Part):
+class ContactSpec(_Part):
     """Contact with ground and solids: a spring and a damper with friction at each contact point."""
 
     stiffness_n_m: float = Field(300.0, ge=1, le=1e6)
@@ -92,7 +92,7 @@ class Contact(_Part):
     friction: float = Field(0.8, ge=0, le=10)
 
 
-class Battery(_Part):
+class BatterySpec(_Part):
     """The battery."""
 
     cells: int = Field(4, ge=1, le=16, description="in series")
@@ -147,11 +147,11 @@ class Airframe(_Part):
     )
     rotors: tuple[Rotor, ...] = Field(min_length=4)
     motor: Motor
-    drag: Drag = Drag()
+    drag: DragSpec = DragSpec()
     air: AirEffects = AirEffects()
-    contact: Contact = Contact()
+    contact: ContactSpec = ContactSpec()
     limits: Limits = Limits()
-    battery: Battery = Battery()
+    battery: BatterySpec = BatterySpec()
     stabiliser: Weights = Field(Weights(), description="of its design")
     parameters: dict[ParameterName, float | int] = Field(
         default_factory=dict, description="defaults of the autopilot's parameters for this airframe"

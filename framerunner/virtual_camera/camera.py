@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import atan2, cos, sin
 
 from framerunner.flying.plan import FlightPlan
-from framerunner.geometry.axes import ORIGIN, Alignment, Pose
+from framerunner.geometry.axes import ORIGIN, ArenaAlignment, Pose
 from framerunner.geometry.rotations import quaternion_from_yaw, yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
 from framerunner.wire.dialect import Message, mavlink
@@ -18,7 +18,7 @@ from framerunner.wire.vehicle_telemetry import AHEAD_US, VehiclePose, VehicleTel
 from offboard.link.gimbal import GimbalAttitude, gimbal_attitude
 from scenarios.models import Scenario, TrueState
 from scenarios.result import LocalFrame, Standing
-from sitl.camera import FIRST_EXPOSURE_US, Camera, Motion
+from sitl.camera import FIRST_EXPOSURE_US, ExposureMotion, SimulatedCamera
 from sitl.optics.painter import Image
 
 REFEREE_STEP_US = 20_000
@@ -37,7 +37,7 @@ class ArenaPose:
     attitude_arena: Quaternion
 
 
-class Placement:
+class StartPlacement:
     """Places the arena so that the disarmed vehicle stands on the start; keeps it there during a flight.
 
     Only heartbeats, one a second, report arming, so the vehicle may have taken off before one does. Poses
@@ -51,7 +51,7 @@ class Placement:
         self._pending: deque[tuple[Vec3, float]] = deque(maxlen=_PENDING)
         self._rest: Pose | None = None
         self._landed_us: int | None = None
-        self.alignment: Alignment | None = None  # local NED to arena, once the vehicle was seen disarmed
+        self.alignment: ArenaAlignment | None = None  # local NED to arena, once the vehicle was seen disarmed
         self.armed: bool | None = None  # by the last heartbeat; None before the first
 
     def see_pose(self, pose: VehiclePose) -> None:
@@ -63,14 +63,14 @@ class Placement:
         """Take a heartbeat, received at a vehicle time in microseconds."""
         if armed:
             if not self.armed and self._rest is not None:  # a try begins at the place where it stood
-                self.alignment = Alignment(self._start, self._rest)
+                self.alignment = ArenaAlignment(self._start, self._rest)
             self._landed_us = None
         elif self.armed:
             self._landed_us = time_us
         elif self._pending:
             self._rest = _mean(self._pending)
             if self._landed_us is None or time_us - self._landed_us >= HELD_AFTER_FLIGHT_US:
-                self.alignment = Alignment(self._start, self._rest)
+                self.alignment = ArenaAlignment(self._start, self._rest)
         self.armed = armed
         self._pending.clear()
 
@@ -101,7 +101,7 @@ class VirtualCamera:
     extrapolated.
 
     Args:
-        scenario: what is to be seen; its frames are higher than declared if there is no base.
+        scenario: what is to be seen; its gates are higher than declared if there is no base.
         level: whether the camera is held level, as by a gimbal, and follows the heading only; else it is
             fixed to the drone or, if the vehicle reports a gimbal, looks as that does.
         base: whether the drone starts from the scenario's base; else it starts from the floor.
@@ -110,7 +110,7 @@ class VirtualCamera:
     def __init__(self, scenario: Scenario, *, level: bool = False, base: bool = True) -> None:
         self.plan = FlightPlan(scenario, lift_m=0.0 if base else scenario.base.top_m)
         self._level = level
-        self._camera = Camera(self.plan.layout)
+        self._camera = SimulatedCamera(self.plan.layout)
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._wait_us = max(0, round(scenario.camera.latency_s * 1e6) - REPORT_GAP_US)
         self.restarts = 0  # of the vehicle
@@ -120,7 +120,7 @@ class VirtualCamera:
     def _restart(self) -> None:
         """Set the state of a vehicle of which nothing is known."""
         start = self.plan.start_pose
-        self.placement = Placement(Pose(start[:3], start[3]))
+        self.placement = StartPlacement(Pose(start[:3], start[3]))
         self._referee = self.plan.new_referee()
         self._judged_us = 0
         self._next = 0
@@ -176,7 +176,7 @@ class VirtualCamera:
         if where is None:
             return None
         self._next = index + 1
-        motion = Motion(exposure_us, where.velocity_arena_m_s)
+        motion = ExposureMotion(exposure_us, where.velocity_arena_m_s)
         gimbal, alignment = self._gimbal, self.placement.alignment
         turned = None
         attitude = where.attitude_arena

@@ -97,7 +97,7 @@ def write_dataset(settings: VisionSettings) -> None:
             "attitude_arena": labelled.attitude_arena,
             "focal_px": labelled.focal_px,
             "distortion": labelled.calibration.distortion,
-            "frames": [asdict(frame) for frame in labelled.frames],
+            "frames": [asdict(gate) for gate in labelled.gates],
         }
         labels.append(finite(entry, 6))
     (settings.out / LABELS).write_text(json.dumps(labels, indent=1), encoding="utf-8")

@@ -14,9 +14,9 @@ from framerunner.flying.detector import true_calibration
 from framerunner.geometry.rotations import mounting_flu, quaternion_from_euler, rotation, rotation_rows
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Quaternion, Vec3
-from scenarios.models import Scenario, UprightFrame
+from scenarios.models import Scenario, UprightGate
 from scenarios.random_scenarios import Level, random_scenario
-from sitl.camera import STILL, Camera, Motion
+from sitl.camera import STILL, ExposureMotion, SimulatedCamera
 from sitl.video import encode_jpeg
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
@@ -25,12 +25,12 @@ from vision.types import Image
 Floats = npt.NDArray[np.float64]
 
 IMAGES_OF_A_SCENE = 5
-_NEAREST_M, _FARTHEST_M = 0.4, 7.0  # of the frame that the camera is turned to
+_NEAREST_M, _FARTHEST_M = 0.4, 7.0  # of the gate that the camera is turned to
 _MAX_ANGLE_DEG, _MAX_ASIDE_DEG, _MAX_TILT_DEG = 80.0, 38.0, 15.0
 _ANYWHERE = 0.25  # share of the images that are turned anywhere
 _CLEAR_M = 0.35  # of the drone from everything
-_BESIDE_PX = 2.0  # what is nearer to a frame's outline than this may hide a part of it
-_DEPTH_M = 0.05  # nearer than this a frame is not labelled with pixels
+_BESIDE_PX = 2.0  # what is nearer to a gate's outline than this may hide a part of it
+_DEPTH_M = 0.05  # nearer than this a gate is not labelled with pixels
 _DRAWS = 1000
 _LAST_S = 120.0  # of the flight
 _MAX_SPEED_M_S = 0.8
@@ -48,12 +48,12 @@ class Disturbance:
 
 
 @dataclass(frozen=True, slots=True)
-class FrameLabel:
-    """What is true of one frame in one image; camera axes forward, left, up."""
+class GateLabel:
+    """What is true of one gate in one image; camera axes forward, left, up."""
 
     colour: str
     distance_m: float  # from the camera to the opening's centre
-    angle_deg: float  # between the line of sight and the frame's normal, 0..90
+    angle_deg: float  # between the line of sight and the gate's normal, 0..90
     position_flu_m: Vec3
     normal_flu: Vec3  # on the side from which it is seen
     corners_px: tuple[tuple[float, float], ...]
@@ -71,7 +71,7 @@ class LabelledImage:
     position_arena_m: Vec3
     attitude_arena: Quaternion
     calibration: Calibration
-    frames: tuple[FrameLabel, ...]
+    gates: tuple[GateLabel, ...]
     smooth: bool = False  # painted with camera effects
 
     @property
@@ -83,7 +83,7 @@ class LabelledImage:
 def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbance) -> Iterator[LabelledImage]:
     """Paint images from random poses in random scenarios of a level.
 
-    Three of four are turned to one of the frames, from all distances and angles; the others anywhere. The
+    Three of four are turned to one of the gates, from all distances and angles; the others anywhere. The
     same arguments give the same images. With a level's camera effects, the drone flies and turns.
     """
     poses, noise, motions = (np.random.Generator(np.random.PCG64([seed, use])) for use in range(3))
@@ -107,17 +107,17 @@ class _LabelledScene:
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         self.scenario = scenario
-        self.camera = Camera(scenario, seed)
+        self.camera = SimulatedCamera(scenario, seed)
         self.calibration = true_calibration(scenario.camera)
         self.smooth = scenario.camera.effects is not None
         self._lens = None if self.calibration.is_ideal else Lens(self.calibration)
         others = [scenario.base.solid, *scenario.prisms]
-        self._solids = [*(frame.hull for frame in scenario.all_frames), *others]
+        self._solids = [*(gate.hull for gate in scenario.all_gates), *others]
 
     def draw_pose(self, stream: np.random.Generator) -> tuple[Vec3, Quaternion]:
         """A pose of the drone inside the arena, clear of everything."""
         for _ in range(_DRAWS):
-            position, yaw = self._turned_to_a_frame(stream)
+            position, yaw = self._turned_to_a_gate(stream)
             if stream.random() < _ANYWHERE:
                 yaw = stream.uniform(-pi, pi)
             if self._is_free(position):
@@ -125,36 +125,36 @@ class _LabelledScene:
         roll, pitch = (radians(stream.uniform(-_MAX_TILT_DEG, _MAX_TILT_DEG)) for _ in range(2))
         return position, quaternion_from_euler(roll, pitch, yaw)
 
-    def draw_motion(self, stream: np.random.Generator) -> Motion:
+    def draw_motion(self, stream: np.random.Generator) -> ExposureMotion:
         """When the image is taken, and how the drone moves then: as in a contest flight."""
         if not self.smooth:
             return STILL
         time_us = int(stream.uniform(0.0, _LAST_S) * 1e6)
         vx, vy, vz = (float(value) for value in stream.uniform(-_MAX_SPEED_M_S, _MAX_SPEED_M_S, 3))
         roll, pitch, yaw = (float(value) for value in stream.normal(0.0, 1.0, 3) * np.array(_RATES_RAD_S))
-        return Motion(time_us, (vx, vy, vz), (roll, pitch, yaw))
+        return ExposureMotion(time_us, (vx, vy, vz), (roll, pitch, yaw))
 
-    def labels(self, position_arena_m: Vec3, attitude: Quaternion) -> tuple[FrameLabel, ...]:
-        """What is true of every frame."""
+    def labels(self, position_arena_m: Vec3, attitude: Quaternion) -> tuple[GateLabel, ...]:
+        """What is true of every gate."""
         camera = self.scenario.camera
         body = np.array(rotation_rows(rotation(attitude)))
         eye = np.array(position_arena_m) + body @ np.array(camera.position_flu_m)
         rows = body @ np.array(rotation_rows(rotation(mounting_flu(camera.mounting_frd_rad))))
         outlines = [self._outline(solid, eye, rows) for solid in self._solids]
         return tuple(
-            self._label(frame, eye, rows, outlines, k) for k, frame in enumerate(self.scenario.all_frames)
+            self._label(gate, eye, rows, outlines, k) for k, gate in enumerate(self.scenario.all_gates)
         )
 
-    def _turned_to_a_frame(self, stream: np.random.Generator) -> tuple[Vec3, float]:
-        frames = self.scenario.all_frames
-        frame = frames[int(stream.random() * len(frames))]
+    def _turned_to_a_gate(self, stream: np.random.Generator) -> tuple[Vec3, float]:
+        gates = self.scenario.all_gates
+        gate = gates[int(stream.random() * len(gates))]
         distance_m = stream.uniform(_NEAREST_M, _FARTHEST_M)
-        around = frame.yaw_rad + radians(stream.uniform(-_MAX_ANGLE_DEG, _MAX_ANGLE_DEG))
+        around = gate.yaw_rad + radians(stream.uniform(-_MAX_ANGLE_DEG, _MAX_ANGLE_DEG))
         around += pi * (stream.random() < 0.5)
-        x, y = frame.x_m + distance_m * cos(around), frame.y_m + distance_m * sin(around)
-        z = frame.z_m + distance_m * sin(radians(stream.uniform(-30.0, 30.0)))
+        x, y = gate.x_m + distance_m * cos(around), gate.y_m + distance_m * sin(around)
+        z = gate.z_m + distance_m * sin(radians(stream.uniform(-30.0, 30.0)))
         aside = radians(stream.uniform(-_MAX_ASIDE_DEG, _MAX_ASIDE_DEG))
-        return (x, y, z), atan2(frame.y_m - y, frame.x_m - x) + aside
+        return (x, y, z), atan2(gate.y_m - y, gate.x_m - x) + aside
 
     def _is_free(self, position: Vec3) -> bool:
         arena = self.scenario.arena
@@ -175,14 +175,14 @@ class _LabelledScene:
 
     def _label(
         self,
-        frame: UprightFrame,
+        gate: UprightGate,
         eye: Floats,
         rows: Floats,
         outlines: Sequence[tuple[Floats | None, float, float]],
         own: int,
-    ) -> FrameLabel:
-        centre = np.array(frame.position_arena_m)
-        normal = np.array([cos(frame.yaw_rad), sin(frame.yaw_rad), 0.0])
+    ) -> GateLabel:
+        centre = np.array(gate.position_arena_m)
+        normal = np.array([cos(gate.yaw_rad), sin(gate.yaw_rad), 0.0])
         sight = centre - eye
         if normal @ sight > 0.0:
             normal = -normal
@@ -203,9 +203,9 @@ class _LabelledScene:
                 for k, outline in enumerate(outlines)
                 if k != own and outline[1] < farthest
             )
-            corners = self._corners(frame, normal, eye, rows)
-        return FrameLabel(
-            frame.colour,
+            corners = self._corners(gate, normal, eye, rows)
+        return GateLabel(
+            gate.colour,
             distance_m,
             angle,
             _vector(rows.T @ sight),
@@ -216,12 +216,12 @@ class _LabelledScene:
         )
 
     def _corners(
-        self, frame: UprightFrame, normal: Floats, eye: Floats, rows: Floats
+        self, gate: UprightGate, normal: Floats, eye: Floats, rows: Floats
     ) -> tuple[tuple[float, float], ...]:
         """Upper left, upper right, lower right and lower left as seen, in the middle plane."""
-        left = np.cross(np.array([0.0, 0.0, 1.0]), -normal) * frame.outer_width_m / 2
-        up = np.array([0.0, 0.0, frame.outer_height_m / 2])
-        centre = np.array(frame.position_arena_m) - eye
+        left = np.cross(np.array([0.0, 0.0, 1.0]), -normal) * gate.outer_width_m / 2
+        up = np.array([0.0, 0.0, gate.outer_height_m / 2])
+        centre = np.array(gate.position_arena_m) - eye
         points = (
             np.array([centre + left + up, centre - left + up, centre - left - up, centre + left - up]) @ rows
         )
@@ -230,7 +230,7 @@ class _LabelledScene:
 
 
 def _covers(other: tuple[Floats | None, float, float], hull: Floats) -> bool:
-    """Whether something may be before a part of a frame."""
+    """Whether something may be before a part of a gate."""
     outline, _, farthest = other
     if outline is None:
         return farthest > 0.0  # beside the camera

@@ -71,7 +71,7 @@ def _percent(share: float | None) -> float | None:
 
 
 def _telling(examples: Sequence[LabelledImage]) -> list[LabelledImage]:
-    """The image with the most and largest frames of each of some scenes."""
+    """The image with the most and largest gates of each of some scenes."""
     best: dict[str, LabelledImage] = {}
     for one in examples:
         if one.scenario not in best or _content(one) > _content(best[one.scenario]):
@@ -80,7 +80,7 @@ def _telling(examples: Sequence[LabelledImage]) -> list[LabelledImage]:
 
 
 def _content(labelled: LabelledImage) -> float:
-    return sum(1.0 + 1.0 / label.distance_m for label in labelled.frames if label.whole)
+    return sum(1.0 + 1.0 / label.distance_m for label in labelled.gates if label.whole)
 
 
 def _draw_image(axes: Axes, labelled: LabelledImage, *, rendered: bool) -> None:

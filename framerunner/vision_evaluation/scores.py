@@ -11,25 +11,25 @@ from math import acos, asin, degrees, hypot, inf, isfinite, sqrt
 import numpy as np
 
 from framerunner.geometry.vectors import Vec3
-from framerunner.vision_evaluation.labelled_images import FrameLabel, LabelledImage
+from framerunner.vision_evaluation.labelled_images import GateLabel, LabelledImage
 from vision.calibration.model import Calibration
 from vision.detectors import Detector, DetectorMaker, detector_name, new_detector, others_detector
-from vision.types import Detection, Detections, FrameSighting, Image, Vision
+from vision.types import Detection, Detections, GateSighting, Image, Vision
 
 KINDS: tuple[Vision, ...] = ("boxes", "frames")
 DISTANCES_M = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 ANGLES_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
 RATED_DISTANCE_M, RATED_ANGLE_DEG = 6.0, 75.0
-"""The detection rate counts frames wholly in view up to here; farther ones are shown apart."""
+"""The detection rate counts gates wholly in view up to here; farther ones are shown apart."""
 
-_SAME_PX = 8.0  # a sighting whose corners are within this of a frame's is of that frame
+_SAME_PX = 8.0  # a sighting whose corners are within this of a gate's is of that gate
 _OUTLIER = 4.0  # standard deviations
 _KEPT = 60  # images that are given back
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
-    """One frame wholly in view, and what one detector said of it; errors are None if it said nothing."""
+class DetectionSample:
+    """One gate wholly in view, and what one detector said of it; errors are None if it said nothing."""
 
     kind: str  # see `Scores`
     distance_m: float
@@ -47,7 +47,7 @@ class Scores:
     """Everything that was counted, by kind: ours are `KINDS`; what others' gave is rated as both of them."""
 
     images: int = 0
-    samples: list[Sample] = field(default_factory=list)
+    samples: list[DetectionSample] = field(default_factory=list)
     false_alarms: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
     times_ms: dict[str, list[float]] = field(default_factory=lambda: {kind: [] for kind in KINDS})
 
@@ -61,7 +61,7 @@ class Scores:
         self.images += 1
         for name, (detections, time_ms) in found.items():
             for vision in (name,) if name in KINDS else KINDS:
-                samples, false_alarms = (_boxes if vision == "boxes" else _frames)(labelled, detections)
+                samples, false_alarms = (_boxes if vision == "boxes" else _gates)(labelled, detections)
                 kind = name if name == vision else f"{name} {vision}"
                 self.samples += [
                     sample if sample.kind == kind else replace(sample, kind=kind) for sample in samples
@@ -84,7 +84,7 @@ class Scores:
         return rows_by(self.kinds, rated(self.samples), lambda sample: sample.angle_deg, ANGLES_DEG)
 
     def leave_out_unused(self) -> None:
-        """Forget of a detector of others what it never gives, boxes or frames, unless it gives neither."""
+        """Forget of a detector of others what it never gives, boxes or gates, unless it gives neither."""
         used = {*KINDS, *(s.kind for s in self.samples if s.found)}
         used |= {kind for kind, count in self.false_alarms.items() if count}
         others = [kind for kind in self.kinds if kind not in KINDS]
@@ -147,7 +147,10 @@ def detector_of(labelled: LabelledImage, kind: Vision, *, rendered: bool) -> Det
 
 
 def rows_by(
-    kinds: Sequence[str], samples: Sequence[Sample], key: Callable[[Sample], float], edges: Sequence[float]
+    kinds: Sequence[str],
+    samples: Sequence[DetectionSample],
+    key: Callable[[DetectionSample], float],
+    edges: Sequence[float],
 ) -> list[ErrorRow]:
     """The samples of each kind by ranges of a number."""
     return [
@@ -157,7 +160,7 @@ def rows_by(
     ]
 
 
-def row_of(kind: str, low: float, high: float, samples: Sequence[Sample]) -> ErrorRow:
+def row_of(kind: str, low: float, high: float, samples: Sequence[DetectionSample]) -> ErrorRow:
     """Sum up samples."""
     distances = [abs(s.distance_error) for s in samples if s.distance_error is not None]
     bearings = [s.bearing_error_deg for s in samples if s.bearing_error_deg is not None]
@@ -181,7 +184,7 @@ def row_of(kind: str, low: float, high: float, samples: Sequence[Sample]) -> Err
     )
 
 
-def rated(samples: Sequence[Sample]) -> list[Sample]:
+def rated(samples: Sequence[DetectionSample]) -> list[DetectionSample]:
     """Those that count for the detection rate."""
     return [s for s in samples if s.distance_m <= RATED_DISTANCE_M and s.angle_deg < RATED_ANGLE_DEG]
 
@@ -200,23 +203,23 @@ def _timed(detector: Detector, image: Image) -> tuple[Detections, float]:
     return detections, 1e3 * (time.thread_time() - begun_s)
 
 
-def _frames(labelled: LabelledImage, detections: Detections) -> tuple[list[Sample], int]:
-    """Samples and false alarms of the frame finder."""
+def _gates(labelled: LabelledImage, detections: Detections) -> tuple[list[DetectionSample], int]:
+    """Samples and false alarms of the gate finder."""
     samples = []
-    for label in labelled.frames:
+    for label in labelled.gates:
         if label.whole:
             samples.append(_sample_of_sighting(label, _sighting_of(label, detections.frames)))
     false_alarms = sum(
-        not any(_is_near(sighting, label) for label in labelled.frames) for sighting in detections.frames
+        not any(_is_near(sighting, label) for label in labelled.gates) for sighting in detections.frames
     )
     return samples, false_alarms
 
 
-def _is_near(sighting: FrameSighting, label: FrameLabel) -> bool:
-    """Whether a sighting is of a frame, however inexact, rather than of nothing."""
+def _is_near(sighting: GateSighting, label: GateLabel) -> bool:
+    """Whether a sighting is of a gate, however inexact, rather than of nothing."""
     if not label.seen or sighting.colour != label.colour:
         return False
-    if not label.corners_px:  # the frame reaches beside the camera
+    if not label.corners_px:  # the gate reaches beside the camera
         return True
     right, down = zip(*label.corners_px, strict=True)
     return any(
@@ -227,8 +230,8 @@ def _is_near(sighting: FrameSighting, label: FrameLabel) -> bool:
     )
 
 
-def _sighting_of(label: FrameLabel, sightings: Sequence[FrameSighting]) -> FrameSighting | None:
-    """The sighting nearest to a frame, if it is of it."""
+def _sighting_of(label: GateLabel, sightings: Sequence[GateSighting]) -> GateSighting | None:
+    """The sighting nearest to a gate, if it is of it."""
     best, best_px = None, _SAME_PX
     if label.corners_px:
         for sighting in sightings:
@@ -242,9 +245,9 @@ def _sighting_of(label: FrameLabel, sightings: Sequence[FrameSighting]) -> Frame
     return best
 
 
-def _sample_of_sighting(label: FrameLabel, sighting: FrameSighting | None) -> Sample:
+def _sample_of_sighting(label: GateLabel, sighting: GateSighting | None) -> DetectionSample:
     if sighting is None or not sighting.poses:
-        return Sample("frames", label.distance_m, label.angle_deg, False)
+        return DetectionSample("frames", label.distance_m, label.angle_deg, False)
     tilts = [_angle_deg(pose.normal_flu, label.normal_flu) for pose in sighting.poses]
     best = tilts.index(min(tilts))
     pose = sighting.poses[best]
@@ -253,7 +256,7 @@ def _sample_of_sighting(label: FrameLabel, sighting: FrameSighting | None) -> Sa
         if corner is not None:
             deviations.append((corner.right_px - right) / corner.std_right_px)
             deviations.append((corner.down_px - down) / corner.std_down_px)
-    return Sample(
+    return DetectionSample(
         "frames",
         label.distance_m,
         label.angle_deg,
@@ -266,24 +269,24 @@ def _sample_of_sighting(label: FrameLabel, sighting: FrameSighting | None) -> Sa
     )
 
 
-def _boxes(labelled: LabelledImage, detections: Detections) -> tuple[list[Sample], int]:
+def _boxes(labelled: LabelledImage, detections: Detections) -> tuple[list[DetectionSample], int]:
     """Samples and false alarms of the paper's detector, which sees one box of each colour."""
     samples, false_alarms = [], 0
     for colour in ("red", "green", "blue"):
         box: Detection = getattr(detections, colour)
-        labels = [label for label in labelled.frames if label.colour == colour]
+        labels = [label for label in labelled.gates if label.colour == colour]
         if box.seen and not any(label.seen for label in labels):
             false_alarms += 1
         samples += [_sample_of_box(label, box, labelled.focal_px) for label in labels if label.whole]
     return samples, false_alarms
 
 
-def _sample_of_box(label: FrameLabel, box: Detection, focal_px: float) -> Sample:
+def _sample_of_box(label: GateLabel, box: Detection, focal_px: float) -> DetectionSample:
     if box.d == inf:
-        return Sample("boxes", label.distance_m, label.angle_deg, False)
+        return DetectionSample("boxes", label.distance_m, label.angle_deg, False)
     # Its rows and columns count from the image's middle, up and right.
     sight = (focal_px, -(box.e + box.w) / 2.0, (box.n + box.s) / 2.0)
-    return Sample(
+    return DetectionSample(
         "boxes",
         label.distance_m,
         label.angle_deg,

@@ -43,10 +43,10 @@ NAMES: Mapping[int, str] = MappingProxyType(
         28: "TURTLE",
     }
 )
-PILOT_MODES = frozenset(
+MANUAL_MODES = frozenset(
     {"STABILIZE", "ACRO", "ALT_HOLD", "LOITER", "DRIFT", "SPORT", "POSHOLD", "FLOWHOLD", "ZIGZAG"}
 )
-"""Those that a pilot flies with the sticks."""
+"""Those that an operator flies with the sticks."""
 
 _MULTICOPTERS = frozenset(
     {

@@ -51,7 +51,7 @@ class MissionState:
     time_us: int  # vehicle time
     entered_us: int  # vehicle time at which the present state was entered
     flying: bool  # the app commands the drone
-    paused: bool  # a pilot has the sticks; the mission waits
+    paused: bool  # an operator has the sticks; the mission waits
     finished: bool  # the mission has ended
     command: tuple[
         float, float, float, float
@@ -82,7 +82,7 @@ class DocumentKind(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Document:
+class TunnelDocument:
     """A JSON object sent in pieces; `crc`, the CRC-32 of its compressed bytes, identifies its version."""
 
     kind: DocumentKind
@@ -215,7 +215,7 @@ class DocumentAssembler:
         self._incomplete: dict[DocumentKind, _IncompleteDocument] = {}
         self._complete: dict[DocumentKind, int] = {}  # CRC of the latest
 
-    def take(self, payload: bytes) -> Document | None:
+    def take(self, payload: bytes) -> TunnelDocument | None:
         """Take a piece.
 
         Returns:
@@ -247,7 +247,7 @@ class DocumentAssembler:
         if zlib.crc32(packed) != crc:
             raise PayloadError(f"{what}: its CRC is wrong; some piece was damaged")
         self._complete[kind] = crc  # also if it cannot be read: a repetition would not be better
-        return Document(kind, crc, _unpack(packed, what))
+        return TunnelDocument(kind, crc, _unpack(packed, what))
 
 
 def _check(payload: bytes, min_bytes: int, max_bytes: int, what: str) -> None:

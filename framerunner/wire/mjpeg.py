@@ -30,7 +30,7 @@ class StreamError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class MjpegPart:
     """One part of the stream."""
 
     data: bytes  # its body as received, normally a JPEG
@@ -68,14 +68,14 @@ class MjpegReader:
         self._searched = 0  # up to here, the buffer has no delimiter
         self._head: tuple[int | None, int | None] | None = None  # length and time of the part being read
 
-    def feed(self, data: bytes) -> list[Part]:
+    def feed(self, data: bytes) -> list[MjpegPart]:
         """Take bytes and return the parts that are complete with them.
 
         Raises:
             StreamError: a part or its headers are too large.
         """
         self._buffer += data
-        parts: list[Part] = []
+        parts: list[MjpegPart] = []
         while True:
             if self._head is None and not self._read_head():
                 return parts
@@ -106,7 +106,7 @@ class MjpegReader:
         self._head, self._searched = (length, _number(head, b"x-time-us")), 0
         return True
 
-    def _read_body(self) -> Part | None:
+    def _read_body(self) -> MjpegPart | None:
         """Return the part whose headers were read; None if it is incomplete."""
         assert self._head is not None
         length, time_us = self._head
@@ -123,7 +123,7 @@ class MjpegReader:
         data = bytes(buffer[:length])
         del buffer[:length]
         self._head = None
-        return Part(data.removesuffix(b"\r\n"), time_us)
+        return MjpegPart(data.removesuffix(b"\r\n"), time_us)
 
 
 def _number(head: bytes, name: bytes) -> int | None:

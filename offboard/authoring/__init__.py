@@ -42,7 +42,7 @@ an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a pat
 
 `apply(document, edit)` returns `Edited(document, changes)`; `EditSession(document, layout)` does so with
 `undo()`, `redo()` and a `layout` that follows; `place(places)` moves states and is undone likewise. A
-`Change` is {start, removed, inserted}; the changes of one edit follow each other, each made for the text
+`TextChange` is {start, removed, inserted}; the changes of one edit follow each other, each made for the text
 after those before it. What cannot be applied raises `EditError` with one line, and nothing is changed; its
 `message.text(EDIT_SPANISH)` says it in Spanish.
 
@@ -76,6 +76,7 @@ from offboard.authoring.apply import Edited, EditSession, apply
 from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue, catalogue_of
 from offboard.authoring.diagram import Diagram, Edge, Node, diagram
 from offboard.authoring.document import Document
+from offboard.authoring.edit_texts import EDIT_SPANISH, EditError
 from offboard.authoring.edits import Edit, ReplaceText, StrictModel, TransitionPath, edit_schema, parse_edit
 from offboard.authoring.findings import (
     Finding,
@@ -85,7 +86,7 @@ from offboard.authoring.findings import (
     reported_problems,
 )
 from offboard.authoring.layout import (
-    Layout,
+    DiagramLayout,
     LayoutError,
     StateBox,
     follow,
@@ -95,13 +96,12 @@ from offboard.authoring.layout import (
     read_layout,
     write_layout,
 )
-from offboard.authoring.messages import EDIT_SPANISH, EditError
 from offboard.authoring.outline import Span
 from offboard.authoring.scxml_export import export_scxml
 from offboard.authoring.scxml_import import import_scxml
-from offboard.authoring.text import Change, Positions
+from offboard.authoring.text import Positions, TextChange
 from offboard.authoring.xml_tree import XmlError
-from offboard.chart.messages import ENGLISH
+from offboard.chart.mission_texts import ENGLISH
 from offboard.chart.spanish import SPANISH
 from offboard.mission import mermaid_of
 
@@ -113,8 +113,8 @@ __all__ = [
     "ENGLISH",
     "SPANISH",
     "Catalogue",
-    "Change",
     "Diagram",
+    "DiagramLayout",
     "Document",
     "Edge",
     "Edit",
@@ -122,7 +122,6 @@ __all__ = [
     "EditSession",
     "Edited",
     "Finding",
-    "Layout",
     "LayoutError",
     "Node",
     "Positions",
@@ -131,6 +130,7 @@ __all__ = [
     "Span",
     "StateBox",
     "StrictModel",
+    "TextChange",
     "TransitionPath",
     "ValueEntry",
     "XmlError",

@@ -9,9 +9,9 @@ from typing import Any
 
 from offboard.authoring import edits, state_edits, transition_edits
 from offboard.authoring.document import Document
-from offboard.authoring.layout import Layout, StateBox, completed, follow, with_places
-from offboard.authoring.messages import EditError
-from offboard.authoring.text import Change
+from offboard.authoring.edit_texts import EditError
+from offboard.authoring.layout import DiagramLayout, StateBox, completed, follow, with_places
+from offboard.authoring.text import TextChange
 from offboard.authoring.work import Work
 from offboard.mission import MAX_FILE_BYTES
 
@@ -51,7 +51,7 @@ class Edited:
     """
 
     document: Document
-    changes: tuple[Change, ...]
+    changes: tuple[TextChange, ...]
 
 
 def apply(document: Document, edit: edits.Edit) -> Edited:
@@ -87,7 +87,7 @@ def _typed(document: Document, typed: Sequence[tuple[int, int, str]]) -> Edited:
     return _changed(document, change)
 
 
-def _changed(document: Document, change: Change) -> Edited:
+def _changed(document: Document, change: TextChange) -> Edited:
     changed = replace(document, content=document.content.changed(change))
     _refuse_too_long(changed)
     return Edited(changed, (change,) if change.removed != change.inserted else ())
@@ -102,8 +102,8 @@ def _refuse_too_long(document: Document) -> None:
 class _Step:
     """An edit that was done or undone, with the layout before that; a move of boxes has no changes."""
 
-    changes: tuple[Change, ...]
-    layout: Layout
+    changes: tuple[TextChange, ...]
+    layout: DiagramLayout
 
     @property
     def size(self) -> int:
@@ -124,9 +124,9 @@ class EditSession:
             they had before the edit.
     """
 
-    def __init__(self, document: Document, layout: Layout | None = None) -> None:
+    def __init__(self, document: Document, layout: DiagramLayout | None = None) -> None:
         self.document = document
-        self.layout = Layout() if layout is None else layout
+        self.layout = DiagramLayout() if layout is None else layout
         self._done: deque[_Step] = deque()
         self._undone: list[_Step] = []
         self._kept = 0  # characters in the steps that can be undone
@@ -141,7 +141,7 @@ class EditSession:
         """Whether there is an edit that was taken back."""
         return bool(self._undone)
 
-    def apply(self, edit: edits.Edit) -> tuple[Change, ...]:
+    def apply(self, edit: edits.Edit) -> tuple[TextChange, ...]:
         """Apply an edit and return the changes of the text. Raises `EditError`; nothing is changed then."""
         edited = apply(self.document, edit)
         if edited.changes:
@@ -150,8 +150,8 @@ class EditSession:
         return edited.changes
 
     def type(
-        self, typed: Sequence[tuple[int, int, str]], goes_on: Callable[[Change], bool] = lambda _: False
-    ) -> tuple[Change, ...]:
+        self, typed: Sequence[tuple[int, int, str]], goes_on: Callable[[TextChange], bool] = lambda _: False
+    ) -> tuple[TextChange, ...]:
         """Apply typed changes, see `MissionText.typed`, as one. Raises `EditError`; nothing is changed then.
 
         Args:
@@ -169,7 +169,7 @@ class EditSession:
             self._do(step, edited.document, self.layout)
         return edited.changes
 
-    def _do(self, step: _Step, document: Document, layout: Layout) -> None:
+    def _do(self, step: _Step, document: Document, layout: DiagramLayout) -> None:
         self._undone.clear()
         self._remember(step)
         self.document, self.layout = document, layout
@@ -191,7 +191,7 @@ class EditSession:
         """Note where a page has drawn states that nobody placed; it is no step of its own."""
         self.layout = with_places(self.layout, places)
 
-    def undo(self) -> tuple[Change, ...]:
+    def undo(self) -> tuple[TextChange, ...]:
         """Take the last edit back and return the changes of the text. Raises `EditError` if there is none.
 
         The last one may have been a move of boxes: then the text has no changes.
@@ -203,7 +203,7 @@ class EditSession:
         self._undone.append(_Step(step.changes, self.layout))
         return self._change(tuple(change.inverse for change in reversed(step.changes)), step.layout)
 
-    def redo(self) -> tuple[Change, ...]:
+    def redo(self) -> tuple[TextChange, ...]:
         """Do again what was undone last. Raises `EditError` if nothing was."""
         if not self._undone:
             raise EditError("edit.no_redo")
@@ -211,7 +211,7 @@ class EditSession:
         self._remember(_Step(step.changes, self.layout))
         return self._change(step.changes, step.layout)
 
-    def _change(self, changes: tuple[Change, ...], layout: Layout) -> tuple[Change, ...]:
+    def _change(self, changes: tuple[TextChange, ...], layout: DiagramLayout) -> tuple[TextChange, ...]:
         content = self.document.content
         for change in changes:
             content = content.changed(change)

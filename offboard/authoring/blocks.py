@@ -13,7 +13,7 @@ from difflib import SequenceMatcher
 
 from framerunner.files.yaml_text import ListNode, MapNode, Node, Scalar
 from offboard.authoring.document import Document
-from offboard.authoring.messages import EditError
+from offboard.authoring.edit_texts import EditError
 from offboard.authoring.outline import Span
 from offboard.authoring.yaml_writer import Value, flow, style_of, written
 

@@ -11,7 +11,7 @@ from framerunner.files.text_file import TextError, decode_text, read_bytes
 from framerunner.files.yaml_text import ListNode, MapNode, Node, Place, Scalar
 from offboard.authoring.outline import Outline
 from offboard.authoring.text import MissionText, Positions
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.problems import MissionError, ProblemList, mission_error
 from offboard.chart.read import parse_mission_yaml, read_nodes
 from offboard.chart.spec import MissionFile, expand, merge_extended

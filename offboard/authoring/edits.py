@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from offboard.authoring.messages import EditError
+from offboard.authoring.edit_texts import EditError
 from offboard.authoring.outline import Section
 from offboard.chart.spec import Event
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from offboard.authoring.document import Document
 from offboard.authoring.outline import SECTIONS, Section, Span, StateOutline
 from offboard.authoring.references import instances
-from offboard.chart.messages import ENGLISH, Message
-from offboard.chart.problems import MissionError, Problem, ProblemList, Severity
+from offboard.chart.mission_texts import ENGLISH, Message
+from offboard.chart.problems import MissionError, MissionProblem, ProblemList, Severity
 from offboard.chart.spec import Event
 from offboard.mission import expand_and_check
 from offboard.pilot import Pilot
@@ -63,19 +63,19 @@ def check_document(
     Args:
         document: any; also one that is no mission.
         pilot_class: whose names the mission uses.
-        texts: in which language; see `offboard.chart.messages`.
+        texts: in which language; see `offboard.chart.mission_texts`.
     """
     return findings_of(document, reported_problems(document, pilot_class), texts)
 
 
 def findings_of(
-    document: Document, problems: Iterable[Problem], texts: Mapping[str, str] = ENGLISH
+    document: Document, problems: Iterable[MissionProblem], texts: Mapping[str, str] = ENGLISH
 ) -> tuple[Finding, ...]:
     """The findings that problems of a document are, in the same order."""
     return tuple(_finding(document, each, texts) for each in problems)
 
 
-def reported_problems(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[Problem, ...]:
+def reported_problems(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[MissionProblem, ...]:
     """The problems of which `check_document` makes findings, with the same arguments."""
     problems = problems_of(document, pilot_class)
     if len(problems) > _MAX_FINDINGS:
@@ -83,7 +83,7 @@ def reported_problems(document: Document, pilot_class: type[Pilot] = Pilot) -> t
     return problems
 
 
-def problems_of(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[Problem, ...]:
+def problems_of(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[MissionProblem, ...]:
     """What the checker notes of a document."""
     problems = ProblemList()
     try:
@@ -98,7 +98,7 @@ def _code(message: Message) -> str:
     return reason.code if message.code in _WITH_REASON and isinstance(reason, Message) else message.code
 
 
-def _finding(document: Document, found: Problem, texts: Mapping[str, str]) -> Finding:
+def _finding(document: Document, found: MissionProblem, texts: Mapping[str, str]) -> Finding:
     place, message = found.place, found.message
     plain = Finding(found.severity, _code(message), message.text(texts), place.file, place.line, place.column)
     if place.file != document.label or not place.line:

@@ -37,7 +37,7 @@ class StateBox(StrictModel):
     height: Size | None = None
 
 
-class Layout(StrictModel):
+class DiagramLayout(StrictModel):
     """Places by full id of the state, and the corners of edges by the edge's id."""
 
     version: Literal[1] = 1
@@ -52,24 +52,24 @@ def layout_path(mission: str | Path) -> Path:
     return Path(mission).with_suffix(".layout.json")
 
 
-def parse_layout(text: str, name: str = "layout") -> Layout:
+def parse_layout(text: str, name: str = "layout") -> DiagramLayout:
     """A layout from its file's content. Raises `LayoutError`."""
     try:
-        return Layout.model_validate_json(text)
+        return DiagramLayout.model_validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"]) or "file"
         raise LayoutError(f"{name}: {where}: {first['msg'][:200]}; {_ADVICE}") from None
 
 
-def read_layout(mission: str | Path) -> Layout:
+def read_layout(mission: str | Path) -> DiagramLayout:
     """The layout of a mission file; an empty one if it has none. Raises `LayoutError`."""
     path = layout_path(mission)
     try:
         data = read_in_folder(path, _MAX_BYTES)
         text = decode_text(data)
     except FileNotFoundError:
-        return Layout()
+        return DiagramLayout()
     except OSError as error:
         raise LayoutError(f"{path.name}: cannot be read: {error.strerror}; {_ADVICE}") from None
     except TextError as error:
@@ -79,7 +79,7 @@ def read_layout(mission: str | Path) -> Layout:
     return parse_layout(text, path.name)
 
 
-def layout_text(layout: Layout) -> str:
+def layout_text(layout: DiagramLayout) -> str:
     """The content of a layout's file: one state a line, in order of their ids, so that a diff is small."""
     data = layout.model_dump(mode="json", exclude_none=True)
     parts = []
@@ -89,7 +89,7 @@ def layout_text(layout: Layout) -> str:
     return '{\n  "version": 1,\n' + ",\n".join(parts) + "\n}\n"
 
 
-def write_layout(mission: str | Path, layout: Layout) -> Path:
+def write_layout(mission: str | Path, layout: DiagramLayout) -> Path:
     """Write the side file of a mission file.
 
     Raises:
@@ -104,7 +104,7 @@ def write_layout(mission: str | Path, layout: Layout) -> Path:
     return path
 
 
-def follow(layout: Layout, before: Document, edit: Edit, after: Document) -> Layout:
+def follow(layout: DiagramLayout, before: Document, edit: Edit, after: Document) -> DiagramLayout:
     """The layout after an edit: states that were renamed or moved keep their places, deleted ones lose them.
 
     After typed text nothing is known of what became of a state, so all places are kept.
@@ -124,34 +124,34 @@ def follow(layout: Layout, before: Document, edit: Edit, after: Document) -> Lay
         pairs = list(zip(instances(before, state), new, strict=False))
     change = prefix_change(pairs)
     known = chart_ids(after)
-    return Layout(
+    return DiagramLayout(
         states={change(name): box for name, box in layout.states.items() if change(name) in known},
         corners={_edge_id(name, change): points for name, points in layout.corners.items()},
     )
 
 
-def with_places(layout: Layout, places: Mapping[str, StateBox | None]) -> Layout:
+def with_places(layout: DiagramLayout, places: Mapping[str, StateBox | None]) -> DiagramLayout:
     """A layout with other places of some states; None forgets one."""
     states = {**layout.states, **{name: box for name, box in places.items() if box is not None}}
     for name, box in places.items():
         if box is None:
             states.pop(name, None)
-    return Layout(states=states, corners=layout.corners)
+    return DiagramLayout(states=states, corners=layout.corners)
 
 
-def known_places(layout: Layout, document: Document) -> Layout:
+def known_places(layout: DiagramLayout, document: Document) -> DiagramLayout:
     """The places of the states that a document has; all, if it cannot be understood."""
-    return layout if document.chart is None else completed(layout, Layout(), document)
+    return layout if document.chart is None else completed(layout, DiagramLayout(), document)
 
 
-def completed(layout: Layout, earlier: Layout, document: Document) -> Layout:
+def completed(layout: DiagramLayout, earlier: DiagramLayout, document: Document) -> DiagramLayout:
     """The layout of a document's states; those that have no place have the one of an earlier layout."""
     if document.chart is None:
         return layout
     known = chart_ids(document)
     states = {name: box for name, box in (earlier.states | layout.states).items() if name in known}
     edges = earlier.corners | layout.corners
-    return Layout(
+    return DiagramLayout(
         states=states,
         corners={name: points for name, points in edges.items() if name.partition("/")[0] in known},
     )

@@ -12,7 +12,7 @@ from offboard.chart.spec import Event, all_states, look_up
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class TargetReference:
     """A transition's target as written.
 
     Attributes:
@@ -34,14 +34,14 @@ class Reference:
         return self.state, self.event, self.index
 
 
-def references(document: Document) -> dict[tuple[str, Event, int], Reference]:
+def references(document: Document) -> dict[tuple[str, Event, int], TargetReference]:
     """All references of a document that lead to states."""
     leads = _leads(document)
     found = {}
     for state in document.outline:
         for transition in state.transitions:
             if transition.to is not None and leads.get(transition.to.place):
-                reference = Reference(
+                reference = TargetReference(
                     state.path,
                     transition.event,
                     transition.index,

@@ -11,7 +11,7 @@ import ast
 import re
 from dataclasses import dataclass, field
 
-from offboard.authoring.messages import EditError
+from offboard.authoring.edit_texts import EditError
 from offboard.authoring.scxml_export import NAMESPACE, SCXML, TICK
 from offboard.authoring.xml_tree import Element, XmlError, parse_xml
 from offboard.authoring.yaml_writer import Style, Value

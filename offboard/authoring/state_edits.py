@@ -6,6 +6,7 @@ from collections import defaultdict
 
 from framerunner.files.yaml_text import MapNode, Scalar
 from offboard.authoring.blocks import Owner, Patch
+from offboard.authoring.edit_texts import EditError, EditText
 from offboard.authoring.edits import (
     AddState,
     AddTemplate,
@@ -19,9 +20,15 @@ from offboard.authoring.edits import (
     SetParameter,
     SetUse,
 )
-from offboard.authoring.messages import EditError, EditMessage
 from offboard.authoring.outline import KEYS, TEMPLATE, StateOutline
-from offboard.authoring.references import Reference, beside, instances, prefix_change, references, relative
+from offboard.authoring.references import (
+    TargetReference,
+    beside,
+    instances,
+    prefix_change,
+    references,
+    relative,
+)
 from offboard.authoring.work import STATE_ORDER, Work, keys_before
 from offboard.authoring.yaml_writer import Value, style_of
 from offboard.chart.problems import cut
@@ -118,7 +125,7 @@ def _refuse_taken(work: Work, parent: str, name: str, *, replacing: bool = False
     outline = work.document.outline
     siblings = outline.templates if parent == TEMPLATE else outline.states_in(parent)
     if name in [state.name for state in siblings]:
-        what = EditMessage("edit.what_template" if parent == TEMPLATE else "edit.what_state")
+        what = EditText("edit.what_template" if parent == TEMPLATE else "edit.what_state")
         raise EditError("edit.taken", what=what, name=name)
     if parent == "" and not replacing and name in _base_names(work):
         raise EditError("edit.taken_base", base=outline.text("extends"), name=name)
@@ -329,7 +336,7 @@ def _remove_with_key(work: Work, node: MapNode, key: str, state: StateOutline) -
 
 def _delete_references(work: Work, state: StateOutline) -> None:
     gone = instances(work.document, state)
-    leading: dict[str, list[Reference]] = defaultdict(list)
+    leading: dict[str, list[TargetReference]] = defaultdict(list)
     for reference in sorted(references(work.document).values(), key=lambda each: each.index):
         inside = f"{reference.state}.".startswith(f"{state.path}.")
         targets = {target for _, target in reference.leads}

@@ -20,7 +20,7 @@ _MAX_CHANGES = 20  # that an edit makes; more are one, so that applying and tell
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class TextChange:
     """Some characters replaced by others.
 
     Attributes:
@@ -36,16 +36,16 @@ class Change:
     inserted_ends: tuple[str, ...] = ()
 
     @property
-    def inverse(self) -> Change:
+    def inverse(self) -> TextChange:
         """What takes this change back."""
-        return Change(self.start, self.inserted, self.removed, self.inserted_ends, self.removed_ends)
+        return TextChange(self.start, self.inserted, self.removed, self.inserted_ends, self.removed_ends)
 
-    def with_letters(self, then: Change) -> Change:
+    def with_letters(self, then: TextChange) -> TextChange:
         """This change of letters and the next one, of letters beside them; both add, or both delete."""
         if self.inserted:
-            return Change(self.start, "", self.inserted + then.inserted)
+            return TextChange(self.start, "", self.inserted + then.inserted)
         first, second = (self, then) if then.start == self.start else (then, self)
-        return Change(then.start, first.removed + second.removed, "")
+        return TextChange(then.start, first.removed + second.removed, "")
 
 
 # Offsets of the first character and of the one after the last, and the text that is put there.
@@ -87,7 +87,7 @@ class MissionText:
         most = Counter(self.line_ends).most_common(1)
         return most[0][0] if most else "\n"
 
-    def changes(self, parts: Sequence[Part]) -> tuple[Change, ...]:
+    def changes(self, parts: Sequence[Part]) -> tuple[TextChange, ...]:
         """The changes that put texts in the place of parts of this text; one change for all if they are many.
 
         Args:
@@ -100,7 +100,7 @@ class MissionText:
             return (self._joined(parts[::-1]),)
         return tuple(self._joined((part,)) for part in parts)
 
-    def _joined(self, parts: Sequence[Part]) -> Change:
+    def _joined(self, parts: Sequence[Part]) -> TextChange:
         """One change for all parts, given from the first to the last; line ends between them are kept."""
         begin, end = parts[0][0], parts[-1][1]
         first = line = self.text.count("\n", 0, begin)
@@ -116,9 +116,9 @@ class MissionText:
             line += count + self.text.count("\n", start, stop)
             place = stop
         removed_ends = self.line_ends[first:line]
-        return Change(begin, self.text[begin:end], "".join(texts), removed_ends, tuple(ends))
+        return TextChange(begin, self.text[begin:end], "".join(texts), removed_ends, tuple(ends))
 
-    def typed(self, changes: Sequence[tuple[int, int, str]]) -> Change:
+    def typed(self, changes: Sequence[tuple[int, int, str]]) -> TextChange:
         """The one change that does what typed ones do. Their number times the length of the text is copied.
 
         Args:
@@ -142,7 +142,7 @@ class MissionText:
             kept, rest = min(kept, start), min(rest, len(after) - end)
             after[start:end] = _LINE_END.sub(usual, new).encode("utf-16-le")
         if not changes:
-            return Change(0, "", "")
+            return TextChange(0, "", "")
         old = before[kept : len(before) - rest].decode("utf-16-le")
         put = after[kept : len(after) - rest].decode("utf-16-le")
         ends = {mark: end for end, mark in marks.items()}
@@ -153,7 +153,7 @@ class MissionText:
 
         start = len(before[:kept].decode("utf-16-le"))
         removed_text, inserted = (any_mark.sub("\n", each) for each in (old, put))
-        return Change(start, removed_text, inserted, ends_in(old), ends_in(put))
+        return TextChange(start, removed_text, inserted, ends_in(old), ends_in(put))
 
     def _marks(self, more: str) -> dict[str, str]:
         """For each line end that the file has, a character that is not in the text nor in another one."""
@@ -168,7 +168,7 @@ class MissionText:
         ends = (*(marks[end] for end in self.line_ends), "")
         return "".join(line + end for line, end in zip(self.text.split("\n"), ends, strict=True))
 
-    def changed(self, change: Change) -> MissionText:
+    def changed(self, change: TextChange) -> MissionText:
         """The text after a change that was made for it."""
         start, end = change.start, change.start + len(change.removed)
         assert self.text[start:end] == change.removed

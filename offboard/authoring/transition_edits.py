@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from framerunner.files.yaml_text import ListNode, MapNode, Scalar
 from offboard.authoring.blocks import Owner
+from offboard.authoring.edit_texts import EditError
 from offboard.authoring.edits import (
     AddTransition,
     DeleteTransition,
@@ -16,7 +17,6 @@ from offboard.authoring.edits import (
     SetTransitionActions,
     SetVariable,
 )
-from offboard.authoring.messages import EditError
 from offboard.authoring.outline import KEYS, StateOutline
 from offboard.authoring.state_edits import deleted_reference
 from offboard.authoring.work import STATE_ORDER, Work, keys_before

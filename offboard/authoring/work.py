@@ -8,11 +8,18 @@ from dataclasses import replace
 from framerunner.files.yaml_text import MapNode, Scalar
 from offboard.authoring.blocks import Blocks, Owner, Patch
 from offboard.authoring.document import Document
+from offboard.authoring.edit_texts import EditError, EditText
 from offboard.authoring.edits import TransitionPath
-from offboard.authoring.messages import EditError, EditMessage
 from offboard.authoring.outline import TEMPLATE, StateOutline, TransitionOutline
-from offboard.authoring.references import Reference, chart_ids, instances, references, relative, shortest_text
-from offboard.authoring.text import Change
+from offboard.authoring.references import (
+    TargetReference,
+    chart_ids,
+    instances,
+    references,
+    relative,
+    shortest_text,
+)
+from offboard.authoring.text import TextChange
 from offboard.authoring.yaml_writer import Value
 from offboard.chart.problems import cut
 
@@ -42,10 +49,10 @@ class Work:
         if document.unreadable is not None:
             problem = document.unreadable.problems[0]
             line = problem.place.line
-            place = EditMessage("edit.line", line=line) if line else EditMessage("edit.the_text")
+            place = EditText("edit.line", line=line) if line else EditText("edit.the_text")
             raise EditError("edit.unreadable", place=place, reason=problem.message)
         self.document = document
-        self.changes: list[Change] = []
+        self.changes: list[TextChange] = []
 
     def patch(self, *patches: Patch) -> None:
         """Replace parts of the text; the offsets of all patches are those before this step."""
@@ -73,7 +80,7 @@ class Work:
             if self.document.outline.get(inner) is not None:
                 raise EditError("edit.in_template", state=cut(path), inner=cut(inner))
         if path.partition(".")[0] in {each.partition(".")[0] for each in chart_ids(self.document)}:
-            base = self.document.outline.text("extends") or EditMessage("edit.other_template")
+            base = self.document.outline.text("extends") or EditText("edit.other_template")
             raise EditError("edit.in_other_file", state=cut(path), base=base)
         raise EditError("edit.no_state", state=cut(path))
 
@@ -84,7 +91,7 @@ class Work:
             if (each.event, each.index) == (path.event, path.index):
                 return state, each
         own = [each.index for each in state.transitions if each.event == path.event]
-        known = EditMessage("edit.has", count=len(own)) if own else EditMessage("edit.has_none")
+        known = EditText("edit.has", count=len(own)) if own else EditText("edit.has_none")
         raise EditError(
             "edit.no_transition", state=path.state, index=path.index, event=path.event, known=known
         )
@@ -150,7 +157,7 @@ class Work:
 
     def keep_references(
         self,
-        before: Iterable[Reference],
+        before: Iterable[TargetReference],
         path_of: Callable[[str], str],
         id_of: Callable[[str], str],
         *,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from framerunner.files.yaml_text import ListNode, MapNode, Scalar, YamlError, compose
-from offboard.authoring.messages import EditError
+from offboard.authoring.edit_texts import EditError
 
 Value = str | Sequence["Value"] | Mapping[str, "Value"]
 """What is written: a text, a list, or a mapping."""

@@ -15,7 +15,7 @@ from offboard.chart.expressions import (
     names_in,
 )
 from offboard.chart.guards import actions_of, check_guards
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.problems import ProblemList, cut, did_you_mean
 from offboard.chart.spec import (
     Action,
@@ -143,7 +143,7 @@ def _check_detector(mission: MissionFile, problems: ProblemList) -> None:
 
 
 def _check_vision(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:
-    """The map is only used by missions that see frames; the first use is reported."""
+    """The map is only used by missions that see gates; the first use is reported."""
     if mission.vision == "frames":
         return
     for state in all_states(mission.states):

@@ -19,7 +19,7 @@ from math import inf, isnan
 from typing import Any
 
 from offboard.chart.kinds import as_float
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.problems import cut
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary, choices_of, path_of
 

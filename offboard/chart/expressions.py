@@ -15,7 +15,7 @@ from functools import lru_cache
 from numbers import Number
 
 from offboard.chart.kinds import KindError, Kinds, masked
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary, path_of
 from offboard.pilot import Pilot
 

@@ -8,7 +8,7 @@ from functools import cache
 from framerunner.files.yaml_text import Place
 from offboard.chart.conditions import Conditions
 from offboard.chart.expressions import names_in
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.problems import ProblemList, cut
 from offboard.chart.spec import Action, Leaf, MissionFile, State, Transition, all_states, leaves
 from offboard.chart.vocabulary import Vocabulary

@@ -11,7 +11,7 @@ from math import inf
 from typing import get_args, get_origin
 
 from framerunner.geometry.vectors import Vec3
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.problems import cut
 from offboard.chart.vocabulary import Vocabulary, choices_of, path_of
 from offboard.limits import CONTEST

@@ -9,7 +9,7 @@ from typing import Literal
 
 from framerunner.errors import UserError
 from framerunner.files.yaml_text import Place
-from offboard.chart.messages import ENGLISH, Message, as_message
+from offboard.chart.mission_texts import ENGLISH, Message, as_message
 
 MAX_REPORTED = 50
 MAX_NOTED = 500
@@ -24,7 +24,7 @@ NOWHERE = Place("")
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class MissionProblem:
     """One finding of the checker."""
 
     place: Place
@@ -49,17 +49,17 @@ class MissionError(UserError):
         problems: the same with codes and places, all of them.
     """
 
-    def __init__(self, text: str, problems: tuple[Problem, ...] = ()) -> None:
+    def __init__(self, text: str, problems: tuple[MissionProblem, ...] = ()) -> None:
         super().__init__(text)
         self.problems = problems
 
-    def __reduce__(self) -> tuple[type[MissionError], tuple[str, tuple[Problem, ...]]]:
+    def __reduce__(self) -> tuple[type[MissionError], tuple[str, tuple[MissionProblem, ...]]]:
         return MissionError, (str(self), self.problems)
 
 
 def mission_error(place: Place, text: Message | str) -> MissionError:
     """The error for a single problem."""
-    found = Problem(place, as_message(text))
+    found = MissionProblem(place, as_message(text))
     return MissionError(str(found), (found,))
 
 
@@ -71,7 +71,7 @@ class ProblemList:
     the same word mostly follows from the first.
     """
 
-    _by_place: dict[Place, Problem] = field(default_factory=dict)
+    _by_place: dict[Place, MissionProblem] = field(default_factory=dict)
 
     @property
     def found(self) -> bool:
@@ -84,7 +84,7 @@ class ProblemList:
         return len(self._by_place) > MAX_NOTED
 
     @property
-    def all(self) -> tuple[Problem, ...]:
+    def all(self) -> tuple[MissionProblem, ...]:
         """In order of file, line and column."""
         order = sorted(self._by_place, key=lambda place: (place.file, place.line, place.column))
         return tuple(self._by_place[place] for place in order)
@@ -93,7 +93,7 @@ class ProblemList:
         """Note a problem; an error replaces a warning of the same place."""
         known = self._by_place.get(place)
         if known is None or (known.severity != "error" and severity == "error"):
-            self._by_place[place] = Problem(place, message, severity)
+            self._by_place[place] = MissionProblem(place, message, severity)
 
     def add_all(self, other: ProblemList) -> None:
         """Note all problems of another list."""
@@ -111,7 +111,7 @@ class ProblemList:
             lines = [str(each) for each in errors[:MAX_REPORTED]]
             if len(errors) > MAX_REPORTED:
                 more = f"and {len(errors) - MAX_REPORTED} more mistakes"
-                lines.append(str(Problem(Place(errors[0].place.file), as_message(more))))
+                lines.append(str(MissionProblem(Place(errors[0].place.file), as_message(more))))
             raise MissionError("\n".join(lines), errors)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeVar, get_args
 
 from framerunner.files.yaml_text import ListNode, MapNode, Node, Place, Scalar
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.problems import ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, MissionFile, State, Transition
 from offboard.chart.yaml_syntax import parse_yaml

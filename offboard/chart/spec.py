@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Literal
 
 from framerunner.files.yaml_text import Place
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.problems import NOWHERE, ProblemList, cut, did_you_mean, mission_error
 from scenarios.models import MissionClass
 from vision.types import Vision

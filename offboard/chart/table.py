@@ -36,7 +36,7 @@ class Guarded:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ChartRow:
     """What a state without states of its own does while it is active.
 
     Attributes:
@@ -53,7 +53,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
+class ChartPassage:
     """All that happens when a transition is taken.
 
     Attributes:
@@ -67,7 +67,7 @@ class Passage:
     ids: tuple[str, ...]
 
 
-class Table:
+class ChartTable:
     """A chart that can be run.
 
     Args:
@@ -81,8 +81,8 @@ class Table:
     def __init__(self, chart: MissionFile) -> None:
         self._states = {state.id: state for state in all_states(chart.states)}
         self.start = Transition(chart.initial_place, chart.initial)
-        self.rows: Mapping[str, Row] = {
-            leaf.state.id: Row(
+        self.rows: Mapping[str, ChartRow] = {
+            leaf.state.id: ChartRow(
                 tuple(Guarded(each, compile_value(each.when or "True")) for each in leaf.transitions),
                 tuple(map(_act, leaf.during)),
                 leaf.resume,
@@ -91,7 +91,7 @@ class Table:
             for leaf in leaves(chart.states)
         }
 
-    def passage(self, source: str, transition: Transition) -> Passage:
+    def passage(self, source: str, transition: Transition) -> ChartPassage:
         """What happens when a transition is taken while a state is active; "" is none."""
         states = self._states
         actions: list[Action] = []
@@ -106,7 +106,7 @@ class Table:
             actions += [each for name in active if name not in around for each in states[name].enter]
             outer = states.get(leaf.rpartition(".")[0])
             if not states[leaf].final or outer is None or not outer.then or len(ids) > len(states):
-                return Passage(tuple(map(_act, actions)), leaf, tuple(ids))
+                return ChartPassage(tuple(map(_act, actions)), leaf, tuple(ids))
             ids.append(outer.then.id)
             source, target, between = outer.id, outer.then.to, ()
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import get_args, get_origin
 
 from offboard.chart.described import ValueDescription, descriptions
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.problems import cut, did_you_mean
 from offboard.pilot import Memory, Pilot
 from scenarios.models import COLOURS

@@ -11,7 +11,7 @@ import re
 import yaml
 
 from framerunner.files.yaml_text import MapNode, Place, YamlError, compose
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 from offboard.chart.problems import ProblemList, mission_error
 
 _KEY = re.compile(r"\s*(?:-\s+)?([\w.]+)\s*:(?:\s|$)")

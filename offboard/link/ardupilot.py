@@ -26,7 +26,7 @@ from mavsdk.asyncio import MavsdkError
 
 from framerunner.wire import ardupilot_modes
 from framerunner.wire.dialect import mavlink
-from offboard.drone import ResponsePrior, VelocityCommand
+from offboard.drone import ResponsePrior, VelocityFluCommand
 from offboard.link.dialect import AutopilotKind, ModeNames
 from offboard.link.direct import DirectDialect, DirectMessages
 from offboard.link.stepped import SteppedDialect
@@ -45,7 +45,7 @@ STREAMS_HZ = {
 }
 ARDUPILOT = AutopilotKind(
     name="ArduPilot",
-    modes=ModeNames(offboard="GUIDED", hold="BRAKE", land="LAND", pilot=ardupilot_modes.PILOT_MODES),
+    modes=ModeNames(offboard="GUIDED", hold="BRAKE", land="LAND", manual=ardupilot_modes.MANUAL_MODES),
     offboard=(1.0, float(ardupilot_modes.GUIDED)),
     hold=(1.0, float(ardupilot_modes.BRAKE)),
     land=(1.0, float(ardupilot_modes.LAND)),
@@ -70,7 +70,7 @@ class Setpoints:
         self._takeoff_us: int | None = None  # vehicle time at which take-off was last requested
         feed.needs_landed_state = True  # else each climb in the air would be taken for a take-off
 
-    def send(self, command: VelocityCommand) -> None:
+    def send(self, command: VelocityFluCommand) -> None:
         """Send a velocity, or request take-off."""
         if self._stands_ready and command.up_m_s > TAKEOFF_CLIMB_M_S:
             self._take_off()
@@ -149,7 +149,7 @@ class ArduPilotDialect(DirectDialect):
     async def _command_long(self, number: int, *parameters: float) -> None:
         await asyncio.to_thread(self._messages.command, number, *parameters)
 
-    def _transmit(self, command: VelocityCommand) -> None:
+    def _transmit(self, command: VelocityFluCommand) -> None:
         self._setpoints.send(command)
 
 
@@ -187,7 +187,7 @@ class SteppedArduPilotDialect(SteppedDialect):
         message_id, rate_hz = streams[-1]
         return _answered(self._request(number, message_id, 1e6 / rate_hz))
 
-    def _transmit(self, command: VelocityCommand) -> None:
+    def _transmit(self, command: VelocityFluCommand) -> None:
         self._setpoints.send(command)
 
 

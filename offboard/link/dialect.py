@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
-from offboard.drone import ResponsePrior, VelocityCommand
+from offboard.drone import ResponsePrior, VelocityFluCommand
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class ModeNames:
     offboard: str  # follows the app's setpoints
     hold: str  # hovers without setpoints or sticks
     land: str
-    pilot: frozenset[str]  # flown by a pilot's sticks
+    manual: frozenset[str]  # flown by an operator's sticks
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class Dialect(ABC):
         """Request what the vehicle does not send by itself, or too rarely, as soon as it is connected."""
 
     @abstractmethod
-    def send(self, command: VelocityCommand) -> None:
+    def send(self, command: VelocityFluCommand) -> None:
         """Send a velocity from now on; ignored after `end`. From any thread."""
 
     def repeat(self) -> None:  # noqa: B027 - it is complete

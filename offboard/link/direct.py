@@ -16,7 +16,7 @@ from mavsdk.asyncio import MavsdkError
 from mavsdk.plugins.mavlink_direct import MavlinkMessage
 
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, command_long, mavlink
-from offboard.drone import VelocityCommand
+from offboard.drone import VelocityFluCommand
 from offboard.link.dialect import Dialect
 
 _VELOCITY_AND_YAW_RATE = (
@@ -85,7 +85,7 @@ class DirectMessages:
         """Send a message."""
         self._direct.send_message(_encoded(message))
 
-    def send_velocity(self, command: VelocityCommand) -> None:
+    def send_velocity(self, command: VelocityFluCommand) -> None:
         """Send a velocity and a yaw rate in body axes."""
         message = mavlink.MAVLink_set_position_target_local_ned_message(
             time_boot_ms=0,
@@ -136,11 +136,11 @@ class DirectDialect(Dialect):
 
     def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
         self._messages = DirectMessages(direct, system_id)
-        self._command: VelocityCommand | None = None  # the last one; None: the stream has ended
+        self._command: VelocityFluCommand | None = None  # the last one; None: the stream has ended
         self._sent_since_repeat = False
         self._lock = threading.Lock()  # the watchdog's thread sends, too
 
-    def send(self, command: VelocityCommand) -> None:
+    def send(self, command: VelocityFluCommand) -> None:
         """Send a velocity; ignored after `end`."""
         with self._lock:
             if self.ended:
@@ -171,6 +171,6 @@ class DirectDialect(Dialect):
         with self._lock:
             self.ended, self._command = True, None
 
-    def _transmit(self, command: VelocityCommand) -> None:
+    def _transmit(self, command: VelocityFluCommand) -> None:
         """Send a velocity now."""
         self._messages.send_velocity(command)

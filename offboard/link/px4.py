@@ -20,7 +20,7 @@ from mavsdk.plugins.offboard import VelocityBodyYawspeed
 from framerunner.wire import px4_modes
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.px4_modes import Px4Mode
-from offboard.drone import ResponsePrior, VelocityCommand
+from offboard.drone import ResponsePrior, VelocityFluCommand
 from offboard.link.dialect import AutopilotKind, Dialect, ModeNames
 from offboard.link.direct import synchronous
 from offboard.link.stepped import SteppedDialect
@@ -40,7 +40,7 @@ PX4 = AutopilotKind(
         offboard="OFFBOARD",
         hold="HOLD",
         land="LAND",
-        pilot=frozenset({"MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE"}),
+        manual=frozenset({"MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE"}),
     ),
     offboard=_parameters(px4_modes.OFFBOARD),
     hold=_parameters(px4_modes.HOLD),
@@ -76,7 +76,7 @@ class Px4Dialect(Dialect):
     async def request_streams(self) -> None:
         """Nothing: PX4 sends all streams by itself."""
 
-    def send(self, command: VelocityCommand) -> None:
+    def send(self, command: VelocityFluCommand) -> None:
         """Send a velocity from now on; ignored after `end`."""
         setpoint = self._setpoint
         with self._lock:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from framerunner.geometry.axes import Alignment, Pose
+from framerunner.geometry.axes import ArenaAlignment, Pose
 from offboard.drone import DroneState
 from offboard.link.dialect import Dialect
-from offboard.link.telemetry import Sample, TelemetryFeed
+from offboard.link.telemetry import TelemetryFeed, TelemetrySample
 
 
 def reported_state(
-    sample: Sample,
+    sample: TelemetrySample,
     feed: TelemetryFeed,
-    alignment: Alignment,
+    alignment: ArenaAlignment,
     dialect: Dialect,
     missed: tuple[DroneState, ...] = (),
 ) -> DroneState:

@@ -16,7 +16,7 @@ from typing import Any
 
 from mavsdk.asyncio import MavsdkError
 
-from framerunner.geometry.axes import Alignment, Pose
+from framerunner.geometry.axes import ArenaAlignment, Pose
 from framerunner.geometry.rotations import rotation, to_world, yaw_of
 from framerunner.geometry.vectors import Vec3
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
@@ -100,7 +100,7 @@ class ResetFeed:
         self._jumps.append(jump if known else None)
 
 
-def followed(alignment: Alignment, jump: Jump | None) -> Alignment:
+def followed(alignment: ArenaAlignment, jump: Jump | None) -> ArenaAlignment:
     """The alignment after a reset: the drone has not moved, but its north may be another.
 
     A small change of the position is a correction within the frame, and stays one.
@@ -120,7 +120,7 @@ def followed(alignment: Alignment, jump: Jump | None) -> Alignment:
         "the vehicle's estimator has turned its north by %.0f°; the app follows", degrees(turned_rad)
     )
     place = alignment.pose(Pose(jump.reported.position_m, jump.expected.yaw_rad))
-    return Alignment(place, jump.reported)
+    return ArenaAlignment(place, jump.reported)
 
 
 def _report(message: Message) -> _Report:

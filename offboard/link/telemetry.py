@@ -42,7 +42,7 @@ CHECKS = "pre-arm checks not passed"
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class TelemetrySample:
     """Where the vehicle was when its clock crossed the 50 ms grid, in its local NED axes."""
 
     time_us: int  # of the attitude that crossed, microseconds since boot
@@ -69,12 +69,13 @@ class Sample:
 class TelemetryFeed:
     """Latest values; written on MAVSDK's thread, read on the loop's. Each field is replaced whole.
 
-    `clock` is monotonic wall time, seconds. Time, yaw, position and velocity have the units of `Sample`.
+    `clock` is monotonic wall time, seconds. Time, yaw, position and velocity have the units of
+    `TelemetrySample`.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self.sample = Sample(0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # of the last tick
+        self.sample = TelemetrySample(0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # of the last tick
         self.tick_number = 0  # of the last tick, counted from the vehicle's boot
         self.time_us = 0
         self.yaw_ned_rad = 0.0
@@ -98,7 +99,7 @@ class TelemetryFeed:
         self._texts: deque[tuple[float, str]] = deque(maxlen=TEXTS_KEPT)
         self._attitude_order = MessageOrder()
         self._position_order = MessageOrder()
-        self._samples: deque[Sample] = deque(maxlen=SAMPLES_KEPT)
+        self._samples: deque[TelemetrySample] = deque(maxlen=SAMPLES_KEPT)
         self._taken = self.sample  # what the waiting tasks have had; the next tick is another one
         self._loop: asyncio.AbstractEventLoop | None = None
         self._new_tick = asyncio.Event()
@@ -140,7 +141,7 @@ class TelemetryFeed:
         self._taken = self.sample
         return True
 
-    def take_samples(self) -> tuple[Sample, list[Sample]]:
+    def take_samples(self) -> tuple[TelemetrySample, list[TelemetrySample]]:
         """The newest tick's sample, after which `next_tick` waits for another, and those before it.
 
         Those since the last call, oldest first; of many only the last `SAMPLES_KEPT`.
@@ -228,7 +229,7 @@ class TelemetryFeed:
         self.attitudes += 1
         tick = time_us // TICK_US
         if tick != self.tick_number:
-            self.sample = Sample(
+            self.sample = TelemetrySample(
                 time_us,
                 self.yaw_ned_rad,
                 self.position_ned_m,

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from mavsdk.asyncio import MavsdkError
 
-from offboard.drone import DroneError, VelocityCommand
+from offboard.drone import DroneError, VelocityFluCommand
 from offboard.link.dialect import Dialect, TickExchange
 from offboard.link.telemetry import TICK_US, TelemetryFeed
 
@@ -91,7 +91,9 @@ class VehicleClock(Protocol):
         """Stop time; returns the time of the last telemetry, microseconds."""
         ...
 
-    async def advance(self, tick_us: int, command: VelocityCommand | None, *, at_once: bool = False) -> None:
+    async def advance(
+        self, tick_us: int, command: VelocityFluCommand | None, *, at_once: bool = False
+    ) -> None:
         """Let time run to a tick of the 50 ms grid, and wait until its image has been processed.
 
         A command was sent before and must arrive first. Time goes on a little after the tick, in which a real
@@ -181,7 +183,7 @@ class TickSource:
             pass
 
     async def next(
-        self, timeout_s: float, command: VelocityCommand | None = None, *, at_once: bool = False
+        self, timeout_s: float, command: VelocityFluCommand | None = None, *, at_once: bool = False
     ) -> bool:
         """Wait for the next tick; the feed's `sample` belongs to it then. False if there was none.
 

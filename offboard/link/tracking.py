@@ -1,6 +1,6 @@
 """Corrects velocity commands so that a vehicle with poor velocity control moves as the simulated drone would.
 
-A mission flies by velocities: 0.3 m/s for four seconds are 1.2 m through a frame, and zero is a hover. The
+A mission flies by velocities: 0.3 m/s for four seconds are 1.2 m through a gate, and zero is a hover. The
 simulated drone follows that closely. A real one lags by half a second and more, stays slower than commanded
 against drag, and drifts in height while it hovers, as PX4 does under velocity setpoints. So a model of an
 ideal drone is flown by the same commands, and the vehicle is made to follow the model: by the model's
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from math import cos, exp, hypot, pi, remainder, sin
 
 from framerunner.geometry.vectors import Vec3, turned
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 
 MODEL_LAG_S = 0.15  # as of the simulated drone
 SPEED_MEMORY_S = 0.5  # decay of the commanded speed by which the threshold is raised
@@ -101,7 +101,7 @@ class CommandTracker:
     """
 
     def __init__(self) -> None:
-        self._commanded = self._sent = VelocityCommand()
+        self._commanded = self._sent = VelocityFluCommand()
         self.reset()
 
     def reset(self) -> None:
@@ -110,7 +110,7 @@ class CommandTracker:
         self._model: _Model | None = None
         self._lags = tuple(map(LagEstimate, MIN_CHANGES))
 
-    def correct(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
+    def correct(self, command: VelocityFluCommand, state: DroneState) -> VelocityFluCommand:
         """The command to send, from the mission's command and the vehicle's state now; once a tick."""
         model, commanded, sent = self._model, self._commanded, self._sent
         self._commanded = self._sent = command
@@ -130,14 +130,16 @@ class CommandTracker:
             self._sent = _corrected(command, model, [lag.lag_s for lag in self._lags], state)
         return self._sent
 
-    def _measure_lags(self, sent: VelocityCommand, model: _Model, state: DroneState, step_s: float) -> None:
+    def _measure_lags(
+        self, sent: VelocityFluCommand, model: _Model, state: DroneState, step_s: float
+    ) -> None:
         commanded = (*turned(sent.forward_m_s, sent.left_m_s, state.yaw), sent.up_m_s, sent.yaw_rate_rad_s)
         measured = (*state.velocity_arena_m_s, model.measured_yaw_rate_rad_s)
         for lag, command, speed in zip(self._lags, commanded, measured, strict=True):
             lag.update(command, speed, step_s)
 
 
-def _advance(model: _Model, commanded: VelocityCommand, state: DroneState, step_s: float) -> None:
+def _advance(model: _Model, commanded: VelocityFluCommand, state: DroneState, step_s: float) -> None:
     """Fly the model by the command of the last step, at most MAX_OFFSET_M away from the vehicle."""
     speed_m_s = hypot(commanded.forward_m_s, commanded.left_m_s, commanded.up_m_s)
     model.recent_speed_m_s = max(speed_m_s, exp(-step_s / SPEED_MEMORY_S) * model.recent_speed_m_s)
@@ -187,8 +189,8 @@ def _forget_across(
 
 
 def _corrected(
-    command: VelocityCommand, model: _Model, lags_s: list[float], state: DroneState
-) -> VelocityCommand:
+    command: VelocityFluCommand, model: _Model, lags_s: list[float], state: DroneState
+) -> VelocityFluCommand:
     wanted_x, wanted_y = turned(command.forward_m_s, command.left_m_s, state.yaw)
     x_s, y_s, up_s, yaw_s = lags_s
     level_s = max(x_s, y_s)
@@ -212,7 +214,7 @@ def _corrected(
         lag_s=yaw_s,
     )
     c, s = cos(state.yaw), sin(state.yaw)
-    return VelocityCommand(
+    return VelocityFluCommand(
         command.forward_m_s + scale * (c * add[0] + s * add[1]),
         command.left_m_s + scale * (c * add[1] - s * add[0]),
         command.up_m_s + scale * add[2],

@@ -1,1 +1,1 @@
-"""Navigation by a map of frames: seen, remembered, planned, flown."""
+"""Navigation by a map of gates: seen, remembered, planned, flown."""

@@ -1,4 +1,4 @@
-"""One attempt to fly through a frame: how far it is, and whether it can go on."""
+"""One attempt to fly through a gate: how far it is, and whether it can go on."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from math import cos, dist, hypot, inf, pi, remainder, sin
 from framerunner.geometry.vectors import Vec3, turned
 from offboard.navigation.goals import Point
 from offboard.navigation.path import Crossing, Path
-from offboard.navigation.view import FrameEstimate
+from offboard.navigation.view import GateEstimate
 
 COMMIT_M = 0.3  # before the opening; from there the path is not planned again
 COMMIT_ACROSS_M = 0.06  # if the drone is no farther beside the opening's axis
 STOP_M = 0.9  # before the opening; a drone that must look brakes on its path if it finds no other
-SETTLED_M = 0.7  # before the opening; from there it is only if the frame turns out to be elsewhere,
+SETTLED_M = 0.7  # before the opening; from there it is only if the gate turns out to be elsewhere,
 SETTLED_MOVE_M = 0.02  # by this,
 SETTLED_TURN_RAD = 0.05  # or this
 CLEAR_M = 0.25  # behind the opening
@@ -33,12 +33,12 @@ class CrossingAttempt:
     """Positions along the direction of flight are negative before the opening. Times are vehicle time.
 
     Attributes:
-        colour: of the frame.
+        colour: of the gate.
         began_s: when the attempt began.
-        known_s: when the frame was last on the map.
+        known_s: when the gate was last on the map.
         planned_s: when there was last a path.
         passed: the drone has gone through the opening.
-        cleared: and is behind the frame's bars.
+        cleared: and is behind the gate's bars.
         refusal: why it cannot go on; empty if it can.
         after: where to look from behind the opening, if what comes next is not known; None if not chosen yet.
     """
@@ -113,7 +113,7 @@ class CrossingAttempt:
         """The drone is straight before the opening, too near to plan again, or beyond it."""
         return self.passed or (-COMMIT_M < self._along_m < 0.0 and self._across_m < COMMIT_ACROSS_M)
 
-    def is_settled(self, estimate: FrameEstimate) -> bool:
+    def is_settled(self, estimate: GateEstimate) -> bool:
         """The drone is near, and the path leads through the opening as it is known now."""
         if self._aim is None or not estimate.certain or not -SETTLED_M < self._along_m < 0.0:
             return False
@@ -123,14 +123,14 @@ class CrossingAttempt:
 
     @property
     def looks(self) -> bool:
-        """The drone stops before the frame, see `must_look`."""
+        """The drone stops before the gate, see `must_look`."""
         return self._looking_since_s is not None
 
-    def must_look(self, estimate: FrameEstimate, distance_m: float, near_m: float, now_s: float) -> bool:
-        """Whether the drone must stop before the frame, because it is near and the frame is not certain.
+    def must_look(self, estimate: GateEstimate, distance_m: float, near_m: float, now_s: float) -> bool:
+        """Whether the drone must stop before the gate, because it is near and the gate is not certain.
 
         Args:
-            estimate: of the frame.
+            estimate: of the gate.
             distance_m: from it to the drone.
             near_m: nearer to it, the drone must stop.
             now_s: vehicle time.
@@ -145,7 +145,7 @@ class CrossingAttempt:
         return True
 
     def lose(self, now_s: float) -> None:
-        """The frame is not on the map."""
+        """The gate is not on the map."""
         if not self.refusal and now_s - self.known_s > MAX_LOST_S:
             self.refusal = "lost from the map"
 

@@ -1,4 +1,4 @@
-"""Where to look next for frames: the view that shows most of what has not been seen, for its time."""
+"""Where to look next for gates: the view that shows most of what has not been seen, for its time."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from framerunner.geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import FlightStyle
 from offboard.navigation.search.coverage import Coverage
-from offboard.navigation.search.frame_visibility import (
+from offboard.navigation.search.gate_visibility import (
     YAWS,
     Bools,
     Doubles,
     Floats,
-    FrameVisibility,
+    GateVisibility,
     view_qualities,
     view_table,
 )
@@ -39,7 +39,7 @@ _NO_FLIGHT_S: Final = 0.1  # to so near a viewpoint the drone only turns
 _DETOUR_M: Final = 0.1  # a way longer by more than this is not straight
 _USED: Final = 1.0  # how much a view counts for less, each time it was taken
 _REFUSED: Final = 3.0  # visits for which a place counts that could not be reached
-_CLEAR_M: Final = 0.5  # from a viewpoint to frames found, and to obstacles' surfaces
+_CLEAR_M: Final = 0.5  # from a viewpoint to gates found, and to obstacles' surfaces
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class Explorer:
 
     Args:
         camera: the drone's camera.
-        arena: where the frames are.
+        arena: where the gates are.
         pace: of the flight to viewpoints.
 
     Attributes:
@@ -76,7 +76,7 @@ class Explorer:
     def __init__(self, camera: CameraModel, arena: Arena, pace: Pace | None = None) -> None:
         self._pace = pace or Pace()
         self.coverage = Coverage(camera, arena)
-        self._visibility = FrameVisibility(camera)
+        self._visibility = GateVisibility(camera)
         self._blocks = self.coverage.grid.blocks()
         self._table = view_table(camera, arena)
         self._likelihood = Likelihood(self._blocks)
@@ -101,8 +101,8 @@ class Explorer:
         Args:
             position_m: of the drone's centre, arena axes.
             yaw_rad: its heading.
-            found: centres of the frames that are known; others are less likely close to them.
-            hints: directions in which frames were seen that are not known; they are looked at first.
+            found: centres of the gates that are known; others are less likely close to them.
+            hints: directions in which gates were seen that are not known; they are looked at first.
             columns_m: obstacles from the floor to the ceiling, as discs in plan: x, y, radius.
             from_here: the drone flies from there, so the choice is remembered; False: it only will be there.
 
@@ -241,7 +241,7 @@ class _Unseen:
     """What there is to see, by block of the grid."""
 
     seen: Floats  # quality of the best view so far, shape (HEADINGS, blocks)
-    weights: Floats  # how likely a frame is there, shape (blocks,)
+    weights: Floats  # how likely a gate is there, shape (blocks,)
 
 
 @dataclass(frozen=True, slots=True)

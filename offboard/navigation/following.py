@@ -12,7 +12,7 @@ from dataclasses import replace
 from math import hypot, pi, remainder
 
 from framerunner.geometry.vectors import Vec3
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.control.late_following import (
     GATE_TURN_M,
@@ -88,7 +88,7 @@ class PathFollower:
         self._own = OwnMotion()
         self._own_s: float | None = None  # vehicle time of the state last taken in
         self._own_yaw_rad = 0.0
-        self._sent: VelocityCommand | None = None
+        self._sent: VelocityFluCommand | None = None
 
     @property
     def lead_s(self) -> float:
@@ -136,7 +136,7 @@ class PathFollower:
         """The path's end is reached, by its time."""
         return self._path is not None and self.progress_s >= self._path.duration_s
 
-    def observe(self, state: DroneState, now_s: float, sent: VelocityCommand | None) -> None:
+    def observe(self, state: DroneState, now_s: float, sent: VelocityFluCommand | None) -> None:
         """Take in a state, also while no path is followed; else `command` does it.
 
         Args:
@@ -169,7 +169,7 @@ class PathFollower:
         *,
         turn_rad_s: float | None = None,
         brake_m_s2: float = 0.0,
-    ) -> VelocityCommand:
+    ) -> VelocityFluCommand:
         """The command for this tick.
 
         Args:
@@ -235,7 +235,7 @@ class PathFollower:
 
     def _command_now(
         self, path: Path, state: DroneState, errors: tuple[Vec3, Vec3], step_s: float
-    ) -> VelocityCommand:
+    ) -> VelocityFluCommand:
         """The command for the simulated drone; the errors are of position and velocity, arena axes."""
         now, before, soon, later = (
             self._motion_in(path, state, ACTS_S + more_s)
@@ -249,8 +249,8 @@ class PathFollower:
         if self._turn_rad_s is not None:
             turn = self._turn_rad_s
         limits = self._limits
-        command = limits.limited(VelocityCommand(forward, left, up, turn + YAW_GAIN_PER_S * off_rad))
-        turn_sent = limits.limited(VelocityCommand(yaw_rate_rad_s=turn)).yaw_rate_rad_s
+        command = limits.limited(VelocityFluCommand(forward, left, up, turn + YAW_GAIN_PER_S * off_rad))
+        turn_sent = limits.limited(VelocityFluCommand(yaw_rate_rad_s=turn)).yaw_rate_rad_s
         self._inverse.sent(command.up_m_s, turn_sent, step_s)
         return command
 
@@ -287,7 +287,7 @@ class PathFollower:
 
     def _command_late(
         self, path: Path, state: DroneState, prediction: Prediction, step_s: float
-    ) -> VelocityCommand:
+    ) -> VelocityFluCommand:
         """The command for a vehicle that answers late."""
         dead_s = self.response.level_dead_s
         if path is not self._path:
@@ -300,7 +300,7 @@ class PathFollower:
         self.progress_s = max(late.before(dead_s)[0], 0.0)
         command = late.command(path, state, prediction, self.response)
         self.error_m = late.error_m
-        return self._limits.limited(VelocityCommand(*command))
+        return self._limits.limited(VelocityFluCommand(*command))
 
     def _errors(self, state: DroneState, now_s: float) -> tuple[Vec3, Vec3]:
         """From the drone to the path: position and velocity, both when the drone's were measured."""

@@ -9,16 +9,16 @@ from typing import Any
 from framerunner.geometry.vectors import Vec3
 from offboard.limits import CommandLimits
 from offboard.response import Response
-from scenarios.models import Base, Frame
+from scenarios.models import Base, Gate
 
-FRAME_WIDTH_M: float = Frame.model_fields["outer_width_m"].default  # of all frames, bars included
-FRAME_HEIGHT_M: float = Frame.model_fields["outer_height_m"].default
+GATE_WIDTH_M: float = Gate.model_fields["outer_width_m"].default  # of all gates, bars included
+GATE_HEIGHT_M: float = Gate.model_fields["outer_height_m"].default
 FRAME_THICKNESS_M = 0.02
 HEADROOM = 0.92
 """Share of a limit that a path uses; the rest is for corrections."""
 BOLD_HEADROOM = 0.98
 """Likewise of level speed in class open: where it counts, in openings, the drone flies more slowly."""
-VIEW_NEAR_M = 0.25  # half a frame's width, with a margin
+VIEW_NEAR_M = 0.25  # half a gate's width, with a margin
 PRESENT_SHARE = 1.15
 """Of the crossing speed: a drone that is faster at the start of a path brakes to this before an opening."""
 LOOK_AGAIN_M = 1.0
@@ -28,8 +28,8 @@ LOOK_BRAKING_M = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Gate:
-    """A frame, as a goal to cross or as an obstacle.
+class PathGate:
+    """A gate on a path's way: a goal to cross, or an obstacle.
 
     Attributes:
         centre_m: of the opening, arena axes.
@@ -53,7 +53,7 @@ class Point:
     yaw_rad: float | None = None
 
 
-Goal = Gate | Point
+Goal = PathGate | Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +61,12 @@ class Obstacles:
     """All that must not be touched, besides the arena's sides.
 
     Attributes:
-        frames: all frames known, with those to cross.
+        gates: all gates known, with those to cross.
         columns_m: what reaches from the floor to the ceiling, as discs in plan: x, y, radius.
         base: the cube of take-off and landing.
     """
 
-    frames: tuple[Gate, ...] = ()
+    gates: tuple[PathGate, ...] = ()
     columns_m: tuple[Vec3, ...] = ()
     base: Base | None = None
 
@@ -98,11 +98,11 @@ class FlightStyle:
         course_offset_rad: on the way to a gate the heading may differ from the course by this, so that the
             drone sees where it flies.
         view_half_rad: half the camera's view, with a margin for tilt.
-        bar_margin_m: between the drone's box and other frames, base and columns.
+        bar_margin_m: between the drone's box and other gates, base and columns.
         side_margin_m: between the drone's centre and the arena's sides and ceiling.
         floor_margin_m: between the drone's centre and the floor.
         replan_s: between two plans.
-        look_again_m: before a gate; there the drone waits until it knows the frame well enough.
+        look_again_m: before a gate; there the drone waits until it knows the gate well enough.
         look_braking_m: before that; there it is decided.
         arrived_m: a goal is reached this near to it,
         arrived_m_s: and at most this fast.
@@ -191,7 +191,7 @@ _OPEN = FlightStyle(
 """For the simulated drone's own limits: at them nothing would be left to correct with.
 
 Looking at places that no image has shown costs over a second of a flight, and saves one flight in a hundred
-from a frame there.
+from a gate there.
 """
 _OPEN_M_S = 1.748  # its level speed
 COMMAND_SHARE = 0.98  # of a limit that planned commands use

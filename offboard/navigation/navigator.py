@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from math import dist, hypot
 
 from framerunner.geometry.vectors import Vec3
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.crossing_attempt import CrossingAttempt
 from offboard.navigation.goals import Goal, Point, style_of
@@ -24,19 +24,19 @@ from vision.types import Detections
 GAP_S = 0.6  # an action that was not called for so long begins again
 EXPLORE_S = 0.5  # between two choices of where to look next
 HOME_HEIGHT_M = 0.5  # above the start, on the way home
-AHEAD_STD_M = 0.3  # of a next frame; if it is known less well, it is not planned for yet
+AHEAD_STD_M = 0.3  # of a next gate; if it is known less well, it is not planned for yet
 SPACED_S = 0.15  # in which one image is enough: one from nearly the same place adds little to the map
 SPACED_M_S = 1.5  # up to this speed
-NEAR_GATE_M = 1.5  # nearer to a frame to be crossed that is not certain yet, no image is left out
+NEAR_GATE_M = 1.5  # nearer to a gate to be crossed that is not certain yet, no image is left out
 VIEWPOINT_WORK = 85_000  # of choosing where to look next, in the unit of `PathFlight.work`
-SEARCH_AFTER_M = 2.0  # from behind a frame to the drone, when it is chosen where to look from there
+SEARCH_AFTER_M = 2.0  # from behind a gate to the drone, when it is chosen where to look from there
 
 
 class Navigator:
     """The world model, the path, and the action that is flown. All positions are in arena axes."""
 
     def __init__(self, surroundings: Surroundings, limits: CommandLimits = CONTEST) -> None:
-        width_m, height_m = surroundings.frame_m
+        width_m, height_m = surroundings.gate_m
         self._opening_m = (width_m - 2 * surroundings.bar_m, height_m - 2 * surroundings.bar_m)
         self._style = style_of(limits)
         self._world = WorldModel(surroundings, self._style)
@@ -52,7 +52,7 @@ class Navigator:
         self._steps_back = 0
 
     def observe(
-        self, state: DroneState, images: Sequence[Detections], sent: VelocityCommand | None = None
+        self, state: DroneState, images: Sequence[Detections], sent: VelocityFluCommand | None = None
     ) -> None:
         """Add the state of this tick and what was seen in the images since the last one.
 
@@ -68,16 +68,16 @@ class Navigator:
         self._world.observe(state, images)
 
     def is_known(self, colour: str) -> bool:
-        """The frame is on the map."""
-        return self._world.frame(colour) is not None
+        """The gate is on the map."""
+        return self._world.gate(colour) is not None
 
     def is_certain(self, colour: str) -> bool:
-        """The frame is known well enough to fly through."""
-        estimate = self._world.frame(colour)
+        """The gate is known well enough to fly through."""
+        estimate = self._world.gate(colour)
         return estimate is not None and estimate.certain
 
     def has_crossed(self, colour: str) -> bool:
-        """`cross` has flown through this frame and is clear of it."""
+        """`cross` has flown through this gate and is clear of it."""
         crossing = self._crossing
         return crossing is not None and crossing.colour == colour and crossing.cleared
 
@@ -88,7 +88,7 @@ class Navigator:
         if state is None or hypot(*state.velocity_arena_m_s) > SPACED_M_S or self._flight.looks:
             return 0.0
         if crossing is not None and self._action == f"cross {crossing.colour}":
-            estimate = self._world.frame(crossing.colour)
+            estimate = self._world.gate(crossing.colour)
             if estimate is None:
                 return 0.0
             if not estimate.certain and dist(estimate.position_m, position_now(state)) < NEAR_GATE_M:
@@ -117,9 +117,9 @@ class Navigator:
         if crossing is not None and crossing.refusal:
             trouble = f"{crossing.colour}: {crossing.refusal}"
         points = () if path is None else path.points_m
-        return NavigationView(self._world.frames, points, self._action, trouble)
+        return NavigationView(self._world.gates, points, self._action, trouble)
 
-    def explore(self) -> VelocityCommand:
+    def explore(self) -> VelocityFluCommand:
         """Fly to the view that shows most of what has not been seen."""
         state, now_s = self._begin("explore")
         if self._goal is None or now_s - self._chosen_s >= EXPLORE_S:
@@ -132,7 +132,7 @@ class Navigator:
             self._goal, self._chosen_s = Point(viewpoint.position_m, viewpoint.yaw_rad), now_s
         return self._fly(self._goal)
 
-    def fly_to(self, goal_m: Vec3) -> VelocityCommand:
+    def fly_to(self, goal_m: Vec3) -> VelocityFluCommand:
         """Fly to a point on a smooth path."""
         self._begin("fly to goal")
         if self._goal is None or self._goal.position_m != goal_m:
@@ -140,31 +140,31 @@ class Navigator:
             self._flight.change()
         return self._fly(self._goal)
 
-    def step_back(self, colour: str) -> VelocityCommand:
-        """Fly back from a frame, to one of its sides, facing it."""
+    def step_back(self, colour: str) -> VelocityFluCommand:
+        """Fly back from a gate, to one of its sides, facing it."""
         state, _ = self._begin(f"step back from {colour}")
         if self._goal is None:
-            frame, here_m = self._world.frame(colour), position_now(state)
-            if frame is None:
+            gate, here_m = self._world.gate(colour), position_now(state)
+            if gate is None:
                 self._goal = self._places.back(here_m, state.yaw)
             else:
                 side = 1 if self._steps_back % 2 else -1
-                self._goal = self._places.aside(frame, here_m, side, self._world.obstacles())
+                self._goal = self._places.aside(gate, here_m, side, self._world.obstacles())
             self._steps_back += 1
         return self._fly(self._goal)
 
-    def cross(self, colour: str) -> VelocityCommand:
-        """Fly through a frame as the map has it now, and on towards what comes next."""
+    def cross(self, colour: str) -> VelocityFluCommand:
+        """Fly through a gate as the map has it now, and on towards what comes next."""
         state, now_s = self._begin(f"cross {colour}")
         crossing = self._crossing
         if crossing is None or crossing.colour != colour or crossing.refusal:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)
         crossing.move(position_now(state), self._opening_m, now_s)
-        estimate = self._world.frame(colour)
+        estimate = self._world.gate(colour)
         goes_on = crossing.is_committed or (estimate is not None and crossing.is_settled(estimate))
         if goes_on and crossing.is_on(self._flight.path):
             return self._flight.follow(state)
-        if crossing.passed and crossing.behind is not None:  # and stopped within the frame
+        if crossing.passed and crossing.behind is not None:  # and stopped within the gate
             return self._fly(crossing.behind)
         if estimate is None:
             crossing.lose(now_s)
@@ -207,24 +207,24 @@ class Navigator:
         self._acted_s = now_s
         return state, now_s
 
-    def _fly(self, *goals: Goal) -> VelocityCommand:
+    def _fly(self, *goals: Goal) -> VelocityFluCommand:
         assert self._state is not None, "observe() comes before any action"
         world = self._world
         return self._flight.fly(goals, world.obstacles(), self._state, world.seen_space, world.viewed_space)
 
     def _goals_after(self, colour: str) -> list[Goal]:
-        """The next frame, if it is on the map; after the last one, the start."""
+        """The next gate, if it is on the map; after the last one, the start."""
         following = COLOURS[COLOURS.index(colour) + 1 :] if colour in COLOURS else ()
         if not following:
             x, y, z = self._start_m or (0.0, 0.0, 0.0)
             return [Point((x, y, z + HOME_HEIGHT_M))]
-        estimate = self._world.frame(following[0])
+        estimate = self._world.gate(following[0])
         if estimate is None or estimate.ambiguous or max(estimate.position_std_m) > AHEAD_STD_M:
             return self._search_after()
         return [self._world.gate_of(estimate)]
 
     def _search_after(self) -> list[Goal]:
-        """Where to look from behind the frame that is crossed, once the drone is near it."""
+        """Where to look from behind the gate that is crossed, once the drone is near it."""
         assert self._state is not None, "observe() comes before any action"
         crossing, here_m = self._crossing, position_now(self._state)
         behind = None if crossing is None else crossing.behind

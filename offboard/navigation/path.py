@@ -8,7 +8,7 @@ from functools import cached_property
 from math import dist, pi, remainder
 
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.goals import Gate, Motion
+from offboard.navigation.goals import Motion, PathGate
 
 _SHORTEST_S = 0.005  # knots are not nearer to each other than this
 _SAME_GATE_M = 0.3
@@ -24,7 +24,7 @@ class Crossing:
         time_s: when, since the path's start.
     """
 
-    gate: Gate
+    gate: PathGate
     heading_rad: float
     time_s: float
 

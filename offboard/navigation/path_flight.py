@@ -11,13 +11,13 @@ from dataclasses import replace
 from math import dist, hypot, pi, remainder
 
 from framerunner.geometry.vectors import Vec3
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.limits import CommandLimits
 from offboard.navigation.control.stuck_detector import StuckDetector
 from offboard.navigation.following import PathFollower
-from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
+from offboard.navigation.goals import FlightStyle, Goal, Motion, Obstacles, PathGate, Refusal
 from offboard.navigation.path import Path
-from offboard.navigation.planner.clearance import SAME_FRAME_M
+from offboard.navigation.planner.clearance import SAME_GATE_M
 from offboard.navigation.planner.passages import load_graphs
 from offboard.navigation.planning import Search, obstructed
 from offboard.navigation.search.lookout import Lookout, turn_to
@@ -25,16 +25,16 @@ from offboard.navigation.seen_space import SeenSpace, ViewedSpace
 from offboard.response import Prediction, ResponseEstimate
 from scenarios.models import Arena
 
-STILL = VelocityCommand()
+STILL = VelocityFluCommand()
 RESTART_M = 0.28  # farther from its path, the drone's own motion is planned from
 MAX_REFUSALS = 3  # in a row, until the drone stops
-SAME_M = 0.004  # between two estimates of the frame that is crossed, for which the path stays as it is,
+SAME_M = 0.004  # between two estimates of the gate that is crossed, for which the path stays as it is,
 SAME_SHARE = 0.005  # or this share of its distance: there is time to plan again when it is nearer
-NEARLY_SAME_M = 0.04  # likewise of the other frames
+NEARLY_SAME_M = 0.04  # likewise of the other gates
 SAME_RAD_M = 1.0  # likewise of headings, for each metre
 STILL_GOOD_M = 0.02  # an estimate that has moved less lets a path through it be kept, if another one is later
 LATER_S = 0.5  # by this
-ELSEWHERE_M = 0.08  # a frame that has moved by more, or turned, must not be flown through on the present path
+ELSEWHERE_M = 0.08  # a gate that has moved by more, or turned, must not be flown through on the present path
 AHEAD_S = 0.7  # of the path that must be free, beside the vehicle's lag: it is long enough to stop
 LOOK_AHEAD_S = 2.0  # likewise; the drone turns in flight to look at what it has not seen there
 AHEAD_STEP_S = 0.1
@@ -86,7 +86,7 @@ class PathFlight:
         self._looks_aside = False  # and not where its path says
         self._watched_s = 0.0  # when the drone began to look there
 
-    def learn(self, state: DroneState, sent: VelocityCommand | None) -> None:
+    def learn(self, state: DroneState, sent: VelocityFluCommand | None) -> None:
         """How late the vehicle answers, from the command that it had since the last tick; call every tick."""
         near_gate = self._response.response.late and self._is_near_gate()  # it matters of a late one only
         self._response.update(state, sent, near_gate=near_gate)
@@ -129,7 +129,7 @@ class PathFlight:
         state: DroneState,
         seen: SeenSpace,
         viewed: ViewedSpace,
-    ) -> VelocityCommand:
+    ) -> VelocityFluCommand:
         """Plan again if that is due and goals or obstacles have changed; the command for this tick."""
         self.work, self.spent = self.spent, 0
         goals = self._goals_now(goals, state)
@@ -153,7 +153,7 @@ class PathFlight:
                 self._watched_s = now_s
                 return self._stand(state, _look_rate(turn_to(self.watched, state)))
         self._looks_aside = False
-        to_gate = isinstance(goals[0], Gate)
+        to_gate = isinstance(goals[0], PathGate)
         if (
             checked
             and self._style.looks_ahead
@@ -168,7 +168,9 @@ class PathFlight:
                 return self.follow(state, _look_rate(turn_to(later, state)))
         return self.follow(state)
 
-    def _look_out(self, command: VelocityCommand, state: DroneState, seen: SeenSpace) -> VelocityCommand:
+    def _look_out(
+        self, command: VelocityFluCommand, state: DroneState, seen: SeenSpace
+    ) -> VelocityFluCommand:
         """The lookout's command; among obstacles the drone first stops on its path, and stays where it is."""
         if not seen.has_obstacles:
             self._left = None
@@ -199,7 +201,7 @@ class PathFlight:
                 self.leave()
         return checked
 
-    def follow(self, state: DroneState, turn_rad_s: float | None = None) -> VelocityCommand:
+    def follow(self, state: DroneState, turn_rad_s: float | None = None) -> VelocityFluCommand:
         """The command for this tick on the present path; without one, to stop.
 
         Args:
@@ -221,10 +223,10 @@ class PathFlight:
             self._left = None if self._follower.response.late else self.path
         self.path = None
 
-    def _stand(self, state: DroneState, turn_rad_s: float) -> VelocityCommand:
+    def _stand(self, state: DroneState, turn_rad_s: float) -> VelocityFluCommand:
         """Stop, and turn."""
         if self._left is None:
-            return VelocityCommand(yaw_rate_rad_s=turn_rad_s)
+            return VelocityFluCommand(yaw_rate_rad_s=turn_rad_s)
         now_s, brake_m_s2 = state.time_us * 1e-6, self._style.acceleration_m_s2
         return self._follower.command(self._left, state, now_s, turn_rad_s=turn_rad_s, brake_m_s2=brake_m_s2)
 
@@ -327,16 +329,16 @@ class PathFlight:
         """Whether it is time to check that the path is free."""
         if self.path is None:
             return False
-        what = (self.path, len(obstacles.frames), obstacles.columns_m)
+        what = (self.path, len(obstacles.gates), obstacles.columns_m)
         if what == self._checked and now_s - self._checked_s < CHECK_S:
             return False
         self._checked, self._checked_s = what, now_s
         return True
 
     def _is_obstructed(self, obstacles: Obstacles) -> bool:
-        """Whether an obstacle is where the drone will be; the frames it flies through are none.
+        """Whether an obstacle is where the drone will be; the gates it flies through are none.
 
-        A frame that turns out to be elsewhere, or turned, is one: the path does not lead through its opening.
+        A gate that turns out to be elsewhere, or turned, is one: the path does not lead through its opening.
         """
         if self.path is None:
             return False
@@ -344,9 +346,9 @@ class PathFlight:
             crossing.gate
             for crossing in self.path.crossings
             if not any(
-                dist(frame.centre_m, crossing.gate.centre_m) < SAME_FRAME_M
-                and _moved(frame, crossing.gate, ELSEWHERE_M)
-                for frame in obstacles.frames
+                dist(gate.centre_m, crossing.gate.centre_m) < SAME_GATE_M
+                and _moved(gate, crossing.gate, ELSEWHERE_M)
+                for gate in obstacles.gates
             )
         ]
         places_m = self._ahead(AHEAD_S + CHECK_S)
@@ -379,20 +381,20 @@ def _differ(
     a: tuple[Sequence[Goal], Obstacles], b: tuple[Sequence[Goal], Obstacles] | None, from_m: Vec3
 ) -> bool:
     """Whether goals or obstacles differ by more than the map's noise, as seen from a place."""
-    if b is None or len(a[0]) != len(b[0]) or len(a[1].frames) != len(b[1].frames):
+    if b is None or len(a[0]) != len(b[0]) or len(a[1].gates) != len(b[1].gates):
         return True
     if a[1].columns_m != b[1].columns_m:
         return True
     first = a[0][0]
-    away_m = dist(first.centre_m if isinstance(first, Gate) else first.position_m, from_m)
+    away_m = dist(first.centre_m if isinstance(first, PathGate) else first.position_m, from_m)
     if _moved(first, b[0][0], max(SAME_M, SAME_SHARE * away_m)):
         return True
-    other = [*zip(a[0][1:], b[0][1:], strict=True), *zip(a[1].frames, b[1].frames, strict=True)]
+    other = [*zip(a[0][1:], b[0][1:], strict=True), *zip(a[1].gates, b[1].gates, strict=True)]
     return any(_moved(*pair, NEARLY_SAME_M) for pair in other)
 
 
 def _moved(a: Goal, b: Goal, same_m: float) -> bool:
-    if isinstance(a, Gate) and isinstance(b, Gate):
+    if isinstance(a, PathGate) and isinstance(b, PathGate):
         turned = abs(remainder(a.yaw_rad - b.yaw_rad, pi))
         return dist(a.centre_m, b.centre_m) > same_m or turned > same_m * SAME_RAD_M
     return a != b

@@ -13,10 +13,10 @@ from math import dist, hypot, sqrt
 import numpy as np
 
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
+from offboard.navigation.goals import FlightStyle, Goal, Motion, Obstacles, PathGate, Refusal
 from offboard.navigation.path import Crossing, Path
-from offboard.navigation.planner.clearance import DRONE_RADIUS_M, SAME_FRAME_M, Clearance, frame_reach_m
-from offboard.navigation.planner.detours import MOST_WORK, LegFinder, Step, Steps, open_ended
+from offboard.navigation.planner.clearance import DRONE_RADIUS_M, SAME_GATE_M, Clearance, gate_reach_m
+from offboard.navigation.planner.detours import MOST_WORK, LegFinder, PlannedLeg, Steps, open_ended
 from offboard.navigation.planner.legs import Array, Connector, Leg
 from offboard.navigation.planner.route import BLOCKED_S, Pass, RouteFinder, place
 from offboard.navigation.planner.timing import Stretch, headings, run_in, sample, slowed
@@ -25,7 +25,7 @@ from scenarios.models import Arena
 LIFT_OFF_M_S = 0.5  # when the base is left below
 LIFT_OFF_M_S2 = 0.4  # acceleration to that speed, also of vehicles that answer late
 LIFT_OFF_SPARE_M = 0.02
-LEAVE_OPENING_M_S = 0.3  # of a drone that was stopped in a frame's opening
+LEAVE_OPENING_M_S = 0.3  # of a drone that was stopped in a gate's opening
 STOPPING_M = 0.5  # behind a last gate the drone stops in this distance,
 STOPPING_SHARES = np.array([1.0, 0.7, 0.5, 0.3, 0.15])  # or in the largest of these shares that is clear
 USED_MARGIN_M = 0.05  # of the margin to obstacles, while a path is flown
@@ -53,7 +53,7 @@ def plan(
     Args:
         start: the motion now; for a continuous flight that of the path flown now, `Path.at`.
         goals: at least one.
-        obstacles: what must not be touched; frames to be crossed belong to them.
+        obstacles: what must not be touched; gates to be crossed belong to them.
         arena: its sides and ceiling.
         style: how boldly to fly.
         previous: the path flown now; without a reason, gates are crossed from the same sides.
@@ -180,11 +180,16 @@ class Search:
         leg = self._legs.clear_leg(at, steps[0].end)
         if leg is None or leg.duration_s > steps[0].leg.duration_s + SLOWER_S:
             return None
-        return [at, *route[1:]], [[Step(leg, steps[0].end), *steps[1:]], *found[1:]]
+        return [at, *route[1:]], [[PlannedLeg(leg, steps[0].end), *steps[1:]], *found[1:]]
 
 
 def obstructed(
-    places_m: Sequence[Vec3], gates: Sequence[Gate], *, obstacles: Obstacles, arena: Arena, style: FlightStyle
+    places_m: Sequence[Vec3],
+    gates: Sequence[PathGate],
+    *,
+    obstacles: Obstacles,
+    arena: Arena,
+    style: FlightStyle,
 ) -> bool:
     """Whether obstacles are in the way of a path that was planned without them, or before they moved.
 
@@ -192,35 +197,35 @@ def obstructed(
 
     Args:
         places_m: on the path, from the drone on.
-        gates: the frames that the path leads through.
+        gates: the gates that the path leads through.
         obstacles: as they are known now.
         arena: as for `plan`.
         style: as for `plan`; of its margin a part may be used up.
     """
     near = _near(places_m, obstacles, style)
     others = tuple(
-        frame
-        for frame in near.frames
-        if all(dist(frame.centre_m, gate.centre_m) >= SAME_FRAME_M for gate in gates)
+        other_gate
+        for other_gate in near.gates
+        if all(dist(other_gate.centre_m, gate.centre_m) >= SAME_GATE_M for gate in gates)
     )
     if not others and not near.columns_m:
         return False
     nearer = replace(style, bar_margin_m=style.bar_margin_m - USED_MARGIN_M)
-    clearance = Clearance(replace(near, frames=others, base=None), arena, nearer)
+    clearance = Clearance(replace(near, gates=others, base=None), arena, nearer)
     depths = clearance.depths(np.array(places_m))[:, :-1]
     return bool((open_ended(depths[None], ends=False) > 0.0).any())
 
 
 def _near(places_m: Sequence[Vec3], obstacles: Obstacles, style: FlightStyle) -> Obstacles:
-    """The frames and columns that may be in the way of some of these places, and perhaps some more."""
+    """The gates and columns that may be in the way of some of these places, and perhaps some more."""
     first = places_m[0]
     span_m = max(dist(first, place_m) for place_m in places_m)
-    frame_m = span_m + frame_reach_m(style)
+    gate_m = span_m + gate_reach_m(style)
     column_m = span_m + DRONE_RADIUS_M + style.bar_margin_m
     x, y, _ = first
     return replace(
         obstacles,
-        frames=tuple(frame for frame in obstacles.frames if dist(first, frame.centre_m) < frame_m),
+        gates=tuple(gate for gate in obstacles.gates if dist(first, gate.centre_m) < gate_m),
         columns_m=tuple(
             column
             for column in obstacles.columns_m
@@ -275,7 +280,7 @@ def _complete(route: list[Pass], clearance: Clearance) -> list[Pass]:
             at, direction = out
             speed = max(float(start.exits.velocities_m_s[0] @ direction), LEAVE_OPENING_M_S)
             passes.insert(1, place(at, speed * direction, start.yaw_rad))
-    if isinstance(end.goal, Gate):
+    if isinstance(end.goal, PathGate):
         passes.append(place(_stop_behind(end, clearance), np.zeros(3), end.yaw_rad))
     return passes
 
@@ -295,8 +300,8 @@ def _refusal(route: list[Pass], found: list[Steps]) -> Refusal | None:
     passed: list[Goal] = []
     for after, steps in zip(route[1:], found, strict=True):
         if steps is None:
-            gate = 1 + sum(isinstance(goal, Gate) for goal in passed)
-            what = f"gate {gate}" if isinstance(after.goal, Gate) else "the next point"
+            gate = 1 + sum(isinstance(goal, PathGate) for goal in passed)
+            what = f"gate {gate}" if isinstance(after.goal, PathGate) else "the next point"
             return Refusal(f"obstacles block the way to {what}", len(passed))
         if after.goal is not None:
             passed.append(after.goal)
@@ -307,9 +312,9 @@ def _stretches(route: list[Pass], found: list[Steps]) -> list[Stretch]:
     stretches: list[Stretch] = []
     for (_, after), steps in zip(pairwise(route), found, strict=True):
         goal = after.goal
-        look = np.array(goal.centre_m) if isinstance(goal, Gate) else None
+        look = np.array(goal.centre_m) if isinstance(goal, PathGate) else None
         stretches += [Stretch(step.leg, goal, False, after.yaw_rad, look) for step in steps or ()]
-        if not isinstance(goal, Gate):
+        if not isinstance(goal, PathGate):
             continue
         if after.begun:
             stretches[-1] = replace(stretches[-1], crosses=True, look_m=None)

@@ -1,7 +1,7 @@
 """Which parts of the arena, in plan, were seen to be free, and which places were in view of the camera.
 
 A drone that knows obstacles flies only where it has seen that nothing stands; where a place was in view, a
-frame at its height would have been seen.
+gate at its height would have been seen.
 """
 
 from __future__ import annotations
@@ -170,9 +170,9 @@ class SeenSpace:
 _KEPT: Final = 256  # views
 _VIEW_MOVED_M: Final = 0.15  # a view from a pose nearer than this and _VIEW_TURNED to the last one is skipped
 _VIEW_TURNED: Final = 0.1  # likewise, of any part of the rotation matrix
-_VIEWED_M: Final = 4.5  # a frame farther away may be too small to be seen
+_VIEWED_M: Final = 4.5  # a gate farther away may be too small to be seen
 _BASE_M: Final = 0.8  # from the base in plan there is room for take-off and landing
-_ABOVE_M: Final = 0.15  # above and below a place, that must be in view with it: a frame there
+_ABOVE_M: Final = 0.15  # above and below a place, that must be in view with it: a gate there
 _FLOWN_M: Final = 0.3  # from where the camera was, along each axis: there is nothing
 _NEAR_M: Final = 0.6  # from the drone in plan; nearer places cannot come into view
 
@@ -181,7 +181,7 @@ class ViewedSpace:
     """Remembers the camera's poses, and tells which places were in view from one of them.
 
     Attributes:
-        needed: there may be frames that are not on the map; else all places are as good as viewed.
+        needed: there may be gates that are not on the map; else all places are as good as viewed.
     """
 
     def __init__(self, camera: CameraModel, base: Base) -> None:

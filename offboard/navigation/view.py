@@ -5,29 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.goals import FRAME_HEIGHT_M, FRAME_WIDTH_M
+from offboard.navigation.goals import GATE_HEIGHT_M, GATE_WIDTH_M
 from scenarios.models import Arena, Base, Camera
 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """The arena, the base and the drone's camera; nothing about the frames but their size."""
+    """The arena, the base and the drone's camera; nothing about the gates but their size."""
 
     arena: Arena
     base: Base
     camera: Camera
-    frame_m: tuple[float, float] = (FRAME_WIDTH_M, FRAME_HEIGHT_M)  # outer width and height of each frame
+    gate_m: tuple[float, float] = (GATE_WIDTH_M, GATE_HEIGHT_M)  # outer width and height of each gate
     bar_m: float = 0.02  # thickness of its bars
 
 
 @dataclass(frozen=True, slots=True)
-class FrameEstimate:
-    """A frame in the arena, as estimated from all images so far.
+class GateEstimate:
+    """A gate in the arena, as estimated from all images so far.
 
     Attributes:
-        colour: red, green, blue, or the colour of a frame that is no part of the task.
+        colour: red, green, blue, or the colour of a gate that is no part of the task.
         position_m: centre of the opening, arena axes.
-        yaw_rad: heading of its normal, -pi/2..pi/2: a frame may be crossed from either side.
+        yaw_rad: heading of its normal, -pi/2..pi/2: a gate may be crossed from either side.
         position_std_m: standard deviations along x, y, z.
         yaw_std_rad: standard deviation of the yaw.
         ambiguous: another yaw explains the images (nearly) as well.
@@ -49,16 +49,16 @@ class FrameEstimate:
 
 @dataclass(frozen=True, slots=True)
 class NavigationView:
-    """The map of frames and the plan at one time.
+    """The map of gates and the plan at one time.
 
     Attributes:
-        frames: all frames seen so far.
+        gates: all gates seen so far.
         path_m: points of the planned path, in order, arena axes; empty without a plan.
         goal: what the navigator does now, a word or a short phrase such as "explore" or "cross red".
         trouble: why it last could not go on, such as "red: lost from the map"; empty if it can.
     """
 
-    frames: tuple[FrameEstimate, ...] = ()
+    gates: tuple[GateEstimate, ...] = ()
     path_m: tuple[Vec3, ...] = ()
     goal: str = ""
     trouble: str = ""

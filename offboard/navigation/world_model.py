@@ -1,4 +1,4 @@
-"""What the navigator knows of the arena: frames, obstacles, and what has not been seen yet."""
+"""What the navigator knows of the arena: gates, obstacles, and what has not been seen yet."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.exploration import Explorer, Pace
-from offboard.navigation.frames.frame_map import FrameMap
-from offboard.navigation.goals import FlightStyle, Gate, Obstacles
+from offboard.navigation.gates.gate_map import GateMap
+from offboard.navigation.goals import FlightStyle, Obstacles, PathGate
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
 from offboard.navigation.pose_history import DronePose, PoseHistory
 from offboard.navigation.search.likelihood import Glimpses
 from offboard.navigation.seen_space import SeenSpace, ViewedSpace
-from offboard.navigation.view import FrameEstimate, Surroundings
+from offboard.navigation.view import GateEstimate, Surroundings
 from scenarios.models import COLOURS
 from vision.types import Detections
 
@@ -32,14 +32,14 @@ class WorldModel:
 
     Attributes:
         seen_space: where nothing stands.
-        viewed_space: where a frame would have been seen.
+        viewed_space: where a gate would have been seen.
     """
 
     def __init__(self, surroundings: Surroundings, style: FlightStyle) -> None:
         camera = self._camera = CameraModel.of(surroundings.camera)
         self._surroundings = surroundings
         self._history = PoseHistory(camera)
-        self._map = FrameMap(camera, surroundings.arena)
+        self._map = GateMap(camera, surroundings.arena)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
         self.seen_space = SeenSpace(camera, surroundings.arena)
         self.viewed_space = ViewedSpace(camera, surroundings.base)
@@ -49,7 +49,7 @@ class WorldModel:
         self._start_room_m = DRONE_RADIUS_M + style.bar_margin_m + START_SPARE_M
         self._image_us = -1
         self._waiting: deque[Detections] = deque(maxlen=IMAGES_WAITING)
-        self._frames: tuple[Gate, ...] | None = None  # that a path must keep clear of; None: not made yet
+        self._gates: tuple[PathGate, ...] | None = None  # that a path must keep clear of; None: not made yet
 
     def observe(self, state: DroneState, images: Sequence[Detections]) -> None:
         """Add the state of a tick and what was seen in the images since the last one.
@@ -76,19 +76,19 @@ class WorldModel:
 
     def _use(self, image: Detections, pose: DronePose) -> None:
         position_m, attitude = pose.position_m, pose.attitude_arena
-        self._frames = None
+        self._gates = None
         self._map.observe(image, pose, self._poses_of_rows(image, pose))
         self._obstacle_map.update(position_m, attitude, image.obstacle_edges)
         self.seen_space.update(position_m, attitude, image.obstacle_edges)
         self._explorer.coverage.update(position_m, attitude, image.obstacle_edges)
         known = [colour for colour in COLOURS if self._map.best(colour) is not None]
         self.viewed_space.update(self._camera.pose(position_m, attitude))
-        others = any(frame.colour not in COLOURS for frame in self._map.frames)
+        others = any(gate.colour not in COLOURS for gate in self._map.gates)
         self.viewed_space.needed = others or len(known) < len(COLOURS)
         self._glimpses.update(position_m, attitude, image, known, self._map.is_lookalike)
 
     def _poses_of_rows(self, image: Detections, pose: DronePose) -> list[DronePose] | None:
-        """With a rolling shutter, the drone's pose when each frame's middle row was read out."""
+        """With a rolling shutter, the drone's pose when each gate's middle row was read out."""
         if self._camera.readout_s == 0.0:
             return None
         poses = []
@@ -99,42 +99,42 @@ class WorldModel:
             poses.append(pose if at is None else replace(at, time_us=pose.time_us))
         return poses
 
-    def frame(self, colour: str) -> FrameEstimate | None:
-        """The frame of a colour; None if it is not on the map."""
+    def gate(self, colour: str) -> GateEstimate | None:
+        """The gate of a colour; None if it is not on the map."""
         return self._map.best(colour)
 
     @property
-    def frames(self) -> tuple[FrameEstimate, ...]:
-        """All frames on the map."""
-        return self._map.frames
+    def gates(self) -> tuple[GateEstimate, ...]:
+        """All gates on the map."""
+        return self._map.gates
 
-    def gate_of(self, frame: FrameEstimate) -> Gate:
-        """A frame as a path crosses it: in the arena, also while it seems to be outside, seen from afar."""
+    def gate_of(self, gate: GateEstimate) -> PathGate:
+        """A gate as a path crosses it: in the arena, also while it seems to be outside, seen from afar."""
         arena = self._surroundings.arena
-        half_m = self._surroundings.frame_m[1] / 2
+        half_m = self._surroundings.gate_m[1] / 2
         x_m, y_m = arena.length_x_m / 2, arena.width_y_m / 2
-        x, y, z = frame.position_m
+        x, y, z = gate.position_m
         inside = (
             min(max(x, -x_m), x_m),
             min(max(y, -y_m), y_m),
             min(max(z, half_m), arena.height_m - half_m),
         )
-        return Gate(inside, frame.yaw_rad)
+        return PathGate(inside, gate.yaw_rad)
 
     def obstacles(self) -> Obstacles:
-        """All that a path must keep clear of; of each colour of the task only the frame known best."""
-        if self._frames is None:
-            seen = [frame for frame in self._map.frames if frame.colour not in COLOURS]
+        """All that a path must keep clear of; of each colour of the task only the gate known best."""
+        if self._gates is None:
+            seen = [gate for gate in self._map.gates if gate.colour not in COLOURS]
             seen += [best for best in map(self._map.best, COLOURS) if best is not None]
-            self._frames = tuple(map(self.gate_of, seen))
-        return Obstacles(self._frames, self._columns_m(), self._surroundings.base)
+            self._gates = tuple(map(self.gate_of, seen))
+        return Obstacles(self._gates, self._columns_m(), self._surroundings.base)
 
     def next_viewpoint(self, position_m: Vec3, yaw_rad: float, *, from_here: bool = True) -> Pose:
-        """Where to look next for frames that are not on the map; see `Explorer.next_viewpoint`."""
+        """Where to look next for gates that are not on the map; see `Explorer.next_viewpoint`."""
         return self._explorer.next_viewpoint(
             position_m,
             yaw_rad,
-            [frame.position_m for frame in self._map.frames],
+            [gate.position_m for gate in self._map.gates],
             self._glimpses.lines(),
             self._columns_m(),
             from_here=from_here,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import hypot
 
-from framerunner.geometry.axes import Alignment
+from framerunner.geometry.axes import ArenaAlignment
 from framerunner.geometry.vectors import Vec3
 from offboard.limits import Box
 
@@ -30,7 +30,7 @@ class FlightFence:
     height_m: float
     radius_m: float
 
-    def corners_ned_m(self, alignment: Alignment) -> tuple[Vec3, ...]:
+    def corners_ned_m(self, alignment: ArenaAlignment) -> tuple[Vec3, ...]:
         """Its corners in the vehicle's local frame, at the height of the arena's floor."""
         return tuple(alignment.to_ned((x, y, 0.0)) for x, y in self.corners_arena_m)
 

@@ -145,7 +145,7 @@ def _camera_delay_check(facts: CameraFacts) -> Check:
 def calibration_checks(
     calibration: Calibration | None, size_px: tuple[int, int], days_since: Callable[[str | None], int | None]
 ) -> list[Check]:
-    """Whether the camera's lens and its mounting on the drone were measured, for missions that map frames.
+    """Whether the camera's lens and its mounting on the drone were measured, for missions that map gates.
 
     Args:
         calibration: of the camera; None: there is none.

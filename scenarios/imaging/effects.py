@@ -16,7 +16,7 @@ _MAX_TANGENT = 6.0  # of the angle between the optical axis and the image's corn
 Gain = Annotated[float, Field(ge=0.2, le=5.0)]
 
 
-class Lens(Part):
+class LensDistortion(Part):
     """Lens distortion: the Brown-Conrady model with the coefficients of OpenCV.
 
     A ray at (x, y) = (right, down) / ahead, with r² = x² + y², is seen at
@@ -65,7 +65,7 @@ class CameraEffects(Part):
     Brightness is linear, without a gamma curve: the painted colours are what a sensor with the gain 1 sees.
     """
 
-    lens: Lens = Field(Lens(), description="distortion")
+    lens: LensDistortion = Field(LensDistortion(), description="distortion")
     exposure_s: float = Field(
         0.0, ge=0, le=0.05, description="time of exposure, in which motion blurs the image"
     )

@@ -31,7 +31,7 @@ _METRES_PER_DEGREE = 111_320.0  # of latitude; a fault needs no more digits
 
 
 @dataclass(frozen=True, slots=True)
-class Channel(Generic[T]):
+class LinkChannel(Generic[T]):
     """The samples of one sensor.
 
     Attributes:
@@ -73,9 +73,9 @@ def _field(
     add: Callable[[Any, Numbers], Any],
     scale: Callable[[Any, float], Any] = _unscaled,
     width: int = 1,
-) -> Channel[Any]:
+) -> LinkChannel[Any]:
     """Samples whose fault is in one field."""
-    return Channel(
+    return LinkChannel(
         width,
         lambda sample, by: replace(sample, **{name: add(getattr(sample, name), by)}),
         lambda sample, factor: replace(sample, **{name: scale(getattr(sample, name), factor)}),
@@ -107,32 +107,32 @@ def _scale_flow(sample: FlowSample, factor: float) -> FlowSample:
     return replace(sample, flow_rad=(sample.flow_rad[0] * factor, sample.flow_rad[1] * factor))
 
 
-_VECTOR: Channel[Vec3] = Channel(3, _add_vector, _scale_vector, _first)
+_VECTOR: LinkChannel[Vec3] = LinkChannel(3, _add_vector, _scale_vector, _first)
 
-CHANNELS: dict[FaultPart, Channel[Any]] = {
+CHANNELS: dict[FaultPart, LinkChannel[Any]] = {
     FaultPart.GYROSCOPE: _VECTOR,
     FaultPart.ACCELEROMETER: _VECTOR,
     FaultPart.MAGNETOMETER: _field("field_frd_gauss", add=_add_vector, scale=_scale_vector, width=3),
     FaultPart.BAROMETER: _field("pressure_pa", add=_add_number),
-    FaultPart.GPS: Channel(2, _add_to_fix, _unscaled, _with_time),
+    FaultPart.GPS: LinkChannel(2, _add_to_fix, _unscaled, _with_time),
     FaultPart.RANGE_FINDER: _field(
         "distance_m", add=_add_number, scale=lambda distance_m, factor: distance_m * factor
     ),
-    FaultPart.OPTICAL_FLOW: Channel(2, _add_to_flow, _scale_flow, _with_time),
+    FaultPart.OPTICAL_FLOW: LinkChannel(2, _add_to_flow, _scale_flow, _with_time),
     FaultPart.EXTERNAL_POSE: _field("position_ned_m", add=_add_vector, width=3),
-    FaultPart.BATTERY_MONITOR: Channel(
+    FaultPart.BATTERY_MONITOR: LinkChannel(
         1, lambda sample, by: (max(0.0, sample[0] + by[0]), sample[1]), _unscaled, _first
     ),
 }
 """Of each sensor. Gyroscope, accelerometer and battery monitor deliver tuples, the others samples."""
 
-IDEAL_POSITION: Channel[tuple[Vec3, Vec3]] = Channel(
+IDEAL_POSITION: LinkChannel[tuple[Vec3, Vec3]] = LinkChannel(
     3, lambda sample, by: (_add_vector(sample[0], by), sample[1]), _unscaled, _first
 )
 """Position and velocity of ideal sensors."""
 
 
-def new_effect(fault: Fault, channel: Channel[T], seed: int) -> Effect[T]:
+def new_effect(fault: Fault, channel: LinkChannel[T], seed: int) -> Effect[T]:
     """The effect of a fault from now on.
 
     Args:
@@ -179,7 +179,7 @@ def _times(sigma: float, numbers: list[float]) -> tuple[float, ...]:
 class _Stuck(Generic[T]):
     """Repeats the first sample, with the time of each new one."""
 
-    def __init__(self, channel: Channel[T]) -> None:
+    def __init__(self, channel: LinkChannel[T]) -> None:
         self._channel = channel
         self._first: T | None = None
 

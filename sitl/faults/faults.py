@@ -66,7 +66,7 @@ _ALWAYS = frozenset({FaultPart.GYROSCOPE, FaultPart.ACCELEROMETER, FaultPart.BAT
 
 
 @dataclass(frozen=True, slots=True)
-class BegunFault:
+class RunningFault:
     """A fault that has begun.
 
     Attributes:
@@ -129,7 +129,7 @@ class Faults:
         self.link: LinkFault | None = None
         self.rc: Fault | None = None
         self.camera: tuple[Fault, ...] = ()
-        self.begun: list[BegunFault] = []
+        self.begun: list[RunningFault] = []
         self.notice: Callable[[str], None] = lambda line: None
         for fault in self._declared:
             self._check(fault)
@@ -142,7 +142,7 @@ class Faults:
     def armed(self, now_us: int) -> None:
         """A try begins: schedule what is declared."""
         self._armed_us = now_us
-        self.begun = [BegunFault(fault, now_us) for fault in self._active]  # those injected before
+        self.begun = [RunningFault(fault, now_us) for fault in self._active]  # those injected before
         self._scheduled = []
         for fault in self._declared:
             begin_us = now_us + round(fault.at_s * 1e6)
@@ -245,7 +245,7 @@ class Faults:
     def _begin(self, fault: Fault, now_us: int) -> None:
         self._active.append(fault)
         self.notice(f"fault begins: {fault}")
-        self.begun.append(BegunFault(fault, now_us))
+        self.begun.append(RunningFault(fault, now_us))
         if fault.part not in _OTHERS:
             self._all_sensors.begin(fault)
         self._apply()

@@ -11,7 +11,7 @@ from framerunner.geometry.solids import Solid
 from scenarios.faults.declaration import Fault, FaultKind, FaultPart
 from scenarios.models import Scenario
 from sitl.camera import CameraFeed, Exposure
-from sitl.faults.effects import Channel, Effect, new_effect
+from sitl.faults.effects import Effect, LinkChannel, new_effect
 from sitl.faults.faults import Faults
 from sitl.optics.painter import Image
 
@@ -77,7 +77,7 @@ def _frozen(first: Exposure, now: Exposure) -> Exposure:
     return _Changed(now.time_us, lambda: first.image)
 
 
-_EXPOSURES: Channel[Exposure] = Channel(
+_EXPOSURES: LinkChannel[Exposure] = LinkChannel(
     0, add=lambda exposure, _by: exposure, scale=lambda exposure, _factor: exposure, freeze=_frozen
 )
 """Images are no numbers: nothing is added, and no fault scales them."""

@@ -27,7 +27,7 @@ PATCH_BGR: dict[PatchColour, Bgr] = {
     "white": (240, 242, 242),
     "black": (34, 32, 30),
 }
-"""Colours of print and cloth: less pure than a frame's."""
+"""Colours of print and cloth: less pure than a gate's."""
 
 _LIFT_M = 0.002  # of a thing above what it is on; it decides nothing but keeps faces apart
 _Axes = tuple[Vec3, Vec3, Vec3, Vec3]  # origin, across, up, normal

@@ -1,6 +1,6 @@
 """What a pinhole camera sees of a scenario, painted with OpenCV.
 
-Far to near: sky, ground to the horizon, the hall's walls, tatami, shadows, then base and frames in an order
+Far to near: sky, ground to the horizon, the hall's walls, tatami, shadows, then base and gates in an order
 in which nothing is painted over by what it hides.
 
 Pixels: OpenCV's convention, whole coordinates at pixel centres, so the optical axis is at ((w - 1) / 2,

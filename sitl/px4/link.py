@@ -19,7 +19,7 @@ from framerunner.wire.framing import PacketReader
 from framerunner.wire.transports.sockets import Address, Stream, listen_tcp
 from framerunner.wire.transports.urls import in_url
 from sitl.autopilots import WARNING
-from sitl.px4.messages import ActuatorControls
+from sitl.px4.simulator_messages import ActuatorControls
 
 FIRST_PORT = 4560  # of PX4's instance 0
 _SOON_S = 0.004  # for which the event loop waits for an answer; it usually comes in a fraction of this

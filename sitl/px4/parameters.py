@@ -65,7 +65,7 @@ def all_parameters(
         airframe: of the drone.
         suite: its sensors, not ideal ones.
         speed: simulated seconds a second.
-        transmitter: a pilot has a remote control.
+        transmitter: an operator has a remote control.
     """
     values = simulation_parameters(speed) | suite_parameters(suite) | airframe_parameters(airframe)
     return values | RC_PARAMETERS if transmitter else values
@@ -128,7 +128,7 @@ def _rate_controllers(airframe: Airframe) -> dict[str, Value]:
 def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
     """What PX4's estimator uses with a suite: its sensors, delays and noise."""
     values: dict[str, Value] = {
-        "EKF2_RNG_CTRL": 0,  # over frames and a base a range is not the height
+        "EKF2_RNG_CTRL": 0,  # over gates and a base a range is not the height
         "EKF2_MULTI_IMU": 0,
         "SENS_IMU_MODE": 1,  # one IMU, one estimator
         "EKF2_BARO_DELAY": 0,

@@ -11,15 +11,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import BinaryIO
 
-from firmware_py.mavlink.camera.messages import stream_information
+from firmware_py.mavlink.camera.camera_messages import stream_information
 from framerunner.vehicle.measurements import BatteryState
 from framerunner.wire.dialect import Message, degrees_e7, device_heartbeat, mavlink, whole
 from framerunner.wire.framing import PacketReader, packed
 from framerunner.wire.px4_modes import px4_name
 from framerunner.wire.transports.sockets import connect_udp
 from scenarios.models import Camera
-from sitl.px4.messages import SIMULATOR_COMPONENT_ID, SIMULATOR_SYSTEM_ID
 from sitl.px4.simulation import Px4Simulation
+from sitl.px4.simulator_messages import SIMULATOR_COMPONENT_ID, SIMULATOR_SYSTEM_ID
 from sitl.server_settings import ServerSettings
 from sitl.streaming.streams import video_streams
 

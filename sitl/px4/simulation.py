@@ -11,7 +11,7 @@ from framerunner.vehicle.airframe import Airframe
 from framerunner.vehicle.measurements import BatteryState
 from scenarios.faults.declaration import FaultKind, FaultPart
 from scenarios.models import Scenario
-from sitl.px4.messages import RC_PERIOD_US, ActuatorControls, SensorMessages, has_whole_imu
+from sitl.px4.simulator_messages import RC_PERIOD_US, ActuatorControls, SensorMessages, has_whole_imu
 from sitl.px4.transmitter import CENTRED, Channels, Sticks, centred
 from sitl.px4.words import FailsafeWords
 from sitl.vehicle import SimulatedVehicle
@@ -27,7 +27,7 @@ class Px4Simulation(SimulatedVehicle):
     A tick has two halves: `sense`, whose messages are sent, and `move`, with PX4's answer to them.
 
     Args:
-        transmitter: the pilot's; None: there is none, unless the scenario has a fault of it.
+        transmitter: the operator's; None: there is none, unless the scenario has a fault of it.
 
     Attributes:
         messages: packs what `sense` returns.

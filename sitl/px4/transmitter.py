@@ -1,4 +1,4 @@
-"""A pilot's transmitter, as a receiver delivers it to PX4: pulse widths of channels, 50 times a second."""
+"""An operator's transmitter, as a receiver delivers it to PX4: pulse widths of channels, 50 a second."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from sitl.sensors.noise import normal_numbers
 from sitl.sensors.specs import BatteryMonitorSpec
 
 
-class BatteryMonitor:
+class BatterySensor:
     """Voltage and current, each with an error of its scale and white noise.
 
     Args:

@@ -14,7 +14,7 @@ from sitl.sensors.truth import TrueMotion
 _DRIFT_TICKS = 25  # between steps of the slow bias, whose time constant is minutes
 
 
-class Imu:
+class ImuSensor:
     """Gyroscope and accelerometer at the centre of mass: a sample in each control tick.
 
     Args:

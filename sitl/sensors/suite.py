@@ -9,10 +9,10 @@ from framerunner.files.yaml_file import FileKind
 from framerunner.vehicle.airframe import Airframe
 from framerunner.vehicle.geodesy import GeodeticPoint
 from framerunner.vehicle.measurements import ExternalPose, Readings
-from sitl.sensors.battery_monitor import BatteryMonitor
+from sitl.sensors.battery_monitor import BatterySensor
 from sitl.sensors.environment import Barometer, Gps, Magnetometer
 from sitl.sensors.ground import OpticalFlow, RangeFinder
-from sitl.sensors.imu import Imu
+from sitl.sensors.imu import ImuSensor
 from sitl.sensors.motion_capture import MotionCapture
 from sitl.sensors.specs import SuiteSpec
 from sitl.sensors.truth import TrueMotion
@@ -57,7 +57,7 @@ class SensorSuite:
     """
 
     def __init__(self, spec: SuiteSpec, airframe: Airframe, origin: GeodeticPoint, seed: int) -> None:
-        self._imu = Imu(spec.imu, airframe, seed) if spec.imu else None
+        self._imu = ImuSensor(spec.imu, airframe, seed) if spec.imu else None
         self._magnetometer = Magnetometer(spec.magnetometer, origin, seed) if spec.magnetometer else None
         self._barometer = Barometer(spec.barometer, origin, seed) if spec.barometer else None
         self._gps = Gps(spec.gps, origin, seed) if spec.gps else None
@@ -66,7 +66,7 @@ class SensorSuite:
         pose = spec.external_pose
         simulated = pose is not None and pose.source == "simulated"
         self._motion_capture = MotionCapture(pose, seed) if pose is not None and simulated else None
-        self._battery = BatteryMonitor(spec.battery, seed) if spec.battery else None
+        self._battery = BatterySensor(spec.battery, seed) if spec.battery else None
 
     def read(
         self, motion: TrueMotion, battery_voltage_v: float, battery_current_a: float

@@ -67,7 +67,7 @@ class Flight:
 
     Attributes:
         setpoint: what an offboard controller sends; None: nothing.
-        sticks: what a pilot sends; None: nothing.
+        sticks: what an operator sends; None: nothing.
         ground_station: whether one is heard.
         sensed: makes what the autopilot senses of what is true.
         track: what was flown, oldest first.

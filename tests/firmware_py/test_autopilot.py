@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.commands import FlightLimits, VelocityCommand
+from firmware_py.commands import FlightLimits, VelocityFrdCommand
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.status import CommandResult, FlightMode, LandedState
@@ -102,7 +102,7 @@ class Flight:
         self.texts.clear()
         return self
 
-    def _move(self, command: VelocityCommand | None):
+    def _move(self, command: VelocityFrdCommand | None):
         north, east, down = self.sensors.position_ned_m
         if command is None:
             falls = self.height_m > 0
@@ -285,7 +285,7 @@ def test_offboard_on_the_ground_idles_until_a_climb_is_commanded(velocity):
     assert flight.height_m == 0.0
     flight.feed((0.3, 0.0, -0.25), yaw_rate_rad_s=1.0)
     flight.tick()
-    assert flight.stabiliser.command == VelocityCommand((0.0, 0.0, -0.25), 0.0)  # straight up first
+    assert flight.stabiliser.command == VelocityFrdCommand((0.0, 0.0, -0.25), 0.0)  # straight up first
     assert flight.stabiliser.grounded
     flight.run(0.1)
     assert flight.status.landed_state is LandedState.IN_AIR

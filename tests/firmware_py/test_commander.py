@@ -5,13 +5,13 @@ import pytest
 
 from firmware_py import commander_guards as when
 from firmware_py.commander import Commander, Observation
-from firmware_py.commander_guards import NEVER_US, Cause, Choices, Reaction, Situation, Timeouts
+from firmware_py.commander_guards import NEVER_US, Choices, FailsafeCause, Reaction, Situation, Timeouts
 from firmware_py.commander_table import (
     FLOWN_MODE,
     RULES,
     TABLE,
+    CommanderState,
     Event,
-    State,
     first_match,
 )
 from firmware_py.parameters import Parameters
@@ -20,7 +20,7 @@ from firmware_py.status import CommandResult, FlightMode
 NOW = 100_000_000
 LONG_AGO = 1_000_000
 ARMED = set(FLOWN_MODE)
-COMMANDS = [event for event in (*Event, *FlightMode, *Cause) if event is not Event.TICK]
+COMMANDS = [event for event in (*Event, *FlightMode, *FailsafeCause) if event is not Event.TICK]
 ARMING = (Event.ARM, Event.DISARM, Event.FORCE_DISARM, FlightMode.TERMINATION)
 OK, NO = CommandResult.ACCEPTED, CommandResult.TEMPORARILY_REJECTED
 
@@ -44,9 +44,9 @@ STANDING = replace(FLYING, airborne_us=NEVER_US, landed=True, flown=False, armed
 
 CHOICES = (
     Choices(),
-    Choices(dict.fromkeys(Cause, Reaction.WARN), arm_needs_ground_station=True),
+    Choices(dict.fromkeys(FailsafeCause, Reaction.WARN), arm_needs_ground_station=True),
     *(
-        Choices(dict.fromkeys(Cause, reaction), without_sticks=Reaction.RETURN)
+        Choices(dict.fromkeys(FailsafeCause, reaction), without_sticks=Reaction.RETURN)
         for reaction in Reaction
         if reaction not in {Reaction.NOTHING, Reaction.WARN}
     ),
@@ -108,9 +108,9 @@ def situations():
         for landed, cause, then in (
             (False, None, Reaction.NOTHING),
             (True, None, Reaction.NOTHING),
-            (False, Cause.SETPOINTS, Reaction.LAND),
-            (False, Cause.MANUAL, Reaction.RETURN),
-            (True, Cause.MANUAL, Reaction.RETURN),
+            (False, FailsafeCause.SETPOINTS, Reaction.LAND),
+            (False, FailsafeCause.MANUAL, Reaction.RETURN),
+            (True, FailsafeCause.MANUAL, Reaction.RETURN),
         )
     ]
     found += [
@@ -124,10 +124,15 @@ def situations():
 
 
 SITUATIONS = situations()
-SEVERITY = [State.FAILSAFE_HOLD, State.FAILSAFE_RETURN, State.FAILSAFE_LAND, State.TERMINATED]
+SEVERITY = [
+    CommanderState.FAILSAFE_HOLD,
+    CommanderState.FAILSAFE_RETURN,
+    CommanderState.FAILSAFE_LAND,
+    CommanderState.TERMINATED,
+]
 
 
-@pytest.mark.parametrize("state", State)
+@pytest.mark.parametrize("state", CommanderState)
 def test_every_command_has_a_safe_answer_in_every_state_and_situation(state):
     for event, now in product(COMMANDS, SITUATIONS):
         row = first_match(RULES[state, event], now)
@@ -136,23 +141,23 @@ def test_every_command_has_a_safe_answer_in_every_state_and_situation(state):
             assert row.text, f"a refusal of {event} says why"
             assert row.target is None, f"a refusal of {event} changes nothing"
             assert row.intends is None, f"a refusal of {event} changes nothing"
-        if row.target is not None and event in Cause:
-            assert state not in {State.DISARMED, State.TERMINATED}, event
+        if row.target is not None and event in FailsafeCause:
+            assert state not in {CommanderState.DISARMED, CommanderState.TERMINATED}, event
             if row.target in SEVERITY and state in SEVERITY:
                 assert SEVERITY.index(row.target) >= SEVERITY.index(state), (
                     f"{event} never leads to a milder one"
                 )
-        if row.target is State.DISARMED:
+        if row.target is CommanderState.DISARMED:
             assert event is Event.FORCE_DISARM or may_stop_motors(state, event, row, now)
     for now in SITUATIONS:
         row = first_match(RULES[state, Event.TICK], now)
-        if row is not None and row.target is State.DISARMED:
+        if row is not None and row.target is CommanderState.DISARMED:
             assert may_stop_motors(state, Event.TICK, row, now)
 
 
 def may_stop_motors(state, event, row, now):
     chosen = row.cause is not None and now.choices.reaction(row.cause) is Reaction.DISARM
-    terminated = state is State.TERMINATED and event is Event.DISARM
+    terminated = state is CommanderState.TERMINATED and event is Event.DISARM
     # "never flown" in the air cannot be: the commander sets `flown` with `landed` false.
     return now.landed or not now.flown or chosen or terminated
 
@@ -193,25 +198,25 @@ failsafe_descend -    !        disarmed terminated
 terminated       -    disarmed disarmed -
 """
 GOES_ON = {
-    State.HOLD,
-    State.LAND,
-    State.RETURN,
-    State.MISSION,
-    State.OFFBOARD,
-    State.MANUAL,
-    State.STABILIZED,
-    State.ACRO,
-    State.ALTITUDE,
-    State.POSITION,
+    CommanderState.HOLD,
+    CommanderState.LAND,
+    CommanderState.RETURN,
+    CommanderState.MISSION,
+    CommanderState.OFFBOARD,
+    CommanderState.MANUAL,
+    CommanderState.STABILIZED,
+    CommanderState.ACRO,
+    CommanderState.ALTITUDE,
+    CommanderState.POSITION,
 }
 MODES = [mode for mode in FlightMode if mode is not FlightMode.TERMINATION]
 
 
 def _expected():
     rows = [line.split() for line in IN_FLIGHT.split("\n") if line]
-    assert [row[0] for row in rows] == [state.value for state in State]
+    assert [row[0] for row in rows] == [state.value for state in CommanderState]
     return [
-        (State(state), event, cell)
+        (CommanderState(state), event, cell)
         for state, *cells in rows
         for event, cell in zip(ARMING, cells, strict=True)
     ]
@@ -222,81 +227,86 @@ def test_commands_in_flight(state, event, cell):
     row = first_match(RULES[state, event], FLYING)
     assert row is not None
     assert row.result is (NO if cell == "!" else OK)
-    assert row.target is (None if cell in "-!" else State(cell))
+    assert row.target is (None if cell in "-!" else CommanderState(cell))
 
 
-@pytest.mark.parametrize("state", State)
+@pytest.mark.parametrize("state", CommanderState)
 def test_every_mode_can_be_requested_in_every_state(state):
     for mode in MODES:
         row = first_match(RULES[state, mode], FLYING)
         assert row is not None, mode
-        if state is State.TERMINATED:
+        if state is CommanderState.TERMINATED:
             assert row.result is NO, mode
             continue
         assert (row.result, row.intends) == (OK, mode)
-        own = State(mode.name.lower())
-        stays = state is State.DISARMED or (state is own and own in GOES_ON)
+        own = CommanderState(mode.name.lower())
+        stays = state is CommanderState.DISARMED or (state is own and own in GOES_ON)
         assert row.target is (None if stays else own), mode
 
 
-@pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
+@pytest.mark.parametrize("state", sorted(ARMED - {CommanderState.TERMINATED}, key=lambda state: state.value))
 def test_a_mode_that_cannot_be_flown_is_refused_in_flight(state):
     blind = replace(FLYING, position_us=LONG_AGO, manual_us=NEVER_US, has_mission=False, setpoint_us=NEVER_US)
     for mode in MODES:
         row = first_match(RULES[state, mode], blind)
         assert row is not None, mode
         if mode is FlightMode.LAND:
-            assert row.target in {State.FAILSAFE_DESCEND, State.LAND, None}
+            assert row.target in {CommanderState.FAILSAFE_DESCEND, CommanderState.LAND, None}
             assert row.result is OK
-        elif state is State.OFFBOARD and mode is FlightMode.OFFBOARD:
+        elif state is CommanderState.OFFBOARD and mode is FlightMode.OFFBOARD:
             assert (row.result, row.target) == (OK, None)
         else:
             assert row.result is NO, mode
             assert row.text, mode
 
 
-@pytest.mark.parametrize("state", State)
+@pytest.mark.parametrize("state", CommanderState)
 def test_nothing_changes_without_a_cause(state):
     assert first_match(RULES[state, Event.TICK], replace(FLYING)) is None
 
 
-@pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
+@pytest.mark.parametrize("state", sorted(ARMED - {CommanderState.TERMINATED}, key=lambda state: state.value))
 def test_offboard_resumes_from_every_state_after_the_loss_of_setpoints(state):
-    row = first_match(RULES[state, Event.TICK], replace(FLYING, cause=Cause.SETPOINTS))
+    row = first_match(RULES[state, Event.TICK], replace(FLYING, cause=FailsafeCause.SETPOINTS))
     assert row is not None
-    assert row.target is State.OFFBOARD
+    assert row.target is CommanderState.OFFBOARD
 
 
 def test_nothing_resumes_after_termination():
-    assert first_match(RULES[State.TERMINATED, Event.TICK], replace(FLYING, cause=Cause.SETPOINTS)) is None
+    assert (
+        first_match(
+            RULES[CommanderState.TERMINATED, Event.TICK], replace(FLYING, cause=FailsafeCause.SETPOINTS)
+        )
+        is None
+    )
 
 
 REACTIONS = {
-    Reaction.HOLD: State.FAILSAFE_HOLD,
-    Reaction.RETURN: State.FAILSAFE_RETURN,
-    Reaction.LAND: State.FAILSAFE_LAND,
-    Reaction.TERMINATE: State.TERMINATED,
-    Reaction.DISARM: State.DISARMED,
+    Reaction.HOLD: CommanderState.FAILSAFE_HOLD,
+    Reaction.RETURN: CommanderState.FAILSAFE_RETURN,
+    Reaction.LAND: CommanderState.FAILSAFE_LAND,
+    Reaction.TERMINATE: CommanderState.TERMINATED,
+    Reaction.DISARM: CommanderState.DISARMED,
 }
-CHOSEN = [cause for cause in Cause if cause is not Cause.POSITION]
-LATER = {Cause.GROUND_STATION, Cause.MANUAL}
+CHOSEN = [cause for cause in FailsafeCause if cause is not FailsafeCause.POSITION]
+LATER = {FailsafeCause.GROUND_STATION, FailsafeCause.MANUAL}
 
 
 @pytest.mark.parametrize("reaction", REACTIONS)
 @pytest.mark.parametrize("cause", CHOSEN)
 def test_every_cause_has_every_reaction(cause, reaction):
     now = replace(FLYING, choices=Choices({cause: reaction}))
-    row = first_match(RULES[State.MISSION, cause], now)
+    row = first_match(RULES[CommanderState.MISSION, cause], now)
     assert row is not None
     delayed = cause in LATER and reaction in {Reaction.RETURN, Reaction.LAND}
-    assert row.target is (State.FAILSAFE_HOLD if delayed else REACTIONS[reaction])
+    assert row.target is (CommanderState.FAILSAFE_HOLD if delayed else REACTIONS[reaction])
     assert row.cause is cause
     assert cause.value in row.text
     assert row.follow_up is (
         reaction
         if delayed
         else Reaction.LAND
-        if (cause, reaction) == (Cause.SETPOINTS, Reaction.HOLD)
+        if (cause, reaction) == (FailsafeCause.SETPOINTS, Reaction.HOLD)
         else Reaction.NOTHING
     )
 
@@ -304,25 +314,27 @@ def test_every_cause_has_every_reaction(cause, reaction):
 @pytest.mark.parametrize(
     ("reaction", "state"),
     [
-        (Reaction.POSITION, State.POSITION),
-        (Reaction.ALTITUDE, State.ALTITUDE),
-        (Reaction.STABILIZED, State.STABILIZED),
+        (Reaction.POSITION, CommanderState.POSITION),
+        (Reaction.ALTITUDE, CommanderState.ALTITUDE),
+        (Reaction.STABILIZED, CommanderState.STABILIZED),
     ],
 )
 def test_lost_setpoints_give_control_to_a_pilot_with_sticks(reaction, state):
-    choices = Choices({Cause.SETPOINTS: reaction}, without_sticks=Reaction.LAND)
-    row = first_match(RULES[State.OFFBOARD, Cause.SETPOINTS], replace(FLYING, choices=choices))
+    choices = Choices({FailsafeCause.SETPOINTS: reaction}, without_sticks=Reaction.LAND)
+    row = first_match(
+        RULES[CommanderState.OFFBOARD, FailsafeCause.SETPOINTS], replace(FLYING, choices=choices)
+    )
     assert row is not None
     assert row.target is state
     alone = replace(FLYING, choices=choices, manual_us=NEVER_US)
-    row = first_match(RULES[State.OFFBOARD, Cause.SETPOINTS], alone)
+    row = first_match(RULES[CommanderState.OFFBOARD, FailsafeCause.SETPOINTS], alone)
     assert row is not None
-    assert row.target is State.FAILSAFE_LAND
+    assert row.target is CommanderState.FAILSAFE_LAND
 
 
 def test_only_arming_arms_and_only_when_checks_pass():
     for event, now in product((Event.TICK, *COMMANDS), SITUATIONS):
-        row = first_match(RULES[State.DISARMED, event], now)
+        row = first_match(RULES[CommanderState.DISARMED, event], now)
         if row is not None and row.target in ARMED:
             assert event is Event.ARM
             assert not when.unsettled(now)
@@ -334,20 +346,21 @@ def test_only_arming_arms_and_only_when_checks_pass():
             assert FLOWN_MODE[row.target] is now.intended
 
 
-@pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
+@pytest.mark.parametrize("state", sorted(ARMED - {CommanderState.TERMINATED}, key=lambda state: state.value))
 def test_failsafes_come_first(state):
     for now in SITUATIONS:
         row = first_match(RULES[state, Event.TICK], now)
         if when.sensors_lost(now):
             assert row is not None
-            assert row.target is (State.DISARMED if now.landed else State.TERMINATED)
+            assert row.target is (CommanderState.DISARMED if now.landed else CommanderState.TERMINATED)
         elif when.tumbled(now):
             assert row is not None
-            assert row.target is State.TERMINATED
+            assert row.target is CommanderState.TERMINATED
 
 
 @pytest.mark.parametrize(
-    "state", sorted(ARMED - {State.OFFBOARD, State.TERMINATED}, key=lambda state: state.value)
+    "state",
+    sorted(ARMED - {CommanderState.OFFBOARD, CommanderState.TERMINATED}, key=lambda state: state.value),
 )
 def test_offboard_is_entered_only_with_setpoints(state):
     row = first_match(RULES[state, FlightMode.OFFBOARD], replace(FLYING, setpoint_us=NEVER_US))
@@ -359,31 +372,41 @@ def test_offboard_is_entered_only_with_setpoints(state):
 @pytest.mark.parametrize(
     ("state", "change", "target", "text"),
     [
-        (State.HOLD, {"usable_us": NOW - 300_001}, State.TERMINATED, "Sensors lost: flight terminated"),
         (
-            State.HOLD,
+            CommanderState.HOLD,
+            {"usable_us": NOW - 300_001},
+            CommanderState.TERMINATED,
+            "Sensors lost: flight terminated",
+        ),
+        (
+            CommanderState.HOLD,
             {"usable_us": NOW - 300_001, "landed": True},
-            State.DISARMED,
+            CommanderState.DISARMED,
             "Sensors lost: motors stopped",
         ),
-        (State.HOLD, {"usable_us": NOW - 300_000}, None, ""),
+        (CommanderState.HOLD, {"usable_us": NOW - 300_000}, None, ""),
         (
-            State.LAND,
+            CommanderState.LAND,
             {"upright_us": NOW - 300_001},
-            State.TERMINATED,
+            CommanderState.TERMINATED,
             "Attitude failure: flight terminated",
         ),
-        (State.LAND, {"upright_us": NOW - 300_000}, None, ""),
-        (State.HOLD, {"landed": True, "airborne_us": NOW - 2_000_000}, State.DISARMED, "Disarmed by landing"),
-        (State.HOLD, {"landed": True, "airborne_us": NOW - 1_999_999}, None, ""),
+        (CommanderState.LAND, {"upright_us": NOW - 300_000}, None, ""),
         (
-            State.HOLD,
+            CommanderState.HOLD,
+            {"landed": True, "airborne_us": NOW - 2_000_000},
+            CommanderState.DISARMED,
+            "Disarmed by landing",
+        ),
+        (CommanderState.HOLD, {"landed": True, "airborne_us": NOW - 1_999_999}, None, ""),
+        (
+            CommanderState.HOLD,
             {"landed": True, "flown": False, "airborne_us": NEVER_US, "armed_us": NOW - 10_000_000},
-            State.DISARMED,
+            CommanderState.DISARMED,
             "Disarmed by auto preflight disarming",
         ),
         (
-            State.LAND,
+            CommanderState.LAND,
             {
                 "landed": True,
                 "flown": False,
@@ -391,31 +414,31 @@ def test_offboard_is_entered_only_with_setpoints(state):
                 "armed_us": NOW,
                 "entered_us": LONG_AGO,
             },
-            State.DISARMED,
+            CommanderState.DISARMED,
             "Disarmed by landing",
         ),
-        (State.OFFBOARD, {"setpoint_us": NEVER_US}, None, ""),  # told by an event, not by the tick
-        (State.FAILSAFE_HOLD, {"entered_us": NOW - 4_999_999, "follow_up": Reaction.LAND}, None, ""),
+        (CommanderState.OFFBOARD, {"setpoint_us": NEVER_US}, None, ""),  # told by an event, not by the tick
+        (CommanderState.FAILSAFE_HOLD, {"entered_us": NOW - 4_999_999, "follow_up": Reaction.LAND}, None, ""),
         (
-            State.FAILSAFE_HOLD,
+            CommanderState.FAILSAFE_HOLD,
             {"entered_us": NOW - 5_000_000, "follow_up": Reaction.LAND},
-            State.FAILSAFE_LAND,
+            CommanderState.FAILSAFE_LAND,
             "Failsafe: landing",
         ),
         (
-            State.FAILSAFE_HOLD,
+            CommanderState.FAILSAFE_HOLD,
             {"entered_us": NOW - 5_000_000, "follow_up": Reaction.RETURN},
-            State.FAILSAFE_RETURN,
+            CommanderState.FAILSAFE_RETURN,
             "Failsafe: returning home",
         ),
-        (State.FAILSAFE_HOLD, {"entered_us": LONG_AGO}, None, ""),  # hold was chosen for good
+        (CommanderState.FAILSAFE_HOLD, {"entered_us": LONG_AGO}, None, ""),  # hold was chosen for good
         (
-            State.FAILSAFE_HOLD,
+            CommanderState.FAILSAFE_HOLD,
             {"entered_us": NOW - 5_000_000, "landed": True, "follow_up": Reaction.LAND},
-            State.DISARMED,
+            CommanderState.DISARMED,
             "Disarmed by failsafe",
         ),
-        (State.TAKEOFF, {"target_reached": True}, State.HOLD, ""),
+        (CommanderState.TAKEOFF, {"target_reached": True}, CommanderState.HOLD, ""),
     ],
 )
 def test_what_a_tick_does(state, change, target, text):
@@ -445,7 +468,7 @@ def test_what_a_tick_does(state, change, target, text):
     ],
 )
 def test_why_arming_is_denied(change, text):
-    row = first_match(RULES[State.DISARMED, Event.ARM], replace(STANDING, **change))
+    row = first_match(RULES[CommanderState.DISARMED, Event.ARM], replace(STANDING, **change))
     assert row is not None
     assert (row.result, row.text) == (NO, text)
 
@@ -467,7 +490,7 @@ def test_disarming_on_the_ground():
     for state in ARMED:
         row = first_match(RULES[state, Event.DISARM], STANDING)
         assert row is not None
-        assert (row.result, row.target, row.intends) == (OK, State.DISARMED, FlightMode.HOLD)
+        assert (row.result, row.target, row.intends) == (OK, CommanderState.DISARMED, FlightMode.HOLD)
 
 
 @pytest.mark.parametrize("wait", [-1.0, 0.0])
@@ -475,7 +498,7 @@ def test_automatic_disarming_can_be_turned_off(wait):
     commander = Commander()
     commander.configure(Parameters({"COM_DISARM_LAND": wait, "COM_DISARM_PRFLT": wait}))
     now = replace(STANDING, armed_us=LONG_AGO, airborne_us=LONG_AGO, timeouts=commander.situation.timeouts)
-    for flown, state in product((False, True), (State.HOLD, State.LAND)):
+    for flown, state in product((False, True), (CommanderState.HOLD, CommanderState.LAND)):
         assert first_match(RULES[state, Event.TICK], replace(now, flown=flown)) is None
 
 
@@ -486,16 +509,16 @@ def test_parameters_set_times_and_choices():
     )
     assert commander.situation.timeouts == Timeouts(setpoint_loss_us=500_000, failsafe_hold_us=3_000_000)
     choices = commander.situation.choices
-    assert choices.reactions[Cause.SETPOINTS] is Reaction.LAND
-    assert choices.reactions[Cause.GROUND_STATION] is Reaction.RETURN
-    assert choices.reactions[Cause.FENCE] is Reaction.HOLD  # PX4's default
+    assert choices.reactions[FailsafeCause.SETPOINTS] is Reaction.LAND
+    assert choices.reactions[FailsafeCause.GROUND_STATION] is Reaction.RETURN
+    assert choices.reactions[FailsafeCause.FENCE] is Reaction.HOLD  # PX4's default
     assert choices.arm_needs_ground_station
 
 
 def test_defaults_return_home_when_setpoints_stop_without_manual_control():
     commander = Commander()
     commander.configure(Parameters())
-    assert commander.situation.choices.reaction(Cause.SETPOINTS) is Reaction.RETURN
+    assert commander.situation.choices.reaction(FailsafeCause.SETPOINTS) is Reaction.RETURN
 
 
 def _flying_commander():
@@ -519,31 +542,32 @@ def test_a_lost_ground_station_holds_and_then_returns_with_px4s_timing():
     commander, now_us = _flying_commander()
     commander.configure(Parameters({"NAV_DLL_ACT": 2}))
     commander.note_ground_station()
-    held_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
+    held_s = _until(commander, now_us, lambda: commander.state is CommanderState.FAILSAFE_HOLD)
     assert held_s == pytest.approx(12.28, abs=0.06)
     assert commander.failsafe
     now_us += round(held_s * 1e6)
-    returned_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_RETURN)
+    returned_s = _until(commander, now_us, lambda: commander.state is CommanderState.FAILSAFE_RETURN)
     assert returned_s == pytest.approx(5.0, abs=0.02)
     commander.note_ground_station()  # it does not come back by itself
     _ticks(commander, now_us + 5_100_000, 100, landed=False)
-    assert commander.state is State.FAILSAFE_RETURN
+    assert commander.state is CommanderState.FAILSAFE_RETURN
 
 
 def test_a_failsafe_that_was_overridden_acts_again_only_after_its_cause_has_ended():
     commander, now_us = _flying_commander()
     commander.configure(Parameters({"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 5}))
     commander.note_ground_station()
-    _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
+    _until(commander, now_us, lambda: commander.state is CommanderState.FAILSAFE_HOLD)
     commander.handle(FlightMode.HOLD)
     now_us = _ticks(commander, commander.situation.now_us + 4000, 500, landed=False)
-    assert commander.state is State.HOLD
+    assert commander.state is CommanderState.HOLD
     commander.note_ground_station()
-    _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
+    _until(commander, now_us, lambda: commander.state is CommanderState.FAILSAFE_HOLD)
 
 
 @pytest.mark.parametrize(
-    ("level", "state"), [(2, State.HOLD), (3, State.FAILSAFE_RETURN), (4, State.FAILSAFE_LAND)]
+    ("level", "state"),
+    [(2, CommanderState.HOLD), (3, CommanderState.FAILSAFE_RETURN), (4, CommanderState.FAILSAFE_LAND)],
 )
 def test_a_discharging_battery_warns_returns_and_lands(level, state):
     commander, now_us = _flying_commander()
@@ -557,34 +581,36 @@ def test_sticks_that_stop_in_a_manual_mode_hold_and_then_return():
     commander, now_us = _flying_commander()
     commander.note_manual_input()
     commander.handle(FlightMode.POSITION)
-    lost_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
+    lost_s = _until(commander, now_us, lambda: commander.state is CommanderState.FAILSAFE_HOLD)
     assert lost_s == pytest.approx(0.5, abs=0.05)
     now_us += round(lost_s * 1e6)
-    assert _until(commander, now_us, lambda: commander.state is State.FAILSAFE_RETURN) == pytest.approx(
-        5, abs=0.02
-    )
+    assert _until(
+        commander, now_us, lambda: commander.state is CommanderState.FAILSAFE_RETURN
+    ) == pytest.approx(5, abs=0.02)
 
 
 def test_sticks_that_were_missing_at_arming_are_not_lost():
     commander, now_us = _flying_commander()
     _ticks(commander, now_us, 1000, landed=False)
-    assert commander.state is State.HOLD
+    assert commander.state is CommanderState.HOLD
 
 
 def test_a_lost_position_descends():
     commander, now_us = _flying_commander()
-    lost_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_DESCEND, has_position=False)
+    lost_s = _until(
+        commander, now_us, lambda: commander.state is CommanderState.FAILSAFE_DESCEND, has_position=False
+    )
     assert lost_s == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_geofence_breach_holds():
     commander, now_us = _flying_commander()
     commander.situation.fence_breached = True
-    _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD, limit_s=0.1)
+    _until(commander, now_us, lambda: commander.state is CommanderState.FAILSAFE_HOLD, limit_s=0.1)
     commander.handle(Event.FORCE_DISARM)
     now_us = _ticks(commander, commander.situation.now_us + 4000, 300)
     commander.handle(Event.ARM)  # it is reacted to again in the next flight
-    _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD, limit_s=0.1)
+    _until(commander, now_us, lambda: commander.state is CommanderState.FAILSAFE_HOLD, limit_s=0.1)
 
 
 def _ticks(commander, start_us, count, **conditions):

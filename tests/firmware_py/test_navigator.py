@@ -1,6 +1,6 @@
 import pytest
 
-from firmware_py.missions.flight import View
+from firmware_py.missions.flight import VehicleView
 from firmware_py.missions.items import Do, PlanType
 from firmware_py.missions.store import MissionStore
 from firmware_py.navigator import return_place
@@ -17,7 +17,7 @@ def place_for(rtl_type, position, *, rally=(), landing=False):
     if landing:
         store.replace(PlanType.MISSION, plan(waypoint(0, 10, 10), placed(Do.LAND, *LANDING)))
         store.valid = True
-    view = View(projection=PROJECTION, home_ned_m=(0.0, 0.0, 0.0), position_ned_m=position)
+    view = VehicleView(projection=PROJECTION, home_ned_m=(0.0, 0.0, 0.0), position_ned_m=position)
     return return_place(view, store, Parameters({"RTL_TYPE": rtl_type}))
 
 
@@ -46,4 +46,4 @@ def test_where_a_return_goes(rtl_type, north, rally, landing, place):
 
 
 def test_there_is_no_return_before_home_is_known():
-    assert return_place(View(projection=PROJECTION), MissionStore(), Parameters()) is None
+    assert return_place(VehicleView(projection=PROJECTION), MissionStore(), Parameters()) is None

@@ -21,14 +21,14 @@ TRY_LIMIT_S = 11.0
 SLOW_AND_LOSSY = IMPAIRMENTS["5 % lost, 100 ± 100 ms"]
 
 
-def before_a_low_frame():
+def before_a_low_gate():
     """Test case 1, but the drone starts before red, which is low: after seconds it shifts before it."""
     scenario = load_scenario("test-case-1")
     base = scenario.base.model_copy(update={"x_m": 1.5, "y_m": 2.0})
     start = scenario.start.model_copy(update={"x_m": 1.5, "y_m": 2.0, "yaw_rad": 0.0})
     red = scenario.frames[0].model_copy(update={"z_m": 0.3})
-    frames = (red, *scenario.frames[1:])
-    update = {"base": base, "start": start, "frames": frames, "try_limit_s": TRY_LIMIT_S}
+    gates = (red, *scenario.frames[1:])
+    update = {"base": base, "start": start, "frames": gates, "try_limit_s": TRY_LIMIT_S}
     return scenario.model_copy(update=update)
 
 
@@ -43,7 +43,7 @@ def silence_later(impairment, seed):
 
 @pytest.mark.parametrize("name", IMPAIRMENTS)
 def test_every_flight_ends_safely_inside_its_box(name):
-    scenario, mission = before_a_low_frame(), load_mission("frame_challenge")
+    scenario, mission = before_a_low_gate(), load_mission("frame_challenge")
     for seed in SEEDS:
         flight = fly_over(silence_later(IMPAIRMENTS[name], seed), scenario, mission, seed=seed)
         message = f"{name}, seed {seed}: {flight.outcome}, {flight.mode.name}"
@@ -68,7 +68,7 @@ def test_a_flight_with_swapped_datagrams_is_completed(mission):
 )
 def test_no_mission_leads_out_over_a_slow_and_lossy_link(tmp_path, first, then):
     mission = runaway(tmp_path, first, then)
-    scenario = before_a_low_frame().model_copy(update={"frames": (), "try_limit_s": 14.0})
+    scenario = before_a_low_gate().model_copy(update={"frames": (), "try_limit_s": 14.0})
     for seed in range(2):
         flight = fly_over(SLOW_AND_LOSSY, scenario, mission, seed=seed)
         assert flight.outcome.kept_in_box_s > 1.0

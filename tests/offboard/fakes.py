@@ -8,7 +8,7 @@ from itertools import pairwise, product
 from math import atan2, ceil, cos, exp, floor, hypot, pi, remainder, sin
 from textwrap import dedent
 
-from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityCommand
+from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityFluCommand
 from offboard.limits import CONTEST, VelocityLimits
 from offboard.mission import load_mission
 from vision.detector import measure
@@ -22,7 +22,7 @@ DRAG = 0.635 / 0.3  # of speed squared, over mass
 
 @dataclass(frozen=True)
 class Target:
-    """A frame: centre in the arena and yaw of its normal."""
+    """A gate: centre in the arena and yaw of its normal."""
 
     x: float
     y: float
@@ -55,11 +55,11 @@ class KinematicDrone:
         self.start = (self.x, self.y)
         self.rates = [0.0, 0.0, 0.0, 0.0]
         self.pitch = self.roll = 0.0  # nose down, left side down: it tilts to accelerate and against drag
-        self.command_now = VelocityCommand()
+        self.command_now = VelocityFluCommand()
         self.latest: DroneState | None = None
         self.armed = False
         self.confirmed: bool | None = None  # as `motors_on` was last asked
-        self.commands: list[VelocityCommand] = []
+        self.commands: list[VelocityFluCommand] = []
         self.time_us = 1_000_000
         self.path: list[tuple[float, float, float]] = []
         self.hold_error: DroneError | None = None
@@ -108,7 +108,7 @@ class KinematicDrone:
     async def close(self) -> None:
         self.calls.append("close")
 
-    def command(self, command: VelocityCommand) -> LimitedCommand:
+    def command(self, command: VelocityFluCommand) -> LimitedCommand:
         limited = self.limits.limit(command, self.latest)
         self.commands.append(limited.command)
         self.command_now = limited.command
@@ -177,7 +177,7 @@ class NoCamera:
 
 
 class GeometricPerception:
-    """What a camera of 320 x 240 sees of frames that do not hide one another, at 10 Hz."""
+    """What a camera of 320 x 240 sees of gates that do not hide one another, at 10 Hz."""
 
     def __init__(self, drone: KinematicDrone, targets: dict[str, Target], latency_ticks: int = 0) -> None:
         self._drone = drone
@@ -231,7 +231,7 @@ def _turned(level: float, up: float, tilt: float) -> tuple[float, float]:
 
 
 def crossings(path: list[tuple[float, float, float]], target: Target) -> list[float]:
-    """Distances from the frame's centre, in its plane, wherever a path goes through its opening."""
+    """Distances from the gate's centre, in its plane, wherever a path goes through its opening."""
     found = []
     normal = (cos(target.yaw), sin(target.yaw))
     for before, after in pairwise(path):

@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from offboard.drone import DroneError, VelocityCommand
+from offboard.drone import DroneError, VelocityFluCommand
 from offboard.limits import Box, VelocityLimits
 from offboard.mavsdk_drone import MavsdkDrone
 from tests.free_ports import free_port
@@ -18,7 +18,7 @@ from tests.offboard.udp_arducopter import BRAKE, GUIDED, LOITER, UdpArduCopter
 pytestmark = pytest.mark.realtime
 
 START = (-3.0, -3.0, 0.5, 1.0)
-UP = VelocityCommand(up_m_s=1.0)
+UP = VelocityFluCommand(up_m_s=1.0)
 
 
 @pytest.fixture
@@ -57,18 +57,18 @@ async def test_a_climb_on_the_ground_is_a_take_off_and_velocities_follow_in_the_
         ticks = drone.ticks()
         await drone.motors_on()
         assert (copter.mode[0], copter.armed) == (GUIDED, True)
-        drone.command(VelocityCommand(forward_m_s=1.0))  # no climb: it stays on the ground
+        drone.command(VelocityFluCommand(forward_m_s=1.0))  # no climb: it stays on the ground
         assert copter.takeoffs == []
         await fly(drone, ticks, UP, lambda state: state.z > 1.0)
         assert copter.takeoffs == [1.0]
         assert copter.early == 0
         before = await anext(ticks)
-        command = VelocityCommand(forward_m_s=1.0, left_m_s=0.5)
+        command = VelocityFluCommand(forward_m_s=1.0, left_m_s=0.5)
         after = await fly(drone, ticks, command, lambda s: s.time_us > before.time_us + 1_500_000)
         expected = (math.cos(1) - 0.5 * math.sin(1), math.sin(1) + 0.5 * math.cos(1))
         assert after.velocity_arena_m_s[:2] == pytest.approx(expected, abs=0.02)
         assert math.hypot(after.x - before.x, after.y - before.y) == pytest.approx(1.5 * 1.118, rel=0.2)
-        turn = VelocityCommand(yaw_rate_rad_s=0.5)
+        turn = VelocityFluCommand(yaw_rate_rad_s=0.5)
         turned = await fly(drone, ticks, turn, lambda s: s.time_us > after.time_us + 1_000_000)
         assert turned.yaw > after.yaw + 0.3  # to the left
         await drone.land()
@@ -125,7 +125,7 @@ async def test_a_pilot_takes_it_in_loiter_and_gives_it_back_in_guided(copter):
         state = await fly(drone, ticks, UP, lambda state: not state.offboard)
         assert state.mode == "LOITER"
         copter.mode = (GUIDED, 0)
-        await fly(drone, ticks, VelocityCommand(), lambda state: state.offboard)
+        await fly(drone, ticks, VelocityFluCommand(), lambda state: state.offboard)
         await drone.hold()
 
 

@@ -61,7 +61,7 @@ class GoingBlind(GeometricPerception):
 
 @pytest.mark.parametrize("mission", ["frame_challenge", "careful_crossing"])
 @pytest.mark.parametrize("state", ["red.frame_visible", "red.shift_left", "red.shift_right"])
-async def test_a_frame_lost_from_view_is_not_climbed_after(mission, state):
+async def test_a_gate_lost_from_view_is_not_climbed_after(mission, state):
     drone = KinematicDrone(*START_1)
     perception, moments = GoingBlind(drone, TEST_CASE_1), []
 
@@ -78,7 +78,7 @@ async def test_a_frame_lost_from_view_is_not_climbed_after(mission, state):
     assert max(each.state.z for each in moments) < max(moments[0].state.z, search_m) + 0.6
 
 
-async def test_turns_for_ever_at_the_centre_when_a_frame_is_never_seen():
+async def test_turns_for_ever_at_the_centre_when_a_gate_is_never_seen():
     far = {**TEST_CASE_1, "red": Target(0, 300, 1, 0)}
     drone, moments, outcome = await fly(load_mission("frame_challenge"), far, limit_s=60.0)
     assert (outcome.ended, outcome.mission_state) == ("timed out", "red.turning")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from framerunner.errors import SettingError
 from offboard.app import fly_mission
-from offboard.drone import DroneState, LimitedCommand, VelocityCommand
+from offboard.drone import DroneState, LimitedCommand, VelocityFluCommand
 from offboard.limits import (
     CONTEST,
     Box,
@@ -54,7 +54,7 @@ speed = st.floats(-1.0, 1.0)
 
 @given(
     st.tuples(st.floats(-4.7, 4.7), st.floats(-4.7, 4.7), st.floats(1.1, 4.0), st.floats(-pi, pi)),
-    st.builds(VelocityCommand, speed, speed, speed, speed),
+    st.builds(VelocityFluCommand, speed, speed, speed, speed),
 )
 def test_inside_the_arena_a_command_is_the_very_same(place, command):
     kept, sides = confine(command, state(*place), BOX)
@@ -65,7 +65,7 @@ def test_inside_the_arena_a_command_is_the_very_same(place, command):
 @given(
     st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-1, 9), st.floats(-pi, pi)),
     st.tuples(speed, speed, speed),
-    st.builds(VelocityCommand, speed, speed, speed, speed),
+    st.builds(VelocityFluCommand, speed, speed, speed, speed),
 )
 def test_nothing_leads_out_and_turning_is_free(place, velocity, command):
     at = state(*place, velocity)
@@ -84,7 +84,7 @@ def test_nothing_leads_out_and_turning_is_free(place, velocity, command):
 
 
 def test_near_the_start_it_may_land_and_elsewhere_not_sink_to_the_floor():
-    down = VelocityCommand(up_m_s=-0.3)
+    down = VelocityFluCommand(up_m_s=-0.3)
     assert confine(down, state(-3.2, -2.8, 0.1), BOX)[0] is down
     assert confine(down, state(1.0, 1.0, 0.1), BOX)[0].up_m_s > 0.0
 
@@ -109,10 +109,10 @@ class Lagging:
 @pytest.mark.parametrize("way", [(1, 0, 0), (0, -1, 0), (0.7, 0.7, 0), (0, 0, 1), (0, 0, -1)])
 def test_a_vehicle_told_to_fly_on_for_ever_stays_inside(lag_s, delay_ticks, way):
     vehicle, limits, kept_in = Lagging(lag_s, delay_ticks), VelocityLimits(box=BOX), 0
-    limited = LimitedCommand(VelocityCommand())
+    limited = LimitedCommand(VelocityFluCommand())
     for tick in range(600):
         at = state(*vehicle.place, 0.0, tuple(vehicle.velocity), 50_000 * tick)
-        limited = limits.limit(VelocityCommand(*map(float, way)), at)
+        limited = limits.limit(VelocityFluCommand(*map(float, way)), at)
         kept_in += limited.kept_in_box
         vehicle.step(in_arena(limited.command, 0.0))
         assert outside(BOX, state(*vehicle.place)) < 0.005, vehicle.place
@@ -122,20 +122,20 @@ def test_a_vehicle_told_to_fly_on_for_ever_stays_inside(lag_s, delay_ticks, way)
 
 def test_a_position_that_is_old_is_no_place_to_fly_by():
     limits = VelocityLimits(box=BOX)
-    stopped = limits.limit(VelocityCommand(0.5), state(age_s=0.6))
-    assert (stopped.command, stopped.kept_in_box) == (VelocityCommand(), True)
+    stopped = limits.limit(VelocityFluCommand(0.5), state(age_s=0.6))
+    assert (stopped.command, stopped.kept_in_box) == (VelocityFluCommand(), True)
     assert stopped.remark == "stopped: the position is 0.6 s old"
-    assert limits.limit(VelocityCommand(0.5), state(age_s=0.1)) == LimitedCommand(VelocityCommand(0.5))
+    assert limits.limit(VelocityFluCommand(0.5), state(age_s=0.1)) == LimitedCommand(VelocityFluCommand(0.5))
 
 
 def test_a_drone_that_does_not_come_back_is_given_up_and_one_that_does_is_not():
     limits = VelocityLimits(box=BOX)
     for tick in range(100):
-        limits.limit(VelocityCommand(), state(x=9.0 - 0.02 * tick, time_us=50_000 * tick))
-    limits.limit(VelocityCommand(), state(x=7.0, time_us=5_000_000))
-    limits.limit(VelocityCommand(), state(x=9.0, time_us=7_900_000))
+        limits.limit(VelocityFluCommand(), state(x=9.0 - 0.02 * tick, time_us=50_000 * tick))
+    limits.limit(VelocityFluCommand(), state(x=7.0, time_us=5_000_000))
+    limits.limit(VelocityFluCommand(), state(x=9.0, time_us=7_900_000))
     with pytest.raises(OutsideBoxError, match=r"3\.0 m outside its box and does not come back: x 9\.0"):
-        limits.limit(VelocityCommand(), state(x=9.0, time_us=8_050_000))
+        limits.limit(VelocityFluCommand(), state(x=9.0, time_us=8_050_000))
 
 
 @pytest.mark.parametrize("velocity", [(1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)])
@@ -166,10 +166,10 @@ async def test_a_drone_carried_off_ends_in_hold(tmp_path):
 def test_what_the_adapter_adds_to_a_command_does_not_lead_out_either():
     drone, sent = MavsdkDrone("udpin://127.0.0.1:14540", limits=VelocityLimits(CONTEST, BOX)), []
     drone._commanding, drone._dialect = True, SimpleNamespace(send=sent.append)
-    drone._tracker = SimpleNamespace(correct=lambda command, state: VelocityCommand(up_m_s=0.7))
+    drone._tracker = SimpleNamespace(correct=lambda command, state: VelocityFluCommand(up_m_s=0.7))
     for z in (3.0, 4.9, 5.5):
         drone._latest = state(z=z)
-        drone.command(VelocityCommand())
+        drone.command(VelocityFluCommand())
     assert [command.up_m_s for command in sent] == pytest.approx([0.7, 0.2, -0.5])
 
 
@@ -177,10 +177,10 @@ def test_a_mission_that_corrects_its_own_commands_has_them_sent_unchanged():
     limits, sent = VelocityLimits(CONTEST, BOX), []
     drone = MavsdkDrone("udpin://127.0.0.1:14540", limits=limits, corrects=False)
     drone._commanding, drone._dialect = True, SimpleNamespace(send=sent.append)
-    drone._tracker = SimpleNamespace(correct=lambda command, state: VelocityCommand(up_m_s=0.7))
+    drone._tracker = SimpleNamespace(correct=lambda command, state: VelocityFluCommand(up_m_s=0.7))
     drone._latest = state(z=3.0)
-    drone.command(VelocityCommand(forward_m_s=0.5))
-    assert sent == [VelocityCommand(forward_m_s=0.5)]
+    drone.command(VelocityFluCommand(forward_m_s=0.5))
+    assert sent == [VelocityFluCommand(forward_m_s=0.5)]
 
 
 CAPS = Caps(level_m_s=1.0, vertical_m_s=0.5, yaw_rate_rad_s=1.5, height_m=2.0)
@@ -189,20 +189,20 @@ SPEEDS = st.floats(-100.0, 100.0) | st.sampled_from([inf, -inf, nan])
 
 @given(SPEEDS, SPEEDS, SPEEDS, SPEEDS)
 def test_no_command_exceeds_the_caps(forward, left, up, rate):
-    command = VelocityLimits(caps=CAPS).limit(VelocityCommand(forward, left, up, rate), None).command
+    command = VelocityLimits(caps=CAPS).limit(VelocityFluCommand(forward, left, up, rate), None).command
     assert hypot(command.forward_m_s, command.left_m_s) <= 1.0 + 1e-9
     assert abs(command.up_m_s) <= 0.5
     assert abs(command.yaw_rate_rad_s) <= 1.5
 
 
 def test_the_direction_of_a_capped_speed_stays():
-    command = VelocityLimits(caps=CAPS).limit(VelocityCommand(6.0, 8.0, 0.1, 0.2), None).command
+    command = VelocityLimits(caps=CAPS).limit(VelocityFluCommand(6.0, 8.0, 0.1, 0.2), None).command
     assert (command.forward_m_s, command.left_m_s) == pytest.approx((0.6, 0.8))
     assert (command.up_m_s, command.yaw_rate_rad_s) == (0.1, 0.2)
 
 
 def test_a_command_that_nothing_limits_is_the_same_object():
-    command = VelocityCommand(0.5, 0.5, 0.5, 1.0)
+    command = VelocityFluCommand(0.5, 0.5, 0.5, 1.0)
     limited = VelocityLimits(CONTEST, BOX, CAPS).limit(command, state())
     assert limited.command is command
     assert not limited.clips
@@ -211,7 +211,7 @@ def test_a_command_that_nothing_limits_is_the_same_object():
 def test_each_cap_is_logged_once_and_named_in_each_command(caplog):
     limits = VelocityLimits(caps=CAPS)
     for _ in range(3):
-        limited = limits.limit(VelocityCommand(6.0, 0.0, 2.0), None)
+        limited = limits.limit(VelocityFluCommand(6.0, 0.0, 2.0), None)
     assert [(clip.limit, clip.quantity) for clip in limited.clips] == [
         ("cap", "level speed"),
         ("cap", "vertical speed"),
@@ -221,7 +221,7 @@ def test_each_cap_is_logged_once_and_named_in_each_command(caplog):
 
 
 def test_class_and_box_are_told_apart_and_the_class_is_not_remarked_on(caplog):
-    limited = VelocityLimits(CONTEST, BOX).limit(VelocityCommand(inf, 0.2, 0.0, -3.0), state(x=5.9))
+    limited = VelocityLimits(CONTEST, BOX).limit(VelocityFluCommand(inf, 0.2, 0.0, -3.0), state(x=5.9))
     assert [(clip.limit, clip.quantity) for clip in limited.clips] == [
         ("class", "level speed"),
         ("class", "yaw rate"),
@@ -235,7 +235,7 @@ def test_class_and_box_are_told_apart_and_the_class_is_not_remarked_on(caplog):
 
 def test_a_level_velocity_of_the_open_class_is_shortened_as_a_whole():
     limits = CommandLimits(forward_m_s=3.0, left_m_s=4.0, level_m_s=2.5)
-    assert limits.limited(VelocityCommand(inf, inf)) == VelocityCommand(1.5, 2.0)
+    assert limits.limited(VelocityFluCommand(inf, inf)) == VelocityFluCommand(1.5, 2.0)
 
 
 def test_the_height_counts_from_the_start_and_never_above_the_ceiling():
@@ -246,12 +246,12 @@ def test_the_height_counts_from_the_start_and_never_above_the_ceiling():
 
 def test_no_climb_at_the_cap():
     limits = VelocityLimits(None, CAPS.box(BOX, 0.5), CAPS)
-    assert limits.limit(VelocityCommand(up_m_s=0.4), state(z=2.5)).command.up_m_s == pytest.approx(0.0)
+    assert limits.limit(VelocityFluCommand(up_m_s=0.4), state(z=2.5)).command.up_m_s == pytest.approx(0.0)
 
 
 def test_the_way_back_into_the_box_is_capped_too():
     slow = Caps(level_m_s=0.2, vertical_m_s=0.1)
-    back = VelocityLimits(None, BOX, slow).limit(VelocityCommand(), state(9.0, 9.0, 9.0)).command
+    back = VelocityLimits(None, BOX, slow).limit(VelocityFluCommand(), state(9.0, 9.0, 9.0)).command
     assert hypot(back.forward_m_s, back.left_m_s) == pytest.approx(0.2)
     assert (back.forward_m_s < 0, back.left_m_s < 0, back.up_m_s) == (True, True, -0.1)
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 import pytest
 from pymavlink import mavutil
 
-from offboard.drone import DroneError, VelocityCommand
+from offboard.drone import DroneError, VelocityFluCommand
 from offboard.link.watchdog import HangLimits
 from offboard.mavsdk_drone import MavsdkDrone
 from tests.free_ports import free_port
@@ -50,7 +50,7 @@ async def test_flies_as_commanded_in_arena_axes_and_stops_its_motors(vehicle):
         assert vehicle.armed
         modes = [command[0] for command in vehicle.commands if command[0] in (176, 400)]
         assert modes[:2] == [176, 400]  # offboard first, then arming
-        drone.command(VelocityCommand(0.8, 0.4, 0.2, 0.0))
+        drone.command(VelocityFluCommand(0.8, 0.4, 0.2, 0.0))
         states = await take(ticks, 21)
         assert states[-1].armed
         assert states[-1].offboard
@@ -59,7 +59,7 @@ async def test_flies_as_commanded_in_arena_axes_and_stops_its_motors(vehicle):
         expected = (0.8 * math.cos(1) - 0.4 * math.sin(1), 0.8 * math.sin(1) + 0.4 * math.cos(1), 0.2)
         moved = [getattr(states[-1], axis) - getattr(states[5], axis) for axis in "xyz"]
         assert moved == pytest.approx([v * flown_s for v in expected], abs=0.05)
-        drone.command(VelocityCommand(yaw_rate_rad_s=0.5))
+        drone.command(VelocityFluCommand(yaw_rate_rad_s=0.5))
         states = await take(ticks, 15)
         assert states[-1].yaw > states[0].yaw  # to the left
         assert vehicle.setpoints[-1][4] == pytest.approx(-0.5, abs=1e-6)
@@ -86,7 +86,7 @@ async def test_landing_waits_until_disarmed(vehicle):
     async with connected(vehicle) as drone:
         ticks = drone.ticks()
         await drone.motors_on()
-        drone.command(VelocityCommand(up_m_s=1.0))
+        drone.command(VelocityFluCommand(up_m_s=1.0))
         await take(ticks, 20)
         await drone.land()
         assert not vehicle.armed
@@ -114,11 +114,11 @@ async def until(ticks, condition, limit_s=8.0):
 
 @asynccontextmanager
 async def taken_by_a_pilot(vehicle):
-    """A drone and its ticks, and how many commands the vehicle had had when a pilot took it."""
+    """A drone and its ticks, and how many commands the vehicle had had when an operator took it."""
     async with connected(vehicle) as drone:
         ticks = drone.ticks()
         await drone.motors_on()
-        drone.command(VelocityCommand(up_m_s=0.5))
+        drone.command(VelocityFluCommand(up_m_s=0.5))
         await take(ticks, 5)
         before = len(vehicle.commands)
         vehicle.mode = (POSCTL, 0)
@@ -138,7 +138,7 @@ def fresh_setpoints(vehicle, seconds):
 async def test_a_pilot_who_takes_over_keeps_the_vehicle_and_can_give_it_back(vehicle):
     async with taken_by_a_pilot(vehicle) as (drone, ticks, before):
         for _ in range(100):  # five seconds: MAVSDK has ended its own stream meanwhile
-            drone.command(VelocityCommand(forward_m_s=0.9))
+            drone.command(VelocityFluCommand(forward_m_s=0.9))
             assert not (await anext(ticks)).offboard
         fresh = fresh_setpoints(vehicle, 1.0)
         assert len(fresh) >= 15
@@ -150,7 +150,7 @@ async def test_a_pilot_who_takes_over_keeps_the_vehicle_and_can_give_it_back(veh
         await take(ticks, 5)
         assert set(fresh_setpoints(vehicle, 0.2)) == {(0.0, 0.0, 0.0, 0.0)}  # it stands until taken back
         for _ in range(10):
-            drone.command(VelocityCommand(forward_m_s=0.4))
+            drone.command(VelocityFluCommand(forward_m_s=0.4))
             await anext(ticks)
         assert vehicle.setpoints[-1][1] == pytest.approx(0.4)
         vehicle.mode = (POSCTL, 0)  # and again
@@ -163,7 +163,7 @@ async def test_after_a_pilot_the_vehicle_is_followed_from_where_he_left_it(vehic
         vehicle.mode = (6, 0)
         await until(ticks, lambda state: state.offboard)
         for _ in range(10):
-            drone.command(VelocityCommand())
+            drone.command(VelocityFluCommand())
             await anext(ticks)
         assert set(fresh_setpoints(vehicle, 0.3)) == {(0.0, 0.0, 0.0, 0.0)}  # no way back is flown
 
@@ -257,7 +257,7 @@ async def test_some_heartbeats_may_be_lost_while_telemetry_comes(vehicle):
         await drone.motors_on()
         vehicle.heartbeats = False
         for _ in range(90):  # 4.5 s; after 3 MAVSDK holds the vehicle for gone and ends its stream once
-            drone.command(VelocityCommand(forward_m_s=0.4))
+            drone.command(VelocityFluCommand(forward_m_s=0.4))
             await anext(ticks)
         assert fresh_setpoints(vehicle, 0.2)[-1][0] == pytest.approx(0.4)
         assert (await until_error(ticks)).startswith("link lost: no heartbeat for 6.")
@@ -267,7 +267,7 @@ async def test_a_silent_link_stands_still_before_it_is_lost(vehicle):
     async with connected(vehicle) as drone:
         ticks = drone.ticks()
         await drone.motors_on()
-        drone.command(VelocityCommand(forward_m_s=0.8))
+        drone.command(VelocityFluCommand(forward_m_s=0.8))
         await take(ticks, 5)
         vehicle.mute = True
         assert (await until_error(ticks)).startswith("link lost")
@@ -302,7 +302,7 @@ async def armed_by_acknowledgement(vehicle):
         await drone.motors_on(confirmed=False)
         assert vehicle.armed
         assert drone._feed.mode == "OFFBOARD"  # this is confirmed in any case, before arming
-        drone.command(VelocityCommand(up_m_s=1.0))
+        drone.command(VelocityFluCommand(up_m_s=1.0))
         yield drone, ticks
 
 
@@ -376,7 +376,7 @@ async def test_hold_stops_the_setpoints_and_is_confirmed(vehicle):
         await drone.hold()
         assert vehicle.mode == (4, 3)
         count = len(vehicle.setpoints)
-        drone.command(VelocityCommand(forward_m_s=1.0))
+        drone.command(VelocityFluCommand(forward_m_s=1.0))
         await asyncio.sleep(0.3)
         assert len(vehicle.setpoints) == count
 
@@ -432,7 +432,7 @@ async def test_a_vehicle_that_drifts_is_brought_back(vehicle):
         vehicle.drift_m_s = -0.1  # up, as PX4's height does under velocity setpoints
         heights = []
         async for state in drone.ticks():
-            drone.command(VelocityCommand())
+            drone.command(VelocityFluCommand())
             heights.append(state.z)
             if len(heights) == 80:
                 break
@@ -500,7 +500,7 @@ async def test_the_recording_holds_both_directions(vehicle, tmp_path):
     await drone.ready()
     await drone.motors_on()
     ticks = drone.ticks()
-    drone.command(VelocityCommand(forward_m_s=0.7))
+    drone.command(VelocityFluCommand(forward_m_s=0.7))
     await take(ticks, 20)
     await drone.motors_off()
     await drone.close()

@@ -7,7 +7,7 @@ from math import inf
 import pytest
 
 from framerunner.wire.mission_report import TransitionTaken
-from offboard.drone import VelocityCommand
+from offboard.drone import VelocityFluCommand
 from offboard.engine import MissionEngine, MissionRunError
 from offboard.limits import CONTEST
 from offboard.mission import load_mission
@@ -112,7 +112,7 @@ INNER = [
     ("shift_left", AWAY, angle(3.1), 0.05, "shift_left"),
     ("shift_left", AWAY, angle(30.0), 0.05, "shift_left"),
     ("shift_left", AWAY, angle(30.1), 0.05, "shift_right"),
-    ("shift_left", AWAY, LOST, 0.05, "shift_right"),  # a lost frame's angle is infinite
+    ("shift_left", AWAY, LOST, 0.05, "shift_right"),  # a lost gate's angle is infinite
     ("shift_right", AWAY, angle(2.9), 0.05, "crossing"),
     ("shift_right", AWAY, angle(80.0), 0.05, "shift_right"),
     ("crossing", AWAY, NEAR, 3.95, "crossing"),
@@ -123,7 +123,7 @@ INNER = [
 
 @pytest.mark.parametrize("colour", ["red", "green", "blue"])
 @pytest.mark.parametrize(("state", "imu", "detection", "after_s", "expected"), INNER)
-def test_crossing_of_a_frame(colour, state, imu, detection, after_s, expected):
+def test_crossing_of_a_gate(colour, state, imu, detection, after_s, expected):
     driver = Driver().to(f"{colour}.{state}")
     assert driver.engine.state == f"{colour}.{state}"
     assert driver.tick(imu, see(colour, detection), after_s) == f"{colour}.{expected}"
@@ -190,13 +190,13 @@ def test_nothing_happens_after_the_end():
 
 
 ON_ENTRY = [
-    ("take_off.start", VelocityCommand()),
-    ("red.turning", VelocityCommand(yaw_rate_rad_s=1.0)),
-    ("red.frame_visible", VelocityCommand()),
-    ("red.frame_close", VelocityCommand()),
-    ("red.shift_left", VelocityCommand(left_m_s=0.1)),
-    ("red.crossing", VelocityCommand(forward_m_s=0.3)),
-    ("red.going_up", VelocityCommand(up_m_s=0.3)),
+    ("take_off.start", VelocityFluCommand()),
+    ("red.turning", VelocityFluCommand(yaw_rate_rad_s=1.0)),
+    ("red.frame_visible", VelocityFluCommand()),
+    ("red.frame_close", VelocityFluCommand()),
+    ("red.shift_left", VelocityFluCommand(left_m_s=0.1)),
+    ("red.crossing", VelocityFluCommand(forward_m_s=0.3)),
+    ("red.going_up", VelocityFluCommand(up_m_s=0.3)),
 ]
 
 
@@ -214,7 +214,7 @@ def test_command_on_entry_of_shift_right_keeps_the_other_rates():
     assert driver.command.forward_m_s == before.forward_m_s == pytest.approx(0.025)
 
 
-def test_approach_looks_to_the_frame_and_keeps_to_one_metre_a_second():
+def test_approach_looks_to_the_gate_and_keeps_to_one_metre_a_second():
     driver = Driver().to("green.frame_visible")
     driver.tick(cam=see("green", Detection(n=30.0, s=10.0, e=50.0, w=30.0, d=1.4, a=0.0)))
     assert driver.command.forward_m_s == pytest.approx(0.5)
@@ -223,7 +223,7 @@ def test_approach_looks_to_the_frame_and_keeps_to_one_metre_a_second():
     assert driver.command.forward_m_s == 1.0
 
 
-def test_a_frame_lost_while_shifting_gives_full_speed_ahead_as_published_but_a_finite_one():
+def test_a_gate_lost_while_shifting_gives_full_speed_ahead_as_published_but_a_finite_one():
     driver = Driver().to("red.shift_right")
     driver.tick(cam=see("red", LOST))
     assert driver.engine.pilot.cmd.vel_x == inf

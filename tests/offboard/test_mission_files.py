@@ -11,7 +11,7 @@ from textwrap import dedent
 
 import pytest
 
-from offboard.drone import VelocityCommand
+from offboard.drone import VelocityFluCommand
 from offboard.engine import MissionEngine, MissionRunError
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import MissionError, list_missions, load_mission, mermaid
@@ -103,7 +103,9 @@ def test_a_mission_flies_within_the_limits_of_its_class_and_can_read_them(tmp_pa
     assert (sent.up_m_s, sent.yaw_rate_rad_s) == (-0.7, 1.2)
     contest = MissionEngine(mission)
     contest.tick(Imu(), Detections(), 0)
-    assert CONTEST.limited(contest.tick(Imu(), Detections(), 50_000)) == VelocityCommand(1.0, -1.0, -1.0, 1.0)
+    assert CONTEST.limited(contest.tick(Imu(), Detections(), 50_000)) == VelocityFluCommand(
+        1.0, -1.0, -1.0, 1.0
+    )
 
 
 def test_the_minimal_mission_is_fine(tmp_path):

@@ -1,4 +1,4 @@
-"""A pilot takes the drone: the mission waits, and goes on when it is given back where that is safe."""
+"""An operator takes the drone: the mission waits, and goes on when it is given back where that is safe."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from textwrap import dedent
 import pytest
 
 from offboard.app import MissionEnd, Moment, fly_mission
-from offboard.drone import DroneError, VelocityCommand
+from offboard.drone import DroneError, VelocityFluCommand
 from offboard.mission import Mission, load_mission
 from offboard.perception import CameraLostError
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone, crossings
@@ -20,7 +20,7 @@ PLACES = ["take_off.set_base", "blue.go_to_center", "red.crossing", "green.going
 
 
 class Flight:
-    """A flight and a pilot who acts at some of its ticks."""
+    """A flight and an operator who acts at some of its ticks."""
 
     def __init__(self, mission: Mission = MISSION, limit_s: float = 180.0) -> None:
         self.drone = KinematicDrone(*START_1)
@@ -36,7 +36,7 @@ class Flight:
         return self
 
     def take(self, state: str, after_s: float = 0.5, pilot_m_s=(0.0, 0.0, 0.0)) -> Flight:
-        """The pilot takes the drone when it has been in a state for a while."""
+        """The operator takes the drone when it has been in a state for a while."""
         since: list[float] = []
 
         def holds(moment: Moment) -> bool:
@@ -98,7 +98,7 @@ async def test_while_a_pilot_has_it_nothing_is_commanded_and_all_stands_still(st
     paused = flight.paused
     assert outcome.pauses == 1
     assert {moment.mission_state for moment in paused} == {state}
-    assert {moment.command for moment in paused} == {VelocityCommand()}
+    assert {moment.command for moment in paused} == {VelocityFluCommand()}
     assert {moment.state.mode for moment in paused} == {POSCTL}
     assert not any(moment.transition or moment.remark for moment in paused)
     assert paused[-1].flight_time_s - paused[0].flight_time_s == pytest.approx(
@@ -110,7 +110,7 @@ async def test_while_a_pilot_has_it_nothing_is_commanded_and_all_stands_still(st
     assert len(flight.drone.commands) == outcome.ticks - len(paused) - stopped
     assert paused[-1].state.y - paused[0].state.y == pytest.approx(
         0.6, abs=0.02
-    )  # it was the pilot who flew it
+    )  # it was the operator who flew it
 
 
 GOES_ON = [
@@ -243,7 +243,7 @@ async def test_a_fault_of_the_drone_ends_a_pause_as_it_ends_a_flight(reason):
 
 
 async def test_what_no_pilot_did_still_ends_the_flight():
-    """The port raises for a mode that is no pilot's; nothing here makes a pause of it."""
+    """The port raises for a mode that is no operator's; nothing here makes a pause of it."""
     flight = Flight()
     flight.drone.faults[200] = DroneError("the pilot or a failsafe took over: mode RETURN_TO_LAUNCH")
     outcome = await flight.fly()
@@ -285,7 +285,7 @@ async def test_with_a_dead_camera_it_is_not_taken_back_until_the_camera_lives():
     assert remarks == ["", "the camera is dead: no image for 1.1 s"]
     refused = next(moment for moment in flight.paused if moment.remark)
     assert refused.state.offboard  # he had chosen it
-    assert refused.command == VelocityCommand()
+    assert refused.command == VelocityFluCommand()
     assert flight.first_after.remark == ""
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from framerunner.geometry.axes import Alignment, Pose
+from framerunner.geometry.axes import ArenaAlignment, Pose
 from offboard.drone import DroneError
 from offboard.link.resets import ResetFeed, followed
 
@@ -55,7 +55,7 @@ class Vehicle:
 @pytest.mark.parametrize("body_frame", [False, True])
 @pytest.mark.parametrize("turned_deg", [4.0, -25.0, 179.0])
 def test_a_turned_frame_is_followed_and_the_drone_stays_where_it_is(turned_deg, body_frame):
-    alignment, vehicle = Alignment(START_ARENA, START_NED), Vehicle(body_frame)
+    alignment, vehicle = ArenaAlignment(START_ARENA, START_NED), Vehicle(body_frame)
     vehicle.report().fly(STEP_S)
     true = alignment.pose(Pose((vehicle.x, vehicle.y, -1.5), vehicle.yaw))
     (jump,) = vehicle.reset(radians(turned_deg)).report().feed.take()
@@ -73,7 +73,7 @@ def test_a_turned_frame_is_followed_and_the_drone_stays_where_it_is(turned_deg, 
 
 
 def test_a_small_change_of_the_position_is_a_correction():
-    alignment, vehicle = Alignment(START_ARENA, START_NED), Vehicle()
+    alignment, vehicle = ArenaAlignment(START_ARENA, START_NED), Vehicle()
     (jump,) = vehicle.report().fly(STEP_S).reset(moved_m=0.1).report().feed.take()
     assert followed(alignment, jump) is alignment
 
@@ -90,7 +90,7 @@ def test_a_place_that_is_not_known_ends_the_flight_in_words(gap_s, moved_m, chan
     vehicle = Vehicle().report().fly(gap_s).reset(radians(10), moved_m).report(**changed)
     (jump,) = vehicle.feed.take()
     with pytest.raises(DroneError, match=told):
-        followed(Alignment(START_ARENA, START_NED), jump)
+        followed(ArenaAlignment(START_ARENA, START_NED), jump)
 
 
 def test_packets_that_are_late_and_those_of_others_are_no_resets():

@@ -6,7 +6,7 @@ from math import cos, exp, hypot, pi, remainder, sin
 
 import pytest
 
-from offboard.drone import DroneState, ResponsePrior, VelocityCommand
+from offboard.drone import DroneState, ResponsePrior, VelocityFluCommand
 from offboard.response import ResponseEstimate
 
 STEP_S = 0.05
@@ -94,7 +94,7 @@ class PiVehicle(Vehicle):
 def command_at(time_s):
     """Starts, stops, turns and climbs, as of a flight."""
     quarter = int(time_s / 1.5) % 4
-    return VelocityCommand(
+    return VelocityFluCommand(
         (0.8, 0.8, 0.0, -0.5)[quarter],
         (0.0, 0.4, -0.4, 0.0)[quarter],
         (0.4, 0.0, -0.4, 0.0)[quarter],
@@ -163,7 +163,9 @@ def test_slow_flight_shows_the_lag_of_a_vehicle_that_is_known_to_be_late():
     for tick in range(round(7.0 / STEP_S)):
         estimate.update(vehicle.state, sent)
         usual = command_at(tick * STEP_S)
-        sent = VelocityCommand(usual.forward_m_s / 5, usual.left_m_s / 5, usual.up_m_s, usual.yaw_rate_rad_s)
+        sent = VelocityFluCommand(
+            usual.forward_m_s / 5, usual.left_m_s / 5, usual.up_m_s, usual.yaw_rate_rad_s
+        )
         vehicle.fly(sent)
     assert estimate.response.late
     assert (estimate.response.level_dead_s, estimate.response.level_lag_s) == pytest.approx((0.35, 0.6))
@@ -190,20 +192,20 @@ def test_a_vehicle_that_follows_all_of_a_command_has_no_share(own_lag_s):
 
 
 def test_what_a_leg_leaves_in_the_integral_is_predicted():
-    vehicle, sent = PiVehicle(0.35, 1.0), VelocityCommand(0.0, 0.8)
+    vehicle, sent = PiVehicle(0.35, 1.0), VelocityFluCommand(0.0, 0.8)
     estimate = learn(vehicle, 25.0)
     for _ in range(80):
         vehicle.fly(sent)
         estimate.update(vehicle.state, sent)
     for _ in range(20):
-        vehicle.fly(VelocityCommand())
-        estimate.update(vehicle.state, VelocityCommand())
+        vehicle.fly(VelocityFluCommand())
+        estimate.update(vehicle.state, VelocityFluCommand())
     prediction, before = estimate.predict(), vehicle.position
     left = prediction.slow_m_s[1] * cos(vehicle.yaw) - prediction.slow_m_s[0] * sin(vehicle.yaw)
     assert left > 0.06
     assert hypot(*prediction.disturbance_m_s[:2]) < 0.05
     for _ in range(7):
-        vehicle.fly(VelocityCommand())
+        vehicle.fly(VelocityFluCommand())
     moved = [b - a for a, b in zip(before, vehicle.position, strict=True)]
     assert prediction.moved_m == pytest.approx(moved, abs=0.01)
 
@@ -214,7 +216,7 @@ def test_the_motion_by_commands_on_their_way_is_predicted(own_lag_s):
     estimate = learn(vehicle, 20.0)
     prediction, before = estimate.predict(), vehicle.position
     for _ in range(7):
-        vehicle.fly(VelocityCommand())
+        vehicle.fly(VelocityFluCommand())
     moved = [b - a for a, b in zip(before, vehicle.position, strict=True)]
     missed = hypot(*(p - m for p, m in zip(prediction.moved_m, moved, strict=True)))
     assert hypot(*moved) > 0.1

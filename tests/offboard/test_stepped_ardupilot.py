@@ -1,12 +1,12 @@
 """ArduCopter's dialect with time that waits, against a protocol fake of MAVSDK's plugin `mavlink_direct`."""
 
 from framerunner.wire.dialect import mavlink
-from offboard.drone import VelocityCommand
+from offboard.drone import VelocityFluCommand
 from offboard.link.ardupilot import SteppedArduPilotDialect
 from offboard.link.telemetry import TelemetryFeed
 from tests.offboard.test_stepped_px4 import FakePlugin
 
-UP = VelocityCommand(up_m_s=1.0)
+UP = VelocityFluCommand(up_m_s=1.0)
 
 
 def dialect_of(plugin, **options):

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import pytest
 
 from framerunner.wire.dialect import mavlink
-from offboard.drone import DroneError, VelocityCommand
+from offboard.drone import DroneError, VelocityFluCommand
 from offboard.link import px4, stepped
 from offboard.link.direct import CommandRefusedError
 from offboard.link.px4 import SteppedPx4Dialect
 
-FORWARD = VelocityCommand(forward_m_s=1.0, left_m_s=0.5, up_m_s=0.25, yaw_rate_rad_s=0.1)
+FORWARD = VelocityFluCommand(forward_m_s=1.0, left_m_s=0.5, up_m_s=0.25, yaw_rate_rad_s=0.1)
 
 
 class FakePlugin:

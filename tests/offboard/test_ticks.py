@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import pytest
 from mavsdk.asyncio import MavsdkError
 
-from offboard.drone import VelocityCommand
+from offboard.drone import VelocityFluCommand
 from offboard.link import ticks
 from offboard.link.telemetry import MAX_JITTER_S, TelemetryFeed
 from offboard.link.ticks import PendingRequests, TickSource, request_rates
 
-COMMAND = VelocityCommand(forward_m_s=0.5)
+COMMAND = VelocityFluCommand(forward_m_s=0.5)
 
 
 class Clock:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.link.tracking import (
     INITIAL_LAG_S,
     MAX_CORRECTION_M_S,
@@ -59,18 +59,18 @@ def fly(vehicle, commands, tracker=None):
     return sent
 
 
-HOVER = VelocityCommand()
-AHEAD = VelocityCommand(forward_m_s=0.3)
+HOVER = VelocityFluCommand()
+AHEAD = VelocityFluCommand(forward_m_s=0.3)
 
 
 @pytest.mark.parametrize("lag_s", [0.0, 0.15, 0.3])
 def test_an_ideal_vehicle_gets_its_commands_unchanged(lag_s):
     commands = [
-        (VelocityCommand(up_m_s=0.5), 3.0),
-        (VelocityCommand(forward_m_s=1.0), 4.0),
+        (VelocityFluCommand(up_m_s=0.5), 3.0),
+        (VelocityFluCommand(forward_m_s=1.0), 4.0),
         (HOVER, 3.0),
-        (VelocityCommand(left_m_s=-0.1, yaw_rate_rad_s=0.2), 3.0),
-        (VelocityCommand(yaw_rate_rad_s=1.0), 5.0),
+        (VelocityFluCommand(left_m_s=-0.1, yaw_rate_rad_s=0.2), 3.0),
+        (VelocityFluCommand(yaw_rate_rad_s=1.0), 5.0),
         (HOVER, 2.0),
     ]
     sent = fly(Vehicle(lag_s=lag_s), commands)
@@ -96,11 +96,13 @@ def test_a_vehicle_that_is_too_slow_still_flies_the_whole_distance():
 def test_a_vehicle_with_lag_follows_quickly_once_the_lag_is_measured(lag_s):
     """Its lag is measured and compensated."""
     alone, helped, tracker = Vehicle(lag_s=lag_s, yaw=0.0), Vehicle(lag_s=lag_s, yaw=0.0), CommandTracker()
-    turn = VelocityCommand(yaw_rate_rad_s=0.5)
-    fly(helped, [(VelocityCommand(forward_m_s=1.0), 2.0), (HOVER, 2.0), (turn, 2.0), (HOVER, 2.0)], tracker)
+    turn = VelocityFluCommand(yaw_rate_rad_s=0.5)
+    fly(
+        helped, [(VelocityFluCommand(forward_m_s=1.0), 2.0), (HOVER, 2.0), (turn, 2.0), (HOVER, 2.0)], tracker
+    )
     assert tracker.active
     alone.yaw = helped.yaw
-    wanted = VelocityCommand(forward_m_s=0.3, yaw_rate_rad_s=0.3)
+    wanted = VelocityFluCommand(forward_m_s=0.3, yaw_rate_rad_s=0.3)
     fly(helped, [(wanted, 0.4)], tracker)
     for _ in range(8):
         alone.fly(wanted)
@@ -125,7 +127,7 @@ def test_a_drifting_vehicle_is_held(drift):
 @settings(max_examples=50)
 def test_the_correction_is_bounded_and_finite(yaw, commands):
     vehicle = Vehicle(lag_s=1.0, share=0.5, drift=(0.3, -0.3, 0.2), yaw=yaw)
-    for wanted, got in fly(vehicle, [(VelocityCommand(*each), 1.0) for each in commands]):
+    for wanted, got in fly(vehicle, [(VelocityFluCommand(*each), 1.0) for each in commands]):
         added = (
             got.forward_m_s - wanted.forward_m_s,
             got.left_m_s - wanted.left_m_s,
@@ -138,7 +140,7 @@ def test_the_correction_is_bounded_and_finite(yaw, commands):
 def test_a_vehicle_held_down_does_not_wind_the_offset_up():
     """On the ground, while PX4 spools up: afterwards it does not shoot past the goal."""
     tracker, vehicle = CommandTracker(), Vehicle(lag_s=0.0, share=0.0)
-    fly(vehicle, [(VelocityCommand(up_m_s=0.5), 5.0)], tracker)
+    fly(vehicle, [(VelocityFluCommand(up_m_s=0.5), 5.0)], tracker)
     vehicle.share, vehicle.lag_s = 1.0, 0.3
     fly(vehicle, [(HOVER, 8.0)], tracker)
     assert 1.0 < vehicle.position[2] <= 1.0 + MAX_OFFSET_M + 0.05

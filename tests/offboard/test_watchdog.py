@@ -19,7 +19,7 @@ pytestmark = pytest.mark.realtime
 
 APP = dedent("""\
     import asyncio, ctypes, sys, time
-    from offboard.drone import DroneError, VelocityCommand
+    from offboard.drone import DroneError, VelocityFluCommand
     from offboard.mavsdk_drone import MavsdkDrone
 
     async def main(port, hang):
@@ -27,7 +27,7 @@ APP = dedent("""\
         await drone.connect()
         await drone.ready()
         await drone.motors_on()
-        drone.command(VelocityCommand(forward_m_s=0.5))
+        drone.command(VelocityFluCommand(forward_m_s=0.5))
         ticks = drone.ticks()
         for _ in range(10):
             await anext(ticks)

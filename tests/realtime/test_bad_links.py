@@ -10,7 +10,7 @@ import pytest
 
 from scenarios.loader import dump_yaml
 from tests.framerunner.simulated_link import Impairment
-from tests.framerunner.test_bad_links import before_a_low_frame
+from tests.framerunner.test_bad_links import before_a_low_gate
 from tests.free_ports import free_port
 from tests.processes import program, simulator
 from tests.realtime.conftest import Peer
@@ -31,7 +31,7 @@ HOLD_OR_LAND = (4 << 16 | 3 << 24, 4 << 16 | 6 << 24)
 )
 def test_a_flight_over_a_bad_link_ends_in_hold(tmp_path, instance, impairment, ends):
     scenario = tmp_path / "low.yaml"
-    short = before_a_low_frame().model_copy(update={"try_limit_s": 7.0})
+    short = before_a_low_gate().model_copy(update={"try_limit_s": 7.0})
     scenario.write_text(dump_yaml(short), encoding="utf-8")
     app_port = free_port()
     with UdpProxy(impairment, app_port) as proxy:

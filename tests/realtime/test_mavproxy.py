@@ -108,7 +108,7 @@ def mavproxy(folder, sim, instance):
 
 
 def plan_file(path, *items):
-    """A file of items (command, frame, params 1 to 4, latitude, longitude, altitude); its name."""
+    """A file of items (command, gate, params 1 to 4, latitude, longitude, altitude); its name."""
     lines = ["QGC WPL 110"]
     for number, (command, frame, params, *place) in enumerate(items):
         fields = (number, int(number == 0), frame, command, *params, *place, 1)

@@ -116,7 +116,7 @@ def test_a_ground_station_hears_the_mission_from_its_first_state_to_the_verdict(
     with program(
         tmp_path, "fly", "test-case-1", "--mission", str(path), "--instance", str(instance)
     ) as flight:
-        assert flight.process.wait(90.0) == 1, flight.err  # flown, but no frame was crossed
+        assert flight.process.wait(90.0) == 1, flight.err  # flown, but no gate was crossed
         assert "Traceback" not in flight.err and "warning" not in flight.err
     station.stop()
     (folder,) = (tmp_path / "runs").iterdir()

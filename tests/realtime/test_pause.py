@@ -1,4 +1,4 @@
-"""A pilot at a ground station takes the drone out of a mission, flies it aside and gives it back."""
+"""An operator at a ground station takes the drone out of a mission, flies it aside and gives it back."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ MISSION = dedent("""\
 
 
 class GroundStation(Peer):
-    """A pilot with sticks; he keeps them in his hands, at rest, after he has given the drone back."""
+    """An operator with sticks; he keeps them in his hands, at rest, after he has given the drone back."""
 
     main_mode = 0
 
@@ -94,7 +94,7 @@ class GroundStation(Peer):
 
 
 def take_and_give_back(station, moments, landed):
-    """What the pilot does; on a thread of his own."""
+    """What the operator does; on a thread of his own."""
     state = lambda: moments[-1].mission_state if moments else ""  # noqa: E731
     station.hold_sticks(lambda: state() == "ahead", 30.0)
     station.choose(POSCTL)
@@ -128,7 +128,7 @@ async def test_a_pilot_takes_the_drone_flies_it_aside_and_gives_it_back(sim, ins
     assert {moment.mission_state for moment in paused} == {"ahead"}
     assert paused[-1].flight_time_s - paused[0].flight_time_s > STAYS_S
     first, last = paused[0].state, paused[-1].state
-    assert hypot(last.x - first.x, last.y - first.y) > 0.9  # it was the pilot who moved it
+    assert hypot(last.x - first.x, last.y - first.y) > 0.9  # it was the operator who moved it
     at_rest = [moment.state for moment in paused if moment.flight_time_s > paused[-1].flight_time_s - 3.0]
     assert max(hypot(state.x - last.x, state.y - last.y) for state in at_rest) < 0.15  # and nobody else
     went_on = moments[moments.index(paused[-1]) + 1]

@@ -6,8 +6,8 @@ from math import cos, sin
 import numpy as np
 import pytest
 
-from scenarios.bound import Envelope, Fall, Reach, lower_bound, ordered_frames
-from scenarios.models import Base, Frame, Scenario, ScenarioError, Start
+from scenarios.bound import Envelope, Fall, Reach, lower_bound, ordered_gates
+from scenarios.models import Base, Gate, Scenario, ScenarioError, StartPose
 from scenarios.random_scenarios import load_level, random_scenario
 from scenarios.touchdown import STANDING_TOLERANCE_M
 
@@ -20,12 +20,12 @@ def envelope(level=Reach(1.4), up=Reach(1.0), down=Reach(1.0), **more):  # noqa:
 
 
 def straight(*x_m, z_m=1.0):
-    """Frames across the x axis; the start is at x = 0, on the base."""
-    frames = tuple(
-        Frame(colour=colour, x_m=x, y_m=0, z_m=z_m, yaw_rad=0)
+    """Gates across the x axis; the start is at x = 0, on the base."""
+    gates = tuple(
+        Gate(colour=colour, x_m=x, y_m=0, z_m=z_m, yaw_rad=0)
         for colour, x in zip(("red", "green", "blue"), x_m, strict=False)
     )
-    return Scenario(name="straight", base=Base(top_m=1.0 - HEIGHT_M / 2), start=Start(), frames=frames)
+    return Scenario(name="straight", base=Base(top_m=1.0 - HEIGHT_M / 2), start=StartPose(), frames=gates)
 
 
 def bound(scenario, limits):
@@ -39,14 +39,14 @@ def best_of_grid(scenario, limits, across=25, high=13):
     start, base = scenario.start, scenario.base
     resting_m = base.top_m + HEIGHT_M / 2
     layers = [np.array([(start.x_m, start.y_m, resting_m)])]
-    for frame in ordered_frames(scenario):
-        width_m, height_m = frame.opening_m
+    for gate in ordered_gates(scenario):
+        width_m, height_m = gate.opening_m
         a, b = np.meshgrid(
             np.linspace(-width_m / 2, width_m / 2, across), np.linspace(-height_m / 2, height_m / 2, high)
         )
-        x = frame.x_m - sin(frame.yaw_rad) * a
-        y = frame.y_m + cos(frame.yaw_rad) * a
-        layers.append(np.column_stack((x.ravel(), y.ravel(), frame.z_m + b.ravel())))
+        x = gate.x_m - sin(gate.yaw_rad) * a
+        y = gate.y_m + cos(gate.yaw_rad) * a
+        layers.append(np.column_stack((x.ravel(), y.ravel(), gate.z_m + b.ravel())))
     half_m = base.edge_m / 2
     centre = np.array((base.x_m, base.y_m, resting_m))
     low = np.subtract(centre, (half_m, half_m, 0))
@@ -79,10 +79,10 @@ def test_bound_equals_a_search_over_points(seed, vertical_m_s):
 def test_points_lie_in_the_openings():
     scenario = random_scenario(load_level("calm"), 17)
     found = bound(scenario, envelope())
-    for frame, point in zip(ordered_frames(scenario), found.points_arena_m[1:], strict=False):
-        x, y, z = (a - b for a, b in zip(point, frame.position_arena_m, strict=True))
-        assert cos(frame.yaw_rad) * x + sin(frame.yaw_rad) * y == pytest.approx(0, abs=1e-9)
-        assert abs(cos(frame.yaw_rad) * y - sin(frame.yaw_rad) * x) <= 0.19 + 1e-9
+    for gate, point in zip(ordered_gates(scenario), found.points_arena_m[1:], strict=False):
+        x, y, z = (a - b for a, b in zip(point, gate.position_arena_m, strict=True))
+        assert cos(gate.yaw_rad) * x + sin(gate.yaw_rad) * y == pytest.approx(0, abs=1e-9)
+        assert abs(cos(gate.yaw_rad) * y - sin(gate.yaw_rad) * x) <= 0.19 + 1e-9
         assert abs(z) <= 0.09 + 1e-9
 
 
@@ -101,7 +101,7 @@ def test_each_part_of_an_envelope_counts_as_calculated():
     assert bound(scenario, envelope(Reach(2.0), fall=near)).time_s == pytest.approx((4 + 2.75) / 2)
 
 
-def test_frames_are_crossed_in_order_whatever_their_order_in_the_file():
+def test_gates_are_crossed_in_order_whatever_their_order_in_the_file():
     there_and_back = straight(1.0, -1.0, 2.0)
     shuffled = there_and_back.model_copy(update={"frames": there_and_back.frames[::-1]})
     found = bound(shuffled, envelope(Reach(1.0)))
@@ -109,6 +109,6 @@ def test_frames_are_crossed_in_order_whatever_their_order_in_the_file():
     assert found.time_s == pytest.approx(1 + 2 + 3 + 1.75)
 
 
-def test_a_scenario_without_frames_has_no_bound():
+def test_a_scenario_without_gates_has_no_bound():
     with pytest.raises(ScenarioError, match="has no frames"):
         bound(straight(), envelope())

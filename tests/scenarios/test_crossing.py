@@ -5,28 +5,28 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from scenarios.crossing import Boundary, Gate
-from scenarios.models import Arena, Frame
+from scenarios.crossing import Boundary, GateWatch
+from scenarios.models import Arena, Gate
 
-FRAME = Frame(colour="red", x_m=0, y_m=0, z_m=1)  # its plane is x = 0
+GATE = Gate(colour="red", x_m=0, y_m=0, z_m=1)  # its plane is x = 0
 BOUNDARY = Boundary(Arena())  # x and y within ±5, z up to 4
 
 
-def passages(frame, points):
-    gate = Gate(frame)
+def passages(other_gate, points):
+    gate = GateWatch(other_gate)
     found = [gate.follow(a, b) for a, b in zip([points[0], *points], points, strict=False)]
     return [passage for passage in found if passage is not None]
 
 
 def test_through_the_middle_from_both_sides():
-    (back,) = passages(FRAME, [(-1, 0, 1), (3, 0, 1)])
+    (back,) = passages(GATE, [(-1, 0, 1), (3, 0, 1)])
     assert (back.side, back.offset_m, back.fraction) == ("back", 0.0, 0.25)
-    (front,) = passages(FRAME, [(1, 0, 1), (-1, 0, 1)])
+    (front,) = passages(GATE, [(1, 0, 1), (-1, 0, 1)])
     assert front.side == "front"
 
 
 def test_offset_is_measured_in_the_plane():
-    (passage,) = passages(FRAME, [(-1, 0.06, 1.08), (1, 0.06, 1.08)])
+    (passage,) = passages(GATE, [(-1, 0.06, 1.08), (1, 0.06, 1.08)])
     assert passage.offset_m == pytest.approx(0.1)
 
 
@@ -42,31 +42,31 @@ def test_offset_is_measured_in_the_plane():
     ],
 )
 def test_only_the_opening_counts(y_m, z_m, inside):
-    assert bool(passages(FRAME, [(-1, y_m, z_m), (1, y_m, z_m)])) is inside
+    assert bool(passages(GATE, [(-1, y_m, z_m), (1, y_m, z_m)])) is inside
 
 
 @pytest.mark.parametrize("side", [-1, 1])
 def test_touching_the_plane_is_no_passage(side):
-    assert passages(FRAME, [(side, 0, 1), (0, 0, 1), (side, 0, 1)]) == []
-    assert passages(FRAME, [(side, 0, 1), (0, 0, 1)]) == []
+    assert passages(GATE, [(side, 0, 1), (0, 0, 1), (side, 0, 1)]) == []
+    assert passages(GATE, [(side, 0, 1), (0, 0, 1)]) == []
 
 
 def test_a_stop_in_the_plane_passes_once_when_left_on_the_other_side():
-    found = passages(FRAME, [(-1, 0, 1), (0, 0.05, 1), (0, 0.05, 1), (0, 0.1, 1), (1, 0.1, 1)])
+    found = passages(GATE, [(-1, 0, 1), (0, 0.05, 1), (0, 0.05, 1), (0, 0.1, 1), (1, 0.1, 1)])
     assert [(passage.side, passage.offset_m) for passage in found] == [("back", pytest.approx(0.1))]
 
 
 def test_a_path_that_begins_in_the_plane_has_no_passage():
-    assert passages(FRAME, [(0, 0, 1), (1, 0, 1)]) == []
+    assert passages(GATE, [(0, 0, 1), (1, 0, 1)]) == []
 
 
 def test_forward_and_back_are_two_passages():
-    sides = [p.side for p in passages(FRAME, [(-1, 0, 1), (1, 0, 1), (1, 0, 1), (-1, 0, 1)])]
+    sides = [p.side for p in passages(GATE, [(-1, 0, 1), (1, 0, 1), (1, 0, 1), (-1, 0, 1)])]
     assert sides == ["back", "front"]
 
 
 def test_a_restarted_path_is_not_joined_to_earlier_points():
-    gate = Gate(FRAME)
+    gate = GateWatch(GATE)
     gate.restart((-1, 0, 1))
     gate.restart((1, 0, 1))
     assert gate.follow((-1, 0, 1), (1, 0, 1)) is None
@@ -97,9 +97,9 @@ def test_rotating_and_translating_the_scene_changes_nothing(path, dx, dy, turn):
     def move(x, y):
         return cos(turn) * x - sin(turn) * y + dx, sin(turn) * x + cos(turn) * y + dy
 
-    moved_frame = Frame(colour="red", x_m=dx, y_m=dy, z_m=1, yaw_rad=turn)
-    moved = passages(moved_frame, [(*move(x, y), z) for x, y, z in path])
-    still = passages(FRAME, path)
+    moved_gate = Gate(colour="red", x_m=dx, y_m=dy, z_m=1, yaw_rad=turn)
+    moved = passages(moved_gate, [(*move(x, y), z) for x, y, z in path])
+    still = passages(GATE, path)
     assert [p.side for p in moved] == [p.side for p in still]
     assert [p.offset_m for p in moved] == pytest.approx([p.offset_m for p in still], abs=1e-6)
 
@@ -112,7 +112,7 @@ def test_cutting_a_path_finer_changes_nothing(path, parts):
         fine += [
             tuple(p + (q - p) * i / parts for p, q in zip(a, b, strict=True)) for i in range(1, parts + 1)
         ]
-    coarse, finer = passages(FRAME, path), passages(FRAME, fine)
+    coarse, finer = passages(GATE, path), passages(GATE, fine)
     assert [p.side for p in finer] == [p.side for p in coarse]
     assert [p.offset_m for p in finer] == pytest.approx([p.offset_m for p in coarse], abs=1e-6)
 
@@ -121,14 +121,14 @@ def test_cutting_a_path_finer_changes_nothing(path, parts):
 def test_the_path_backwards_passes_from_the_other_sides(path):
     assume(clear_of_edges(path))
     swap = {"front": "back", "back": "front"}
-    forth = [p.side for p in passages(FRAME, path)]
-    back = [p.side for p in passages(FRAME, path[::-1])]
+    forth = [p.side for p in passages(GATE, path)]
+    back = [p.side for p in passages(GATE, path[::-1])]
     assert back == [swap[side] for side in reversed(forth)]
 
 
 @given(points)
 def test_an_offset_is_within_the_opening(path):
-    for passage in passages(FRAME, path):
+    for passage in passages(GATE, path):
         assert passage.offset_m <= hypot(0.19, 0.09) + 1e-9
         assert 0 <= passage.fraction <= 1
 

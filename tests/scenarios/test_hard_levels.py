@@ -20,8 +20,8 @@ seeds = st.integers(0, MAX_SEED) | st.integers(0, 1000)
 CELLS_PER_M = 10
 
 
-def along(frame, way_m):
-    return frame.x_m + way_m * cos(frame.yaw_rad), frame.y_m + way_m * sin(frame.yaw_rad)
+def along(gate, way_m):
+    return gate.x_m + way_m * cos(gate.yaw_rad), gate.y_m + way_m * sin(gate.yaw_rad)
 
 
 def pairs(scenario):
@@ -44,26 +44,26 @@ def test_crowded_has_the_layout_of_calm_and_obstacles_with_room_around_each(seed
     (wall,) = scenario.walls
     assert wall.doorway.width_m == 1.2
     round_things = [(scenario.base, 0.25)]
-    round_things += [(frame, frame.outer_width_m / 2) for frame in scenario.all_frames]
+    round_things += [(gate, gate.outer_width_m / 2) for gate in scenario.all_gates]
     round_things += [(pole, pole.edge_m / 2) for pole in scenario.poles]
-    fixed = 1 + len(scenario.frames)  # base and frames are as far apart as in calm
+    fixed = 1 + len(scenario.frames)  # base and gates are as far apart as in calm
     for (i, (one, radius_m)), (j, (other, other_m)) in itertools.combinations(enumerate(round_things), 2):
         if max(i, j) >= fixed:
             assert dist((one.x_m, one.y_m), (other.x_m, other.y_m)) - radius_m - other_m > 0.699
     for thing, radius_m in round_things:
         assert filled(wall).plan_distance_m(thing.x_m, thing.y_m) - radius_m > 0.699
-    for frame, way_m in itertools.product(scenario.frames, (-0.8, -0.4, 0.4, 0.8)):
-        assert all(prism.plan_distance_m(*along(frame, way_m)) > 0.1 for prism in scenario.prisms)
+    for gate, way_m in itertools.product(scenario.frames, (-0.8, -0.4, 0.4, 0.8)):
+        assert all(prism.plan_distance_m(*along(gate, way_m)) > 0.1 for prism in scenario.prisms)
     assert parse_scenario(dump_yaml(scenario)) == scenario
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_in_crowded_a_drone_gets_everywhere(seed):
-    """Seen from above: from the base to both sides of each frame, and through the doorway."""
+    """Seen from above: from the base to both sides of each gate, and through the doorway."""
     scenario = random_scenario(CROWDED, seed)
     cells = np.full((10 * CELLS_PER_M, 10 * CELLS_PER_M), 255, np.uint8)
     centres = (np.arange(len(cells)) + 0.5) / CELLS_PER_M - 5
-    solids = [*scenario.prisms, *(frame.hull for frame in scenario.all_frames)]
+    solids = [*scenario.prisms, *(gate.hull for gate in scenario.all_gates)]
     for i, x in enumerate(centres):
         for j, y in enumerate(centres):
             if any(solid.plan_distance_m(x, y) < 0.18 for solid in solids):
@@ -73,7 +73,7 @@ def test_in_crowded_a_drone_gets_everywhere(seed):
     def label(x, y):
         return labels[int((x + 5) * CELLS_PER_M), int((y + 5) * CELLS_PER_M)]
 
-    places = [along(frame, way_m) for frame in scenario.frames for way_m in (-0.6, 0.6)]
+    places = [along(gate, way_m) for gate in scenario.frames for way_m in (-0.6, 0.6)]
     (wall,) = scenario.walls
     share = wall.doorway.offset_m / wall.length_m
     places.append(
@@ -83,34 +83,34 @@ def test_in_crowded_a_drone_gets_everywhere(seed):
 
 
 @given(seeds)
-def test_in_tight_each_frame_has_a_straight_way_through_it(seed):
+def test_in_tight_each_gate_has_a_straight_way_through_it(seed):
     scenario = random_scenario(TIGHT, seed)
     base = scenario.base
-    for frame in scenario.frames:
-        assert hypot(frame.x_m - base.x_m, frame.y_m - base.y_m) >= 0.8
-        others = [base.solid, *(each.hull for each in scenario.frames if each is not frame)]
+    for gate in scenario.frames:
+        assert hypot(gate.x_m - base.x_m, gate.y_m - base.y_m) >= 0.8
+        others = [base.solid, *(each.hull for each in scenario.frames if each is not gate)]
 
-        def is_free(way_m, frame=frame, others=others):
-            x, y = along(frame, way_m)
-            clear = all(solid.distance_m((x, y, frame.z_m)) >= 0.175 for solid in others)
+        def is_free(way_m, gate=gate, others=others):
+            x, y = along(gate, way_m)
+            clear = all(solid.distance_m((x, y, gate.z_m)) >= 0.175 for solid in others)
             return clear and max(abs(x), abs(y)) < 4.801
 
         ways = [np.linspace(-0.6, 0.5, 31) * side for side in (1, -1)]
         assert any(all(is_free(way_m) for way_m in way) for way in ways)
 
 
-def test_in_tight_frames_are_near_each_other_and_sides_floor_or_ceiling():
+def test_in_tight_gates_are_near_each_other_and_sides_floor_or_ceiling():
     scenarios = [random_scenario(TIGHT, seed) for seed in range(100)]
-    frames = [frame for scenario in scenarios for frame in scenario.frames]
-    assert max(max(abs(frame.x_m), abs(frame.y_m)) for frame in frames) > 4.55
-    assert min(frame.z_m for frame in frames) < 0.27
-    assert max(frame.z_m for frame in frames) > 3.73
+    gates = [gate for scenario in scenarios for gate in scenario.frames]
+    assert max(max(abs(gate.x_m), abs(gate.y_m)) for gate in gates) > 4.55
+    assert min(gate.z_m for gate in gates) < 0.27
+    assert max(gate.z_m for gate in gates) > 3.73
     assert any(hypot(a.x_m - b.x_m, a.y_m - b.y_m) < 0.3 for s in scenarios for a, b in pairs(s))
     for scenario in scenarios:
         nearest_m = min(dist(a.position_arena_m, b.position_arena_m) for a, b in pairs(scenario))
         assert 0.8 < nearest_m <= 1.2
-        for frame in scenario.frames:
-            assert min(5 - abs(frame.x_m), 5 - abs(frame.y_m), frame.z_m, 4 - frame.z_m) <= 0.8
+        for gate in scenario.frames:
+            assert min(5 - abs(gate.x_m), 5 - abs(gate.y_m), gate.z_m, 4 - gate.z_m) <= 0.8
 
 
 def test_a_kind_that_is_left_out_changes_no_other():

@@ -14,7 +14,7 @@ from scenarios.loader import (
     load_scenario,
     parse_scenario,
 )
-from scenarios.models import COLOURS, Base, Frame, Scenario, ScenarioError, Start
+from scenarios.models import COLOURS, Base, Gate, Scenario, ScenarioError, StartPose
 from scenarios.random_scenarios import load_level, random_scenario
 
 NAMES = ["empty", "first-flight", "open-field", "round-1", "test-case-1", "test-case-2", "test-case-3"]
@@ -22,8 +22,8 @@ NAMES = ["empty", "first-flight", "open-field", "round-1", "test-case-1", "test-
 
 def layout(scenario):
     start = scenario.start
-    frames = {frame.colour: (frame.x_m, frame.y_m, frame.z_m, frame.yaw_rad) for frame in scenario.frames}
-    return (start.x_m, start.y_m, start.yaw_rad), frames
+    gates = {gate.colour: (gate.x_m, gate.y_m, gate.z_m, gate.yaw_rad) for gate in scenario.frames}
+    return (start.x_m, start.y_m, start.yaw_rad), gates
 
 
 def test_these_scenarios_are_installed():
@@ -53,9 +53,9 @@ def test_published_layouts():
         (-3, -3, 1),
         {"red": (3, 2, 2, 1), "green": (-2, 1, 0.5, 2), "blue": (3, -1, 1, 3)},
     )
-    start, frames = layout(load_scenario("test-case-3"))
+    start, gates = layout(load_scenario("test-case-3"))
     assert start[:2] == (-3, -3)
-    assert {colour: place[:2] for colour, place in frames.items()} == {
+    assert {colour: place[:2] for colour, place in gates.items()} == {
         "red": (-1, 3),
         "green": (-3, 0),
         "blue": (3, -2),
@@ -69,8 +69,8 @@ coordinate = st.floats(-5, 5)
 @st.composite
 def scenarios(draw):
     colours = draw(st.lists(st.sampled_from(COLOURS), unique=True))
-    frames = tuple(
-        Frame(
+    gates = tuple(
+        Gate(
             colour=colour,
             x_m=draw(coordinate),
             y_m=draw(coordinate),
@@ -83,8 +83,8 @@ def scenarios(draw):
         name=draw(st.from_regex(r"\A[a-z0-9][a-z0-9_-]{0,20}\Z")),
         description=draw(st.text(st.characters(exclude_categories=["Cs"]), max_size=60)),
         base=Base(x_m=draw(coordinate), y_m=draw(coordinate)),
-        start=Start(x_m=draw(coordinate), y_m=draw(coordinate), yaw_rad=draw(st.floats(-6.3, 6.3))),
-        frames=frames,
+        start=StartPose(x_m=draw(coordinate), y_m=draw(coordinate), yaw_rad=draw(st.floats(-6.3, 6.3))),
+        frames=gates,
     )
 
 
@@ -124,7 +124,7 @@ def test_schema_describes_every_field():
     assert all(part["additionalProperties"] is False for part in objects)
 
 
-FRAME = "name: a\nframes:\n  - {colour: red, x_m: 1, y_m: 1, z_m: 1}\n"
+GATE = "name: a\nframes:\n  - {colour: red, x_m: 1, y_m: 1, z_m: 1}\n"
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ FRAME = "name: a\nframes:\n  - {colour: red, x_m: 1, y_m: 1, z_m: 1}\n"
         ("{}", "f.yaml:1: name is missing; add it"),
         ("name: a\nframs: []", "f.yaml:2: frams is not a known field; did you mean frames?"),
         ("name: a\nbase:\n  top: 1", "f.yaml:3: base.top is not a known field; did you mean top_m?"),
-        (FRAME + "  - {colr: red}", "f.yaml:4: frames[1].colour is missing; add it (and 4 more)"),
+        (GATE + "  - {colr: red}", "f.yaml:4: frames[1].colour is missing; add it (and 4 more)"),
         ("name: A", 'f.yaml:1: name is "A": must be small letters, digits, - and _, a letter or digit first'),
         ("name: 3", "f.yaml:1: name is 3: must be text"),
         ("name: a\ntry_limit_s: yes", 'f.yaml:2: try_limit_s is "yes": must be a number'),
@@ -164,27 +164,27 @@ FRAME = "name: a\nframes:\n  - {colour: red, x_m: 1, y_m: 1, z_m: 1}\n"
             "one number must be 1e-06 or more",
         ),
         (
-            FRAME.replace("red", "pink"),
+            GATE.replace("red", "pink"),
             "f.yaml:3: frames[0].colour is \"pink\": must be 'red', 'green' or 'blue'",
         ),
         (
-            FRAME + "  - {colour: red, x_m: 2, y_m: 2, z_m: 2}",
+            GATE + "  - {colour: red, x_m: 2, y_m: 2, z_m: 2}",
             "f.yaml:4: frames[1].colour red is used twice; give each frame its own colour",
         ),
         (
-            FRAME.replace("z_m: 1", "z_m: 0.1"),
+            GATE.replace("z_m: 1", "z_m: 0.1"),
             "f.yaml:3: frames[0].z_m 0.1 sinks the frame into the floor; use 0.11 or more",
         ),
         (
-            FRAME.replace("z_m: 1", "z_m: 1, bar_m: 0.2"),
+            GATE.replace("z_m: 1", "z_m: 1, bar_m: 0.2"),
             "f.yaml:3: frames[0].bar_m 0.2 leaves no opening; make it thinner or the frame larger",
         ),
         (
-            FRAME.replace("x_m: 1", "x_m: 7"),
+            GATE.replace("x_m: 1", "x_m: 7"),
             "f.yaml:3: frames[0].x_m 7.0 is outside the arena; keep within ±5.0 or enlarge the arena",
         ),
         (
-            FRAME.replace("z_m: 1", "z_m: 5"),
+            GATE.replace("z_m: 1", "z_m: 5"),
             "f.yaml:3: frames[0].z_m 5.0 is above the arena; use 4.0 or less",
         ),
         ("name: a\nname: b", "f.yaml:2:1: name is given twice, first on line 1; keep one"),

@@ -4,9 +4,9 @@ from pydantic import ValidationError
 from framerunner.files.yaml_file import field_path
 from scenarios.models import (
     Base,
-    Frame,
+    Gate,
     Scenario,
-    Start,
+    StartPose,
     ground_height,
     is_over_base,
     start_position,
@@ -14,13 +14,13 @@ from scenarios.models import (
 
 
 def test_the_opening_excludes_the_bars():
-    frame = Frame(colour="red", x_m=0, y_m=0, z_m=1)
-    assert frame.opening_m == pytest.approx((0.38, 0.18))
+    gate = Gate(colour="red", x_m=0, y_m=0, z_m=1)
+    assert gate.opening_m == pytest.approx((0.38, 0.18))
 
 
 def test_a_refusal_names_field_and_value_in_python_too():
     with pytest.raises(ValidationError, match=r"bar_m 0\.2 leaves no opening"):
-        Frame(colour="red", x_m=0, y_m=0, z_m=1, bar_m=0.2)
+        Gate(colour="red", x_m=0, y_m=0, z_m=1, bar_m=0.2)
 
 
 def test_field_path():
@@ -29,8 +29,8 @@ def test_field_path():
 
 
 def test_the_start_is_on_the_base_when_over_it():
-    on_base = Scenario(name="a", base=Base(x_m=1, y_m=1), start=Start(x_m=1.25, y_m=0.75))
-    beside = Scenario(name="a", base=Base(x_m=1, y_m=1), start=Start(x_m=1.26, y_m=1))
+    on_base = Scenario(name="a", base=Base(x_m=1, y_m=1), start=StartPose(x_m=1.25, y_m=0.75))
+    beside = Scenario(name="a", base=Base(x_m=1, y_m=1), start=StartPose(x_m=1.26, y_m=1))
     assert start_position(on_base) == (1.25, 0.75, 0.51)
     assert start_position(beside) == (1.26, 1, 0.0)
     assert ground_height(beside, 1, 1) == 0.51

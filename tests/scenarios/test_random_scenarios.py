@@ -34,8 +34,8 @@ def test_scenarios_of_calm_are_within_its_limits(seed):
     scenario = random_scenario(CALM, seed)
     assert all(abs(value) <= 4 for place in places(scenario) for value in place)
     assert all(math.dist(*pair) >= 1.5 for pair in itertools.combinations(places(scenario), 2))
-    assert tuple(frame.colour for frame in scenario.frames) == COLOURS
-    assert all(0.5 <= frame.z_m <= 2.5 for frame in scenario.frames)
+    assert tuple(gate.colour for gate in scenario.frames) == COLOURS
+    assert all(0.5 <= gate.z_m <= 2.5 for gate in scenario.frames)
     assert all(abs(part.yaw_rad) <= math.pi for part in (scenario.start, *scenario.frames))
     assert (scenario.start.x_m, scenario.start.y_m) == (scenario.base.x_m, scenario.base.y_m)
     assert (scenario.arena, scenario.camera, scenario.light) == (Arena(), Camera(), Light())
@@ -48,15 +48,15 @@ def test_it_names_its_level_and_seed_and_round_trips(seed):
     assert scenario.description == f"Random scenario of level calm, seed {seed}."
     assert parse_scenario(dump_yaml(scenario)) == scenario
     drawn = [*itertools.chain(*places(scenario)), scenario.start.yaw_rad]
-    drawn += [value for frame in scenario.frames for value in (frame.z_m, frame.yaw_rad)]
+    drawn += [value for gate in scenario.frames for value in (gate.z_m, gate.yaw_rad)]
     assert all(value == round(value, 3) for value in drawn)
 
 
 def test_calm_17_never_changes():
     scenario = random_scenario(CALM, 17)
     assert places(scenario) == [(3.356, -2.251), (-1.088, -0.083), (-1.51, 1.82), (-2.403, -2.574)]
-    assert [frame.z_m for frame in scenario.frames] == [2.265, 2.002, 2.189]
-    assert [frame.yaw_rad for frame in scenario.frames] == [-2.429, -3.11, 2.478]
+    assert [gate.z_m for gate in scenario.frames] == [2.265, 2.002, 2.189]
+    assert [gate.yaw_rad for gate in scenario.frames] == [-2.429, -3.11, 2.478]
     assert scenario.start.yaw_rad == -1.224
 
 
@@ -92,10 +92,10 @@ def test_what_is_changed_in_one_part_of_a_level_changes_no_other():
         flat, near = random_scenario(low, seed), random_scenario(crowded, seed)
         assert flat.base == calm.base
         assert flat.start == calm.start
-        assert [frame.yaw_rad for frame in flat.frames] == [frame.yaw_rad for frame in calm.frames]
-        assert max(frame.z_m for frame in flat.frames) <= 1.0
-        assert [(frame.z_m, frame.yaw_rad) for frame in near.frames] == [
-            (frame.z_m, frame.yaw_rad) for frame in calm.frames
+        assert [gate.yaw_rad for gate in flat.frames] == [gate.yaw_rad for gate in calm.frames]
+        assert max(gate.z_m for gate in flat.frames) <= 1.0
+        assert [(gate.z_m, gate.yaw_rad) for gate in near.frames] == [
+            (gate.z_m, gate.yaw_rad) for gate in calm.frames
         ]
 
 
@@ -119,9 +119,9 @@ def uniformity(values, low, high):
 
 def test_heights_and_yaws_are_uniform(many):
     for index in range(3):
-        frames = [scenario.frames[index] for scenario in many]
-        assert uniformity([frame.z_m for frame in frames], 0.5, 2.5) > 0.001
-        assert uniformity([frame.yaw_rad for frame in frames], -math.pi, math.pi) > 0.001
+        gates = [scenario.frames[index] for scenario in many]
+        assert uniformity([gate.z_m for gate in gates], 0.5, 2.5) > 0.001
+        assert uniformity([gate.yaw_rad for gate in gates], -math.pi, math.pi) > 0.001
     assert uniformity([scenario.start.yaw_rad for scenario in many], -math.pi, math.pi) > 0.001
 
 
@@ -144,7 +144,7 @@ def test_independent_draws_do_not_correlate(many):
         [
             *itertools.chain(*places(scenario)),
             scenario.start.yaw_rad,
-            *(value for frame in scenario.frames for value in (frame.z_m, frame.yaw_rad)),
+            *(value for gate in scenario.frames for value in (gate.z_m, gate.yaw_rad)),
         ]
         for scenario in many
     ]
@@ -156,7 +156,7 @@ def test_independent_draws_do_not_correlate(many):
 
 def test_both_ends_of_a_range_are_drawn():
     narrow = with_layout(frame_z_m=CALM.layout.frame_z_m.model_copy(update={"low": 2.499}))
-    heights = {frame.z_m for seed in range(10) for frame in random_scenario(narrow, seed).frames}
+    heights = {gate.z_m for seed in range(10) for gate in random_scenario(narrow, seed).frames}
     assert heights == {2.499, 2.5}
 
 

@@ -5,19 +5,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenarios.models import Frame, Scenario, TrueState
+from scenarios.models import Gate, Scenario, TrueState
 from scenarios.referee import Referee
 from scenarios.verdict import Verdict
 
 ENVELOPE = (0.25, 0.25, 0.045)
 HOME = (0.0, 0.0, 0.5325)
 LEVEL = (1.0, 0.0, 0.0, 0.0)
-FRAMES = (  # listed in another order than their turns; all planes are crossed along x
-    Frame(colour="blue", x_m=3, y_m=0, z_m=1),
-    Frame(colour="red", x_m=1, y_m=0, z_m=1),
-    Frame(colour="green", x_m=2, y_m=0, z_m=1, yaw_rad=3.14159265),
+GATES = (  # listed in another order than their turns; all planes are crossed along x
+    Gate(colour="blue", x_m=3, y_m=0, z_m=1),
+    Gate(colour="red", x_m=1, y_m=0, z_m=1),
+    Gate(colour="green", x_m=2, y_m=0, z_m=1, yaw_rad=3.14159265),
 )
-COURSE = Scenario(name="course", frames=FRAMES, try_limit_s=60)
+COURSE = Scenario(name="course", frames=GATES, try_limit_s=60)
 EMPTY = Scenario(name="empty")
 UP = (0.0, 0.0, 1.0)
 OUT = (4.0, 0.0, 1.0)
@@ -107,7 +107,7 @@ def test_contacts_make_it_completed_and_a_gap_makes_a_new_one():
     assert report.contact_frames == ("red", "red", "blue")
 
 
-def test_base_and_floor_are_no_frame_contacts():
+def test_base_and_floor_are_no_gate_contacts():
     report = Flight().motors(True).wait(1, contacts=["base"]).fly(*LAP).land().report()
     assert report.verdict is Verdict.CLEAN
 
@@ -155,7 +155,7 @@ def test_wrong_order_stays():
     assert "crossed green before red at" in report.reason
 
 
-def test_a_frame_crossed_again_is_harmless():
+def test_a_gate_crossed_again_is_harmless():
     report = (
         Flight()
         .motors(True)
@@ -167,8 +167,8 @@ def test_a_frame_crossed_again_is_harmless():
     assert report.crossing_times_s[0] == pytest.approx(1.46, abs=0.02)
 
 
-def test_only_the_scenarios_frames_are_required():
-    scenario = Scenario(name="one", frames=(Frame(colour="blue", x_m=3, y_m=0, z_m=1),))
+def test_only_the_scenarios_gates_are_required():
+    scenario = Scenario(name="one", frames=(Gate(colour="blue", x_m=3, y_m=0, z_m=1),))
     assert Flight(scenario).motors(True).fly(*LAP).land().report().verdict is Verdict.CLEAN
     assert Flight(EMPTY).motors(True).fly(UP, HOME).land().report().verdict is Verdict.CLEAN
 
@@ -206,7 +206,7 @@ def test_landing_beside_the_base_is_aborted():
     assert report.landing_error_m == 1.5
 
 
-def test_landing_without_all_frames_is_aborted():
+def test_landing_without_all_gates_is_aborted():
     report = Flight().motors(True).fly(UP, (1.5, 0, 1), UP, HOME).land().report("green.turning")
     assert report.verdict is Verdict.ABORTED
     assert "in green.turning (landed on the base without crossing green, blue); crossed: red" in report.reason

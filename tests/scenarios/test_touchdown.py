@@ -1,10 +1,10 @@
 import pytest
 
-from scenarios.models import Base, Scenario, Start, TrueState
+from scenarios.models import Base, Scenario, StartPose, TrueState
 from scenarios.touchdown import CrashWatch, find_landing, is_resting, up_component
 
 ENVELOPE = (0.25, 0.25, 0.045)
-SCENARIO = Scenario(name="a", base=Base(x_m=1.0, y_m=0.0), start=Start(x_m=1.0))
+SCENARIO = Scenario(name="a", base=Base(x_m=1.0, y_m=0.0), start=StartPose(x_m=1.0))
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 INVERTED = (0.0, 1.0, 0.0, 0.0)
 

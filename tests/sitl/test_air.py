@@ -8,7 +8,7 @@ from scipy.signal import welch
 
 from framerunner.vehicle.airframe import AirEffects, load_airframe
 from scenarios.air import Wind
-from scenarios.models import Base, Scenario, Start
+from scenarios.models import Base, Scenario, StartPose
 from sitl.air.wind import MIN_AIRSPEED_M_S, SimulatedWind
 from sitl.dynamics import Dynamics
 from sitl.world import World
@@ -201,7 +201,7 @@ def test_ground_effect_is_bounded():
 
 
 def states(seed, wind=WIND, airframe=X500):
-    world = World(Scenario(name="windy", base=Base(), start=Start(), wind=wind), airframe, seed)
+    world = World(Scenario(name="windy", base=Base(), start=StartPose(), wind=wind), airframe, seed)
     for _ in range(500):
         world.step((1.02 * airframe.hover_speed_rad_s,) * 4)
     return world.sensors()

@@ -9,12 +9,12 @@ import pytest
 
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Quaternion, Vec3
-from scenarios.models import Arena, Base, Camera, Decoy, Doorway, Frame, Light, Pole, Scenario, Wall
-from sitl.camera import Camera as PaintedCamera
+from scenarios.models import Arena, Base, Camera, Decoy, Doorway, Gate, Light, Pole, Scenario, Wall
+from sitl.camera import SimulatedCamera as PaintedCamera
 from sitl.camera_projection import SUBPIXELS, Mesh, Pinhole
 from sitl.camera_scene import GROUND_BGR, SKY_BGR, build_scene
 from sitl.optics.painter import Image
-from sitl.solids import frame_solids
+from sitl.solids import gate_solids
 from sitl.video import encode_jpeg
 from vision.detector import detect
 from vision.types import NOT_SEEN
@@ -25,12 +25,12 @@ CLASSES |= {"cyan": CYAN, "magenta": MAGENTA, "pole": VIOLET, "wall": VIOLET}
 OVERSAMPLING = 3
 
 
-def frame(colour: str, x: float, y: float, z: float, yaw: float) -> Frame:
-    return Frame.model_validate({"colour": colour, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": yaw})
+def gate(colour: str, x: float, y: float, z: float, yaw: float) -> Gate:
+    return Gate.model_validate({"colour": colour, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": yaw})
 
 
-FRAMES = (frame("red", 3, 2, 2, 3), frame("green", -2, 1, 0.5, 2), frame("blue", 3, -1, 1, 1))
-SCENARIO = Scenario(name="scene", base=Base(x_m=-3, y_m=-3), frames=FRAMES)
+GATES = (gate("red", 3, 2, 2, 3), gate("green", -2, 1, 0.5, 2), gate("blue", 3, -1, 1, 1))
+SCENARIO = Scenario(name="scene", base=Base(x_m=-3, y_m=-3), frames=GATES)
 
 
 def quaternion(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> Quaternion:
@@ -58,7 +58,7 @@ def focal(camera: Camera) -> float:
     return float(camera.width_px / 2 / np.tan(camera.horizontal_fov_rad / 2))
 
 
-def outer_corners(one: Frame) -> npt.NDArray[np.float64]:
+def outer_corners(one: Gate) -> npt.NDArray[np.float64]:
     c, s = cos(one.yaw_rad), sin(one.yaw_rad)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     half = np.array([one.bar_m, one.outer_width_m, one.outer_height_m]) / 2
@@ -80,9 +80,9 @@ def projected(
 
 
 def facing(
-    one: Frame, distance: float, turn: float = 0.0, side: float = 0.0, up: float = 0.0
+    one: Gate, distance: float, turn: float = 0.0, side: float = 0.0, up: float = 0.0
 ) -> tuple[Vec3, Quaternion]:
-    """Pose whose camera stands before a frame, `turn` round it, looking at its centre (moved by side, up)."""
+    """Pose whose camera stands before a gate, `turn` round it, looking at its centre (moved by side, up)."""
     yaw = one.yaw_rad + turn
     x = one.x_m - distance * cos(yaw) - side * sin(yaw) - 0.08 * cos(yaw)
     y = one.y_m - distance * sin(yaw) + side * cos(yaw) - 0.08 * sin(yaw)
@@ -92,7 +92,7 @@ def facing(
 def palette(scenario: Scenario) -> dict[int, int]:
     """What every painted colour stands for."""
     scene = build_scene(scenario)
-    names = [BASE, *(CLASSES[one.colour] for one in scenario.all_frames)]
+    names = [BASE, *(CLASSES[one.colour] for one in scenario.all_gates)]
     names += [CLASSES[prism.name] for prism in scenario.prisms]
     colours = [(colour, SKY) for colour in SKY_BGR] + [(GROUND_BGR, GROUND), (scene.tatami.colour, TATAMI)]
     colours += [(face.colour, TATAMI) for face in scene.mats]
@@ -133,7 +133,7 @@ def traced(scenario: Scenario, position: Vec3, q: Quaternion) -> npt.NDArray[np.
     with np.errstate(invalid="ignore", over="ignore"):
         place = origin[:2] + np.where(to_floor < inf, to_floor, 0.0)[:, None] * rays[:, :2]
     result[(to_floor < inf) & (abs(place) <= 5).all(axis=1)] = TATAMI
-    solids = [scenario.base.solid] + [bar for one in scenario.all_frames for bar in frame_solids(one)]
+    solids = [scenario.base.solid] + [bar for one in scenario.all_gates for bar in gate_solids(one)]
     solids += scenario.prisms
     for solid in solids:
         entry = entry_of_rays(solid, origin, rays)
@@ -174,9 +174,9 @@ WALL = Scenario(
     name="crowd",
     camera=Camera(width_px=96, height_px=72),
     frames=(
-        frame("red", 0.8, -0.15, 1.0, 0.0),
-        frame("green", 0.65, 0.15, 0.95, 1.2),
-        frame("blue", 0.6, 0.1, 1.2, 0.5),
+        gate("red", 0.8, -0.15, 1.0, 0.0),
+        gate("green", 0.65, 0.15, 0.95, 1.2),
+        gate("blue", 0.6, 0.1, 1.2, 0.5),
     ),
     base=Base(x_m=1.2, y_m=0.2, top_m=0.8),
 )
@@ -223,9 +223,9 @@ def test_agrees_with_a_ray_tracer_between_obstacles(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_agrees_with_a_ray_tracer_close_to_frames_and_through_them(seed: int) -> None:
+def test_agrees_with_a_ray_tracer_close_to_gates_and_through_them(seed: int) -> None:
     rng = np.random.default_rng(200 + seed)
-    one = FRAMES[seed % 3]
+    one = GATES[seed % 3]
     distance, turn, side, up = rng.uniform((-0.05, -0.6, -0.12, -0.05), (0.5, 0.6, 0.12, 0.05))
     position, q = facing(one, distance, turn, side, up)
     assert not wrong_pixels(SMALL, position, q).any()
@@ -239,9 +239,9 @@ def test_things_before_each_other_hide_rightly(seed: int) -> None:
     assert not wrong_pixels(WALL, (x, y, height), quaternion(around, (height - 1) / distance)).any()
 
 
-def test_nearer_frame_hides_the_farther_one_from_both_sides() -> None:
-    frames = (frame("red", -1, 0, 1, 0), frame("green", 1, 0, 1, 0))
-    camera = PaintedCamera(Scenario(name="two", frames=frames, base=Base(x_m=4, y_m=4)))
+def test_nearer_gate_hides_the_farther_one_from_both_sides() -> None:
+    gates = (gate("red", -1, 0, 1, 0), gate("green", 1, 0, 1, 0))
+    camera = PaintedCamera(Scenario(name="two", frames=gates, base=Base(x_m=4, y_m=4)))
     bar = 0.1  # height of the upper bars above the middle: both are seen along one line
     from_behind = camera.render((-2.08, 0, 1 + bar), quaternion(0))
     from_ahead = camera.render((2.08, 0, 1 + bar), quaternion(pi))
@@ -279,7 +279,7 @@ def test_projection_is_that_of_opencv() -> None:
 
 def test_painted_boxes_are_unbiased() -> None:
     rng = np.random.default_rng(2)
-    one = frame("green", 0, 0, 2, 0.4)
+    one = gate("green", 0, 0, 2, 0.4)
     alone = Scenario(name="alone", frames=(one,), base=Base(x_m=-4.5, y_m=4.5))
     camera, errors = PaintedCamera(alone), []
     for _ in range(300):
@@ -298,7 +298,7 @@ def test_painted_boxes_are_unbiased() -> None:
 
 
 def test_thin_bars_far_away_do_not_vanish() -> None:
-    one = frame("red", 0, 0, 1.5, 0)
+    one = gate("red", 0, 0, 1.5, 0)
     camera = PaintedCamera(Scenario(name="far", frames=(one,), base=Base(x_m=4, y_m=4)))
     for distance in (6.0, 8.0, 10.0):  # a bar is 0.5 to 0.3 pixels wide
         red = classes(camera.render(*facing(one, distance)), Scenario(name="far", frames=(one,))) == RED
@@ -312,9 +312,9 @@ def test_thin_bars_far_away_do_not_vanish() -> None:
 
 @pytest.mark.parametrize("ambient", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("sun", [(-0.5, 0.1, -0.9), (0.3, 0.3, 0.1), (0.0, 0.0, -1.0)])
-def test_frames_keep_their_colour_in_light_and_shade(ambient: float, sun: Vec3) -> None:
+def test_gates_keep_their_colour_in_light_and_shade(ambient: float, sun: Vec3) -> None:
     scenario = SCENARIO.model_copy(update={"light": Light(ambient=ambient, sun_direction_arena=sun)})
-    for body, one in zip(build_scene(scenario).bodies[1:], FRAMES, strict=True):
+    for body, one in zip(build_scene(scenario).bodies[1:], GATES, strict=True):
         shown = ("blue", "green", "red").index(one.colour)
         for face in body.faces:
             others = [face.colour[i] for i in range(3) if i != shown]
@@ -323,7 +323,7 @@ def test_frames_keep_their_colour_in_light_and_shade(ambient: float, sun: Vec3) 
 
 
 @pytest.mark.parametrize("ambient", [0.0, 0.5, 1.0])
-def test_nothing_but_frames_has_a_frame_colour(ambient: float) -> None:
+def test_nothing_but_gates_has_a_gate_colour(ambient: float) -> None:
     bare = SCENARIO.model_copy(update={"frames": (), "light": Light(ambient=ambient)})
     camera = PaintedCamera(bare)
     for yaw in (0.5, 2.0, 4.0):
@@ -374,7 +374,7 @@ def test_odd_poses_give_an_image(position: Vec3, q: Quaternion) -> None:
 @pytest.mark.filterwarnings("error")
 def test_corners_exactly_on_the_near_plane_and_on_the_eye() -> None:
     camera = PaintedCamera(SCENARIO.model_copy(update={"camera": Camera(position_flu_m=(0.0, 0.0, 0.0))}))
-    for corner in outer_corners(FRAMES[2]):
+    for corner in outer_corners(GATES[2]):
         for depth in (0.0, 0.01):
             x, y, z = corner.tolist()
             camera.render((x - depth, y, z), (1.0, 0.0, 0.0, 0.0))
@@ -405,7 +405,7 @@ def test_attitude_must_be_a_rotation(q: Quaternion) -> None:
 
 def test_same_pose_same_image_and_a_new_one_each_time() -> None:
     first, second = PaintedCamera(SCENARIO), PaintedCamera(SCENARIO)
-    pose = facing(FRAMES[0], 1.0, 0.3)
+    pose = facing(GATES[0], 1.0, 0.3)
     image = first.render(*pose)
     first.render((0.0, 0.0, 1.0), quaternion(1))
     again = first.render(*pose)
@@ -414,8 +414,8 @@ def test_same_pose_same_image_and_a_new_one_each_time() -> None:
     assert not np.shares_memory(image, again)
 
 
-def test_frames_beyond_the_far_plane_are_not_seen() -> None:
-    one = frame("red", 4, 0, 1, 0)
+def test_gates_beyond_the_far_plane_are_not_seen() -> None:
+    one = gate("red", 4, 0, 1, 0)
     for far, seen in ((20.0, True), (5.0, False)):
         scenario = Scenario(name="far", frames=(one,), camera=Camera(far_m=far))
         image = PaintedCamera(scenario).render((-4.0, 0.0, 1.0), quaternion(0))
@@ -423,7 +423,7 @@ def test_frames_beyond_the_far_plane_are_not_seen() -> None:
 
 
 def test_shadow_lies_where_the_sun_throws_it() -> None:
-    one = frame("red", 0, 0, 1, 0)
+    one = gate("red", 0, 0, 1, 0)
     scenario = Scenario(name="sun", frames=(one,), base=Base(x_m=4, y_m=4))
     down = quaternion(0, pi / 2)
     # Sun (-0.5, 0.1, -0.9): the middle of the lower bar's shadow lies at its height times (-5, 1) / 9.
@@ -434,6 +434,6 @@ def test_shadow_lies_where_the_sun_throws_it() -> None:
     assert image[middle].mean() < 0.8 * lit[middle].mean()
 
 
-def test_no_frames_and_empty_floor() -> None:
+def test_no_gates_and_empty_floor() -> None:
     image = PaintedCamera(Scenario(name="empty")).render((-3.0, 0.0, 1.0), quaternion(atan2(0.0, 1.0)))
     assert set(np.unique(classes(image, Scenario(name="empty")))) == {SKY, GROUND, TATAMI, BASE}

@@ -5,8 +5,8 @@ import pytest
 
 from framerunner.geometry.solids import Solid
 from scenarios.loader import load_scenario
-from scenarios.models import Base, Doorway, Scenario, Start, Wall
-from sitl.camera import Camera
+from scenarios.models import Base, Doorway, Scenario, StartPose, Wall
+from sitl.camera import SimulatedCamera
 from sitl.camera_scene import DRONE_BGR, PaintTree, build_scene
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -15,7 +15,7 @@ HALF_M = (0.15, 0.15, 0.05)
 
 @pytest.fixture(scope="module")
 def camera():
-    return Camera(load_scenario("test-case-1"))
+    return SimulatedCamera(load_scenario("test-case-1"))
 
 
 def dark(image):
@@ -51,7 +51,9 @@ def test_the_base_hides_what_is_behind_it(camera):
 
 def test_a_wall_hides_what_is_behind_it_and_a_doorway_does_not():
     wall = Wall(x_m=2, y_m=-4, end_x_m=2, end_y_m=4, doorway=Doorway(offset_m=4.2, width_m=1.2))
-    camera = Camera(Scenario(name="a", base=Base(x_m=-4, y_m=-4), start=Start(x_m=-4, y_m=-4), walls=(wall,)))
+    camera = SimulatedCamera(
+        Scenario(name="a", base=Base(x_m=-4, y_m=-4), start=StartPose(x_m=-4, y_m=-4), walls=(wall,))
+    )
 
     def is_seen(x_m, y_m):
         return dark(camera.render((-1.0, y_m, 1.0), LEVEL, [Solid("d", (x_m, y_m, 1.0), 0.0, HALF_M)])).any()
@@ -69,7 +71,7 @@ def test_a_place_in_the_order_is_behind_what_hides_it_and_before_what_it_hides(s
     eye = rng.uniform((-6, -6, 0.2), (6, 6, 5))
     near = [face.corners_arena_m.mean(axis=0) + rng.normal(0, 0.05, 3) for face in tree.faces]
     points = np.vstack((rng.uniform((-5, -5, 0.05), (5, 5, 4), (40, 3)), near))
-    # What is in a frame's opening is before a part of the frame and behind another.
+    # What is in a gate's opening is before a part of the gate and behind another.
     outside = [all(body.hull.distance_m(tuple(point)) > 0.0 for body in bodies) for point in points]
     points = points[outside]
     order = tree.back_to_front(tuple(eye))

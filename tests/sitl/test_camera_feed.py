@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scenarios.models import Camera, Frame, Scenario, TrueState
+from scenarios.models import Camera, Gate, Scenario, TrueState
 from sitl.camera import CameraFeed
 
 TICK_US = 4_000
@@ -13,7 +13,7 @@ def scenario(**camera):
     return Scenario(
         name="feed",
         camera=Camera(width_px=32, height_px=24, **camera),
-        frames=(Frame(colour="red", x_m=2, y_m=0, z_m=1),),
+        frames=(Gate(colour="red", x_m=2, y_m=0, z_m=1),),
     )
 
 

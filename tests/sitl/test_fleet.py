@@ -7,7 +7,7 @@ import pytest
 
 from framerunner.vehicle.airframe import load_airframe
 from scenarios.loader import list_scenarios, load_scenario
-from scenarios.models import Start, ground_height, is_over_base
+from scenarios.models import StartPose, ground_height, is_over_base
 from sitl.fleet import Fleet, side_by_side
 from sitl.world import World
 
@@ -16,7 +16,7 @@ WIDTH_M = max(AIRFRAME.envelope_m[:2])
 
 
 @pytest.mark.parametrize("name", list_scenarios())
-def test_drones_start_apart_beside_base_and_frames(name):
+def test_drones_start_apart_beside_base_and_gates(name):
     scenario = load_scenario(name)
     starts = [one.start for one in side_by_side(scenario, 8, WIDTH_M)]
     assert starts[0] == scenario.start
@@ -42,7 +42,7 @@ def test_four_stand_nearest_to_the_first():
 def worlds_at(*places):
     scenario = load_scenario("empty")
     return [
-        World(scenario.model_copy(update={"start": Start(x_m=x, y_m=y, yaw_rad=0.0)}), AIRFRAME)
+        World(scenario.model_copy(update={"start": StartPose(x_m=x, y_m=y, yaw_rad=0.0)}), AIRFRAME)
         for x, y in places
     ]
 

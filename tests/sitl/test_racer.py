@@ -5,11 +5,11 @@ from math import hypot, pi, sqrt
 import numpy as np
 import pytest
 
-from firmware_py.commands import VelocityCommand
+from firmware_py.commands import VelocityFrdCommand
 from firmware_py.status import FlightMode
 from framerunner.vehicle.airframe import load_airframe
 from scenarios.air import Wind
-from scenarios.models import Frame, Scenario
+from scenarios.models import Gate, Scenario
 from tests.firmware_py.flying import Flight
 from tests.flight import Hover
 
@@ -34,8 +34,8 @@ def test_its_file_agrees_with_its_sources():
     assert 2 * RACER.motor.radius_m == DIAMETER_M
 
 
-def test_it_fits_through_a_frame_also_when_tilted():
-    width_m, height_m = Frame(colour="red", x_m=0, y_m=0, z_m=1).opening_m
+def test_it_fits_through_a_gate_also_when_tilted():
+    width_m, height_m = Gate(colour="red", x_m=0, y_m=0, z_m=1).opening_m
     assert RACER.envelope_m[1] < width_m - 0.1
     assert RACER.envelope_m[2] + RACER.envelope_m[0] * np.sin(0.35) < height_m  # 20 degrees
 
@@ -44,10 +44,10 @@ def test_it_fits_through_a_frame_also_when_tilted():
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_steps_of_velocity_do_not_overshoot(axis, sign):
     hover = Hover(RACER)
-    hover.fly(1.0, VelocityCommand())
+    hover.fly(1.0, VelocityFrdCommand())
     wanted = [0.0, 0.0, 0.0]
     wanted[axis] = sign
-    samples = hover.fly(3.0, VelocityCommand(tuple(wanted)))
+    samples = hover.fly(3.0, VelocityFrdCommand(tuple(wanted)))
     reached = [sign * getattr(s, ("forward_m_s", "right_m_s", "down_m_s")[axis]) for s in samples]
     assert next(i for i, v in enumerate(reached) if v > 0.9) < 0.5 / 0.004
     assert max(reached) < 1.02
@@ -59,8 +59,8 @@ def test_steps_of_velocity_do_not_overshoot(axis, sign):
 def test_steady_wind_leaves_no_error_of_velocity(airframe, velocity):
     hover = Hover(load_airframe(airframe))
     hover.dynamics.set_air_velocity((4.0, -3.0, 0.0))
-    hover.fly(6.0, VelocityCommand(velocity))
-    last = hover.fly(0.5, VelocityCommand(velocity))[-1]
+    hover.fly(6.0, VelocityFrdCommand(velocity))
+    last = hover.fly(0.5, VelocityFrdCommand(velocity))[-1]
     assert (last.forward_m_s, last.right_m_s, last.down_m_s) == pytest.approx(velocity, abs=0.003)
     assert last.tilt_rad > 0.02
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from framerunner.geometry.solids import Solid
-from scenarios.models import Frame
-from sitl.solids import frame_solids, touch
+from scenarios.models import Gate
+from sitl.solids import gate_solids, touch
 
 DRONE = (0.125, 0.125, 0.0225)
 
@@ -32,7 +32,7 @@ def euler(yaw, pitch, roll):
 
 
 def test_bars_enclose_the_opening():
-    bars = frame_solids(Frame(colour="red", x_m=1, y_m=2, z_m=1.5, yaw_rad=pi / 2))
+    bars = gate_solids(Gate(colour="red", x_m=1, y_m=2, z_m=1.5, yaw_rad=pi / 2))
     assert [bar.name for bar in bars] == ["red"] * 4
     tops = [bar.centre_arena_m[2] for bar in bars[:2]]
     assert tops == pytest.approx([1.6, 1.4])
@@ -43,9 +43,9 @@ def test_bars_enclose_the_opening():
 
 @given(st.floats(-0.06, 0.06), st.floats(-0.06, 0.06), st.floats(-pi, pi))
 def test_a_centred_drone_fits_through(y, z, yaw):
-    frame = Frame(colour="green", x_m=0, y_m=0, z_m=1, yaw_rad=yaw)
+    gate = Gate(colour="green", x_m=0, y_m=0, z_m=1, yaw_rad=yaw)
     centre = (-sin(yaw) * y, cos(yaw) * y, 1 + z)
-    assert all(touch(bar, centre, about_z(yaw), DRONE) is None for bar in frame_solids(frame))
+    assert all(touch(bar, centre, about_z(yaw), DRONE) is None for bar in gate_solids(gate))
 
 
 @pytest.mark.parametrize(
@@ -53,8 +53,8 @@ def test_a_centred_drone_fits_through(y, z, yaw):
     [((0.0, 0.075, 1.0), (0, -1, 0)), ((0.0, 0.0, 1.075), (0, 0, -1)), ((0.125, 0.15, 1.0), (1, 0, 0))],
 )
 def test_pushes_out_the_shortest_way(centre, normal):
-    frame = Frame(colour="green", x_m=0, y_m=0, z_m=1)
-    found = [hit for bar in frame_solids(frame) if (hit := touch(bar, centre, about_z(0.0), DRONE))]
+    gate = Gate(colour="green", x_m=0, y_m=0, z_m=1)
+    found = [hit for bar in gate_solids(gate) if (hit := touch(bar, centre, about_z(0.0), DRONE))]
     assert len(found) == 1
     assert found[0].normal_arena == pytest.approx(normal, abs=1e-9)
     assert 0 < found[0].depth_m <= 0.0101

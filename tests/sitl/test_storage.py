@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_py.storage import Entry, parse_path
+from firmware_py.storage import StorageEntry, parse_path
 from sitl.storage import FolderStorage, StorageFolderError, StorageLimits, TemporaryStorage, open_storage
 from tests.disk import disk_that_takes
 
@@ -78,7 +78,7 @@ def test_times_and_kinds(storage):
     file, folder = storage.entries(())
     assert (file.name, file.is_folder, folder.name, folder.is_folder) == ("file", False, "folder", True)
     assert abs(file.modified_unix_s - datetime.now(UTC).timestamp()) < 5
-    assert storage.entry(()) == Entry("", 0, True)
+    assert storage.entry(()) == StorageEntry("", 0, True)
 
 
 def test_errors_have_numbers(storage):

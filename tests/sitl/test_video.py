@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 import pytest
 
-from scenarios.models import Base, Frame, Scenario
-from sitl.camera import Camera
+from scenarios.models import Base, Gate, Scenario
+from sitl.camera import SimulatedCamera
 from sitl.video import Image, VideoError, VideoServer, encode_jpeg
 from vision.detector import detect
 
@@ -223,12 +223,12 @@ def test_importing_the_module_does_not_import_the_http_library() -> None:
 
 
 def test_compression_keeps_thin_bars_detectable() -> None:
-    frames = [
-        Frame(colour="red", x_m=0, y_m=0.6, z_m=1.3),
-        Frame(colour="green", x_m=0, y_m=0, z_m=1, yaw_rad=0.3),
-        Frame(colour="blue", x_m=0, y_m=-0.6, z_m=0.7, yaw_rad=pi),
+    gates = [
+        Gate(colour="red", x_m=0, y_m=0.6, z_m=1.3),
+        Gate(colour="green", x_m=0, y_m=0, z_m=1, yaw_rad=0.3),
+        Gate(colour="blue", x_m=0, y_m=-0.6, z_m=0.7, yaw_rad=pi),
     ]
-    camera = Camera(Scenario(name="bars", frames=tuple(frames), base=Base(x_m=4, y_m=4)))
+    camera = SimulatedCamera(Scenario(name="bars", frames=tuple(gates), base=Base(x_m=4, y_m=4)))
     for distance in (1.0, 2.0, 3.0, 4.0):
         image = camera.render((-distance, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
         decoded = cv2.imdecode(np.frombuffer(encode_jpeg(image), np.uint8), cv2.IMREAD_COLOR)

@@ -4,10 +4,10 @@ from math import hypot, isfinite, pi
 
 import pytest
 
-from firmware_py.commands import VelocityCommand
+from firmware_py.commands import VelocityFrdCommand
 from firmware_py.control.stabiliser import Stabiliser
 from framerunner.vehicle.airframe import load_airframe
-from scenarios.models import Base, Decoy, Frame, Pole, Scenario, Start, Wall
+from scenarios.models import Base, Decoy, Gate, Pole, Scenario, StartPose, Wall
 from sitl.world import CONTROL_PERIOD_US, MAX_RATE_RAD_S, PHYSICS_RATE_HZ, World
 from tests.flight import state_of
 
@@ -35,7 +35,7 @@ class Flight:
 
 
 def test_stands_on_the_base_at_rest_with_the_given_heading():
-    w = world(base=Base(x_m=-3, y_m=-3), start=Start(x_m=-3, y_m=-3, yaw_rad=1.0))
+    w = world(base=Base(x_m=-3, y_m=-3), start=StartPose(x_m=-3, y_m=-3, yaw_rad=1.0))
     truth = w.truth(w.sensors(), motors_on=False)
     assert w.time_us == 0
     assert truth.position_arena_m == pytest.approx((-3, -3, 0.51 + 0.0225), abs=3e-3)
@@ -46,7 +46,7 @@ def test_stands_on_the_base_at_rest_with_the_given_heading():
 
 
 def test_stands_on_the_floor_beside_the_base():
-    w = world(base=Base(x_m=2), start=Start(x_m=0))
+    w = world(base=Base(x_m=2), start=StartPose(x_m=0))
     truth = w.truth(w.sensors(), motors_on=False)
     assert truth.position_arena_m[2] == pytest.approx(0.0225, abs=3e-3)
     assert truth.contacts == ("floor",)
@@ -61,35 +61,35 @@ def test_time_is_exact():
 
 def test_same_inputs_give_the_same_states_bit_for_bit():
     def states():
-        flight = Flight(world(frames=(Frame(colour="red", x_m=1.0, y_m=0.1, z_m=1.0),)))
-        flight.fly(1.0, VelocityCommand((0.0, 0.0, -0.8)))
-        flight.fly(3.0, VelocityCommand((1.0, 0.1, 0.0), 0.3))
+        flight = Flight(world(frames=(Gate(colour="red", x_m=1.0, y_m=0.1, z_m=1.0),)))
+        flight.fly(1.0, VelocityFrdCommand((0.0, 0.0, -0.8)))
+        flight.fly(3.0, VelocityFrdCommand((1.0, 0.1, 0.0), 0.3))
         return [(t.position_arena_m, t.attitude_arena, t.contacts) for t in flight.truths]
 
     first = states()
     assert first == states()
 
 
-def test_flies_through_a_frame_without_touching():
-    flight = Flight(world(frames=(Frame(colour="red", x_m=1.0, y_m=0.0, z_m=1.5),)))
-    flight.fly(3.0, VelocityCommand((0.0, 0.0, -0.322)))
-    height = flight.fly(1.0, VelocityCommand()).position_arena_m[2]
-    flight.fly(1.0, VelocityCommand((0.0, 0.0, height - 1.5)))
-    flight.fly(1.0, VelocityCommand())
-    last = flight.fly(5.0, VelocityCommand((0.4, 0.0, 0.0)))
+def test_flies_through_a_gate_without_touching():
+    flight = Flight(world(frames=(Gate(colour="red", x_m=1.0, y_m=0.0, z_m=1.5),)))
+    flight.fly(3.0, VelocityFrdCommand((0.0, 0.0, -0.322)))
+    height = flight.fly(1.0, VelocityFrdCommand()).position_arena_m[2]
+    flight.fly(1.0, VelocityFrdCommand((0.0, 0.0, height - 1.5)))
+    flight.fly(1.0, VelocityFrdCommand())
+    last = flight.fly(5.0, VelocityFrdCommand((0.4, 0.0, 0.0)))
     assert last.position_arena_m[0] > 1.5
     assert not any("red" in truth.contacts for truth in flight.truths)
 
 
 @pytest.mark.parametrize("speed_m_s", [0.3, 1.0, 2.0])
-def test_a_frame_is_solid(speed_m_s):
+def test_a_gate_is_solid(speed_m_s):
     """Flown at beside its opening, the drone touches it, loses speed and does not come out behind it."""
-    frame = Frame(colour="blue", x_m=1.2, y_m=0.2, z_m=1.0)
-    flight = Flight(world(base=Base(x_m=-4), frames=(frame,)))
-    flight.fly(1.6, VelocityCommand((0.0, 0.0, -0.65)))
-    flight.fly(1.0, VelocityCommand())
+    gate = Gate(colour="blue", x_m=1.2, y_m=0.2, z_m=1.0)
+    flight = Flight(world(base=Base(x_m=-4), frames=(gate,)))
+    flight.fly(1.6, VelocityFrdCommand((0.0, 0.0, -0.65)))
+    flight.fly(1.0, VelocityFrdCommand())
     before = len(flight.truths)
-    flight.fly(1.0 + 1.2 / speed_m_s, VelocityCommand((speed_m_s, 0.0, 0.0)))
+    flight.fly(1.0 + 1.2 / speed_m_s, VelocityFrdCommand((speed_m_s, 0.0, 0.0)))
     touched = [truth for truth in flight.truths if "blue" in truth.contacts]
     assert touched
     # The drone's front face stays short of the bar's far side (it gives by a spring's travel).
@@ -107,9 +107,9 @@ def test_a_frame_is_solid(speed_m_s):
 )
 def test_obstacles_are_solid(name, parts):
     flight = Flight(world(base=Base(x_m=-4), **parts))
-    flight.fly(1.6, VelocityCommand((0.0, 0.0, -0.65)))
-    flight.fly(1.0, VelocityCommand())
-    flight.fly(2.5, VelocityCommand((1.0, 0.0, 0.0)))
+    flight.fly(1.6, VelocityFrdCommand((0.0, 0.0, -0.65)))
+    flight.fly(1.0, VelocityFrdCommand())
+    flight.fly(2.5, VelocityFrdCommand((1.0, 0.0, 0.0)))
     touched = [truth for truth in flight.truths if name in truth.contacts]
     assert touched
     near_side_m = 1.2 - {"pole": 0.075, "wall": 0.05, "cyan": 0.01}[name]
@@ -117,18 +117,18 @@ def test_obstacles_are_solid(name, parts):
 
 
 def test_the_side_of_the_base_is_solid():
-    flight = Flight(world(base=Base(x_m=1.5), start=Start(x_m=0)))
-    flight.fly(1.0, VelocityCommand((0.0, 0.0, -0.3)))
-    flight.fly(3.0, VelocityCommand((0.6, 0.0, 0.0)))
+    flight = Flight(world(base=Base(x_m=1.5), start=StartPose(x_m=0)))
+    flight.fly(1.0, VelocityFrdCommand((0.0, 0.0, -0.3)))
+    flight.fly(3.0, VelocityFrdCommand((0.6, 0.0, 0.0)))
     assert any("base" in truth.contacts for truth in flight.truths)
     assert max(truth.position_arena_m[0] for truth in flight.truths) < 1.5 - 0.25 - 0.125 + 0.03
     assert max(truth.position_arena_m[2] for truth in flight.truths) < 0.6
 
 
 def test_motors_off_above_the_base_falls_onto_it_and_stays():
-    w = world(base=Base(), start=Start())
+    w = world(base=Base(), start=StartPose())
     flight = Flight(w)
-    flight.fly(1.0, VelocityCommand((0.0, 0.0, -0.2)))
+    flight.fly(1.0, VelocityFrdCommand((0.0, 0.0, -0.2)))
     for _ in range(500):
         w.step((0.0, 0.0, 0.0, 0.0))
     truth = w.truth(w.sensors(), motors_on=False)
@@ -138,10 +138,10 @@ def test_motors_off_above_the_base_falls_onto_it_and_stays():
 
 
 def test_a_drone_past_the_edge_falls_off():
-    w = world(base=Base(x_m=0.0), start=Start(x_m=0.24, yaw_rad=pi / 4))
+    w = world(base=Base(x_m=0.0), start=StartPose(x_m=0.24, yaw_rad=pi / 4))
     flight = Flight(w)
-    flight.fly(1.0, VelocityCommand((0.0, 0.0, -0.2)))
-    flight.fly(1.0, VelocityCommand((0.1, 0.1, 0.0)))
+    flight.fly(1.0, VelocityFrdCommand((0.0, 0.0, -0.2)))
+    flight.fly(1.0, VelocityFrdCommand((0.1, 0.1, 0.0)))
     for _ in range(750):
         w.step((0.0, 0.0, 0.0, 0.0))
     assert w.truth(w.sensors(), motors_on=False).position_arena_m[2] < 0.3

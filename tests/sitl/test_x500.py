@@ -4,7 +4,7 @@ from math import cos, hypot, radians, sin, sqrt, tanh
 
 import pytest
 
-from firmware_py.commands import VelocityCommand
+from firmware_py.commands import VelocityFrdCommand
 from framerunner.vehicle.airframe import load_airframe
 from scenarios.loader import load_scenario
 from sitl.dynamics import Dynamics
@@ -57,7 +57,7 @@ def test_rotors_are_in_px4s_order_and_turn_as_px4s_do(stronger, axis, sign):
 
 def test_cruise_takes_the_tilt_that_the_drag_asks_for():
     hover = Hover(X500, height_m=60.0)
-    last = hover.fly(6.0, VelocityCommand((12.0, 0.0, 0.0)))[-1]
+    last = hover.fly(6.0, VelocityFrdCommand((12.0, 0.0, 0.0)))[-1]
     assert 10.0 < last.tilt_rad * 57.3 < 18.0
     forward, _, down = X500.drag.force_n_s2_m2
     along, through = 12.0 * cos(last.tilt_rad), 12.0 * sin(last.tilt_rad)

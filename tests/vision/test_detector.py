@@ -65,7 +65,7 @@ def test_one_pixel_has_no_size() -> None:
     assert (found.d, found.a) == (inf, inf)
 
 
-def test_wider_than_a_frame_has_angle_zero() -> None:
+def test_wider_than_a_gate_has_angle_zero() -> None:
     assert detect(box(picture(), (100, 110), (100, 200), BGR["green"])).green.a == 0.0
 
 

@@ -14,8 +14,8 @@ import pytest
 from tests.vision.hostile_images import progressive_of_many_scans
 from vision.decoder import ImageDecoder
 from vision.jpeg import ImageError
-from vision.worker import Reply, Request
-from vision.worker_process import WorkerEndedError, WorkerProcess
+from vision.worker import WorkerReply, WorkerRequest
+from vision.worker_process import CameraProcess, WorkerEndedError
 
 IMAGE = np.arange(30 * 40 * 3, dtype=np.uint8).reshape(30, 40, 3)
 PNG = bytes(cv2.imencode(".png", IMAGE)[1])
@@ -36,12 +36,12 @@ async def gone(pid: int) -> None:
 
 
 async def test_images_come_back_in_order() -> None:
-    worker = WorkerProcess()
+    worker = CameraProcess()
     try:
         for _ in range(3):
-            answer = await worker.request(Request.DECODE, PNG)
+            answer = await worker.request(WorkerRequest.DECODE, PNG)
             assert np.array_equal(answer.image, IMAGE)
-            assert (await worker.request(Request.DECODE, b"garbage")).reply is Reply.NO_IMAGE
+            assert (await worker.request(WorkerRequest.DECODE, b"garbage")).reply is WorkerReply.NO_IMAGE
     finally:
         worker.end()
 
@@ -71,13 +71,13 @@ async def test_an_image_that_takes_too_long_ends_its_process_while_the_loop_turn
 
 
 async def test_a_process_that_dies_is_replaced() -> None:
-    worker = WorkerProcess()
+    worker = CameraProcess()
     try:
         await worker.start()
         os.kill(worker.pid, signal.SIGKILL)
         with pytest.raises(WorkerEndedError):
-            await worker.request(Request.DECODE, PNG)
-        assert np.array_equal((await worker.request(Request.DECODE, PNG)).image, IMAGE)
+            await worker.request(WorkerRequest.DECODE, PNG)
+        assert np.array_equal((await worker.request(WorkerRequest.DECODE, PNG)).image, IMAGE)
     finally:
         worker.end()
 
@@ -97,13 +97,13 @@ async def test_closing_ends_a_process_at_work() -> None:
 
 PARENT = """
 import asyncio, sys
-from vision.worker import Request
-from vision.worker_process import WorkerProcess
+from vision.worker import WorkerRequest
+from vision.worker_process import CameraProcess
 async def main():
-    worker = WorkerProcess()
+    worker = CameraProcess()
     await worker.start()
     print(worker.pid, flush=True)
-    await worker.request(Request.DECODE, sys.stdin.buffer.read())
+    await worker.request(WorkerRequest.DECODE, sys.stdin.buffer.read())
 asyncio.run(main())
 """
 

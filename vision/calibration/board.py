@@ -45,7 +45,7 @@ _TEXT_MM = 4.0
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class BoardView:
     """The board in one image."""
 
     name: str
@@ -53,7 +53,7 @@ class View:
     ids: npt.NDArray[np.int32]  # numbers of the corners, shape (n,)
     size_px: tuple[int, int]  # of the image
 
-    def distance(self, other: View) -> float:
+    def distance(self, other: BoardView) -> float:
         """Mean distance of the corners that both have, as a share of the image's width; 1 if too few."""
         _, mine, others = np.intersect1d(self.ids, other.ids, return_indices=True)
         if len(mine) < MIN_CORNERS // 2:
@@ -74,7 +74,7 @@ class CalibrationReport:
 
 
 @dataclass(frozen=True)
-class Board:
+class CharucoBoard:
     """A ChArUco board; by default it fits on A4 and on US letter, landscape.
 
     The size of a square has no effect on a calibration; that all are squares has.
@@ -129,7 +129,7 @@ class Board:
         _, data = cv2.imencode(".png", np.vstack([picture, below]))
         return _with_resolution(data.tobytes())
 
-    def find(self, image: Image, name: str) -> View | None:
+    def find(self, image: Image, name: str) -> BoardView | None:
         """The board's corners in an image, BGR or grey; None if fewer than `MIN_CORNERS` are seen."""
         grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
         corners, ids, _, _ = self._detector.detectBoard(grey)
@@ -137,9 +137,9 @@ class Board:
             return None
         height, width = grey.shape
         places = np.asarray(corners, np.float32).reshape(-1, 2)
-        return View(name, places, np.asarray(ids, np.int32).ravel(), (width, height))
+        return BoardView(name, places, np.asarray(ids, np.int32).ravel(), (width, height))
 
-    def calibrate(self, views: Sequence[View]) -> CalibrationReport:
+    def calibrate(self, views: Sequence[BoardView]) -> CalibrationReport:
         """Calibrate the camera that took views.
 
         Raises:
@@ -168,7 +168,7 @@ class Board:
 
     def _solved(
         self,
-        views: Sequence[View],
+        views: Sequence[BoardView],
         size_px: tuple[int, int],
         cells: npt.NDArray[np.int64],
         coverage: float,
@@ -219,12 +219,12 @@ def _tilt_deg(turns: Sequence[npt.NDArray[np.float64]]) -> float:
     return float(np.degrees(np.arccos(np.clip((normals @ normals.T).min(), -1.0, 1.0)))) / 2.0
 
 
-def coverage_of(views: Sequence[View]) -> float:
+def coverage_of(views: Sequence[BoardView]) -> float:
     """Share of the image's cells in which corners were seen."""
     return float(np.count_nonzero(_cells(views, views[0].size_px))) / (CELLS[0] * CELLS[1]) if views else 0.0
 
 
-def _cells(views: Sequence[View], size_px: tuple[int, int]) -> npt.NDArray[np.int64]:
+def _cells(views: Sequence[BoardView], size_px: tuple[int, int]) -> npt.NDArray[np.int64]:
     """Corners in each cell of the image, shape (rows, columns)."""
     corners = np.concatenate([view.corners_px for view in views])
     reach = ((-0.5, size_px[1] - 0.5), (-0.5, size_px[0] - 0.5))

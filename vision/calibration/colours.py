@@ -1,6 +1,6 @@
-"""The colours of real frames, learnt from swatches: a matrix that makes them as pure as the detector wants.
+"""The colours of real gates, learnt from swatches: a matrix that makes them as pure as the detector wants.
 
-The detector of frames knows red, green and blue by comparing channels, whatever the brightness. Paint, lamps
+The detector of gates knows red, green and blue by comparing channels, whatever the brightness. Paint, lamps
 and a camera's own processing mix the channels. A linear map of them undoes most of that, as the colour
 correction of any camera does; it keeps grey grey, so that walls and floor do not take on colour.
 """

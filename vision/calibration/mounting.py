@@ -1,18 +1,18 @@
-"""The mounting of a camera on a drone, from frames seen while it moves: bundle adjustment.
+"""The mounting of a camera on a drone, from gates seen while it moves: bundle adjustment.
 
 Also known as extrinsic calibration of camera and body, hand-eye calibration, or boresight alignment.
 
 Unknown are roll, pitch and yaw of the camera on the body, its place, the delay of its images, and the pose of
-every frame; known are the frames' size, where their corners are in the images, and the drone's poses by its
+every gate; known are the gates' size, where their corners are in the images, and the drone's poses by its
 telemetry but for an error of its position that wanders. All are found by robust least squares of the corners'
-errors (B. Triggs et al., "Bundle adjustment - a modern synthesis", 2000). Frames hang nearly upright, so
+errors (B. Triggs et al., "Bundle adjustment - a modern synthesis", 2000). Gates hang nearly upright, so
 their tilt is unknown within a degree only.
 
 The standard deviations are the larger of two: those of the least squares, and those of the jackknife, which
 leaves out one tenth of the flight after the other. The second knows that errors of the drone's estimator go
 on for seconds.
 
-How the drone moved while its camera saw frames tells what is still missing for the mounting to be known.
+How the drone moved while its camera saw gates tells what is still missing for the mounting to be known.
 """
 
 from __future__ import annotations
@@ -26,48 +26,48 @@ import numpy as np
 
 from framerunner.geometry.vectors import Vec3
 from vision.calibration.sightings import (
-    MIN_OF_A_FRAME,
+    MIN_OF_A_GATE,
     Bools,
     Floats,
     Indices,
-    Motion,
+    PoseSpline,
     Sightings,
     Values,
     first_mounting,
     first_yaw,
-    frames_among,
+    gates_among,
     mounting_matrix,
 )
-from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M
+from vision.gate_model import GATE_HEIGHT_M, GATE_WIDTH_M
 
 _PLACE_STD_M = 0.02
 """Of the camera's place on the drone, measured with a ruler."""
 _DELAY_STD_S = 0.1
 _WANDER_STD_M = 0.01
 """Of the errors of the drone's position, which go on for seconds: by motion capture or visual odometry."""
-_FRAME_TILT_STD_RAD = 0.0175
+_GATE_TILT_STD_RAD = 0.0175
 _SIZE_STD = 0.005
-"""Of a frame, as a share of it; of what may be none, `_UNKNOWN_SIZE_STD`."""
+"""Of a gate, as a share of it; of what may be none, `_UNKNOWN_SIZE_STD`."""
 _UNKNOWN_SIZE_STD = 0.5
 _ANGLE_STD_RAD = 0.6
-_MAX_SIZE_ERROR = 0.06  # a rectangle that differs more from a frame's size is none
+_MAX_SIZE_ERROR = 0.06  # a rectangle that differs more from a gate's size is none
 _SURE = 3.0  # standard deviations
 _MAX_STEPS = 40
-_PIXEL_STD_PX = 0.1  # added to what the finder of frames states: its edges' errors are not all independent
+_PIXEL_STD_PX = 0.1  # added to what the finder of gates states: its edges' errors are not all independent
 _ATTITUDE_STD_RAD = 0.0025  # of the drone's estimator
 _OUTLIER = 4.0  # standard deviations of a corner, after the robust solution
-_MAX_FRAME_ERROR = 3.0  # median of a frame's corners' errors, standard deviations; more: it is no frame
+_MAX_GATE_ERROR = 3.0  # median of a gate's corners' errors, standard deviations; more: it is no gate
 _NEAREST_M = 0.05
 _BLOCKS = 10
 _MIN_ROUNDS, _MAX_ROUNDS = 2, 6
-_OF_MOUNTING = 7  # numbers before those of the frames: three angles, three of the place, the delay
-_OF_A_FRAME = 7  # x, y, z, yaw, two small angles of its tilt, logarithm of its size
+_OF_MOUNTING = 7  # numbers before those of the gates: three angles, three of the place, the delay
+_OF_A_GATE = 7  # x, y, z, yaw, two small angles of its tilt, logarithm of its size
 _OF_A_KNOT = 3  # of how far the drone is from where its estimator has it: x, y, z
 _KNOT_S = 3.0  # between two of them; in between it is interpolated
 _STEP = 1e-4  # of numerical differences, rad and s
 
-_SIDEWAYS_M = np.array([-1.0, 1.0, 1.0, -1.0]) * FRAME_WIDTH_M / 2.0
-_UPWARDS_M = np.array([1.0, 1.0, -1.0, -1.0]) * FRAME_HEIGHT_M / 2.0
+_SIDEWAYS_M = np.array([-1.0, 1.0, 1.0, -1.0]) * GATE_WIDTH_M / 2.0
+_UPWARDS_M = np.array([1.0, 1.0, -1.0, -1.0]) * GATE_HEIGHT_M / 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,8 +78,8 @@ class MountingFit:
         values: of the mounting.
         std: their standard deviations.
         sightings: those used.
-        numbers: of the frame that each is of.
-        frames_m: where the frames are, shape (frames, 3).
+        numbers: of the gate that each is of.
+        gates_m: where the gates are, shape (gates, 3).
         rms_px: of the corners' errors.
     """
 
@@ -87,29 +87,29 @@ class MountingFit:
     std: Values
     sightings: Sightings
     numbers: Indices
-    frames_m: Floats
+    gates_m: Floats
     rms_px: float
 
 
-def fit_mounting(seen: Sightings, motion: Motion, focal_px: float, known: Values) -> MountingFit | None:
+def fit_mounting(seen: Sightings, motion: PoseSpline, focal_px: float, known: Values) -> MountingFit | None:
     """Find the mounting.
 
     Args:
-        seen: frames in images.
+        seen: gates in images.
         motion: of the drone.
         focal_px: focal length of the camera.
         known: what is known before: the place and the delay; of the angles nothing is known.
 
     Returns:
-        None if no frame was seen often enough. How exactly the values are known is told by their standard
+        None if no gate was seen often enough. How exactly the values are known is told by their standard
         deviations alone.
     """
-    if len(seen) < MIN_OF_A_FRAME:
+    if len(seen) < MIN_OF_A_GATE:
         return None
     start = first_mounting(seen, motion, known)
-    free = np.ones(len(seen), np.bool_)  # sightings that may be of a frame
+    free = np.ones(len(seen), np.bool_)  # sightings that may be of a gate
     for number in range(_MAX_ROUNDS):
-        numbers, places = frames_among(seen, free, motion, start)
+        numbers, places = gates_among(seen, free, motion, start)
         used = np.flatnonzero(numbers >= 0)
         if not len(used):
             return None
@@ -117,7 +117,7 @@ def fit_mounting(seen: Sightings, motion: Motion, focal_px: float, known: Values
         fitted.solve(start, places)
         start = fitted.values
         wrong = fitted.are_wrong()
-        free[used[wrong[numbers[used]]]] = False  # such as a poster: drawn borders look like frames
+        free[used[wrong[numbers[used]]]] = False  # such as a poster: drawn borders look like gates
         if number >= _MIN_ROUNDS - 1 and not wrong.any():
             break
     else:
@@ -127,25 +127,25 @@ def fit_mounting(seen: Sightings, motion: Motion, focal_px: float, known: Values
 
 
 class _BundleAdjustment:
-    """The least squares of some sightings, each of a numbered frame.
+    """The least squares of some sightings, each of a numbered gate.
 
     Args:
         seen: the sightings.
-        numbers: of the frame that each is of; each frame has sightings.
+        numbers: of the gate that each is of; each gate has sightings.
         motion: of the drone.
         focal_px: focal length of the camera.
         known: the place and the delay, known before.
 
     Attributes:
-        solution: the mounting's numbers, then those of every frame, then those of every knot.
+        solution: the mounting's numbers, then those of every gate, then those of every knot.
     """
 
     def __init__(
-        self, seen: Sightings, numbers: Indices, motion: Motion, focal_px: float, known: Values
+        self, seen: Sightings, numbers: Indices, motion: PoseSpline, focal_px: float, known: Values
     ) -> None:
         self._seen, self._numbers, self._motion, self._focal_px = seen, numbers, motion, focal_px
-        self._count = int(numbers.max()) + 1  # of frames
-        self._first_knot = _OF_MOUNTING + self._count * _OF_A_FRAME
+        self._count = int(numbers.max()) + 1  # of gates
+        self._first_knot = _OF_MOUNTING + self._count * _OF_A_GATE
         self._knots = _knots_of(seen.times_s)
         self._mean, self._std = _prior(known, self._count, self._knots.shape[1])
         self.solution = self._mean
@@ -164,36 +164,36 @@ class _BundleAdjustment:
 
         Args:
             start: a mounting.
-            places: of the frames.
+            places: of the gates.
         """
         self.solution = np.zeros(len(self._mean))
         self.solution[:_OF_MOUNTING] = *start.angles_frd_rad, *start.position_flu_m, start.delay_s
-        for number, (frame, place) in enumerate(zip(self._frames(self.solution), places, strict=True)):
+        for number, (gate, place) in enumerate(zip(self._gates(self.solution), places, strict=True)):
             mine = self._seen.at(np.flatnonzero(self._numbers == number))
-            frame[:4] = *place, first_yaw(mine, self._motion, start)
+            gate[:4] = *place, first_yaw(mine, self._motion, start)
         for _ in range(2):
             self._sides = self._seen_from()
             self.solution = _minimized(self._residuals, self.solution, self._jacobian, "soft_l1")
 
     def refine(self) -> None:
-        """Go on from the solution: frames have their size, and corners that are far off are not used."""
-        self._frames(self._std)[:, 6] = _SIZE_STD
+        """Go on from the solution: gates have their size, and corners that are far off are not used."""
+        self._gates(self._std)[:, 6] = _SIZE_STD
         self.solution = _minimized(self._residuals, self.solution, self._jacobian, "soft_l1")
         errors = np.abs(self._errors(self.solution)).max(axis=2)
         self._weights[errors > _OUTLIER] = 0.0
         self.solution = _minimized(self._residuals, self.solution, self._jacobian, "linear")
 
     def are_wrong(self) -> Bools:
-        """Which frames are none: their corners are not those of a rectangle, or their size is another."""
-        sizes = self._frames(self.solution)[:, 6]
+        """Which gates are none: their corners are not those of a rectangle, or their size is another."""
+        sizes = self._gates(self.solution)[:, 6]
         jacobian = self._jacobian(self.solution)
         variances = np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True))
-        sizes_std = np.sqrt(self._frames(variances)[:, 6])
+        sizes_std = np.sqrt(self._gates(variances)[:, 6])
         wrong_size = np.abs(sizes) > np.maximum(_MAX_SIZE_ERROR, _SURE * sizes_std)
-        return (self._frame_errors() > _MAX_FRAME_ERROR) | wrong_size
+        return (self._gate_errors() > _MAX_GATE_ERROR) | wrong_size
 
-    def _frame_errors(self) -> Floats:
-        """The median of each frame's corners' errors, standard deviations; infinite without corners."""
+    def _gate_errors(self) -> Floats:
+        """The median of each gate's corners' errors, standard deviations; infinite without corners."""
         errors = np.linalg.norm(self._errors(self.solution), axis=2)
         used = self._weights[:, :, 0] > 0.0
         found = []
@@ -207,12 +207,12 @@ class _BundleAdjustment:
         std = _values(self._deviations())
         errors_px = np.linalg.norm(self._offsets(self.solution), axis=2)[self._weights[:, :, 0] > 0.0]
         rms_px = float(np.sqrt(np.mean(errors_px**2))) if len(errors_px) else np.inf
-        frames_m = self._frames(self.solution)[:, :3]
-        return MountingFit(self.values, std, self._seen, self._numbers, frames_m, rms_px)
+        gates_m = self._gates(self.solution)[:, :3]
+        return MountingFit(self.values, std, self._seen, self._numbers, gates_m, rms_px)
 
-    def _frames(self, at: Floats) -> Floats:
-        """A view of the frames' numbers, shape (frames, 7)."""
-        return at[_OF_MOUNTING : self._first_knot].reshape(-1, _OF_A_FRAME)
+    def _gates(self, at: Floats) -> Floats:
+        """A view of the gates' numbers, shape (gates, 7)."""
+        return at[_OF_MOUNTING : self._first_knot].reshape(-1, _OF_A_GATE)
 
     def _drone(self, delay_s: float) -> tuple[Floats, Floats]:
         """Positions and rotations of the drone when corners were exposed, shape (n, 4, 3), (n, 4, 3, 3)."""
@@ -224,31 +224,31 @@ class _BundleAdjustment:
         return self._poses[1:]
 
     def _seen_from(self) -> Floats:
-        """From which side of its frame each sighting is."""
+        """From which side of its gate each sighting is."""
         positions, _ = self._drone(self.solution[6])
-        frames = self._frames(self.solution)[self._numbers]
-        away = positions[:, 0] - frames[:, :3]
-        facing = away[:, 0] * np.cos(frames[:, 3]) + away[:, 1] * np.sin(frames[:, 3])
+        gates = self._gates(self.solution)[self._numbers]
+        away = positions[:, 0] - gates[:, :3]
+        facing = away[:, 0] * np.cos(gates[:, 3]) + away[:, 1] * np.sin(gates[:, 3])
         return np.where(facing >= 0.0, 1.0, -1.0)
 
     def _corners(self, at: Floats) -> tuple[Floats, Floats]:
-        """Where the corners are in the world, shape (n, 4, 3), and how they move with their frame's numbers.
+        """Where the corners are in the world, shape (n, 4, 3), and how they move with their gate's numbers.
 
         The second has shape (n, 4, 3, 7).
         """
-        frames = self._frames(at)[self._numbers]
-        across, up = self._sides[:, None] * _SIDEWAYS_M, np.broadcast_to(_UPWARDS_M, (len(frames), 4))
-        c, s = np.cos(frames[:, 3:4]), np.sin(frames[:, 3:4])
-        roll, lean, size = frames[:, 4:5], frames[:, 5:6], np.exp(frames[:, 6:7])
+        gates = self._gates(at)[self._numbers]
+        across, up = self._sides[:, None] * _SIDEWAYS_M, np.broadcast_to(_UPWARDS_M, (len(gates), 4))
+        c, s = np.cos(gates[:, 3:4]), np.sin(gates[:, 3:4])
+        roll, lean, size = gates[:, 4:5], gates[:, 5:6], np.exp(gates[:, 6:7])
         along, ahead, above = size * (across - roll * up), size * lean * up, size * (up + roll * across)
         arms = np.stack([c * ahead - s * along, s * ahead + c * along, above], axis=-1)
-        slopes = np.zeros((*arms.shape, _OF_A_FRAME))
+        slopes = np.zeros((*arms.shape, _OF_A_GATE))
         slopes[..., :3] = np.eye(3)
         slopes[..., 0, 3], slopes[..., 1, 3] = -arms[..., 1], arms[..., 0]
         slopes[..., 0, 4], slopes[..., 1, 4], slopes[..., 2, 4] = s * size * up, -c * size * up, size * across
         slopes[..., 0, 5], slopes[..., 1, 5] = c * size * up, s * size * up
         slopes[..., 6] = arms
-        return frames[:, None, :3] + arms, slopes
+        return gates[:, None, :3] + arms, slopes
 
     def _in_camera(self, at: Floats, corners: Floats) -> tuple[Floats, Floats]:
         """Corners of the world from the camera, forward, left, up, and from the drone's centre, likewise."""
@@ -316,27 +316,27 @@ class _BundleAdjustment:
         ends = [self._in_camera(_later(at, step), corners)[0] for step in (-_STEP, _STEP)]
         mounting[..., 6] = (ends[1] - ends[0]) / (2.0 * _STEP)
         _, rotations = self._drone(float(at[6]))
-        frames = np.einsum("im,nkji,nkjp->nkmp", turn, rotations, slopes, optimize=True)
+        gates = np.einsum("im,nkji,nkjp->nkmp", turn, rotations, slopes, optimize=True)
         dense = np.zeros((*camera.shape[:2], 2, len(at)))
         dense[..., :_OF_MOUNTING] = by_place @ mounting
-        of_frames = by_place @ frames
+        of_gates = by_place @ gates
         for number in range(self._count):
-            first = _OF_MOUNTING + number * _OF_A_FRAME
+            first = _OF_MOUNTING + number * _OF_A_GATE
             mine = self._numbers == number
-            dense[mine, :, :, first : first + _OF_A_FRAME] = of_frames[mine]
-        wandering = of_frames[:, :, :, None, :_OF_A_KNOT] * -self._knots[:, None, None, :, None]
+            dense[mine, :, :, first : first + _OF_A_GATE] = of_gates[mine]
+        wandering = of_gates[:, :, :, None, :_OF_A_KNOT] * -self._knots[:, None, None, :, None]
         dense[..., self._first_knot :] = wandering.reshape(*dense.shape[:3], -1)
         before = np.diag(1.0 / self._std)
         jacobian: Floats = np.concatenate([dense.reshape(-1, len(at)), before])
         return jacobian
 
 
-def _prior(known: Values, frames: int, knots: int) -> tuple[Floats, Floats]:
+def _prior(known: Values, gates: int, knots: int) -> tuple[Floats, Floats]:
     """What is known of each number before, and its standard deviation; infinite: nothing."""
-    others = frames * _OF_A_FRAME + knots * _OF_A_KNOT
+    others = gates * _OF_A_GATE + knots * _OF_A_KNOT
     mean = [0.0] * 3 + [*known.position_flu_m, known.delay_s] + [0.0] * others
     std = [_ANGLE_STD_RAD] * 3 + [_PLACE_STD_M] * 3 + [_DELAY_STD_S]
-    std += ([np.inf] * 4 + [_FRAME_TILT_STD_RAD] * 2 + [_UNKNOWN_SIZE_STD]) * frames
+    std += ([np.inf] * 4 + [_GATE_TILT_STD_RAD] * 2 + [_UNKNOWN_SIZE_STD]) * gates
     std += [_WANDER_STD_M] * _OF_A_KNOT * knots
     return np.array(mean), np.array(std)
 
@@ -392,33 +392,33 @@ MAX_POSITION_STD_M = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Movement:
-    """What the drone did while frames were seen.
+    """What the drone did while gates were seen.
 
     Attributes:
-        sightings: of frames, in images that differ.
-        frames: how many frames were seen.
+        sightings: of gates, in images that differ.
+        gates: how many gates were seen.
         turn_deg: the arc of its headings.
-        approach_m: by how much its distance to some frame changed.
+        approach_m: by how much its distance to some gate changed.
     """
 
     sightings: int
-    frames: int
+    gates: int
     turn_deg: float
     approach_m: float
 
 
-def movement_of(seen: Sightings, motion: Motion, fit: MountingFit | None) -> Movement:
+def movement_of(seen: Sightings, motion: PoseSpline, fit: MountingFit | None) -> Movement:
     """The movement at the times of the sightings that were used."""
     if fit is None:
         return Movement(len(seen), 0, 0.0 if not len(seen) else _turn_deg(seen, motion), 0.0)
     used = fit.sightings
     places = motion.positions(used.times_s)
-    away = np.linalg.norm(places - fit.frames_m[fit.numbers], axis=1)
-    spans = [np.ptp(away[fit.numbers == number]) for number in range(len(fit.frames_m))]
-    return Movement(len(used), len(fit.frames_m), _turn_deg(used, motion), float(max(spans)))
+    away = np.linalg.norm(places - fit.gates_m[fit.numbers], axis=1)
+    spans = [np.ptp(away[fit.numbers == number]) for number in range(len(fit.gates_m))]
+    return Movement(len(used), len(fit.gates_m), _turn_deg(used, motion), float(max(spans)))
 
 
-def _turn_deg(seen: Sightings, motion: Motion) -> float:
+def _turn_deg(seen: Sightings, motion: PoseSpline) -> float:
     """The smallest arc that has all headings."""
     rotations = motion.rotations(seen.times_s)
     headings: Floats = np.sort(np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0]))

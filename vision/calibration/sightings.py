@@ -1,6 +1,6 @@
-"""Frames seen from a moving drone: which images are used, and which sightings are of one frame.
+"""Gates seen from a moving drone: which images are used, and which sightings are of one gate.
 
-A frame does not move, so the sightings of one are those that put it to one place in the world, whatever the
+A gate does not move, so the sightings of one are those that put it to one place in the world, whatever the
 camera's mounting is thought to be: an error of the mounting moves them together as long as the drone stands,
 and spreads them when it moves. The mounting with which they are least spread is where the solution starts.
 """
@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from framerunner.geometry.rotations import mounting_flu, rotation, rotation_rows
 from framerunner.geometry.vectors import Quaternion, Vec3
-from vision.types import Detections, FrameSighting
+from vision.types import Detections, GateSighting
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -47,7 +47,7 @@ class MotionReport:
     attitude: Quaternion
 
 
-class Motion:
+class PoseSpline:
     """The drone's poses between reports: positions by cubic Hermite splines, attitudes with a constant rate.
 
     Args:
@@ -117,9 +117,9 @@ def mounting_matrix(angles_frd_rad: Vec3) -> Floats:
 Indices = npt.NDArray[np.intp]
 
 MAX_SIGHTINGS = 700
-MIN_OF_A_FRAME = 12
+MIN_OF_A_GATE = 12
 """Sightings; of what is seen less often nothing is learnt."""
-_MAX_FRAMES = 8
+_MAX_GATES = 8
 _MIN_CORNERS = 3
 _SAME_PLACE_M = 0.45
 _MOVED_M, _TURNED_COSINE, _LONGEST_S = 0.02, 0.99985, 1.0
@@ -145,16 +145,16 @@ class Values:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sightings:
-    """Frames in images, n of them.
+    """Gates in images, n of them.
 
     Attributes:
-        colours: of the frames, shape (n,).
+        colours: of the gates, shape (n,).
         corners_px: right of and below the optical axis, upper left, upper right, lower right, lower left as
             seen; NaN where one is not seen, shape (n, 4, 2).
         std_px: standard deviations, likewise.
         corners_s: when the row of each corner was read, seconds of the motion, shape (n, 4).
-        positions_flu_m: of the frames' centres from the camera, forward, left, up, shape (n, 3).
-        normals_flu: of the frames, by the better and the other pose; NaN if there is none, shape (n, 2, 3).
+        positions_flu_m: of the gates' centres from the camera, forward, left, up, shape (n, 3).
+        normals_flu: of the gates, by the better and the other pose; NaN if there is none, shape (n, 2, 3).
     """
 
     colours: npt.NDArray[np.str_]
@@ -187,12 +187,12 @@ class Sightings:
 
 def sightings_of(
     images: Sequence[Detections],
-    motion: Motion,
+    motion: PoseSpline,
     half_height_px: float,
     readout_s: float,
     delay_s: float = 0.0,
 ) -> Sightings:
-    """The frames in images that differ and at whose times the drone's pose is known.
+    """The gates in images that differ and at whose times the drone's pose is known.
 
     Args:
         images: with their vehicle times.
@@ -204,38 +204,38 @@ def sightings_of(
     timed = sorted(
         (image for image in images if image.time_us is not None), key=lambda each: each.time_us or 0
     )
-    useful = [(image, frames) for image in timed if (frames := _useful(image))]
+    useful = [(image, gates) for image in timed if (gates := _useful(image))]
     times_s = motion.seconds([image.time_us or 0 for image, _ in useful])
     kept = _differing(times_s, motion, delay_s)
-    pairs = [(times_s[place], frame) for place in kept for frame in useful[place][1]]
+    pairs = [(times_s[place], gate) for place in kept for gate in useful[place][1]]
     if len(pairs) > MAX_SIGHTINGS:
         pairs = [pairs[place] for place in np.linspace(0, len(pairs) - 1, MAX_SIGHTINGS).astype(int)]
     count = len(pairs)
     corners, std = np.full((count, 4, 2), np.nan), np.full((count, 4, 2), np.nan)
     places, normals = np.empty((count, 3)), np.full((count, 2, 3), np.nan)
-    for row, (_, frame) in enumerate(pairs):
-        for place, corner in enumerate(frame.corners):
+    for row, (_, gate) in enumerate(pairs):
+        for place, corner in enumerate(gate.corners):
             if corner is not None:
                 corners[row, place] = corner.right_px, corner.down_px
                 std[row, place] = corner.std_right_px, corner.std_down_px
-        places[row] = frame.poses[0].position_flu_m
-        for place, pose in enumerate(frame.poses[:2]):
+        places[row] = gate.poses[0].position_flu_m
+        for place, pose in enumerate(gate.poses[:2]):
             normals[row, place] = pose.normal_flu
     share = np.clip(np.nan_to_num(corners[:, :, 1]) / (2.0 * half_height_px), -0.5, 0.5)
     read_s = np.array([time_s for time_s, _ in pairs]).reshape(-1, 1) + readout_s * share
-    colours = np.array([frame.colour for _, frame in pairs], dtype=np.str_)
+    colours = np.array([gate.colour for _, gate in pairs], dtype=np.str_)
     return Sightings(colours, corners, std, read_s, places, normals)
 
 
-def _useful(image: Detections) -> list[FrameSighting]:
+def _useful(image: Detections) -> list[GateSighting]:
     return [
-        frame
-        for frame in image.frames
-        if frame.poses and sum(corner is not None for corner in frame.corners) >= _MIN_CORNERS
+        gate
+        for gate in image.frames
+        if gate.poses and sum(corner is not None for corner in gate.corners) >= _MIN_CORNERS
     ]
 
 
-def _differing(times_s: Floats, motion: Motion, delay_s: float) -> list[int]:
+def _differing(times_s: Floats, motion: PoseSpline, delay_s: float) -> list[int]:
     """Which images differ from the last one used: the drone has moved or turned, or a second has passed."""
     known = np.flatnonzero(motion.is_known(times_s - delay_s - 0.1) & motion.is_known(times_s))
     at = times_s[known] - delay_s
@@ -254,8 +254,8 @@ def _differing(times_s: Floats, motion: Motion, delay_s: float) -> list[int]:
     return kept
 
 
-def _world_places(seen: Sightings, motion: Motion, by: Values) -> Floats:
-    """Where sightings put their frames, by a mounting, shape (n, 3)."""
+def _world_places(seen: Sightings, motion: PoseSpline, by: Values) -> Floats:
+    """Where sightings put their gates, by a mounting, shape (n, 3)."""
     times_s = seen.times_s - by.delay_s
     turn = mounting_matrix(by.angles_frd_rad)
     from_centre = np.array(by.position_flu_m) + seen.positions_flu_m @ turn.T
@@ -265,8 +265,8 @@ def _world_places(seen: Sightings, motion: Motion, by: Values) -> Floats:
     return places
 
 
-def first_mounting(seen: Sightings, motion: Motion, known: Values) -> Values:
-    """A mounting, its angles in steps of some degrees, with which frames are spread the least."""
+def first_mounting(seen: Sightings, motion: PoseSpline, known: Values) -> Values:
+    """A mounting, its angles in steps of some degrees, with which gates are spread the least."""
     few = [np.flatnonzero(seen.colours == colour) for colour in np.unique(seen.colours)]
     few = [index[np.linspace(0, len(index) - 1, min(len(index), _SEARCHED)).astype(int)] for index in few]
     best, best_score = known, -np.inf
@@ -283,24 +283,24 @@ def first_mounting(seen: Sightings, motion: Motion, known: Values) -> Values:
     return best
 
 
-def frames_among(seen: Sightings, usable: Bools, motion: Motion, by: Values) -> tuple[Indices, list[Vec3]]:
-    """Which frame each usable sighting is of.
+def gates_among(seen: Sightings, usable: Bools, motion: PoseSpline, by: Values) -> tuple[Indices, list[Vec3]]:
+    """Which gate each usable sighting is of.
 
     Returns:
-        The number of its frame for each sighting, -1 if it is of none; where the frames are.
+        The number of its gate for each sighting, -1 if it is of none; where the gates are.
     """
     places = _world_places(seen, motion, by)
     numbers = np.full(len(seen), -1, np.intp)
     found: list[Vec3] = []
     for colour in np.unique(seen.colours):
         free = np.flatnonzero((seen.colours == colour) & usable)
-        while len(free) >= MIN_OF_A_FRAME and len(found) < _MAX_FRAMES:
+        while len(free) >= MIN_OF_A_GATE and len(found) < _MAX_GATES:
             centre = places[free[_neighbours(places[free], _SAME_PLACE_M).argmax()]]
             for _ in range(3):
                 near = np.linalg.norm(places[free] - centre, axis=1) < _SAME_PLACE_M
                 if near.any():
                     centre = np.median(places[free[near]], axis=0)
-            if np.count_nonzero(near) < MIN_OF_A_FRAME:
+            if np.count_nonzero(near) < MIN_OF_A_GATE:
                 break
             numbers[free[near]] = len(found)
             found.append((float(centre[0]), float(centre[1]), float(centre[2])))
@@ -318,8 +318,8 @@ def _neighbours(places: Floats, within_m: float) -> Indices:
     return counts
 
 
-def first_yaw(seen: Sightings, motion: Motion, by: Values) -> float:
-    """The yaw of a frame's normal, up to half a turn, that most of its sightings allow, radians."""
+def first_yaw(seen: Sightings, motion: PoseSpline, by: Values) -> float:
+    """The yaw of a gate's normal, up to half a turn, that most of its sightings allow, radians."""
     turn = mounting_matrix(by.angles_frd_rad)
     body = seen.normals_flu @ turn.T
     normals = np.einsum("nij,nkj->nki", motion.rotations(seen.times_s - by.delay_s), body)

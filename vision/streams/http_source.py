@@ -11,7 +11,7 @@ from typing import Generic, Self, TypeVar
 
 import aiohttp
 
-from framerunner.wire.mjpeg import MjpegReader, Part, StreamError
+from framerunner.wire.mjpeg import MjpegPart, MjpegReader, StreamError
 from vision.decoder import ImageDecoder
 from vision.jpeg import ImageError
 from vision.types import CameraError, CameraFrame, shown_url
@@ -67,7 +67,7 @@ class HttpSource:
         self._url = url
         self._name = f"camera {shown_url(url)}"
         self._timeout_s = timeout_s
-        self._latest: Latest[tuple[Part, float]] = Latest()
+        self._latest: Latest[tuple[MjpegPart, float]] = Latest()
         self._session: aiohttp.ClientSession | None = None
         self._task: asyncio.Task[None] | None = None
         self._decoder = ImageDecoder(size_px)

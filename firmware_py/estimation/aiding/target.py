@@ -30,7 +30,7 @@ _CONSTANT = Drift()
 
 
 @dataclass(slots=True)
-class Layout:
+class TargetLayout:
     """Indices of the slow errors in the error state; -1: there is none.
 
     Place and turn of markers, and scale factors, are only considered: in flight, what little a filter could
@@ -64,7 +64,7 @@ class Target:
     """
 
     def __init__(self, settings: EstimatorSettings) -> None:
-        self.layout = layout = Layout()
+        self.layout = layout = TargetLayout()
         drifts: list[Drift] = []
         sigmas: list[float] = []
 

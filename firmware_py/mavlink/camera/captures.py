@@ -7,8 +7,8 @@ from collections.abc import Callable
 from math import dist, inf
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.camera import messages
-from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink
+from firmware_py.mavlink.camera import camera_messages
+from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CaptureSink, FixedCamera
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.geometry.vectors import Vec3
@@ -29,7 +29,7 @@ class Captures:
     """
 
     def __init__(
-        self, autopilot: Autopilot, exchange: Exchange, camera: CameraModel, sink: CaptureSink | None
+        self, autopilot: Autopilot, exchange: Exchange, camera: FixedCamera, sink: CaptureSink | None
     ) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
@@ -106,7 +106,7 @@ class Captures:
     def _take(self) -> bool:
         exchange, index = self._exchange, self.count
         url = "" if self._sink is None else self._sink.capture(exchange.time_us, index)
-        message = messages.image_captured(self._autopilot, exchange, index, url)
+        message = camera_messages.image_captured(self._autopilot, exchange, index, url)
         if url is not None:
             self.count += 1
             self._sent[index] = message

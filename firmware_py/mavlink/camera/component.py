@@ -13,17 +13,17 @@ from functools import partial
 from math import isfinite, isnan
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.camera import messages
+from firmware_py.mavlink.camera import camera_messages
 from firmware_py.mavlink.camera.captures import MAX_COUNT, Captures, Recordings
 from firmware_py.mavlink.camera.model import (
     CAMERA_COMPONENT_ID,
-    CameraModel,
     CaptureSink,
+    FixedCamera,
     PictureSpace,
     VideoEncoding,
     VideoStream,
 )
-from firmware_py.mavlink.service import Command, DeviceComponent, MissionCommandHandler
+from firmware_py.mavlink.service import DeviceComponent, MissionCommandHandler, VehicleCommand
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import Message, mavlink
@@ -58,7 +58,9 @@ class Streaming:
     def information(self, _link: Link, index: int) -> list[Message]:
         """VIDEO_STREAM_INFORMATION of a stream, or of all, 0."""
         return [
-            messages.stream_information(stream, n, len(self._streams), running=self._is_running(stream))
+            camera_messages.stream_information(
+                stream, n, len(self._streams), running=self._is_running(stream)
+            )
             for n, stream in self._chosen(index)
         ]
 
@@ -69,7 +71,7 @@ class Streaming:
         too, the preferred stream's last.
         """
         status = [
-            messages.stream_status(stream, n, running=self._is_running(stream))
+            camera_messages.stream_status(stream, n, running=self._is_running(stream))
             for n, stream in self._chosen(index)
         ]
         return [*reversed(self.information(link, index)), *status]
@@ -106,7 +108,7 @@ class CameraComponent(DeviceComponent):
         self,
         autopilot: Autopilot,
         exchange: Exchange,
-        camera: CameraModel,
+        camera: FixedCamera,
         streaming: Streaming,
         sink: CaptureSink | None = None,
     ) -> None:
@@ -166,7 +168,7 @@ class CameraComponent(DeviceComponent):
         self._captures.update()
         self._recordings.update()
 
-    def _start_once(self, command: Command) -> CommandResult:
+    def _start_once(self, command: VehicleCommand) -> CommandResult:
         """IMAGE_START_CAPTURE; a repeated command for one picture, by its number, takes no other."""
         _, _, count, number = command.params
         if command.repeated and count == 1.0 and self._last_single == (*command.sender, number):
@@ -177,7 +179,7 @@ class CameraComponent(DeviceComponent):
         return result
 
     def _information(self) -> Message:
-        return messages.information(
+        return camera_messages.information(
             self._camera,
             streams=bool(self._streaming),
             records=self._recordings.can_record,
@@ -185,21 +187,23 @@ class CameraComponent(DeviceComponent):
         )
 
     def _storage_information(self, _link: Link, index: int) -> list[Message]:
-        return [messages.storage_information(self._space(), self._exchange.time_us)] if index <= 1 else []
+        return (
+            [camera_messages.storage_information(self._space(), self._exchange.time_us)] if index <= 1 else []
+        )
 
     def _image_captured(self, _link: Link, index: int) -> list[Message]:
         message = self._captures.sent(index)
         return [] if message is None else [message]
 
     def _settings(self) -> Message:
-        return messages.settings(self._mode, self._exchange.time_us)
+        return camera_messages.settings(self._mode, self._exchange.time_us)
 
     def _space(self) -> PictureSpace | None:
         return None if self._sink is None else self._sink.space()
 
     def _capture_status(self) -> Message:
         captures, recorded_us = self._captures, self._recordings.recorded_us
-        return messages.capture_status(
+        return camera_messages.capture_status(
             captures.interval_s, captures.count, recorded_us, self._space(), self._exchange.time_us
         )
 
@@ -259,7 +263,7 @@ class CameraComponent(DeviceComponent):
         return CommandResult.ACCEPTED
 
 
-def _run(work: MissionCommandHandler, command: Command) -> CommandResult:
+def _run(work: MissionCommandHandler, command: VehicleCommand) -> CommandResult:
     return work(command.all_params)
 
 

@@ -12,7 +12,7 @@ _SENSOR_WIDTH_MM = 6.17  # nominal, of a 1/2.3 inch sensor: a pinhole has an ang
 
 
 @dataclass(frozen=True, slots=True)
-class CameraModel:
+class FixedCamera:
     """A camera fixed to the vehicle, looking along its x axis."""
 
     width_px: int

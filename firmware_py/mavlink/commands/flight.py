@@ -7,7 +7,7 @@ from math import copysign, floor, isfinite, isinf, isnan, nan
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.guidance.orbit import Orbit, OrbitYaw
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Service, VehicleCommand
 from firmware_py.status import CommandResult, FlightMode
 from framerunner.geometry.vectors import NAN3, Vec3
 from framerunner.vehicle.geodesy import GeodeticPoint
@@ -45,7 +45,7 @@ class FlightCommands(Service):
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
         }
 
-    def _arm_disarm(self, command: Command) -> CommandResult | None:
+    def _arm_disarm(self, command: VehicleCommand) -> CommandResult | None:
         autopilot, requested = self._autopilot, command.params[0]
         if isnan(requested):
             return CommandResult.ACCEPTED  # as PX4, which does nothing
@@ -58,12 +58,12 @@ class FlightCommands(Service):
         autopilot.say(_CRITICAL, f"Unsupported ARM_DISARM param: {requested:g}")
         return None  # PX4 does not acknowledge this either
 
-    def _takeoff(self, command: Command) -> CommandResult:
+    def _takeoff(self, command: VehicleCommand) -> CommandResult:
         if isinf(command.altitude_m):
             return CommandResult.DENIED
         return self._autopilot.takeoff(command.altitude_amsl_m(self._autopilot.status.home))
 
-    def _set_mode(self, command: Command) -> CommandResult:
+    def _set_mode(self, command: VehicleCommand) -> CommandResult:
         """DO_SET_MODE: only PX4's custom modes are accepted; an unknown mode is refused with a text."""
         base_mode, main, sub, _ = command.params
         if not isfinite(base_mode) or not int(base_mode) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
@@ -76,7 +76,7 @@ class FlightCommands(Service):
             return CommandResult.TEMPORARILY_REJECTED
         return self._autopilot.set_mode(mode)
 
-    def _set_standard_mode(self, command: Command) -> CommandResult:
+    def _set_standard_mode(self, command: VehicleCommand) -> CommandResult:
         number = command.params[0]
         mode = _STANDARD_MODES.get(_small(number))
         if mode is None:
@@ -84,7 +84,7 @@ class FlightCommands(Service):
             return CommandResult.TEMPORARILY_REJECTED
         return self._autopilot.set_mode(mode)
 
-    def _reposition(self, command: Command) -> CommandResult:
+    def _reposition(self, command: VehicleCommand) -> CommandResult:
         """DO_REPOSITION: param 2 must be 1, as in PX4; params that are not given stay as they are."""
         speed_m_s, flags, _, yaw_rad = command.params
         if flags != 1.0:
@@ -98,7 +98,7 @@ class FlightCommands(Service):
             speed_m_s if isfinite(speed_m_s) and speed_m_s > 0 else nan,
         )
 
-    def _orbit(self, command: Command) -> CommandResult:
+    def _orbit(self, command: VehicleCommand) -> CommandResult:
         """DO_ORBIT: a negative radius means counter-clockwise; params not given have PX4's defaults."""
         autopilot = self._autopilot
         radius_m, speed_m_s, yaw, _ = command.params
@@ -123,11 +123,11 @@ class FlightCommands(Service):
             Orbit((north_m, east_m, down_m), abs(radius_m), copysign(1.0, radius_m) * speed_m_s, behaviour)
         )
 
-    def _change_speed(self, command: Command) -> CommandResult:
+    def _change_speed(self, command: VehicleCommand) -> CommandResult:
         speed_m_s = command.params[1]
         return self._autopilot.change_speed(speed_m_s if isfinite(speed_m_s) and speed_m_s > 0 else nan)
 
-    def _set_home(self, command: Command) -> CommandResult:
+    def _set_home(self, command: VehicleCommand) -> CommandResult:
         if command.params[0] > 0.5:
             return self._autopilot.set_home(None)
         if not command.has_place or not isfinite(command.altitude_m):
@@ -136,7 +136,7 @@ class FlightCommands(Service):
             GeodeticPoint(command.latitude_deg, command.longitude_deg, command.altitude_m)
         )
 
-    def _set_roi_location(self, command: Command) -> CommandResult:
+    def _set_roi_location(self, command: VehicleCommand) -> CommandResult:
         place = self._place(command, command.altitude_m)
         if place is None or any(map(isnan, place)):
             return CommandResult.DENIED
@@ -147,7 +147,7 @@ class FlightCommands(Service):
         self._gimbal_look_at(point_ned_m)
         return self._autopilot.look_at(point_ned_m)
 
-    def _set_roi(self, command: Command) -> CommandResult:
+    def _set_roi(self, command: VehicleCommand) -> CommandResult:
         """The older DO_SET_ROI: param 1 is the mode, of which NONE and LOCATION are supported."""
         mode = command.params[0]
         if mode == mavlink.MAV_ROI_NONE:
@@ -156,12 +156,12 @@ class FlightCommands(Service):
             return self._set_roi_location(command)
         return CommandResult.UNSUPPORTED
 
-    def _terminate(self, command: Command) -> CommandResult:
+    def _terminate(self, command: VehicleCommand) -> CommandResult:
         if not command.params[0] > 0.5 or not self._autopilot.status.armed:
             return CommandResult.DENIED
         return self._autopilot.terminate()
 
-    def _place(self, command: Command, altitude_m: float) -> Vec3 | None:
+    def _place(self, command: VehicleCommand, altitude_m: float) -> Vec3 | None:
         """A command's position, NED metres with NaN where not given; None if it is not on Earth.
 
         Args:

@@ -11,7 +11,7 @@ from math import floor, isfinite
 from typing import Protocol
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Service, VehicleCommand
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import mavlink
 
@@ -50,10 +50,10 @@ class MaintenanceCommands(Service):
             mavlink.MAV_CMD_ACTUATOR_TEST: self._test_actuator,
         }
 
-    def _test_actuator(self, _command: Command) -> CommandResult:
+    def _test_actuator(self, _command: VehicleCommand) -> CommandResult:
         return CommandResult.DENIED if self._autopilot.status.armed else CommandResult.UNSUPPORTED
 
-    def _reboot(self, command: Command) -> CommandResult:
+    def _reboot(self, command: VehicleCommand) -> CommandResult:
         """Refuse: a simulator is restarted from outside; PX4's SITL ends."""
         if self._autopilot.status.armed:
             return CommandResult.DENIED
@@ -61,7 +61,7 @@ class MaintenanceCommands(Service):
             self._autopilot.say(_WARNING, "No reboot here: start the simulator again")
         return CommandResult.UNSUPPORTED
 
-    def _calibrate(self, command: Command) -> CommandResult:
+    def _calibrate(self, command: VehicleCommand) -> CommandResult:
         """Calibrate the sensor of the params: 1 gyroscope, 2 magnetometer, 5 accelerometer (1) or level (2).
 
         Returns:
@@ -89,7 +89,7 @@ class MaintenanceCommands(Service):
         autopilot.say(_INFO, f"[cal] calibration done: {name}")
         return CommandResult.ACCEPTED
 
-    def _inject_failure(self, command: Command) -> CommandResult:
+    def _inject_failure(self, command: VehicleCommand) -> CommandResult:
         """Params: unit, type, instance (NaN: all)."""
         autopilot = self._autopilot
         if not autopilot.parameters.value("SYS_FAILURE_EN"):

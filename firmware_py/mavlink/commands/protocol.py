@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import nan
 
-from firmware_py.mavlink.service import Command, CommandHandler, Handler, Service
+from firmware_py.mavlink.service import CommandHandler, Handler, Service, VehicleCommand
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import BROADCAST, Message, mavlink
 from framerunner.wire.exchange import Exchange
@@ -42,14 +42,14 @@ class CommandService(Service):
         self._table = table
         self._owner = owner
         handlers: dict[int, Handler] = {
-            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: partial(self._receive, Command.from_long),
-            mavlink.MAVLINK_MSG_ID_COMMAND_INT: partial(self._receive, Command.from_int),
+            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: partial(self._receive, VehicleCommand.from_long),
+            mavlink.MAVLINK_MSG_ID_COMMAND_INT: partial(self._receive, VehicleCommand.from_int),
         }
         if mavlink.MAV_CMD_DO_SET_MODE in table:
             handlers[mavlink.MAVLINK_MSG_ID_SET_MODE] = self._receive_set_mode
         self.handlers = handlers
 
-    def _receive(self, read: Callable[[Link, Message], Command], link: Link, message: Message) -> None:
+    def _receive(self, read: Callable[[Link, Message], VehicleCommand], link: Link, message: Message) -> None:
         """Execute a command, unless it is for another target."""
         number = message.command
         or_everyone = number in _TO_EVERYONE and number in self._table
@@ -67,9 +67,9 @@ class CommandService(Service):
             main = 0  # reserved bits are set, so this is no custom mode of PX4's
         params = (float(message.base_mode), float(main), float(sub), nan)
         sender = (message.get_srcSystem(), message.get_srcComponent())
-        self._run(mavlink.MAV_CMD_DO_SET_MODE, Command(link, params, sender=sender))
+        self._run(mavlink.MAV_CMD_DO_SET_MODE, VehicleCommand(link, params, sender=sender))
 
-    def _run(self, number: int, command: Command) -> None:
+    def _run(self, number: int, command: VehicleCommand) -> None:
         handler = self._table.get(number)
         result = CommandResult.UNSUPPORTED if handler is None else handler(command)
         if result is not None:

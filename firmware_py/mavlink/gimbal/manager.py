@@ -11,7 +11,7 @@ from math import atan2, hypot, isfinite, isnan, nan, radians, remainder, tau
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.gimbal.device import CAPABILITIES, device_flags
 from firmware_py.mavlink.gimbal.model import GIMBAL_COMPONENT_ID, GimbalDevice, GimbalTarget
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Service, VehicleCommand
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.geometry.rotations import euler_from_quaternion, normalized, yaw_of
@@ -79,7 +79,7 @@ class GimbalManager(Service):
             self._gimbal.turn(GimbalTarget(0.0, 0.0))
         self._region_ned_m = point_ned_m
 
-    def _pitch_yaw(self, command: Command) -> CommandResult:
+    def _pitch_yaw(self, command: VehicleCommand) -> CommandResult:
         if not self._is_in_control(command.sender):
             self._refuse(command.sender)
             return CommandResult.DENIED
@@ -102,7 +102,7 @@ class GimbalManager(Service):
         pitch_deg, _, yaw_deg = params[:3]
         return self._turn((pitch_deg, yaw_deg, nan, nan, 0.0, 0.0, 0.0))
 
-    def _configure(self, command: Command) -> CommandResult:
+    def _configure(self, command: VehicleCommand) -> CommandResult:
         return self._set_control(command.sender, command.all_params)
 
     def _set_control(self, sender: Controller, params: SevenParams) -> CommandResult:

@@ -82,7 +82,7 @@ _GROUP_NAMES: dict[FlightMode, str] = {
 }
 
 
-class Part(IntFlag):
+class HealthComponent(IntFlag):
     """Parts of the vehicle, as bits of `health_component_t`."""
 
     NONE = 1 << 0
@@ -104,12 +104,12 @@ class Part(IntFlag):
     GYRO = 1 << 29
 
 
-_PART_LABELS: dict[Part, str] = {
-    Part.GPS: "Satellite positioning",
-    Part.REMOTE_CONTROL: "Sticks",
-    Part.ABSOLUTE_PRESSURE: "Barometer",
-    Part.ACCEL: "Accelerometer",
-    Part.GYRO: "Gyroscope",
+_PART_LABELS: dict[HealthComponent, str] = {
+    HealthComponent.GPS: "Satellite positioning",
+    HealthComponent.REMOTE_CONTROL: "Sticks",
+    HealthComponent.ABSOLUTE_PRESSURE: "Barometer",
+    HealthComponent.ACCEL: "Accelerometer",
+    HealthComponent.GYRO: "Gyroscope",
 }
 
 
@@ -117,7 +117,7 @@ def enums() -> dict[str, object]:
     """The enumerations in libevents' format."""
     parts = {
         int(part): (part.name, _PART_LABELS.get(part, str(part.name).replace("_", " ").capitalize()))
-        for part in Part
+        for part in HealthComponent
     }
     groups = {
         1 << number: (_GROUP_NAMES.get(mode, mode.name), mode.name.capitalize())

@@ -23,10 +23,10 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     OTHER_CHECK,
     PROTOCOL_LEVEL,
     EventKind,
-    Part,
+    HealthComponent,
     event_of,
 )
-from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.service import Service, VehicleCommand
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import StatusText
 from framerunner.wire.dialect import Message, boot_ms, mavlink
@@ -40,43 +40,43 @@ _HEALTH_PERIOD_US = 100_000  # between assessments
 _REPORT_GAP_US = 2_000_000  # between unrequested reports
 _UNARMABLE = sum(1 << MODE_GROUPS[mode] for mode in UNARMABLE)
 _SENSOR_PARTS = {
-    Sensor.GYROSCOPE: Part.GYRO,
-    Sensor.ACCELEROMETER: Part.ACCEL,
-    Sensor.MAGNETOMETER: Part.MAGNETOMETER,
-    Sensor.BAROMETER: Part.ABSOLUTE_PRESSURE,
-    Sensor.GPS: Part.GPS,
-    Sensor.EXTERNAL_POSE: Part.VISION_POSITION,
-    Sensor.RANGE_FINDER: Part.DISTANCE_SENSOR,
-    Sensor.OPTICAL_FLOW: Part.OPTICAL_FLOW,
+    Sensor.GYROSCOPE: HealthComponent.GYRO,
+    Sensor.ACCELEROMETER: HealthComponent.ACCEL,
+    Sensor.MAGNETOMETER: HealthComponent.MAGNETOMETER,
+    Sensor.BAROMETER: HealthComponent.ABSOLUTE_PRESSURE,
+    Sensor.GPS: HealthComponent.GPS,
+    Sensor.EXTERNAL_POSE: HealthComponent.VISION_POSITION,
+    Sensor.RANGE_FINDER: HealthComponent.DISTANCE_SENSOR,
+    Sensor.OPTICAL_FLOW: HealthComponent.OPTICAL_FLOW,
 }
 _LOW_BATTERY = 2  # MAV_BATTERY_CHARGE_STATE_LOW
 
 # The part that a reason is about, by a word in it, and whether it prevents the chosen mode only.
-_SUBJECTS: tuple[tuple[str, Part, bool], ...] = (
-    (NO_FIX.lower(), Part.GPS, True),
+_SUBJECTS: tuple[tuple[str, HealthComponent, bool], ...] = (
+    (NO_FIX.lower(), HealthComponent.GPS, True),
     *((sensor.value.lower(), part, False) for sensor, part in _SENSOR_PARTS.items()),
-    ("imu ", Part.ACCEL, False),
-    (NO_HEIGHT, Part.LOCAL_POSITION_ESTIMATE, False),
-    ("battery", Part.BATTERY, False),
-    ("ground station", Part.COMMUNICATION_LINKS, False),
-    ("side", Part.ATTITUDE_ESTIMATE, False),
-    ("attitude", Part.ATTITUDE_ESTIMATE, False),
-    ("setpoint", Part.SYSTEM, True),
-    ("manual", Part.REMOTE_CONTROL, True),
-    ("stick", Part.REMOTE_CONTROL, True),
-    ("mission", Part.MISSION, True),
-    ("position", Part.LOCAL_POSITION_ESTIMATE, True),
-    ("mode", Part.SYSTEM, True),
-    ("not in ", Part.SYSTEM, True),
+    ("imu ", HealthComponent.ACCEL, False),
+    (NO_HEIGHT, HealthComponent.LOCAL_POSITION_ESTIMATE, False),
+    ("battery", HealthComponent.BATTERY, False),
+    ("ground station", HealthComponent.COMMUNICATION_LINKS, False),
+    ("side", HealthComponent.ATTITUDE_ESTIMATE, False),
+    ("attitude", HealthComponent.ATTITUDE_ESTIMATE, False),
+    ("setpoint", HealthComponent.SYSTEM, True),
+    ("manual", HealthComponent.REMOTE_CONTROL, True),
+    ("stick", HealthComponent.REMOTE_CONTROL, True),
+    ("mission", HealthComponent.MISSION, True),
+    ("position", HealthComponent.LOCAL_POSITION_ESTIMATE, True),
+    ("mode", HealthComponent.SYSTEM, True),
+    ("not in ", HealthComponent.SYSTEM, True),
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class ArmingCheck:
     """What prevents arming: its event, the part it is about, and the groups of modes it prevents, as bits."""
 
     kind: EventKind
-    part: Part
+    part: HealthComponent
     modes: int
 
 
@@ -84,10 +84,10 @@ class Check:
 class HealthReport:
     """Parts that are present, failing or near it, and what prevents arming."""
 
-    present: Part
-    failing: Part
-    warning: Part
-    check: Check | None
+    present: HealthComponent
+    failing: HealthComponent
+    warning: HealthComponent
+    check: ArmingCheck | None
 
 
 def assess(autopilot: Autopilot) -> HealthReport:
@@ -95,36 +95,36 @@ def assess(autopilot: Autopilot) -> HealthReport:
     status = autopilot.status
     present, failing = _parts(autopilot.estimator.report())
     if status.origin is not None:
-        present |= Part.GLOBAL_POSITION_ESTIMATE
-    present |= Part.BATTERY
-    warning = Part.BATTERY if autopilot.battery.warning >= _LOW_BATTERY else Part(0)
+        present |= HealthComponent.GLOBAL_POSITION_ESTIMATE
+    present |= HealthComponent.BATTERY
+    warning = HealthComponent.BATTERY if autopilot.battery.warning >= _LOW_BATTERY else HealthComponent(0)
     check = None if status.ready else _check(status.not_ready, status.intended_mode)
     return HealthReport(present, failing, warning, check)
 
 
-def _parts(report: EstimatorReport) -> tuple[Part, Part]:
+def _parts(report: EstimatorReport) -> tuple[HealthComponent, HealthComponent]:
     """Parts that an estimator with these sensors has, and those of them that fail."""
-    present = Part.ATTITUDE_ESTIMATE | Part.LOCAL_POSITION_ESTIMATE
-    failing = Part(0)
+    present = HealthComponent.ATTITUDE_ESTIMATE | HealthComponent.LOCAL_POSITION_ESTIMATE
+    failing = HealthComponent(0)
     for sensor in report.present:
         part = _SENSOR_PARTS[sensor]
         present |= part
         if sensor not in report.healthy:
             failing |= part
     if not report.has_attitude:
-        failing |= Part.ATTITUDE_ESTIMATE
+        failing |= HealthComponent.ATTITUDE_ESTIMATE
     if not report.has_position:
-        failing |= Part.LOCAL_POSITION_ESTIMATE
+        failing |= HealthComponent.LOCAL_POSITION_ESTIMATE
     return present, failing
 
 
-def _check(reason: str, intended: FlightMode) -> Check:
+def _check(reason: str, intended: FlightMode) -> ArmingCheck:
     kind = CHECKS.get(reason, OTHER_CHECK)
     said = reason.lower()
     for word, part, this_mode_only in _SUBJECTS:
         if word in said:
-            return Check(kind, part, 1 << MODE_GROUPS[intended] if this_mode_only else ALL_MODES)
-    return Check(kind, Part.SYSTEM, ALL_MODES)
+            return ArmingCheck(kind, part, 1 << MODE_GROUPS[intended] if this_mode_only else ALL_MODES)
+    return ArmingCheck(kind, HealthComponent.SYSTEM, ALL_MODES)
 
 
 class EventService(Service):
@@ -190,7 +190,7 @@ class EventService(Service):
 
     def _send_report(self, report: HealthReport) -> None:
         """Send the events of a report, in their order: summary, check, summary."""
-        check, prevented, error = report.check, _UNARMABLE, Part(0)
+        check, prevented, error = report.check, _UNARMABLE, HealthComponent(0)
         if check is not None:
             prevented, error = prevented | check.modes, check.part
         self._send(
@@ -201,7 +201,7 @@ class EventService(Service):
             self._send(check.kind, mavlink.MAV_SEVERITY_ERROR, check.modes, bit_number)
         self._send(HEALTH_SUMMARY, PROTOCOL_LEVEL, 0, report.present, report.failing, report.warning)
 
-    def _run_checks(self, _command: Command) -> CommandResult:
+    def _run_checks(self, _command: VehicleCommand) -> CommandResult:
         """RUN_PREARM_CHECKS: they run all the time; the report is sent again."""
         self._report_requested = True
         self._health_due_us = 0

@@ -52,7 +52,7 @@ def nak_data(error: RefusalError | OSError) -> bytes:
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class FileRequest:
     """A client's request."""
 
     sequence: int  # the answer has the next one
@@ -75,15 +75,15 @@ class Request:
         return self.data.split(b"\0", 1)[0]
 
 
-def parse(payload: bytes) -> Request:
+def parse(payload: bytes) -> FileRequest:
     """A request from the 251 bytes of a payload."""
     sequence, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(payload)
     data = payload[_HEADER.size : _HEADER.size + min(size, DATA_BYTES)]
-    return Request(sequence, session, opcode, size, offset, data, payload[: _HEADER.size] + data)
+    return FileRequest(sequence, session, opcode, size, offset, data, payload[: _HEADER.size] + data)
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class FileAnswer:
     """The answer to a request."""
 
     data: bytes = b""  # at most 239 bytes
@@ -106,20 +106,20 @@ class Answer:
 class Burst:
     """A burst being sent; sequence and offset are the next packet's."""
 
-    request: bytes  # `Request.raw`
+    request: bytes  # `FileRequest.raw`
     sequence: int
     offset: int
     sent_bytes: int = 0
 
 
 @dataclass(slots=True)
-class Session:
+class FileSession:
     """An open file."""
 
     path: Path
     size: int  # when it was opened
     writable: bool  # opened for writing, else for reading
-    opening: bytes  # `Request.raw` of the request that opened it
+    opening: bytes  # `FileRequest.raw` of the request that opened it
     opened_us: int
     used_us: int
     burst: Burst | None = None
@@ -131,14 +131,14 @@ class Client:
     """One client."""
 
     key: ClientKey
-    sessions: dict[int, Session] = field(default_factory=dict)  # by number; numbers are the client's own
+    sessions: dict[int, FileSession] = field(default_factory=dict)  # by number; numbers are the client's own
     used_us: int = 0  # vehicle time of the last request
-    last_request: bytes = b""  # `Request.raw` of the last request if it changed something, else empty
+    last_request: bytes = b""  # `FileRequest.raw` of the last request if it changed something, else empty
     last_reply: bytes = b""  # payload of the answer to it
-    last_closing: bytes = b""  # `Request.raw` of the last request that closed a session
+    last_closing: bytes = b""  # `FileRequest.raw` of the last request that closed a session
     closed_us: int = 0
 
-    def session(self, number: int, time_us: int) -> Session:
+    def session(self, number: int, time_us: int) -> FileSession:
         """An open file, which is now used.
 
         Raises:
@@ -150,7 +150,7 @@ class Client:
         session.used_us = time_us
         return session
 
-    def twin(self, number: int, opening: bytes, time_us: int) -> Session | None:
+    def twin(self, number: int, opening: bytes, time_us: int) -> FileSession | None:
         """A session that the same request opened a moment ago: the request was received twice."""
         session = self.sessions.get(number)
         if session is None or session.closing or session.opening != opening:
@@ -206,7 +206,7 @@ class Clients:
         client.used_us = time_us
         return client
 
-    def bursting(self) -> list[tuple[Client, int, Session]]:
+    def bursting(self) -> list[tuple[Client, int, FileSession]]:
         """Clients and their sessions whose burst is being sent."""
         return [
             (client, number, session)

@@ -18,18 +18,18 @@ from zlib import crc32
 
 from firmware_py.mavlink.ground_station.file_sessions import (
     DATA_BYTES,
-    Answer,
     Burst,
     Client,
     Clients,
+    FileAnswer,
+    FileRequest,
+    FileSession,
     RefusalError,
-    Request,
-    Session,
     nak_data,
     parse,
 )
 from firmware_py.mavlink.service import Service
-from firmware_py.storage import Entry, Path, Storage, parse_path, refuse, sound_name
+from firmware_py.storage import Path, Storage, StorageEntry, parse_path, refuse, sound_name
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.exchange import Exchange
 from framerunner.wire.link import Link
@@ -69,17 +69,17 @@ class FileTree:
         self._folders = {path[:depth] for path in self._firmware for depth in range(1, len(path))}
         self._tops = {path[0] for path in self._firmware}
 
-    def entry(self, path: Path) -> Entry:
+    def entry(self, path: Path) -> StorageEntry:
         """The file or folder at a path."""
         if not self._is_firmware(path):
             return self._need_storage(path).entry(path)
         if path in self._firmware:
-            return Entry(path[-1], len(self._files[self._firmware[path]]))
+            return StorageEntry(path[-1], len(self._files[self._firmware[path]]))
         if path in self._folders:
-            return Entry(path[-1], 0, True)
+            return StorageEntry(path[-1], 0, True)
         raise refuse(errno.ENOENT, path)
 
-    def entries(self, path: Path) -> list[Entry]:
+    def entries(self, path: Path) -> list[StorageEntry]:
         """The content of a folder, sorted by name."""
         if self._is_firmware(path):
             if path in self._firmware:
@@ -136,13 +136,13 @@ class FileTree:
             raise refuse(errno.ENOENT, path)
         return self._storage
 
-    def _firmware_entries(self, path: Path) -> list[Entry]:
+    def _firmware_entries(self, path: Path) -> list[StorageEntry]:
         depth = len(path) + 1
         inside = [each for each in (*self._firmware, *self._folders) if len(each) == depth]
         return [self.entry(each) for each in sorted(inside) if each[:-1] == path]
 
 
-def _line(entry: Entry) -> bytes:
+def _line(entry: StorageEntry) -> bytes:
     if not sound_name(entry.name):
         return b"S\0"
     if entry.is_folder:
@@ -155,7 +155,7 @@ class _Checksum:
     """A CRC-32 being computed; it is answered when the whole file is read."""
 
     client: Client
-    request: Request
+    request: FileRequest
     path: Path
     size: int
     offset: int = 0
@@ -168,7 +168,7 @@ class FileOperations:
     def __init__(self, tree: FileTree, exchange: Exchange) -> None:
         self._tree = tree
         self._exchange = exchange
-        self.table: dict[int, Callable[[Client, Request], Answer]] = {
+        self.table: dict[int, Callable[[Client, FileRequest], FileAnswer]] = {
             mavlink.MAV_FTP_OPCODE_NONE: self._nothing,
             mavlink.MAV_FTP_OPCODE_TERMINATESESSION: self._terminate,
             mavlink.MAV_FTP_OPCODE_RESETSESSION: self._reset,
@@ -185,41 +185,41 @@ class FileOperations:
             mavlink.MAV_FTP_OPCODE_RENAME: self._rename,
         }
 
-    def reading(self, client: Client, request: Request) -> Session:
+    def reading(self, client: Client, request: FileRequest) -> FileSession:
         """The session that a request reads from."""
         session = client.session(request.session, self._exchange.time_us)
         if session.writable:
             raise refuse(errno.EBADF, session.path)
         return session
 
-    def _nothing(self, _client: Client, request: Request) -> Answer:
-        return Answer(request.data, session=request.session, offset=request.offset)
+    def _nothing(self, _client: Client, request: FileRequest) -> FileAnswer:
+        return FileAnswer(request.data, session=request.session, offset=request.offset)
 
-    def _terminate(self, client: Client, request: Request) -> Answer:
+    def _terminate(self, client: Client, request: FileRequest) -> FileAnswer:
         client.session(request.session, self._exchange.time_us)
         client.close([request.session], request.raw, self._exchange.time_us)
-        return Answer(session=request.session)
+        return FileAnswer(session=request.session)
 
-    def _reset(self, client: Client, request: Request) -> Answer:
+    def _reset(self, client: Client, request: FileRequest) -> FileAnswer:
         client.close(list(client.sessions), request.raw, self._exchange.time_us)
-        return Answer(session=request.session)
+        return FileAnswer(session=request.session)
 
-    def _list(self, _client: Client, request: Request) -> Answer:
+    def _list(self, _client: Client, request: FileRequest) -> FileAnswer:
         page = self._tree.listing(parse_path(request.path), request.offset)
         if not page:
             raise RefusalError(mavlink.MAV_FTP_ERR_EOF)
-        return Answer(page, session=request.session, offset=request.offset)
+        return FileAnswer(page, session=request.session, offset=request.offset)
 
-    def _open(self, client: Client, request: Request) -> Answer:
+    def _open(self, client: Client, request: FileRequest) -> FileAnswer:
         number, time_us = request.session, self._exchange.time_us
         twin = client.twin(number, request.raw, time_us)
         if twin is not None:
-            return Answer(pack("<I", twin.size), session=number)
+            return FileAnswer(pack("<I", twin.size), session=number)
         client.free(number, time_us)
         path, writable = parse_path(request.path), request.opcode != mavlink.MAV_FTP_OPCODE_OPENFILERO
         size = self._prepare(path, request.opcode)
-        client.sessions[number] = Session(path, size, writable, request.raw, time_us, time_us)
-        return Answer(pack("<I", size & 0xFFFFFFFF), session=number)
+        client.sessions[number] = FileSession(path, size, writable, request.raw, time_us, time_us)
+        return FileAnswer(pack("<I", size & 0xFFFFFFFF), session=number)
 
     def _prepare(self, path: Path, opcode: int) -> int:
         """Check or create a file to be opened; its size before that, as PX4 reports it."""
@@ -239,21 +239,21 @@ class FileOperations:
                 storage.truncate(path, 0)
         return size
 
-    def _read(self, client: Client, request: Request) -> Answer:
+    def _read(self, client: Client, request: FileRequest) -> FileAnswer:
         session = self.reading(client, request)
         if request.offset >= session.size:
             raise RefusalError(mavlink.MAV_FTP_ERR_EOF)
         data = self._tree.read(session.path, request.offset, request.size)
-        return Answer(data, session=request.session, offset=request.offset)
+        return FileAnswer(data, session=request.session, offset=request.offset)
 
-    def _write(self, client: Client, request: Request) -> Answer:
+    def _write(self, client: Client, request: FileRequest) -> FileAnswer:
         session = client.session(request.session, self._exchange.time_us)
         if not session.writable:
             raise refuse(errno.EBADF, session.path)
         self._tree.writable(session.path).write(session.path, request.offset, request.data)
-        return Answer(pack("<I", len(request.data)), session=request.session, offset=request.offset)
+        return FileAnswer(pack("<I", len(request.data)), session=request.session, offset=request.offset)
 
-    def _change(self, _client: Client, request: Request) -> Answer:
+    def _change(self, _client: Client, request: FileRequest) -> FileAnswer:
         path, offset = parse_path(request.path), 0
         storage = self._tree.writable(path)
         match request.opcode:
@@ -266,16 +266,16 @@ class FileOperations:
             case mavlink.MAV_FTP_OPCODE_TRUNCATEFILE:
                 offset = request.offset
                 storage.truncate(path, offset)
-        return Answer(session=request.session, offset=offset)
+        return FileAnswer(session=request.session, offset=offset)
 
-    def _rename(self, _client: Client, request: Request) -> Answer:
+    def _rename(self, _client: Client, request: FileRequest) -> FileAnswer:
         names = request.strings
         if len(names) < 2:
             raise refuse(errno.EINVAL, ())
         old, new = parse_path(names[0]), parse_path(names[1])
         self._tree.writable(old)
         self._tree.writable(new).rename(old, new)
-        return Answer(session=request.session)
+        return FileAnswer(session=request.session)
 
 
 class FileTransferService(Service):
@@ -287,7 +287,7 @@ class FileTransferService(Service):
         self._exchange = exchange
         self._tree = FileTree(storage, firmware_files)
         self._operations = FileOperations(self._tree, exchange)
-        self._work: dict[int, Callable[[Client, Request], Answer | None]] = {
+        self._work: dict[int, Callable[[Client, FileRequest], FileAnswer | None]] = {
             **self._operations.table,
             mavlink.MAV_FTP_OPCODE_CALCFILECRC: self._checksum,
             mavlink.MAV_FTP_OPCODE_BURSTREADFILE: self._burst,
@@ -325,7 +325,7 @@ class FileTransferService(Service):
         if answer is not None:
             self._reply(client, request, answer)
 
-    def _answer(self, client: Client, request: Request) -> Answer | None:
+    def _answer(self, client: Client, request: FileRequest) -> FileAnswer | None:
         """Execute a request; None: it is answered later."""
         try:
             if request.size > DATA_BYTES:
@@ -335,9 +335,9 @@ class FileTransferService(Service):
                 raise RefusalError(mavlink.MAV_FTP_ERR_UNKNOWNCOMMAND)
             return work(client, request)
         except (RefusalError, OSError) as error:
-            return Answer(nak_data(error), ack=False, session=request.session, offset=request.offset)
+            return FileAnswer(nak_data(error), ack=False, session=request.session, offset=request.offset)
 
-    def _reply(self, client: Client, request: Request, answer: Answer) -> None:
+    def _reply(self, client: Client, request: FileRequest, answer: FileAnswer) -> None:
         payload = answer.payload(request.sequence + 1, request.opcode)
         no_session = bytes((mavlink.MAV_FTP_ERR_NOSESSIONSAVAILABLE,))
         keep = request.opcode in _CHANGING and answer.data != no_session
@@ -351,7 +351,7 @@ class FileTransferService(Service):
             message = mavlink.MAVLink_file_transfer_protocol_message(0, system, component, payload)
             self._exchange.send(link, message)
 
-    def _checksum(self, client: Client, request: Request) -> Answer | None:
+    def _checksum(self, client: Client, request: FileRequest) -> FileAnswer | None:
         path = parse_path(request.path)
         entry = self._tree.entry(path)
         if entry.is_folder:
@@ -370,22 +370,22 @@ class FileTransferService(Service):
         try:
             data = self._tree.read(checksum.path, checksum.offset, count)
         except OSError as error:
-            answer = Answer(nak_data(error), ack=False, session=checksum.request.session)
+            answer = FileAnswer(nak_data(error), ack=False, session=checksum.request.session)
         else:
             checksum.crc = crc32(data, checksum.crc)
             checksum.offset += len(data)
             if data and checksum.offset < checksum.size:
                 return
-            answer = Answer(pack("<I", checksum.crc ^ 0xFFFFFFFF), session=checksum.request.session)
+            answer = FileAnswer(pack("<I", checksum.crc ^ 0xFFFFFFFF), session=checksum.request.session)
         self._checksums.remove(checksum)
         self._reply(checksum.client, checksum.request, answer)
 
-    def _burst(self, client: Client, request: Request) -> None:
+    def _burst(self, client: Client, request: FileRequest) -> None:
         session = self._operations.reading(client, request)
         if session.burst is None or session.burst.request != request.raw:  # else it was received twice
             session.burst = Burst(request.raw, request.sequence + 1, request.offset)
 
-    def _send_burst(self, client: Client, number: int, session: Session, room: dict[str, int]) -> None:
+    def _send_burst(self, client: Client, number: int, session: FileSession, room: dict[str, int]) -> None:
         """Send the next packets of a burst, as many as its link has room for."""
         link = self._exchange.links.get(client.key[0])
         if link is None:
@@ -396,7 +396,7 @@ class FileTransferService(Service):
             self._send(client, self._burst_packet(session.burst, number, session))
             session.used_us = client.used_us = self._exchange.time_us
 
-    def _burst_packet(self, burst: Burst, number: int, session: Session) -> bytes:
+    def _burst_packet(self, burst: Burst, number: int, session: FileSession) -> bytes:
         """The next packet; the burst ends after the end of the file, an error, or 35 kB."""
         sequence, offset = burst.sequence, burst.offset
         try:
@@ -407,7 +407,7 @@ class FileTransferService(Service):
                 raise RefusalError(mavlink.MAV_FTP_ERR_EOF)  # the file has become shorter
         except (RefusalError, OSError) as error:
             session.burst = None
-            answer = Answer(nak_data(error), ack=False, session=number, offset=offset)
+            answer = FileAnswer(nak_data(error), ack=False, session=number, offset=offset)
             return answer.payload(sequence, mavlink.MAV_FTP_OPCODE_BURSTREADFILE)
         burst.sequence += 1
         burst.offset += len(data)
@@ -415,5 +415,5 @@ class FileTransferService(Service):
         complete = burst.sent_bytes > _BURST_BYTES
         if complete:
             session.burst = None
-        answer = Answer(data, session=number, offset=offset, burst_complete=complete)
+        answer = FileAnswer(data, session=number, offset=offset, burst_complete=complete)
         return answer.payload(sequence, mavlink.MAV_FTP_OPCODE_BURSTREADFILE)

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from math import isfinite
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.missions.messages import mission_current
-from firmware_py.mavlink.service import Command, MissionCommandHandler, Service
+from firmware_py.mavlink.missions.item_messages import mission_current
+from firmware_py.mavlink.service import MissionCommandHandler, Service, VehicleCommand
 from firmware_py.missions.actions import REGIONS
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.status import CommandResult, FlightMode
@@ -102,7 +102,7 @@ class MissionExecution(Service):
             (store.mission.opaque_id, store.fence.opaque_id, store.rally.opaque_id),
         )
 
-    def _start(self, command: Command) -> CommandResult:
+    def _start(self, command: VehicleCommand) -> CommandResult:
         """MISSION_START: switch to mission mode and arm.
 
         Param 1 is the first item; -1, or not given: the current one. Param 2, the last item, is ignored, as
@@ -127,7 +127,7 @@ class MissionExecution(Service):
             result = autopilot.arm()
         return result if result is CommandResult.ACCEPTED else CommandResult.TEMPORARILY_REJECTED
 
-    def _set_current(self, command: Command) -> CommandResult:
+    def _set_current(self, command: VehicleCommand) -> CommandResult:
         """DO_SET_MISSION_CURRENT, which PX4 does not have: param 1 is the item to fly next."""
         autopilot, seq = self._autopilot, command.params[0]
         if isfinite(seq) and autopilot.missions.select(int(seq)):

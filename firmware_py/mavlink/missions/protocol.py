@@ -18,11 +18,17 @@ from weakref import WeakSet
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.missions.execution import MissionExecution
-from firmware_py.mavlink.missions.messages import Refusal, item_message, mission_ack, mission_count, read_item
+from firmware_py.mavlink.missions.item_messages import (
+    ItemRefusal,
+    item_message,
+    mission_ack,
+    mission_count,
+    read_item,
+)
 from firmware_py.mavlink.service import Service
 from firmware_py.missions.geofence import fence_fault
 from firmware_py.missions.items import MissionItem, PlanType
-from firmware_py.missions.store import Plan
+from firmware_py.missions.store import StoredPlan
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.exchange import Exchange
 from framerunner.wire.link import Link
@@ -96,7 +102,7 @@ class MissionService(Service):
         self._outcome: _Outcome | None = None
         self._float_links: WeakSet[Link] = WeakSet()  # whose other side last used the form with floats
         # The plan that is read, and the time of the last request.
-        self._downloads: dict[tuple[_Partner, PlanType], tuple[Plan, int]] = {}
+        self._downloads: dict[tuple[_Partner, PlanType], tuple[StoredPlan, int]] = {}
         self.handlers = {
             message_id: partial(self._receive, work)
             for message_id, work in {
@@ -194,7 +200,7 @@ class MissionService(Service):
     def _take(self, upload: _Upload, message: Message) -> None:
         """Take the requested item."""
         item = read_item(message, upload.plan_type)
-        if isinstance(item, Refusal):
+        if isinstance(item, ItemRefusal):
             self._say(f"IGN MISSION_ITEM: Invalid item {message.seq + 1}: {item.reason}")
             self._end(upload, item.result)
             return

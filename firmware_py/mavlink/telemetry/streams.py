@@ -11,7 +11,7 @@ from functools import partial
 from math import isfinite, nan
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Command, CommandHandler, Reply, Service, Source
+from firmware_py.mavlink.service import CommandHandler, Reply, Service, Source, VehicleCommand
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from framerunner.wire.exchange import Exchange
@@ -74,7 +74,7 @@ class RequestService(Service):
             **{number: partial(self._request_older, *request) for number, request in older.items()},
         }
 
-    def _request_older(self, message_id: int, index_param: int, command: Command) -> CommandResult:
+    def _request_older(self, message_id: int, index_param: int, command: VehicleCommand) -> CommandResult:
         argument = command.all_params[index_param - 1] if index_param else nan
         return self._request(command.link, message_id, argument)
 
@@ -156,10 +156,10 @@ class StreamService(RequestService):
         message = self._message(message_id, link)
         return [] if message is None else [message]
 
-    def _get_interval(self, command: Command) -> CommandResult:
+    def _get_interval(self, command: VehicleCommand) -> CommandResult:
         return self._request(command.link, mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL, command.params[0])
 
-    def _set_interval(self, command: Command) -> CommandResult:
+    def _set_interval(self, command: VehicleCommand) -> CommandResult:
         """0: default, -1: off. HEARTBEAT and unknown messages fail, as in PX4."""
         message_id, interval_us = _message_id(command.params[0]), command.params[1]
         if message_id is None or message_id not in self._streamable:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from framerunner.commands.options.rules import Rule
+from framerunner.commands.options.rules import OptionRule
 
 if TYPE_CHECKING:
     from framerunner.flying.simulator_process import GenuineAutopilot
@@ -65,7 +65,7 @@ class GenuineOptions:
 
 
 GENUINE = ("px4", "ardupilot")
-ONE_AUTOPILOT = Rule(
+ONE_AUTOPILOT = OptionRule(
     "ardupilot", "PX4 flies, by --px4 {given[px4]}; leave one of them out", excludes=("px4",)
 )
 

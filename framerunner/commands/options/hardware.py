@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from framerunner.commands import check_range
 from framerunner.commands.options.flight import HARDWARE_GROUP
-from framerunner.commands.options.rules import Given, Rule, for_each, given_in, names_of
+from framerunner.commands.options.rules import Given, OptionRule, for_each, given_in, names_of
 from framerunner.preflight.settings import DRY_RUN_S, HardwareSettings
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ HARDWARE_RULES = (
         "a drone that is --simulated is not checked; leave one of them out",
         excludes=("simulated",),
     ),
-    Rule("hold-time", "is for --on-abort hold; leave it out", needs=("on-abort hold",)),
+    OptionRule("hold-time", "is for --on-abort hold; leave it out", needs=("on-abort hold",)),
 )
 SERVICE_VARIABLE = "FRAMERUNNER_SERVICE"
 """Set by systemd/framerunner-fly.service: nobody may be near the drone when a service starts."""

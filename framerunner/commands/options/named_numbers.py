@@ -11,13 +11,13 @@ from framerunner.commands import check_range
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
-    from framerunner.flying.response import Response
+    from framerunner.flying.response import ResponseDelay
     from framerunner.geometry.vectors import Vec3
     from offboard.limits import CommandLimits
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class NumberRange:
     """A number's range, and its value where it is not given; without one it must be given."""
 
     low: float
@@ -26,16 +26,20 @@ class Span:
 
 
 _RESPONSE = {
-    "lag": Span(0.0, 2.0, 0.0),
-    "dead-time": Span(0.0, 1.0, 0.0),
-    "height-wander": Span(0.0, 0.5, 0.0),
+    "lag": NumberRange(0.0, 2.0, 0.0),
+    "dead-time": NumberRange(0.0, 1.0, 0.0),
+    "height-wander": NumberRange(0.0, 0.5, 0.0),
 }
 _LIMITS = {
-    **{name: Span(0.1, 20.0) for name in ("forward", "left", "up")},
-    "yaw-rate": Span(0.1, 2 * pi),
-    "down": Span(0.1, 20.0, 0.0),
+    **{name: NumberRange(0.1, 20.0) for name in ("forward", "left", "up")},
+    "yaw-rate": NumberRange(0.1, 2 * pi),
+    "down": NumberRange(0.1, 20.0, 0.0),
 }
-_PLACE = {"forward": Span(-1.0, 1.0), "left": Span(-1.0, 1.0, 0.0), "up": Span(-1.0, 1.0, 0.0)}
+_PLACE = {
+    "forward": NumberRange(-1.0, 1.0),
+    "left": NumberRange(-1.0, 1.0, 0.0),
+    "up": NumberRange(-1.0, 1.0, 0.0),
+}
 
 
 def place_of_lens(text: str) -> Vec3:
@@ -44,12 +48,12 @@ def place_of_lens(text: str) -> Vec3:
     return (given["forward"], given["left"], given["up"])
 
 
-def response_of(text: str) -> Response:
+def response_of(text: str) -> ResponseDelay:
     """The value of `--response`. Raises `SettingError` with one line."""
-    from framerunner.flying.response import Response
+    from framerunner.flying.response import ResponseDelay
 
     given = _named_numbers("--response", text, _RESPONSE)
-    return Response(given["lag"], given["dead-time"], given["height-wander"])
+    return ResponseDelay(given["lag"], given["dead-time"], given["height-wander"])
 
 
 def limits_of(text: str) -> CommandLimits:
@@ -61,7 +65,7 @@ def limits_of(text: str) -> CommandLimits:
     return CommandLimits(given["forward"], given["left"], up_m_s, given["down"] or up_m_s, given["yaw-rate"])
 
 
-def _named_numbers(option: str, text: str, known: Mapping[str, Span]) -> dict[str, float]:
+def _named_numbers(option: str, text: str, known: Mapping[str, NumberRange]) -> dict[str, float]:
     """Read `name=number,name=number`.
 
     Raises:

@@ -16,7 +16,7 @@ Of an option with a text there is a second name, with the text: "on-abort hold" 
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class OptionRule:
     """What an option excludes, and what it needs; names as in `Given`.
 
     Attributes:
@@ -46,9 +46,9 @@ class Rule:
             raise SettingError(f"--{self.option}{shown}: {words}")
 
 
-def for_each(options: Iterable[str], words: str, **how: Any) -> tuple[Rule, ...]:  # noqa: ANN401 - those of `Rule`
+def for_each(options: Iterable[str], words: str, **how: Any) -> tuple[OptionRule, ...]:  # noqa: ANN401 - those of `OptionRule`
     """The same rule for several options."""
-    return tuple(Rule(option, words, **how) for option in options)
+    return tuple(OptionRule(option, words, **how) for option in options)
 
 
 def names_of(group: type) -> tuple[str, ...]:
@@ -69,7 +69,7 @@ def given_in(*groups: Any) -> dict[str, object]:  # noqa: ANN401 - data classes 
     return given
 
 
-def check_rules(rules: Iterable[Rule], given: Given) -> None:
+def check_rules(rules: Iterable[OptionRule], given: Given) -> None:
     """Raise `SettingError` with one line for the first rule that is broken."""
     for rule in rules:
         rule.check(given)

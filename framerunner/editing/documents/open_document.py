@@ -12,14 +12,14 @@ from framerunner.editing.words import Said, SaidError
 from framerunner.errors import UserError, is_disk_full
 from framerunner.files.text_file import read_in_folder, replace_file, resolved_in_folder
 from offboard.authoring import (
-    Change,
+    DiagramLayout,
     Document,
     Edit,
     EditSession,
-    Layout,
     LayoutError,
     ReplaceText,
     StateBox,
+    TextChange,
     known_places,
     layout_path,
     read_layout,
@@ -95,7 +95,7 @@ class OpenDocument:
         try:
             layout, problem = read_layout(path), ""
         except LayoutError as error:
-            layout, problem = Layout(), str(error)
+            layout, problem = DiagramLayout(), str(error)
         session = EditSession(document, layout)
         opened = cls(path, session, problem=problem, pilot_class=pilot_class, _saved=document.data)
         opened._restore()
@@ -118,7 +118,7 @@ class OpenDocument:
         return self.session.document
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> DiagramLayout:
         """Where its states are drawn."""
         return self.session.layout
 
@@ -136,18 +136,18 @@ class OpenDocument:
         """The file beside the mission that has what is not saved."""
         return self.path.with_name(f".{self.path.name}{_JOURNAL_SUFFIX}")
 
-    def apply(self, edit: Edit) -> tuple[Change, ...]:
+    def apply(self, edit: Edit) -> tuple[TextChange, ...]:
         """Apply an edit of the diagram; see `EditSession.apply`."""
         return self._changed(self.session.apply(edit))
 
-    def type(self, typed: Sequence[tuple[int, int, str]]) -> tuple[Change, ...]:
+    def type(self, typed: Sequence[tuple[int, int, str]]) -> tuple[TextChange, ...]:
         """Apply typed changes; see `EditSession.type`.
 
         Letters typed one after the other are undone together, a line at most; deleted ones likewise.
         """
         before, letters = self._typed, None
 
-        def goes_on(change: Change) -> bool:
+        def goes_on(change: TextChange) -> bool:
             nonlocal letters
             letters = _letters(change)
             return letters is not None and before is not None and letters.follows(before)
@@ -156,15 +156,15 @@ class OpenDocument:
         self._typed = letters
         return changes
 
-    def undo(self) -> tuple[Change, ...]:
+    def undo(self) -> tuple[TextChange, ...]:
         """Take the last edit or move of boxes back; see `EditSession.undo`."""
         return self._stepped(self.session.undo)
 
-    def redo(self) -> tuple[Change, ...]:
+    def redo(self) -> tuple[TextChange, ...]:
         """Do again what was undone last; see `EditSession.redo`."""
         return self._stepped(self.session.redo)
 
-    def _stepped(self, step: Callable[[], tuple[Change, ...]]) -> tuple[Change, ...]:
+    def _stepped(self, step: Callable[[], tuple[TextChange, ...]]) -> tuple[TextChange, ...]:
         before = self.layout
         changes = self._changed(step())
         self._typed = None
@@ -172,7 +172,7 @@ class OpenDocument:
             self._write_layout()
         return changes
 
-    def _changed(self, changes: tuple[Change, ...]) -> tuple[Change, ...]:
+    def _changed(self, changes: tuple[TextChange, ...]) -> tuple[TextChange, ...]:
         if changes:
             self.revision += 1
             self._typed = None
@@ -272,7 +272,7 @@ def _words(error: OSError) -> str:
     return (error.strerror or str(error)).lower()
 
 
-def _letters(change: Change) -> _Typed | None:
+def _letters(change: TextChange) -> _Typed | None:
     """What was typed: letters of one line, added or deleted; None if it was more."""
     if bool(change.removed) == bool(change.inserted) or "\n" in change.removed + change.inserted:
         return None

@@ -14,7 +14,7 @@ from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, Response
 from starlette.websockets import WebSocket
 
-from framerunner.editing.documents.messages import (
+from framerunner.editing.documents.document_messages import (
     PAGE_MESSAGE,
     EditMessage,
     LayoutMessage,
@@ -33,15 +33,15 @@ from framerunner.editing.documents.session import EditorSession, SharedDocument
 from framerunner.editing.words import Language, Said, SaidError, language_of, reason, say
 from framerunner.errors import UserError
 from framerunner.monitor.access import Visitor
-from framerunner.monitor.channel import REFUSED_CODE, Channel, ChannelEndError, Terms, refuse
-from offboard.authoring import Change, export_scxml, import_scxml, mermaid_of, parse_edit
+from framerunner.monitor.channel import REFUSED_CODE, Channel, ChannelEndError, ChannelTerms, refuse
+from offboard.authoring import TextChange, export_scxml, import_scxml, mermaid_of, parse_edit
 from offboard.mission import list_missions
 
 _Text = Annotated[str, Body(max_length=100)]
 _Scxml = Annotated[str, Body(max_length=1_000_000)]
 _JOURNAL_PERIOD_S = 2.0
 _MAX_CLIENT = 40  # characters
-_FROM_PAGE: Terms[PageMessage] = Terms(
+_FROM_PAGE: ChannelTerms[PageMessage] = ChannelTerms(
     PAGE_MESSAGE,
     max_bytes=100_000_000,  # the server itself takes less; a text that is too long is refused in words
     is_limited=False,  # typed text is never dropped
@@ -238,7 +238,7 @@ class _Window(Channel[PageMessage, Mapping[str, object]]):
             return _Told(_json({**status_message(opened), **answer}))
         before, layout = opened.document.text, opened.layout
         warning: Said | None = None
-        changes: Sequence[Change] = ()
+        changes: Sequence[TextChange] = ()
         try:
             if isinstance(message, SaveMessage):
                 warning = opened.save(force=message.force)
@@ -272,7 +272,7 @@ def _json(message: dict[str, object]) -> str:
     return to_json(message, inf_nan_mode="null").decode()
 
 
-def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[Change]:
+def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[TextChange]:
     """Do what a message asks for; return the changes of the text. Raises `UserError`."""
     if isinstance(message, EditMessage):
         return opened.apply(parse_edit(message.edit))
@@ -285,7 +285,7 @@ def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[Change]:
     return ()
 
 
-def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[Change]:
+def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[TextChange]:
     if message.revision != opened.revision:
         raise SaidError("typed.elsewhere")
     return opened.type([(each.start, each.removed, each.inserted) for each in message.changes])

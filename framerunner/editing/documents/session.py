@@ -43,7 +43,7 @@ class SessionError(SaidError):
     """A file that cannot be opened or made."""
 
 
-class Viewer(Protocol):
+class DocumentViewer(Protocol):
     """A page that shows a document; `language` is that of its words."""
 
     language: Language
@@ -68,7 +68,7 @@ class SharedDocument:
     """
 
     opened: OpenDocument
-    viewers: list[Viewer] = field(default_factory=list)
+    viewers: list[DocumentViewer] = field(default_factory=list)
     lock: asyncio.Lock = field(default_factory=asyncio.Lock)
     users: int = 0
     answered: OrderedDict[str, int] = field(default_factory=OrderedDict)

@@ -15,7 +15,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.websockets import WebSocket
 
 from framerunner.monitor.addresses import Places, client_address
-from framerunner.monitor.channel import TRY_LATER_CODE, Channel, Terms, close
+from framerunner.monitor.channel import TRY_LATER_CODE, Channel, ChannelTerms, close
 from framerunner.monitor.competition.calls import Entry
 from framerunner.monitor.competition.database import DatabaseError
 from framerunner.monitor.competition.rules import Correction, Rule
@@ -276,7 +276,7 @@ def _add_channel(web: FastAPI, service: CompetitionService) -> None:
         if places.take(address):
             await close(websocket, TRY_LATER_CODE, "too many are watching")
             return
-        channel: Channel[None, Message] = Channel(websocket, Terms(None))
+        channel: Channel[None, Message] = Channel(websocket, ChannelTerms(None))
 
         def put(message: Message) -> None:
             channel.send(message, newest_of=message.kind)

@@ -213,7 +213,7 @@ def _round_attempts(number: int, tries: Iterable[_Judged]) -> list[Attempt]:
 def _scenarios(
     number: int, draws: Sequence[tables.Draw], attempts: Sequence[Attempt]
 ) -> list[tuple[str, tuple[str, ...]]]:
-    """Names and frames of a round's scenarios: those drawn, or, where nothing was drawn, those flown."""
+    """Names and gates of a round's scenarios: those drawn, or, where nothing was drawn, those flown."""
     draw = next((draw for draw in reversed(draws) if draw.round == number), None)
     if draw is not None:
         return _drawn(draw)

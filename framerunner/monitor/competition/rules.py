@@ -33,11 +33,11 @@ class TryScore:
     contacts: int
     penalty_s: float
     try_time_s: float  # motors on to motors off
-    completed: bool  # all frames crossed in order, and landed on the base within the limit
+    completed: bool  # all gates crossed in order, and landed on the base within the limit
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Frames not crossed in the right order."""
+        """Gates not crossed in the right order."""
         return tuple(colour for colour in self.frames if colour not in self.crossed)
 
 
@@ -78,7 +78,7 @@ def read_report(report: RefereeReport | None, frames: Sequence[str]) -> TryScore
 
 
 def crossed_in_order(crossed: Iterable[str], frames: Sequence[str]) -> tuple[str, ...]:
-    """Those of the frames that were crossed after all those before them."""
+    """Those of the gates that were crossed after all those before them."""
     passed: list[str] = []
     for colour in crossed:
         if len(passed) < len(frames) and colour == frames[len(passed)]:
@@ -87,7 +87,7 @@ def crossed_in_order(crossed: Iterable[str], frames: Sequence[str]) -> tuple[str
 
 
 def correct(result: TryScore, correction: Correction | None) -> TryScore:
-    """Apply a judge's correction to the referee's result. A try with a frame missing is never completed."""
+    """Apply a judge's correction to the referee's result. A try with a gate missing is never completed."""
     if correction is None:
         return result
     given = {name: value for name, value in asdict(correction).items() if value is not None}
@@ -135,7 +135,7 @@ def rank(
 
     Args:
         teams: name of each, by id.
-        scenarios: name and frames of those of the round; those still to be drawn count as not flown, with
+        scenarios: name and gates of those of the round; those still to be drawn count as not flown, with
             all colours.
         attempts: judged tries; those of other teams or at other scenarios are left out.
         rule: what counts.

@@ -57,7 +57,7 @@ class CompetitionService:
 
     Attributes:
         problem: what is wrong with the database, in one line; "" while it works.
-        scenarios: names of those that can be drawn: they have all frames of the challenge.
+        scenarios: names of those that can be drawn: they have all gates of the challenge.
     """
 
     def __init__(
@@ -207,7 +207,7 @@ class CompetitionService:
             The round.
 
         Raises:
-            RefusedError: a name is unknown, its scenario lacks a frame, or the pool holds too few.
+            RefusedError: a name is unknown, its scenario lacks a gate, or the pool holds too few.
         """
         names = list(dict.fromkeys(pool))
         if count > len(names):
@@ -220,7 +220,7 @@ class CompetitionService:
         return await self.change(lambda store: store.draw(drawn, names, entry))
 
     async def check_drawable(self, scenario: str) -> None:
-        """Raise `RefusedError` if a scenario is unknown or lacks a frame."""
+        """Raise `RefusedError` if a scenario is unknown or lacks a gate."""
         colours = await self.frames(scenario)
         if colours != COLOURS:
             has = f"only the {' and the '.join(colours)} frame" if colours else "no frames"
@@ -281,7 +281,7 @@ class CompetitionService:
         try:
             frames = await self.frames(event.scenario)
         except RefusedError:
-            frames = COLOURS  # the scenario's file is not known here; a try needs all frames
+            frames = COLOURS  # the scenario's file is not known here; a try needs all gates
         fault: Exception | None = None
         try:
             try_id = await self.read(lambda store: store.take(event, frames, at))

@@ -13,11 +13,11 @@ from framerunner.monitor.competition.board import OPEN_CLASS
 from framerunner.monitor.competition.views import (
     Board,
     CallView,
+    CompetitionView,
     QueueView,
     RankingView,
     RunningView,
     TryView,
-    View,
 )
 from scenarios.result import RefereeReport
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from framerunner.monitor.server import Monitor
 
 
-class FlownView(View):
+class FlownView(CompetitionView):
     """A try that is over, with its split times."""
 
     id: int
@@ -43,7 +43,7 @@ class FlownView(View):
     verdict: str
 
 
-class StageView(View):
+class StageView(CompetitionView):
     """All that the audience is shown."""
 
     running: tuple[RunningView, ...]

@@ -172,7 +172,7 @@ class Store:
             calls.write_queue(session, teams, entry)
 
     def draw(self, scenarios: Mapping[str, Sequence[str]], pool: Sequence[str], entry: Entry) -> int:
-        """Record a draw: names and frames of the scenarios drawn, and the names that could be drawn.
+        """Record a draw: names and gates of the scenarios drawn, and the names that could be drawn.
 
         It replaces that of a round without tries, else the next round begins. Returns the round.
         """

@@ -81,7 +81,7 @@ class Draw(Entered, Table):
     __tablename__ = PREFIX + "draws"
 
     round: Mapped[int] = mapped_column(index=True)
-    scenarios: Mapped[str] = mapped_column(Text)  # in order, one a line: name and frames
+    scenarios: Mapped[str] = mapped_column(Text)  # in order, one a line: name and gates
     pool: Mapped[str] = mapped_column(Text)  # names that could be drawn, one a line
 
 

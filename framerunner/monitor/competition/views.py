@@ -15,13 +15,13 @@ from scenarios.result import spreadsheet_cell
 Counting = Literal["best", "last"]
 
 
-class View(BaseModel):
+class CompetitionView(BaseModel):
     """Base of all views; they are made from rows and other objects, too."""
 
     model_config = ConfigDict(frozen=True, from_attributes=True)
 
 
-class TeamView(View):
+class TeamView(CompetitionView):
     """A team."""
 
     id: int
@@ -30,7 +30,7 @@ class TeamView(View):
     withdrawn: bool = Field(description="out of the contest; its tries are kept")
 
 
-class ResultView(View):
+class ResultView(CompetitionView):
     """What a try was worth."""
 
     crossed: tuple[str, ...] = Field(description="frames crossed in the right order")
@@ -43,7 +43,7 @@ class ResultView(View):
     counted_s: float = Field(description="what it adds to a team's total")
 
 
-class TryView(View):
+class TryView(CompetitionView):
     """A try."""
 
     id: int
@@ -72,7 +72,7 @@ class TryView(View):
     ended: datetime | None
 
 
-class JudgementView(View):
+class JudgementView(CompetitionView):
     """A judge's entry on a try; null is "as the referee says"."""
 
     number: int
@@ -88,7 +88,7 @@ class JudgementView(View):
     at: datetime
 
 
-class DrawView(View):
+class DrawView(CompetitionView):
     """Scenarios drawn for a round."""
 
     round: int
@@ -99,7 +99,7 @@ class DrawView(View):
     at: datetime
 
 
-class QueuedView(View):
+class QueuedView(CompetitionView):
     """A team in the queue."""
 
     team: int
@@ -118,7 +118,7 @@ class CallView(QueuedView):
     at: datetime
 
 
-class QueueView(View):
+class QueueView(CompetitionView):
     """The teams that fly after the one that is called."""
 
     number: int = Field(description="of this state of the queue; a request to change it must have it")
@@ -132,7 +132,7 @@ class LastCallView(QueuedView):
     tries: tuple[int, ...] = Field(description="flown on it: they would have no team")
 
 
-class RuleView(View):
+class RuleView(CompetitionView):
     """The combination rule."""
 
     limit_s: float = Field(description="what a try that is not completed counts at least")
@@ -143,7 +143,7 @@ class RuleView(View):
     at: datetime | None
 
 
-class RivalView(View):
+class RivalView(CompetitionView):
     """Another try of the same team at the same scenario of the round."""
 
     attempt: int = Field(serialization_alias="try")
@@ -151,7 +151,7 @@ class RivalView(View):
     contacts: int
 
 
-class TryDetail(View):
+class TryDetail(CompetitionView):
     """A try with all judges' entries."""
 
     attempt: TryView = Field(serialization_alias="try")
@@ -161,7 +161,7 @@ class TryDetail(View):
     history: tuple[JudgementView, ...] = Field(description="newest first")
 
 
-class CellView(View):
+class CellView(CompetitionView):
     """A team at one scenario."""
 
     scenario: str
@@ -172,7 +172,7 @@ class CellView(View):
     tries: int = Field(description="how many the team had")
 
 
-class RowView(View):
+class RowView(CompetitionView):
     """A row of the ranking."""
 
     rank: int | None = Field(description="null before the first judged try")
@@ -184,7 +184,7 @@ class RowView(View):
     cells: tuple[CellView, ...]
 
 
-class RankingView(View):
+class RankingView(CompetitionView):
     """The ranking of a round."""
 
     round: int
@@ -192,7 +192,7 @@ class RankingView(View):
     rows: tuple[RowView, ...]
 
 
-class RunningView(View):
+class RunningView(CompetitionView):
     """A try that is being flown; sent every second."""
 
     id: int
@@ -208,7 +208,7 @@ class RunningView(View):
     try_time_s: float
 
 
-class ChangedMessage(View):
+class ChangedMessage(CompetitionView):
     """The contest changed; pages then request what they show."""
 
     kind: Literal["changed"] = "changed"
@@ -216,7 +216,7 @@ class ChangedMessage(View):
     problem: str = Field(description='what is wrong with the database; "" while it works')
 
 
-class RunningMessage(View):
+class RunningMessage(CompetitionView):
     """The tries that are being flown."""
 
     kind: Literal["running"] = "running"
@@ -226,7 +226,7 @@ class RunningMessage(View):
 Message = ChangedMessage | RunningMessage
 
 
-class Board(View):
+class Board(CompetitionView):
     """The whole contest as of one moment."""
 
     version: int = Field(description="grows with each change")
@@ -241,7 +241,7 @@ class Board(View):
     rankings: tuple[RankingView, ...] = Field(description="one for each round, the present one first")
 
 
-class StateView(View):
+class StateView(CompetitionView):
     """The contest and the tries being flown."""
 
     board: Board
@@ -250,7 +250,7 @@ class StateView(View):
     scenarios: tuple[str, ...] = Field(description="names that can be drawn: those with all three frames")
 
 
-class RankingStateView(View):
+class RankingStateView(CompetitionView):
     """A ranking, the queue and the tries being flown."""
 
     version: int

@@ -23,11 +23,11 @@ from framerunner.wire.mission_tunnel import (
     STATE_TYPE,
     UNSEEN,
     Box,
-    Document,
     DocumentAssembler,
     DocumentKind,
     MissionState,
     PayloadError,
+    TunnelDocument,
     decode_detections,
     decode_state,
 )
@@ -148,7 +148,7 @@ class MissionView:
             return ""
         return plain(document.states[state.state_index])
 
-    def _read(self, document: Document) -> list[JsonMessage]:
+    def _read(self, document: TunnelDocument) -> list[JsonMessage]:
         if document.kind is DocumentKind.RESULT:
             result = FlightResult.from_outside(dict(document.content))
             if result is None:

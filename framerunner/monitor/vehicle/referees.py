@@ -10,7 +10,7 @@ from typing import Any
 import aiohttp
 from pydantic import ValidationError
 
-from framerunner.monitor.ports import Equipment, Referee
+from framerunner.monitor.ports import Equipment, RefereePort
 from framerunner.wire.simulator_api import SimulatorApi
 from scenarios.models import Scenario, ScenarioError, TrueState
 from scenarios.result import Standing, first_error
@@ -60,7 +60,7 @@ class RefereeChannel:
 
     Attributes:
         scenario: what is flown there; None until it is known.
-        lift_m: how much higher the frames hang than the scenario says.
+        lift_m: how much higher the gates hang than the scenario says.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class TelemetryReferee:
         make_referee: makes a referee for one try.
     """
 
-    def __init__(self, scenario: Scenario, make_referee: Callable[[Scenario], Referee]) -> None:
+    def __init__(self, scenario: Scenario, make_referee: Callable[[Scenario], RefereePort]) -> None:
         self._scenario = scenario
         self._make = make_referee
         self._referee = make_referee(scenario)

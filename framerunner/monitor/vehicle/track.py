@@ -7,7 +7,7 @@ from enum import IntEnum
 from math import dist, hypot, isfinite
 from typing import Any
 
-from framerunner.geometry.axes import ORIGIN, Alignment, Pose
+from framerunner.geometry.axes import ORIGIN, ArenaAlignment, Pose
 from framerunner.geometry.rotations import yaw_of
 from framerunner.geometry.vectors import Vec3
 from framerunner.wire.vehicle_telemetry import PositionReport, VehicleTelemetry
@@ -42,14 +42,14 @@ class Placement:
 
     def __init__(self) -> None:
         self.source = Source.GUESS
-        self.alignment = Alignment(ORIGIN, ORIGIN)
+        self.alignment = ArenaAlignment(ORIGIN, ORIGIN)
         self._slowest_m_s = 1e9
 
     def lay_by_frame(self, origin_arena_m: Vec3, yaw_rad: float) -> None:
         """Use a referee's answer: where the local origin is, and how far north is turned left from x."""
         if isfinite(sum(origin_arena_m) + yaw_rad):
             self.source = Source.REFEREE
-            self.alignment = Alignment(Pose(origin_arena_m, yaw_rad), ORIGIN)
+            self.alignment = ArenaAlignment(Pose(origin_arena_m, yaw_rad), ORIGIN)
 
     def lay_by_start(self, start_arena: ArenaPose, telemetry: VehicleTelemetry) -> None:
         """Use that it stands on its start now; ignored while it moves, because then it is being carried."""
@@ -73,7 +73,7 @@ class Placement:
 
     def _lay_by_pair(self, pose_arena: ArenaPose, position: PositionReport) -> None:
         here_ned = Pose(position.position_ned_m, position.yaw_ned_rad)
-        self.alignment = Alignment(Pose(pose_arena[:3], pose_arena[3]), here_ned)
+        self.alignment = ArenaAlignment(Pose(pose_arena[:3], pose_arena[3]), here_ned)
 
 
 class History:

@@ -46,7 +46,7 @@ class VehicleCallbacks:
     publish_try: Callable[[TryEvent], None]
 
 
-class Vehicle:
+class MonitoredVehicle:
     """One drone on the link.
 
     Args:

@@ -14,21 +14,21 @@ _MAX_ADDRESSES = 10_000
 
 
 @dataclass(frozen=True, slots=True)
-class Rate:
+class RateLimit:
     """Tries that are allowed at once, and how many seconds later another one is."""
 
     at_once: int
     period_s: float
 
 
-ONE_ADDRESS = Rate(10, 3.0)
-ALL_ADDRESSES = Rate(60, 0.5)
+ONE_ADDRESS = RateLimit(10, 3.0)
+ALL_ADDRESSES = RateLimit(60, 0.5)
 
 
 class _Bucket:
     """Tries that are left; fewer than none: that many wait."""
 
-    def __init__(self, rate: Rate, now_s: float) -> None:
+    def __init__(self, rate: RateLimit, now_s: float) -> None:
         self._rate = rate
         self._left = float(rate.at_once)
         self._counted_s = now_s

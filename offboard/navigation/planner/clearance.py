@@ -9,12 +9,12 @@ import numpy.typing as npt
 
 from framerunner.geometry.vectors import Vec3
 from offboard.navigation.goals import (
-    FRAME_HEIGHT_M,
     FRAME_THICKNESS_M,
-    FRAME_WIDTH_M,
+    GATE_HEIGHT_M,
+    GATE_WIDTH_M,
     FlightStyle,
-    Gate,
     Obstacles,
+    PathGate,
 )
 from offboard.navigation.planner.legs import Array
 from scenarios.models import Arena
@@ -23,7 +23,7 @@ DRONE_RADIUS_M = 0.177  # of its box of 0.25 x 0.25 m in plan, whatever its head
 DRONE_HALF_LENGTH_M = 0.125
 DRONE_HALF_HEIGHT_M = 0.0225
 TILTED_M = 0.05  # how much farther down and up its box reaches while it tilts in a turn
-SAME_FRAME_M = 0.4  # a gate and a frame whose centres are nearer are the same
+SAME_GATE_M = 0.4  # two gates whose centres are nearer are the same
 MIDDLE_M = 0.01  # a drone that is nearer to an opening's middle plane may leave it on either side
 
 _SPARE_M = 0.03  # how much farther than needed a detour passes
@@ -33,7 +33,7 @@ Mask = npt.NDArray[np.bool_]
 
 
 class Clearance:
-    """Obstacles in a fixed order: boxes (frames, then the base), columns, and the outside of the arena.
+    """Obstacles in a fixed order: boxes (gates, then the base), columns, and the outside of the arena.
 
     Attributes:
         low_m: least x, y, z of the drone's centre, shape (3,).
@@ -50,10 +50,8 @@ class Clearance:
         self.high_m: Array = np.array([x_m, y_m, arena.height_m - margin_m])
         level_m = DRONE_RADIUS_M + style.bar_margin_m
         upright_m = DRONE_HALF_HEIGHT_M + TILTED_M + style.bar_margin_m
-        half_m = _frame_half_m(style)
-        rows = [
-            (*frame.centre_m, cos(frame.yaw_rad), sin(frame.yaw_rad), *half_m) for frame in obstacles.frames
-        ]
+        half_m = _gate_half_m(style)
+        rows = [(*gate.centre_m, cos(gate.yaw_rad), sin(gate.yaw_rad), *half_m) for gate in obstacles.gates]
         self.base = -1
         if obstacles.base is not None:
             base, side_m = obstacles.base, obstacles.base.edge_m / 2 + level_m
@@ -67,14 +65,14 @@ class Clearance:
         self.columns = len(self._columns)
         self._radii_m: Array = self._columns[:, 2] + level_m
 
-    def frame_of(self, gate: Gate) -> int:
+    def obstacle_of(self, gate: PathGate) -> int:
         """The index of a gate among the obstacles; -1 if it is none of them."""
-        frames = self.boxes - (self.base >= 0)
-        if not frames:
+        gates = self.boxes - (self.base >= 0)
+        if not gates:
             return -1
-        distances_m = np.linalg.norm(self._rows[:frames, :3] - np.array(gate.centre_m), axis=1)
+        distances_m = np.linalg.norm(self._rows[:gates, :3] - np.array(gate.centre_m), axis=1)
         nearest = int(distances_m.argmin())
-        return nearest if distances_m[nearest] < SAME_FRAME_M else -1
+        return nearest if distances_m[nearest] < SAME_GATE_M else -1
 
     @property
     def base_top_m(self) -> float:
@@ -150,20 +148,20 @@ class Clearance:
         return c * dx + s * dy, c * dy - s * dx, points_m[:, 2, None] - z_m
 
     def way_out(self, point_m: Array, next_m: Array) -> tuple[Array, Array] | None:
-        """Straight out of a frame's opening, for a drone within it: where to, and the direction; else None.
+        """Straight out of a gate's opening, for a drone within it: where to, and the direction; else None.
 
         Args:
             point_m: shape (3,); the side on which it is.
             next_m: the place to go to afterwards: its side, from the middle of the opening, shape (3,).
         """
-        frames = self.boxes - (self.base >= 0)
-        offsets = self.offsets(point_m[None])[0, :frames]
-        half_m = (DRONE_HALF_LENGTH_M + FRAME_THICKNESS_M / 2, FRAME_WIDTH_M / 2, FRAME_HEIGHT_M / 2)
+        gates = self.boxes - (self.base >= 0)
+        offsets = self.offsets(point_m[None])[0, :gates]
+        half_m = (DRONE_HALF_LENGTH_M + FRAME_THICKNESS_M / 2, GATE_WIDTH_M / 2, GATE_HEIGHT_M / 2)
         inside = (np.abs(offsets) < half_m).all(axis=1)
         if not inside.any():
             return None
-        frame = int(inside.argmax())
-        row, along_m = self._rows[frame], float(offsets[frame, 0])
+        gate = int(inside.argmax())
+        row, along_m = self._rows[gate], float(offsets[gate, 0])
         normal = np.array([row[3], row[4], 0.0])
         side = along_m if abs(along_m) > MIDDLE_M else float((next_m - row[:3]) @ normal)
         out = normal if side > 0.0 else -normal
@@ -202,17 +200,17 @@ class Clearance:
         return [(point_m + move, level) for move in moves]
 
 
-def frame_reach_m(style: FlightStyle) -> float:
-    """How far from its centre an enlarged frame reaches."""
-    return hypot(*_frame_half_m(style))
+def gate_reach_m(style: FlightStyle) -> float:
+    """How far from its centre an enlarged gate reaches."""
+    return hypot(*_gate_half_m(style))
 
 
-def _frame_half_m(style: FlightStyle) -> Vec3:
-    """Half the size of an enlarged frame: thickness, width and height."""
+def _gate_half_m(style: FlightStyle) -> Vec3:
+    """Half the size of an enlarged gate: thickness, width and height."""
     level_m = DRONE_RADIUS_M + style.bar_margin_m
     upright_m = DRONE_HALF_HEIGHT_M + TILTED_M + style.bar_margin_m
     return (
         FRAME_THICKNESS_M / 2 + level_m,
-        FRAME_WIDTH_M / 2 + level_m,
-        FRAME_HEIGHT_M / 2 + upright_m,
+        GATE_WIDTH_M / 2 + level_m,
+        GATE_HEIGHT_M / 2 + upright_m,
     )

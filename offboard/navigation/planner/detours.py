@@ -32,14 +32,14 @@ _Blocked = tuple[float, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Step:
+class PlannedLeg:
     """A leg, and where it ends."""
 
     leg: Leg
     end: Pass
 
 
-Steps = list[Step] | None
+Steps = list[PlannedLeg] | None
 Seeking = Generator[None, None, Steps]
 
 
@@ -72,7 +72,7 @@ class LegFinder:
         for index, (pair, blocked) in enumerate(zip(pairwise(passes), hits, strict=True)):
             leg = direct[index]
             if blocked is None or pair[1].begun:
-                found.append([Step(leg, pair[1])])
+                found.append([PlannedLeg(leg, pair[1])])
                 continue
             self._until_work = min(self.work + ROUND_WORK, MOST_WORK)
             found.append((yield from self._round(*pair, leg, blocked, MAX_DEPTH)))
@@ -95,7 +95,7 @@ class LegFinder:
         blocked = self._blocked(legs)[0]
         yield
         if blocked is None:
-            return [Step(legs[0], after)]
+            return [PlannedLeg(legs[0], after)]
         return (yield from self._round(before, after, legs[0], blocked, depth)) if depth else None
 
     def _round(self, before: Pass, after: Pass, leg: Leg, blocked: _Blocked, depth: int) -> Seeking:
@@ -113,7 +113,7 @@ class LegFinder:
             clear = [i for i in range(n) if possible[i] and hits[i] is None and hits[n + i] is None]
             if clear:
                 fastest = min(clear, key=lambda i: float(times[i]))
-                return [Step(legs[fastest], ways[fastest]), Step(legs[n + fastest], after)]
+                return [PlannedLeg(legs[fastest], ways[fastest]), PlannedLeg(legs[n + fastest], after)]
             later = [(float(times[i]), ways[i]) for i in range(n) if possible[i]]
         if self._clearance.is_column(obstacle):
             passed = yield from self._through_passages(before, after, depth)
@@ -165,11 +165,11 @@ class LegFinder:
                 hits = self._blocked(legs)
                 yield
                 if not any(hits):
-                    return [Step(legs[i], end) for i, end in enumerate(chain[1:])]
+                    return [PlannedLeg(legs[i], end) for i, end in enumerate(chain[1:])]
         return (yield from self._chain(chain, min(depth - 1, 1)))
 
     def _outside(self, corner_m: Array) -> Array | None:
-        """A corner between columns; beside the frame that it is in: a leg may end in an obstacle."""
+        """A corner between columns; beside the gate that it is in: a leg may end in an obstacle."""
         depths = self._clearance.depths(corner_m[None])[0]
         if depths.max() <= 0.0:
             return corner_m
@@ -179,7 +179,7 @@ class LegFinder:
 
     def _chain(self, passes: Sequence[Pass], depth: int) -> Seeking:
         """Clear legs from pass to pass."""
-        steps: list[Step] = []
+        steps: list[PlannedLeg] = []
         for before, after in pairwise(passes):
             found = yield from self._between(before, after, depth)
             if found is None:

@@ -10,7 +10,7 @@ from math import cos, hypot, nan, pi, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from offboard.navigation.goals import PRESENT_SHARE, FlightStyle, Gate, Goal, Motion, Point, Refusal
+from offboard.navigation.goals import PRESENT_SHARE, FlightStyle, Goal, Motion, PathGate, Point, Refusal
 from offboard.navigation.path import Crossing
 from offboard.navigation.planner.clearance import Clearance
 from offboard.navigation.planner.legs import Array, Connector, Ends
@@ -62,7 +62,7 @@ class Pass:
     @property
     def begun(self) -> bool:
         """Whether the start is in this gate's opening already, so that its leg leads through the rest."""
-        return isinstance(self.goal, Gate) and not self.inner_s[0]
+        return isinstance(self.goal, PathGate) and not self.inner_s[0]
 
     @property
     def yaw_rad(self) -> float:
@@ -113,7 +113,7 @@ class RouteFinder:
         """
         at, speed = np.array(start.position_m), np.array(start.velocity_m_s)
         self._stages = [place(at, speed, start.yaw_rad)]
-        openings = self._openings([goal for goal in goals if isinstance(goal, Gate)])
+        openings = self._openings([goal for goal in goals if isinstance(goal, PathGate)])
         for index, goal in enumerate(goals):
             if isinstance(goal, Point):
                 yaw = nan if goal.yaw_rad is None else goal.yaw_rad
@@ -165,7 +165,7 @@ class RouteFinder:
             times[np.ix_(same[0], same[1])] += extra_s
         times[ways] = time_s
 
-    def _openings(self, gates: list[Gate]) -> list[list[_Opening]]:
+    def _openings(self, gates: list[PathGate]) -> list[list[_Opening]]:
         """Both sides of each gate, as far as there is room and its direction allows."""
         if not gates:
             return []
@@ -178,7 +178,7 @@ class RouteFinder:
         points[..., 2] = np.clip(points[..., 2], low, high)  # a gate beyond is crossed at its own height
         depths = self._clearance.depths(points.reshape(-1, 3)).reshape(len(gates), 2, _ROOM_STEPS, -1)
         for index, gate in enumerate(gates):
-            own = self._clearance.frame_of(gate)
+            own = self._clearance.obstacle_of(gate)
             if own >= 0:
                 depths[index, :, :, own] = -1.0
         blocked = (depths > 0.0).any(axis=-1)
@@ -195,7 +195,7 @@ class RouteFinder:
         return found
 
     def _through_gate(
-        self, gate: Gate, openings: list[_Opening], start: Motion | None, previous: Sequence[Crossing]
+        self, gate: PathGate, openings: list[_Opening], start: Motion | None, previous: Sequence[Crossing]
     ) -> Pass | None:
         """Each side at each speed; None if there is no side."""
         style = self._style
@@ -240,7 +240,7 @@ class RouteFinder:
         return max(sqrt(2.0 * self._style.acceleration_m_s2 * max(room_m, 0.0)), LEAST_CROSSING_M_S)
 
 
-def _same_way(gate: Gate, yaw_rad: float, previous: Sequence[Crossing]) -> bool | None:
+def _same_way(gate: PathGate, yaw_rad: float, previous: Sequence[Crossing]) -> bool | None:
     """Whether the path flown now crosses a gate in this direction; None if it does not cross it."""
     for crossing in previous:
         gap_m = np.linalg.norm(np.array(crossing.gate.centre_m) - np.array(gate.centre_m))

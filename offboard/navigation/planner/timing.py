@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from offboard.limits import clamped
-from offboard.navigation.goals import PRESENT_SHARE, FlightStyle, Gate, Goal, Motion
+from offboard.navigation.goals import PRESENT_SHARE, FlightStyle, Goal, Motion, PathGate
 from offboard.navigation.path import Crossing, Path
 from offboard.navigation.planner.legs import Array, Leg
 
@@ -316,7 +316,7 @@ def _wanted_headings(
         wanted.append(bearing)
     holds: list[tuple[int, int, float]] = []
     for number, stretch in enumerate(stretches):
-        if stretch.crosses and isinstance(stretch.goal, Gate):
+        if stretch.crosses and isinstance(stretch.goal, PathGate):
             past = (samples.positions_m - np.array(stretch.goal.centre_m))[:, :2] @ np.array(
                 [np.cos(stretch.yaw_rad), np.sin(stretch.yaw_rad)]
             )
@@ -363,7 +363,7 @@ def _near_bars(samples: Samples, stretches: list[Stretch]) -> npt.NDArray[np.boo
     """At which samples the drone's box is about to be between an opening's bars, or is still there."""
     near = np.zeros(len(samples.times_s), dtype=bool)
     for number, stretch in enumerate(stretches):
-        if stretch.crosses and isinstance(stretch.goal, Gate):
+        if stretch.crosses and isinstance(stretch.goal, PathGate):
             away = np.hypot(*(samples.positions_m - np.array(stretch.goal.centre_m))[:, :2].T)
             near |= (np.abs(samples.stretches - number) <= 1) & (away < LEFT_M)
     return near
@@ -373,7 +373,7 @@ def _crossings(samples: Samples, stretches: list[Stretch], times: Array) -> tupl
     """When the path crosses its gates."""
     crossings: list[Crossing] = []
     for number, stretch in enumerate(stretches):
-        if not stretch.crosses or not isinstance(stretch.goal, Gate):
+        if not stretch.crosses or not isinstance(stretch.goal, PathGate):
             continue
         rows = np.flatnonzero(samples.stretches >= number)
         normal = np.array([np.cos(stretch.yaw_rad), np.sin(stretch.yaw_rad)])

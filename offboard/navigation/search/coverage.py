@@ -1,4 +1,4 @@
-"""What of the arena has been seen so far: for each cell and heading of a frame's normal, by the best view."""
+"""What of the arena has been seen so far: for each cell and heading of a gate's normal, by the best view."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import COLUMN_PX, CameraModel, CameraPose, FloorPoints
 from offboard.navigation.pose_history import PoseChange
-from offboard.navigation.search.frame_visibility import (
+from offboard.navigation.search.gate_visibility import (
     HEADINGS,
     Floats,
-    FrameVisibility,
+    GateVisibility,
     SearchGrid,
     block_means,
     view_qualities,
@@ -23,7 +23,7 @@ from vision.types import ObstacleEdge
 
 _MOVED_M: Final = 0.15  # an image from a pose nearer than this and _TURNED_RAD to the last one is skipped
 _TURNED_RAD: Final = 0.12
-_MARGIN_M: Final = 0.12  # beyond a frame at a cell's centre: it may be elsewhere in the cell
+_MARGIN_M: Final = 0.12  # beyond a gate at a cell's centre: it may be elsewhere in the cell
 _MOST_WAITING: Final = 2
 _FADE: Final = 0.9998  # of what has been seen, an image used: what was seen long ago is looked at again
 
@@ -38,7 +38,7 @@ class Coverage:
     def __init__(self, camera: CameraModel, arena: Arena) -> None:
         self.grid = SearchGrid.of(arena)
         self._camera = camera
-        self._visibility = FrameVisibility(camera)
+        self._visibility = GateVisibility(camera)
         self._centres = self.grid.centres()
         self._seen = np.zeros((HEADINGS, self._centres[0].size), dtype=np.float32)
         self._change = PoseChange(_MOVED_M, _TURNED_RAD)
@@ -90,7 +90,7 @@ class Coverage:
         return flat
 
     def _in_view(self, pose: CameraPose) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-        """Indices of the cells in which a frame is wholly in the image."""
+        """Indices of the cells in which a gate is wholly in the image."""
         m = pose.rotation
         dx, dy, dz = (
             axis - np.float32(at)

@@ -1,6 +1,6 @@
-"""Where frames are likely: before anything is known of their layout, and by what was seen of them.
+"""Where gates are likely: before anything is known of their layout, and by what was seen of them.
 
-A frame that was not seen well enough to be on the map is somewhere on a line of sight.
+A gate that was not seen well enough to be on the map is somewhere on a line of sight.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import numpy as np
 from framerunner.geometry.rotations import to_world
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.goals import FRAME_HEIGHT_M, FRAME_WIDTH_M
-from offboard.navigation.search.frame_visibility import HEADINGS, Bools, Floats, SearchGrid
+from offboard.navigation.goals import GATE_HEIGHT_M, GATE_WIDTH_M
+from offboard.navigation.search.gate_visibility import HEADINGS, Bools, Floats, SearchGrid
 from vision.types import Detection, Detections
 
-_SPARE: Final = 1.3  # a frame may be this much farther away than its size in the image says
+_SPARE: Final = 1.3  # a gate may be this much farther away than its size in the image says
 _SPARE_M: Final = 0.5
 _KEPT_IMAGES: Final = 150  # a glimpse is forgotten after so many further images
 
 
 @dataclass(frozen=True, slots=True)
 class LineOfSight:
-    """A direction in which there is a frame, in arena axes."""
+    """A direction in which there is a gate, in arena axes."""
 
     origin_m: Vec3  # of the camera
     direction: Vec3  # unit vector
@@ -35,7 +35,7 @@ class LineOfSight:
 
 
 class Glimpses:
-    """Remembers the last line of sight to each frame of the task that is not on the map."""
+    """Remembers the last line of sight to each gate of the task that is not on the map."""
 
     def __init__(self, camera: CameraModel) -> None:
         self._camera = camera
@@ -56,8 +56,8 @@ class Glimpses:
             position_m: of the drone's centre when the image was exposed, arena axes.
             attitude_arena: body FLU to arena.
             detections: what the image showed.
-            known: colours of the frames on the map.
-            is_lookalike: whether what is seen in a direction looks like a frame of a colour, and is none.
+            known: colours of the gates on the map.
+            is_lookalike: whether what is seen in a direction looks like a gate of a colour, and is none.
         """
         self._images += 1
         boxes = {"red": detections.red, "green": detections.green, "blue": detections.blue}
@@ -70,24 +70,24 @@ class Glimpses:
                     self._lines[colour] = (self._images, line)
 
     def lines(self) -> tuple[LineOfSight, ...]:
-        """The lines of sight to frames that are not known, the oldest glimpses left out."""
+        """The lines of sight to gates that are not known, the oldest glimpses left out."""
         return tuple(line for image, line in self._lines.values() if self._images - image <= _KEPT_IMAGES)
 
     def _line(self, position_m: Vec3, attitude_arena: Quaternion, box: Detection) -> LineOfSight:
-        """Through the middle of what was seen; at most as far as a frame looks that small."""
+        """Through the middle of what was seen; at most as far as a gate looks that small."""
         focal_px = self._camera.focal_px
         pose = self._camera.pose(position_m, attitude_arena)
         left, up = -(box.e + box.w) / 2 / focal_px, (box.n + box.s) / 2 / focal_px
         x, y, z = to_world(pose.rotation, 1.0, left, up)
         length = hypot(x, y, z)
-        size = max((box.n - box.s) / FRAME_HEIGHT_M, (box.e - box.w) / FRAME_WIDTH_M, 1.0)
+        size = max((box.n - box.s) / GATE_HEIGHT_M, (box.e - box.w) / GATE_WIDTH_M, 1.0)
         farthest_m = _SPARE * focal_px / size + _SPARE_M
         return LineOfSight(pose.position_m, (x / length, y / length, z / length), farthest_m=farthest_m)
 
 
-_FLOOR_M, _CEILING_M = 0.3, 3.0  # most frames hang between
+_FLOOR_M, _CEILING_M = 0.3, 3.0  # most gates hang between
 _ELSEWHERE: Final = 0.4  # weight of other heights
-_APART_M: Final = 1.2  # from a frame found to other frames, most likely
+_APART_M: Final = 1.2  # from a gate found to other gates, most likely
 _NEAR_FOUND: Final = 0.25  # weight nearer than that
 _RAY_M: Final = 0.45  # half width of a line of sight at its origin
 _RAY_SLOPE: Final = 0.06  # how much wider it gets
@@ -110,14 +110,14 @@ class Likelihood:
         self._prior: Floats = np.float32(_ELSEWHERE) + np.float32(1.0 - _ELSEWHERE) * share
 
     def weights(self, seen: Floats, found: Sequence[Vec3], hints: Sequence[LineOfSight]) -> Floats:
-        """How likely there is a frame in each block, compared with others, before it is looked at.
+        """How likely there is a gate in each block, compared with others, before it is looked at.
 
         A line of sight weighs as much as all the rest of the arena. Its weight is on those of its blocks that
         are not seen yet.
 
         Args:
             seen: quality of the best view so far, shape (HEADINGS, blocks).
-            found: centres of the frames that are known.
+            found: centres of the gates that are known.
             hints: directions in which there are others.
         """
         weights = self._prior.copy()

@@ -6,7 +6,7 @@ from math import atan2, cos, hypot, remainder, sin, tau
 from typing import Final
 
 from framerunner.geometry.vectors import Vec3
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.navigation.goals import FlightStyle
 from offboard.navigation.seen_space import ViewedSpace
 from scenarios.models import Arena
@@ -60,7 +60,7 @@ class Lookout:
         self._began_s = self._reached_s = state.time_us * 1e-6
         return True
 
-    def command(self, state: DroneState, viewed: ViewedSpace) -> VelocityCommand | None:
+    def command(self, state: DroneState, viewed: ViewedSpace) -> VelocityFluCommand | None:
         """Face the place and climb or sink; None once it was in view, or does not come into view."""
         place_m, now_s = self._place_m, state.time_us * 1e-6
         if place_m is None:
@@ -76,7 +76,7 @@ class Lookout:
             self._place_m = None
             return None
         creep_m_s = min(max(away_m - _AWAY_M, 0.0), _CREEP_M_S)
-        return VelocityCommand(
+        return VelocityFluCommand(
             creep_m_s * cos(turn_rad),
             creep_m_s * sin(turn_rad),
             min(max(_CLIMB_PER_S * rise_m, -_CLIMB_M_S), _CLIMB_M_S),

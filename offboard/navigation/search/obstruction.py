@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.search.frame_visibility import Bools, Floats, SearchGrid
+from offboard.navigation.search.gate_visibility import Bools, Floats, SearchGrid
 
 _ROOM_M: Final = 0.1  # beside an obstacle, at least, for the drone to pass
 _ONTO_GRID: Final = 1.6  # cells nearer than this many times their size are entered directly

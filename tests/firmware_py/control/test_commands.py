@@ -10,7 +10,7 @@ from firmware_py.commands import (
     BodyRateCommand,
     MotorCommand,
     TiltCommand,
-    VelocityCommand,
+    VelocityFrdCommand,
 )
 from firmware_py.control.stabiliser import Stabiliser
 from firmware_py.types import VehicleState
@@ -27,13 +27,13 @@ def hover_share(airframe):
 @pytest.fixture(params=NAMES)
 def hover(request):
     flight = Hover(load_airframe(request.param))
-    flight.fly(2.0, VelocityCommand())
+    flight.fly(2.0, VelocityFrdCommand())
     return flight
 
 
 def test_an_acceleration_does_not_control_the_velocity():
     hover = Hover(load_airframe("x500"))
-    hover.fly(2.0, VelocityCommand())
+    hover.fly(2.0, VelocityFrdCommand())
     samples = hover.fly(1.5, AccelerationCommand((2.0, -1.0, 0.0)))
     early, late = samples[125], samples[250]  # the tilt is reached, drag is small
     assert late.forward_m_s - early.forward_m_s == pytest.approx(1.0, abs=0.1)
@@ -46,7 +46,7 @@ def test_an_acceleration_does_not_control_the_velocity():
 
 def test_upward_acceleration():
     hover = Hover(load_airframe("x500"))
-    hover.fly(1.0, VelocityCommand())
+    hover.fly(1.0, VelocityFrdCommand())
     samples = hover.fly(0.6, AccelerationCommand((0.0, 0.0, -1.0)))
     assert samples[149].down_m_s - samples[50].down_m_s == pytest.approx(-0.4, abs=0.1)
 
@@ -88,7 +88,7 @@ def test_body_rates_are_followed(hover, axis):
 
 def test_body_rates_hold_against_an_unknown_moment():
     hover = Hover(load_airframe("x500"))
-    hover.fly(1.0, VelocityCommand())
+    hover.fly(1.0, VelocityFrdCommand())
     hover.dynamics.push((0.0, 0.0, 0.0), (0.2, -0.2, 0.05))
     last = hover.fly(2.5, BodyRateCommand((0.0, 0.0, 0.0), 0.59))[-1]
     assert last.state.angular_rate_frd_rad_s == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
@@ -98,7 +98,7 @@ def test_recovery_from_a_roll_beyond_inverted(hover):
     share = hover_share(hover.airframe)
     highest = max(sample.tilt_rad for sample in hover.fly(1.5, BodyRateCommand((4.3, 0.0, 0.0), share)))
     assert highest > radians(120)
-    last = hover.fly(5.0, VelocityCommand())[-1]
+    last = hover.fly(5.0, VelocityFrdCommand())[-1]
     assert last.tilt_rad < radians(1)
     assert hypot(*last.state.velocity_ned_m_s) < 0.05
 
@@ -137,7 +137,7 @@ def others(airframe):
 @pytest.mark.parametrize("kind", range(5))
 def test_changing_between_commands_is_smooth_at_hover(hover, kind):
     hover.fly(0.3, others(hover.airframe)[kind])
-    back = hover.fly(1.0, VelocityCommand())
+    back = hover.fly(1.0, VelocityFrdCommand())
     for sample in hover.samples[450:]:
         assert sample.output.throttle == pytest.approx(hover_share(hover.airframe), rel=0.02)
         assert sample.tilt_rad < radians(0.3)
@@ -146,9 +146,9 @@ def test_changing_between_commands_is_smooth_at_hover(hover, kind):
 
 def test_a_change_to_velocity_is_smooth_at_speed(hover):
     speed = 1.5
-    steady = hover.fly(6.0, VelocityCommand((speed, 0.0, 0.0)))[-1]
+    steady = hover.fly(6.0, VelocityFrdCommand((speed, 0.0, 0.0)))[-1]
     hover.fly(0.1, TiltCommand(0.0, steady.state.pitch_rad))
-    after = hover.fly(2.0, VelocityCommand((speed, 0.0, 0.0)))
+    after = hover.fly(2.0, VelocityFrdCommand((speed, 0.0, 0.0)))
     assert all(abs(sample.forward_m_s - speed) < 0.06 for sample in after)
     assert all(abs(sample.down_m_s) < 0.06 for sample in after)
 
@@ -157,8 +157,8 @@ def test_acceleration_feed_forward_quickens_a_velocity():
     for name in NAMES:
         plain, helped = Hover(load_airframe(name)), Hover(load_airframe(name))
         for flight, feed in ((plain, 0.0), (helped, 2.0)):
-            flight.fly(1.0, VelocityCommand())
-            flight.fly(0.3, VelocityCommand((0.3, 0.0, 0.0), 0.0, (feed, 0.0, 0.0)))
+            flight.fly(1.0, VelocityFrdCommand())
+            flight.fly(0.3, VelocityFrdCommand((0.3, 0.0, 0.0), 0.0, (feed, 0.0, 0.0)))
         assert helped.samples[-1].forward_m_s > plain.samples[-1].forward_m_s + 0.05
 
 

@@ -4,7 +4,7 @@ from math import cos, degrees, dist, exp, hypot, radians, sin
 
 import pytest
 
-from firmware_py.commands import BodyRateCommand, VelocityCommand
+from firmware_py.commands import BodyRateCommand, VelocityFrdCommand
 from firmware_py.control.vector_law import DisturbanceObserver
 from framerunner.vehicle.airframe import load_airframe
 from tests.flight import PERIOD_S, Hover
@@ -28,18 +28,18 @@ def height_span_m(samples):
 @pytest.fixture
 def hover():
     flight = Hover(X500, height_m=60.0)
-    flight.fly(2.0, VelocityCommand())
+    flight.fly(2.0, VelocityFrdCommand())
     return flight
 
 
 @pytest.mark.parametrize(
     ("field", "target", "command", "limit_s"),
     [
-        ("forward_m_s", 1.0, VelocityCommand((1.0, 0.0, 0.0)), 0.8),
-        ("right_m_s", -1.0, VelocityCommand((0.0, -1.0, 0.0)), 0.8),
-        ("down_m_s", -3.0, VelocityCommand((0.0, 0.0, -3.0)), 0.7),
-        ("down_m_s", 1.5, VelocityCommand((0.0, 0.0, 1.5)), 0.6),
-        ("yaw_rate_rad_s", 1.57, VelocityCommand(yaw_rate_rad_s=1.57), 0.6),
+        ("forward_m_s", 1.0, VelocityFrdCommand((1.0, 0.0, 0.0)), 0.8),
+        ("right_m_s", -1.0, VelocityFrdCommand((0.0, -1.0, 0.0)), 0.8),
+        ("down_m_s", -3.0, VelocityFrdCommand((0.0, 0.0, -3.0)), 0.7),
+        ("down_m_s", 1.5, VelocityFrdCommand((0.0, 0.0, 1.5)), 0.6),
+        ("yaw_rate_rad_s", 1.57, VelocityFrdCommand(yaw_rate_rad_s=1.57), 0.6),
     ],
 )
 def test_step_response(hover, field, target, command, limit_s):
@@ -51,8 +51,8 @@ def test_step_response(hover, field, target, command, limit_s):
 
 @pytest.mark.parametrize(("field", "velocity"), [("forward_m_s", (12, 0, 0)), ("right_m_s", (0, 12, 0))])
 def test_to_twelve_metres_a_second_and_back(hover, field, velocity):
-    faster = hover.fly(5.0, VelocityCommand(velocity))
-    slower = hover.fly(5.0, VelocityCommand())
+    faster = hover.fly(5.0, VelocityFrdCommand(velocity))
+    slower = hover.fly(5.0, VelocityFrdCommand())
     assert rise_s(faster, field, 12.0) < 1.5
     assert rise_s(slower, field, 0.0) < 1.5
     assert max(getattr(sample, field) for sample in faster) < 12.1
@@ -66,7 +66,7 @@ def test_to_twelve_metres_a_second_and_back(hover, field, velocity):
 
 
 def test_a_diagonal_climb_keeps_the_vertical_velocity(hover):
-    samples = hover.fly(4.0, VelocityCommand((8.0, 4.0, -3.0)))
+    samples = hover.fly(4.0, VelocityFrdCommand((8.0, 4.0, -3.0)))
     assert rise_s(samples, "down_m_s", -3.0) < 0.8
     assert samples[-1].forward_m_s == pytest.approx(8.0, abs=0.05)
     assert samples[-1].right_m_s == pytest.approx(4.0, abs=0.05)
@@ -75,7 +75,7 @@ def test_a_diagonal_climb_keeps_the_vertical_velocity(hover):
 
 def test_a_velocity_in_ned_is_kept_while_yawing(hover):
     def eastwards(yaw_rate_rad_s):
-        return lambda state: VelocityCommand(
+        return lambda state: VelocityFrdCommand(
             (12 * sin(state.yaw_rad), 12 * cos(state.yaw_rad), 0.0), yaw_rate_rad_s
         )
 
@@ -89,8 +89,8 @@ def test_a_velocity_in_ned_is_kept_while_yawing(hover):
 
 @pytest.mark.parametrize(("speed", "turn_deg_s"), [(5.0, 60.0), (10.0, -30.0)])
 def test_a_velocity_in_level_axes_turns_with_them(hover, speed, turn_deg_s):
-    hover.fly(3.0, VelocityCommand((speed, 0.0, 0.0)))
-    turning = hover.fly(5.0, VelocityCommand((speed, 0.0, 0.0), radians(turn_deg_s)))
+    hover.fly(3.0, VelocityFrdCommand((speed, 0.0, 0.0)))
+    turning = hover.fly(5.0, VelocityFrdCommand((speed, 0.0, 0.0), radians(turn_deg_s)))
     assert max(abs(sample.right_m_s) for sample in turning) < 0.9
     assert turning[-1].forward_m_s == pytest.approx(speed, abs=0.02)
     assert turning[-1].right_m_s == pytest.approx(0.0, abs=0.02)
@@ -98,22 +98,22 @@ def test_a_velocity_in_level_axes_turns_with_them(hover, speed, turn_deg_s):
 
 def test_an_unknown_force_and_moment_are_learnt_and_unlearnt(hover):
     hover.dynamics.push((4.0, -2.0, -3.0), (0.05, 0.1, 0.02))
-    pushed = hover.fly(5.0, VelocityCommand())
+    pushed = hover.fly(5.0, VelocityFrdCommand())
     assert hypot(*pushed[-1].state.velocity_ned_m_s) < 0.02
     assert pushed[-1].tilt_rad > radians(10)  # tilted against the force
     hover.dynamics.push((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    freed = hover.fly(5.0, VelocityCommand())
+    freed = hover.fly(5.0, VelocityFrdCommand())
     assert hypot(*freed[-1].state.velocity_ned_m_s) < 0.02
     assert freed[-1].tilt_rad < radians(0.5)
 
 
 def test_an_unreachable_speed_winds_nothing_up(hover):
     hover.stabiliser.limits.limit_tilt(radians(10))
-    cruise = hover.fly(8.0, VelocityCommand((20.0, 0.0, 0.0)))
+    cruise = hover.fly(8.0, VelocityFrdCommand((20.0, 0.0, 0.0)))
     assert max(sample.tilt_rad for sample in cruise) < radians(11)
     assert cruise[-1].forward_m_s < 12.0
     hover.stabiliser.limits.limit_tilt(radians(90))  # no more than the airframe's own 45 degrees
-    stop = hover.fly(4.0, VelocityCommand())
+    stop = hover.fly(4.0, VelocityFrdCommand())
     assert max(sample.tilt_rad for sample in stop) < radians(46)
     assert min(sample.forward_m_s for sample in stop) > -0.1
     assert abs(stop[-1].forward_m_s) < 0.02
@@ -126,14 +126,14 @@ def test_recovers_from_a_large_tilt(hover, tilt_deg, loss_m, axis):
         _, x, y, _ = hover.fly(0.004, BodyRateCommand(axis, 0.6))[-1].state.attitude
         if 1.0 - 2.0 * (x * x + y * y) < cos(radians(tilt_deg)):
             break
-    recovery = hover.fly(4.0, VelocityCommand())
+    recovery = hover.fly(4.0, VelocityFrdCommand())
     assert height_span_m(recovery)[0] > -loss_m
     assert recovery[-1].tilt_rad < radians(1)
     assert hypot(*recovery[-1].state.velocity_ned_m_s) < 0.05
 
 
 def test_ten_seconds_of_hover_drift_less_than_two_centimetres(hover):
-    samples = hover.fly(10.0, VelocityCommand())
+    samples = hover.fly(10.0, VelocityFrdCommand())
     assert max(dist(samples[0].position_ned_m, sample.position_ned_m) for sample in samples) < 0.02
     assert samples[-1].output.throttle == pytest.approx(0.592, abs=0.002)  # near PX4's MPC_THR_HOVER, 0.6
 
@@ -188,7 +188,7 @@ def test_while_held_it_learns_and_forgets_nothing():
 def test_a_descent_faster_than_a_fall_keeps_it_upright():
     """Without a least thrust, MPC_THR_MIN 0, the desired thrust is zero and has no direction."""
     hover = Hover(X500, height_m=60.0)
-    hover.fly(1.0, VelocityCommand((3.0, 0.0, 0.0)))
-    falling = hover.fly(0.5, VelocityCommand((0.0, 0.0, 8.0)))
+    hover.fly(1.0, VelocityFrdCommand((3.0, 0.0, 0.0)))
+    falling = hover.fly(0.5, VelocityFrdCommand((0.0, 0.0, 8.0)))
     assert min(sample.output.throttle for sample in falling) < 0.05
     assert falling[-1].tilt_rad < 0.1

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_py.commander_table import State
+from firmware_py.commander_table import CommanderState
 from firmware_py.guidance.limits import AccelerationLimits, SpeedLimits
 from firmware_py.guidance.modes import Guidance
 from firmware_py.parameters import Parameters
@@ -38,7 +38,7 @@ def limited():
 
 def offboard(**setpoint):
     guidance = limited()
-    guidance.enter(State.OFFBOARD, at())
+    guidance.enter(CommanderState.OFFBOARD, at())
     guidance.accept(TrajectorySetpoint(0, **setpoint))
     return guidance
 
@@ -127,7 +127,7 @@ def test_an_infinite_component_counts_as_not_controlled_and_brakes():
 def test_hold_brakes_smoothly_and_then_keeps_the_position():
     guidance = limited()
     state = at(velocity=(1.0, 0.0, 0.0), yaw=0.3)
-    guidance.enter(State.HOLD, state)
+    guidance.enter(CommanderState.HOLD, state)
     speeds = []
     for _ in range(500):
         speeds.append(guidance.step(state).velocity_level_m_s[0])
@@ -143,7 +143,7 @@ def test_hold_brakes_smoothly_and_then_keeps_the_position():
 
 def test_hold_at_rest_keeps_the_exact_position():
     guidance = limited()
-    guidance.enter(State.HOLD, at(1.0, 2.0, -3.0))
+    guidance.enter(CommanderState.HOLD, at(1.0, 2.0, -3.0))
     guidance.step(at(1.0, 2.0, -3.0))
     assert guidance.mode.setpoint.position_ned_m == (1.0, 2.0, -3.0)
     assert guidance.step(at(0.5, 2.0, -3.1)).velocity_level_m_s == pytest.approx((0.5, 0.0, 0.1))
@@ -151,27 +151,27 @@ def test_hold_at_rest_keeps_the_exact_position():
 
 def test_takeoff_climbs_vertically_reports_its_target_and_hold_keeps_it():
     guidance = limited()
-    guidance.enter(State.TAKEOFF, at(1.0, 2.0, 0.0), target_ned_m=(nan, nan, -2.5))
+    guidance.enter(CommanderState.TAKEOFF, at(1.0, 2.0, 0.0), target_ned_m=(nan, nan, -2.5))
     command = guidance.step(at(1.1, 2.0, 0.0))
     assert command.velocity_level_m_s == pytest.approx((-0.1, 0.0, -1.2))
     assert not guidance.mode.target_reached
     guidance.step(at(1.0, 2.0, -2.4))
     assert guidance.mode.target_reached
-    guidance.enter(State.HOLD, at(1.0, 2.0, -2.4), keep_target=True)
+    guidance.enter(CommanderState.HOLD, at(1.0, 2.0, -2.4), keep_target=True)
     guidance.step(at(1.0, 2.0, -2.4))
     assert guidance.mode.setpoint.position_ned_m == (1.0, 2.0, -2.5)
 
 
 def test_takeoff_to_a_lower_height_stays():
     guidance = limited()
-    guidance.enter(State.TAKEOFF, at(down=-5.0), target_ned_m=(nan, nan, -2.5))
+    guidance.enter(CommanderState.TAKEOFF, at(down=-5.0), target_ned_m=(nan, nan, -2.5))
     assert guidance.step(at(down=-5.0)).velocity_level_m_s == (0.0, 0.0, 0.0)
     assert guidance.mode.target_reached
 
 
 def test_land_accelerates_to_its_speed_and_keeps_the_position():
     guidance = limited()
-    guidance.enter(State.LAND, at(1.0, 1.0, -3.0))
+    guidance.enter(CommanderState.LAND, at(1.0, 1.0, -3.0))
     sinks = [guidance.step(at(1.0, 1.0, -3.0)).velocity_level_m_s[2] for _ in range(500)]
     assert all(after > before - 1e-3 for before, after in pairwise(sinks))
     command = guidance.step(at(0.8, 1.0, -2.0))
@@ -181,8 +181,8 @@ def test_land_accelerates_to_its_speed_and_keeps_the_position():
 
 def test_setpoints_are_shown_only_while_followed():
     guidance = limited()
-    guidance.enter(State.HOLD, at())
+    guidance.enter(CommanderState.HOLD, at())
     guidance.accept(TrajectorySetpoint(7, velocity_ned_m_s=(9.0, 0.0, 0.0)))
     assert guidance.mode.setpoint.time_us == 0
-    guidance.enter(State.OFFBOARD, at())
+    guidance.enter(CommanderState.OFFBOARD, at())
     assert guidance.mode.setpoint.velocity_ned_m_s == (2.0, 0.0, 0.0)

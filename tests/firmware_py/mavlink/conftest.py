@@ -9,7 +9,7 @@ from firmware_py.estimation.report import EstimatorReport
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from firmware_py.missions.store import MissionStore
-from firmware_py.navigator import Navigator
+from firmware_py.navigator import MissionNavigator
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, LandedState, VehicleStatus
 from firmware_py.types import FlightRecord, MotorOutput, StatusText, VehicleState
@@ -47,7 +47,7 @@ class FakeAutopilot:
     poses: list = field(default_factory=list)
 
     def __post_init__(self):
-        self.navigator = Navigator(self.missions, self.parameters)
+        self.navigator = MissionNavigator(self.missions, self.parameters)
 
     @property
     def estimator(self):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel
+from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, FixedCamera
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
@@ -23,7 +23,7 @@ COMMAND_NAMES = {
 def node(airframe):
     from tests.firmware_py.mavlink.conftest import FakeAutopilot
 
-    camera = CameraModel(320, 240, 1.57, 10.0)
+    camera = FixedCamera(320, 240, 1.57, 10.0)
     return MavlinkNode(FakeAutopilot(airframe), (ONBOARD, GROUND), NodeOptions(camera=camera, shell=True))
 
 

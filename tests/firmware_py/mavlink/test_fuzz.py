@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.commands import FlightLimits
-from firmware_py.mavlink.camera.model import CameraModel
+from firmware_py.mavlink.camera.model import FixedCamera
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.status import FlightMode
@@ -102,7 +102,7 @@ def test_twenty_thousand_sound_packets_of_every_id_with_random_content(real, mak
 
 
 ALL_DEVICES = {
-    "camera": CameraModel(320, 240, 1.57, 10.0),
+    "camera": FixedCamera(320, 240, 1.57, 10.0),
     "gimbal": SimulatedGimbal(Gimbal()),
     "gripper": True,
     "shell": True,

@@ -3,8 +3,8 @@
 from math import atan2, hypot, isnan, nan, remainder, tau
 
 from firmware_py.missions.executor import MissionExecutor
-from firmware_py.missions.flight import IssuedCommand, LegKind, View
-from firmware_py.missions.items import Do, Frame, MissionItem, PlanType
+from firmware_py.missions.flight import IssuedCommand, LegKind, VehicleView
+from firmware_py.missions.items import Do, MavFrame, MissionItem, PlanType
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.types import StatusText
@@ -20,14 +20,14 @@ TURN_RAD_S = 1.0
 def at(seq, command, north=0.0, east=0.0, up=0.0, *, params=(0.0, 0.0, 0.0, nan), autocontinue=True):
     """An item at a place, height above home."""
     point = PROJECTION.to_geodetic((north, east, 0.0))
-    frame = Frame.GLOBAL_RELATIVE_ALT_INT
+    frame = MavFrame.GLOBAL_RELATIVE_ALT_INT
     return MissionItem(seq, frame, command, params, point.latitude_deg, point.longitude_deg, up, autocontinue)
 
 
 def do(seq, command, *params, autocontinue=True):
     """An item without a place."""
     values = (*params, *[0.0] * (7 - len(params)))
-    return MissionItem(seq, Frame.MISSION, command, values[:4], *values[4:], autocontinue)
+    return MissionItem(seq, MavFrame.MISSION, command, values[:4], *values[4:], autocontinue)
 
 
 def plan(*makers):
@@ -55,7 +55,7 @@ class World:
         self.store = MissionStore()
         self.store.replace(PlanType.MISSION, items, current=current)
         self.store.valid = bool(items)
-        self.view = View(projection=PROJECTION, home_ned_m=(0.0, 0.0, 0.0))
+        self.view = VehicleView(projection=PROJECTION, home_ned_m=(0.0, 0.0, 0.0))
         self.executor = MissionExecutor(self.store, self.parameters)
         self.reached, self.texts, self.commands, self.legs, self.track = [], [], [], [], []
         self.executor.enter(self.view)

@@ -3,7 +3,7 @@ from math import nan
 import pytest
 
 from firmware_py.missions.checks import mission_faults
-from firmware_py.missions.flight import View
+from firmware_py.missions.flight import VehicleView
 from firmware_py.missions.geofence import Geofence
 from firmware_py.missions.items import Do, PlanType
 from firmware_py.missions.store import MissionStore
@@ -14,7 +14,7 @@ from tests.firmware_py.missions.mission_world import PROJECTION, doing, placed, 
 def checked(*makers, fence=(), landed=True, home=(0.0, 0.0, 0.0), **parameters):
     store, values = MissionStore(), Parameters(parameters)
     store.replace(PlanType.FENCE, plan(*fence))
-    view = View(projection=PROJECTION, home_ned_m=home, landed=landed)
+    view = VehicleView(projection=PROJECTION, home_ned_m=home, landed=landed)
     valid, texts = mission_faults(plan(*makers), view, values, Geofence(store, values))
     return valid, [text.text for text in texts]
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from firmware_py.missions.flight import View
+from firmware_py.missions.flight import VehicleView
 from firmware_py.missions.geofence import Geofence, fence_fault
 from firmware_py.missions.items import Do, PlanType
 from firmware_py.missions.store import MissionStore
@@ -26,7 +26,7 @@ def circle(command, north, east, radius):
 def fence_of(*makers, **parameters):
     store = MissionStore()
     store.replace(PlanType.FENCE, plan(*makers))
-    view = View(projection=PROJECTION, home_ned_m=(0.0, 0.0, 0.0), landed=False)
+    view = VehicleView(projection=PROJECTION, home_ned_m=(0.0, 0.0, 0.0), landed=False)
     fence = Geofence(store, Parameters(parameters))
     fence.check(view)
     return fence, view, store
@@ -67,7 +67,7 @@ def test_distance_and_height_from_home():
 
 def test_changed_parameters_and_plans_take_effect():
     store, parameters = MissionStore(), Parameters()
-    view = View(projection=PROJECTION, home_ned_m=(0.0, 0.0, 0.0), position_ned_m=(30.0, 0.0, 0.0))
+    view = VehicleView(projection=PROJECTION, home_ned_m=(0.0, 0.0, 0.0), position_ned_m=(30.0, 0.0, 0.0))
     fence = Geofence(store, parameters)
     assert fence.check(view) is None
     parameters.set("GF_MAX_HOR_DIST", 25.0)

@@ -21,8 +21,8 @@ from offboard.navigation.pose_history import PoseHistory
 from scenarios.loader import dump_yaml, load_scenario
 from scenarios.models import Camera as CameraSettings
 from scenarios.models import Scenario
-from sitl.camera import Camera
-from tests.vision.calibration.seen_frames import FOCAL_PX
+from sitl.camera import SimulatedCamera
+from tests.vision.calibration.seen_gates import FOCAL_PX
 from vision.calibration.model import Calibration, CalibrationError
 from vision.calibration.mounting import MountingFit, Movement
 from vision.calibration.sightings import Sightings, Values
@@ -120,20 +120,20 @@ def test_what_is_not_known_or_cannot_be_is_not_written(tmp_path: Path, what: dic
     assert not file.exists()
 
 
-def test_the_navigator_sees_frames_where_they_are_with_a_turned_camera() -> None:
+def test_the_navigator_sees_gates_where_they_are_with_a_turned_camera() -> None:
     scenario = tilted()
-    frame = scenario.frames[0]
-    at, attitude = (frame.x_m - 2.0, frame.y_m + 0.3, frame.z_m + 0.2), quaternion_from_euler(0.1, -0.05, 0.1)
-    image = Camera(scenario).render(at, attitude)
+    gate = scenario.frames[0]
+    at, attitude = (gate.x_m - 2.0, gate.y_m + 0.3, gate.z_m + 0.2), quaternion_from_euler(0.1, -0.05, 0.1)
+    image = SimulatedCamera(scenario).render(at, attitude)
     detect = new_detector("frames", focal_px=scenario.camera.focal_px, rendered=True)
-    (sighting,) = [each for each in detect(image, 0).frames if each.colour == frame.colour]
+    (sighting,) = [each for each in detect(image, 0).frames if each.colour == gate.colour]
     model = CameraModel.of(scenario.camera)
     history = PoseHistory(model)
     history.add(DroneState(0, *at, 0.1, attitude_arena=attitude))
     history.add(DroneState(50_000, *at, 0.1, attitude_arena=attitude))
     pose = history.at(25_000)
     assert pose is not None
-    seen = model.project(model.pose(pose.position_m, pose.attitude_arena), frame.position_arena_m)
+    seen = model.project(model.pose(pose.position_m, pose.attitude_arena), gate.position_arena_m)
     assert seen is not None
     corners = [each for each in sighting.corners if each is not None]
     assert len(corners) == 4

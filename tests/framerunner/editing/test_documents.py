@@ -16,16 +16,16 @@ from fastapi import FastAPI
 from starlette.websockets import WebSocketDisconnect
 
 from framerunner.editing import words
-from framerunner.editing.documents.messages import catalogue_message, document_message
+from framerunner.editing.documents.document_messages import catalogue_message, document_message
 from framerunner.editing.documents.open_document import OpenDocument, SaveRefusedError
 from framerunner.editing.documents.router import DocumentsRouter
 from framerunner.editing.documents.session import EditorSession, SessionError
 from framerunner.editing.words import SaidError
 from framerunner.monitor.access import Role, Visitor
 from offboard.authoring import read_layout
+from offboard.authoring.edit_texts import EDIT_ENGLISH, EDIT_SPANISH
 from offboard.authoring.edits import AddState
-from offboard.authoring.messages import EDIT_ENGLISH, EDIT_SPANISH
-from offboard.chart.messages import ENGLISH
+from offboard.chart.mission_texts import ENGLISH
 from offboard.mission import MISSIONS, list_missions
 from offboard.pilot import Pilot
 from offboard.pilot_file import PilotFile

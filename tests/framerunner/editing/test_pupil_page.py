@@ -41,7 +41,7 @@ async def pupil(browser, program, file, lesson, locale="en-GB"):
     return user
 
 
-async def test_a_frame_that_is_hit_is_named_and_marked(browser, program):
+async def test_a_gate_that_is_hit_is_named_and_marked(browser, program):
     user = await pupil(browser, program, "careless.yaml", LESSON_4.name)
     await user.press("Fly", user.page.locator(".e-controls"))
     await expect(user.page.locator(".e-touched")).to_have_text(

@@ -1,6 +1,6 @@
 """Short flights and made-up rows for the tests of evaluations."""
 
-from framerunner.evaluation.rows import Row
+from framerunner.evaluation.rows import EvaluationRow
 from scenarios.loader import dump_yaml
 from scenarios.random_scenarios import load_level, random_scenario
 
@@ -44,4 +44,4 @@ def made_row(scenario="calm-1", verdict="clean", **values):
         "state_sha256": "0" * 64,
         "version": "0.1.0",
     }
-    return Row(scenario=scenario, verdict=verdict, **{**usual, **values})
+    return EvaluationRow(scenario=scenario, verdict=verdict, **{**usual, **values})

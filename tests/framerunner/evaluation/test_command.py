@@ -7,7 +7,7 @@ import pytest
 
 from framerunner.cli import run
 from framerunner.evaluation import evaluate as evaluate_module
-from framerunner.evaluation.rows import Row
+from framerunner.evaluation.rows import EvaluationRow
 from framerunner.evaluation.terminal import EvaluationProgress
 from scenarios.loader import load_scenario
 from tests.framerunner.evaluation.flights import made_row, write_scenarios
@@ -150,7 +150,7 @@ def iter_rows(**values):
 def test_progress_shows_counts_verdicts_speed_and_time_left(monkeypatch):
     now = [100.0]
     monkeypatch.setattr("framerunner.evaluation.terminal.time.monotonic", lambda: now[0])
-    rows: list[Row] = [made_row("a"), made_row("b", "timed out")]
+    rows: list[EvaluationRow] = [made_row("a"), made_row("b", "timed out")]
     progress = EvaluationProgress(130, rows)
     assert progress.text() == "2 of 130 flown, 1 clean, 0 completed"
     now[0] += 2.0

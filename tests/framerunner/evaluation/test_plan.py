@@ -6,7 +6,7 @@ import pytest
 
 from framerunner.errors import SettingError
 from framerunner.evaluation.plan import plan_files, plan_level
-from framerunner.flying.response import Response
+from framerunner.flying.response import ResponseDelay
 from offboard.mission import load_mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario
@@ -81,7 +81,7 @@ def test_equal_plans_have_equal_identities_and_others_have_not(mission):
     others = {
         "mission soft_landing, not frame_challenge": plan_level("calm", 1, 3, load_mission("soft_landing")),
         "pilot mine.py, not Pilot": plan_level("calm", 1, 3, own),
-        "response lag=0.5, not none": plan.answering_late(Response(lag_s=0.5)),
+        "response lag=0.5, not none": plan.answering_late(ResponseDelay(lag_s=0.5)),
         r"other scenarios (4 from calm-1, not 3 from calm-1)": plan_level("calm", 1, 4, mission),
         r"other scenarios (3 from calm-2, not 3 from calm-1)": plan_level("calm", 2, 3, mission),
     }

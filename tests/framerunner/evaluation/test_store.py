@@ -10,11 +10,11 @@ from framerunner.evaluation.plan import plan_level
 from framerunner.evaluation.store import FLIGHTS, open_folder, read_folder
 from framerunner.runs.track import Track
 from offboard.mission import load_mission
-from offboard.navigation.view import FrameEstimate
+from offboard.navigation.view import GateEstimate
 from scenarios.loader import load_scenario
 from tests.framerunner.evaluation.flights import made_row
 
-ESTIMATE = FrameEstimate("red", (3.0, 2.0, 2.0), 0.5, (inf, 0.1, 0.1), 0.1, True, False, 1, 2_900_000)
+ESTIMATE = GateEstimate("red", (3.0, 2.0, 2.0), 0.5, (inf, 0.1, 0.1), 0.1, True, False, 1, 2_900_000)
 STATES = ["red.turning", "red.turning"]
 TRACK = Track([0.0, 0.2], [1.0, 2.0], [3.0, 4.0], [0.5, 0.6], STATES, (ESTIMATE,))
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from framerunner.evaluation import runner as runner_module
-from framerunner.evaluation.rows import COLUMNS, Row
+from framerunner.evaluation.rows import COLUMNS, EvaluationRow
 from framerunner.evaluation.runner import fly_task, thinned
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
@@ -45,7 +45,7 @@ def test_a_row_of_an_older_version_can_be_read():
     told = json.loads(made_row("calm-1").to_json())
     for name in ("kept_in_box_s", "bound_s", "times_bound", "contact_times_s", "cause"):
         del told[name]
-    assert Row.model_validate_json(json.dumps(told)) == made_row("calm-1")
+    assert EvaluationRow.model_validate_json(json.dumps(told)) == made_row("calm-1")
 
 
 def test_the_row_of_a_failed_flight_has_a_thinned_track():
@@ -58,10 +58,10 @@ def test_the_row_of_a_failed_flight_has_a_thinned_track():
 
 def test_a_row_is_read_back_from_json():
     row = made_row(seconds_in_state={"turning": 3.1999999999999997})
-    assert Row.model_validate_json(row.to_json()) == row
+    assert EvaluationRow.model_validate_json(row.to_json()) == row
     for line in ("", "{}", "[]", "1", row.to_json()[:-1]):
         with pytest.raises(ValueError, match=r".*"):
-            Row.model_validate_json(line)
+            EvaluationRow.model_validate_json(line)
 
 
 def test_a_fault_of_the_program_is_a_row_with_its_traceback():

@@ -1,13 +1,13 @@
-"""What a film shows: the trail in its colours, frames, crossing times and verdict, at any size."""
+"""What a film shows: the trail in its colours, gates, crossing times and verdict, at any size."""
 
 import numpy as np
 import pytest
 
 from framerunner.film.arena_view import state_colour
 from framerunner.film.film_painter import FilmPainter
-from framerunner.film.style import FRAME, GOOD, Letters, lay_out
+from framerunner.film.style import GATE, GOOD, Letters, lay_out
 from framerunner.film.timeline import Timeline
-from framerunner.film.viewpoint import Flyby, Viewpoint
+from framerunner.film.viewpoint import FilmCamera, Flyby
 from framerunner.recording.collected import collect
 from framerunner.recording.open_recording import recorded_flight
 from scenarios.loader import load_scenario
@@ -64,7 +64,7 @@ def test_the_trail_has_the_colours_of_its_states(timeline):
         assert near(late, colour) > near(early, colour) + 60
 
 
-def test_chips_are_filled_when_frames_are_crossed_and_the_verdict_is_shown_last(timeline):
+def test_chips_are_filled_when_gates_are_crossed_and_the_verdict_is_shown_last(timeline):
     painter = FilmPainter(timeline, SIZE, 8.0)
     box = lay_out(*SIZE, 4 / 3).figures
     end_s = timeline.end_s
@@ -74,12 +74,12 @@ def test_chips_are_filled_when_frames_are_crossed_and_the_verdict_is_shown_last(
         for time_s in (crossed["red"] - 2.0, crossed["green"] + 1.0, end_s)
     )
     full = 1000
-    assert [near(image, FRAME["red"]) > full for image in (before, between, over)] == [False, True, True]
-    assert [near(image, FRAME["blue"]) > full for image in (before, between, over)] == [False, False, True]
+    assert [near(image, GATE["red"]) > full for image in (before, between, over)] == [False, True, True]
+    assert [near(image, GATE["blue"]) > full for image in (before, between, over)] == [False, False, True]
     assert [near(image, GOOD) > full for image in (before, between, over)] == [False, False, True]
 
 
-def test_base_and_frames_are_in_the_image_all_the_time(timeline):
+def test_base_and_gates_are_in_the_image_all_the_time(timeline):
     flyby = Flyby(timeline, (400, 300), 8.0)
     scenario = timeline.scenario
     points = [(scenario.base.x_m, scenario.base.y_m, 0.0), *(f.position_arena_m for f in scenario.frames)]
@@ -99,7 +99,7 @@ def test_the_viewpoint_turns_slowly(timeline):
 
 
 def test_a_point_ahead_is_in_the_middle_and_one_to_the_right_is_right():
-    view = Viewpoint(np.zeros(3), np.array([(0, -1.0, 0), (0, 0, -1.0), (1.0, 0, 0)]), 100.0, (50.0, 40.0))
+    view = FilmCamera(np.zeros(3), np.array([(0, -1.0, 0), (0, 0, -1.0), (1.0, 0, 0)]), 100.0, (50.0, 40.0))
     pixels = view.project(np.array([(2.0, 0.0, 0.0), (2.0, -1.0, 0.5), (-1.0, 0.0, 0.0)]))
     assert pixels[:2].tolist() == [[50.0, 40.0], [100.0, 15.0]]
     assert np.isnan(pixels[2]).all()

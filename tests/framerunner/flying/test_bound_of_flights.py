@@ -8,7 +8,7 @@ from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
 from scenarios.air import Wind
 from scenarios.loader import load_scenario
-from scenarios.models import Frame, Scenario, ScenarioError
+from scenarios.models import Gate, Scenario, ScenarioError
 from tests.framerunner import reference_flights
 
 
@@ -34,22 +34,22 @@ def test_more_speed_means_a_lower_bound():
     assert bound_of(plan, "open").time_s < bound_of(plan, "contest").time_s
 
 
-def test_frames_lifted_for_a_drone_without_a_base_are_bounded_where_they_are():
+def test_gates_lifted_for_a_drone_without_a_base_are_bounded_where_they_are():
     plan = FlightPlan(load_scenario("test-case-1"))
     heights_m = [point[2] for point in bound_of(plan.lifted(0.5), "contest").points_arena_m[1:4]]
-    frames = (frame.z_m + 0.5 for frame in plan.scenario.frames)
-    assert all(abs(z_m - lifted_m) <= 0.09 + 1e-9 for z_m, lifted_m in zip(heights_m, frames, strict=True))
+    gates = (gate.z_m + 0.5 for gate in plan.scenario.frames)
+    assert all(abs(z_m - lifted_m) <= 0.09 + 1e-9 for z_m, lifted_m in zip(heights_m, gates, strict=True))
 
 
 def test_without_frames_or_a_measured_airframe_or_in_wind_there_is_no_bound():
     empty = FlightPlan(load_scenario("empty"))
-    frame = Frame(colour="red", x_m=2, y_m=0, z_m=1, yaw_rad=0)
-    other = FlightPlan(Scenario(name="other", airframe="x500", frames=(frame,)))
+    gate = Gate(colour="red", x_m=2, y_m=0, z_m=1, yaw_rad=0)
+    other = FlightPlan(Scenario(name="other", airframe="x500", frames=(gate,)))
     with pytest.raises(ScenarioError, match="has no frames"):
         bound_of(empty, "contest")
     with pytest.raises(EnvelopeError, match="airframe x500: its motion was not measured, so no bound; use"):
         bound_of(other, "contest")
-    windy = FlightPlan(Scenario(name="windy", frames=(frame,), wind=Wind(gust_m_s=1.0)))
+    windy = FlightPlan(Scenario(name="windy", frames=(gate,), wind=Wind(gust_m_s=1.0)))
     with pytest.raises(EnvelopeError, match="windy: wind pushes a drone beyond its limits, so no bound"):
         bound_of(windy, "contest")
     assert all(bound_s(plan, "contest") is None for plan in (empty, other, windy))

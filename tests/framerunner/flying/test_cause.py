@@ -7,16 +7,16 @@ from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from framerunner.runs.track import Track
 from offboard.app import MissionEnd, Moment
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.mission import load_mission
-from offboard.navigation.view import FrameEstimate, NavigationView
+from offboard.navigation.view import GateEstimate, NavigationView
 from scenarios.loader import load_scenario
 from scenarios.result import RefereeReport
 from tests.framerunner.evaluation.flights import short_scenario
 from vision.types import Detections
 
 LAYOUT = load_scenario("test-case-1")  # red at (3, 2, 2) with yaw 3
-RED = FrameEstimate("red", (3.03, 2.0, 2.04), 3.1 - 3.14159, (0.1, 0.1, 0.1), 0.1, False, True, 9, 0)
+RED = GateEstimate("red", (3.03, 2.0, 2.04), 3.1 - 3.14159, (0.1, 0.1, 0.1), 0.1, False, True, 9, 0)
 TRACK = Track(
     [0.0, 10.0, 20.0, 30.0],
     [-3.0, 3.0, 5.5, 0.0],
@@ -31,7 +31,7 @@ def words(report, ended="finished", reason="", views=()):
     watch = CauseWatch()
     for time_s, view in views:
         state = DroneState(BEGAN_US + round(time_s * 1e6), 0.0, 0.0, 0.0, 0.0)
-        watch.see(Moment(state, VelocityCommand(), Detections(), "", 1.0, navigation=view))
+        watch.see(Moment(state, VelocityFluCommand(), Detections(), "", 1.0, navigation=view))
     end = MissionEnd(ended, reason, "green.search", 30.0, 600)
     return watch.words(Flown(LAYOUT, RefereeReport(**report), end, TRACK, BEGAN_US))
 

@@ -11,7 +11,7 @@ from framerunner.flying.plan import FlightPlan
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
-from vision.types import FrameSighting
+from vision.types import GateSighting
 
 DASH = """\
 class: {mission_class}
@@ -54,17 +54,17 @@ def test_limits_of_a_real_drone_replace_the_airframes_in_the_open_class_only(tmp
         assert plan.command_limits == limits
 
 
-def test_a_mission_sees_frames_by_shape_if_it_says_so(tmp_path):
+def test_a_mission_sees_gates_by_shape_if_it_says_so(tmp_path):
     path = tmp_path / "seeing.yaml"
     path.write_text("vision: frames\nextends: frame_challenge\n", encoding="utf-8")
     scenario = load_scenario("test-case-1").model_copy(update={"try_limit_s": 3.0})
     seen = []
     for mission in (path, "frame_challenge"):
-        sightings: list[FrameSighting] = []
+        sightings: list[GateSighting] = []
         plan = FlightPlan(scenario, load_mission(mission))
         fly_lockstep(plan, observers=[lambda moment, to=sightings: to.extend(moment.detections.frames)])
         seen.append(sightings)
     assert "red" in {sighting.colour for sighting in seen[0]} and not seen[1]
     red = next(sighting for sighting in seen[0] if sighting.colour == "red" and sighting.poses)
     distance_m = hypot(*red.poses[0].position_flu_m)
-    assert distance_m == pytest.approx(7.9, rel=0.1)  # from the start to the red frame
+    assert distance_m == pytest.approx(7.9, rel=0.1)  # from the start to the red gate

@@ -9,7 +9,7 @@ from rich.console import Console
 from framerunner.flying.display import FlightDisplay, result_lines
 from framerunner.runs.recorder import FlightRecorder
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from scenarios.result import FlightResult, RefereeSnapshot
 from scenarios.verdict import Verdict
 from vision.types import Detection, Detections
@@ -35,7 +35,7 @@ def flight():
 def see(recorder, time_s, state, mode="OFFBOARD", **fields):
     drone = DroneState(round(time_s * 1e6), 1.25, -2.5, 0.75, 0.5, armed=True, mode=mode)
     detections = Detections(red=SEEN, green=IN_PART)
-    recorder.see(Moment(drone, VelocityCommand(), detections, state, time_s, **fields))
+    recorder.see(Moment(drone, VelocityFluCommand(), detections, state, time_s, **fields))
 
 
 async def shown(display, recorder, moments):

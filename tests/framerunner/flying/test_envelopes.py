@@ -17,7 +17,7 @@ from firmware_py.offboard_requests import setpoint_from_body_velocity
 from firmware_py.status import FlightMode
 from framerunner.flying.envelopes import ENVELOPES
 from framerunner.flying.plan import airframe_limits
-from offboard.drone import VelocityCommand
+from offboard.drone import VelocityFluCommand
 from offboard.limits import CONTEST
 from scenarios.models import Arena, Base, Scenario
 from scenarios.touchdown import HARD_HIT_M_S
@@ -78,7 +78,7 @@ def fly(segments, mission_class):
     limits = CONTEST if mission_class == "contest" else airframe_limits(airframe)
 
     def send(forward, left, up, turn):
-        level = limits.limited(VelocityCommand(forward * limits.forward_m_s, left * limits.left_m_s))
+        level = limits.limited(VelocityFluCommand(forward * limits.forward_m_s, left * limits.left_m_s))
         up *= limits.up_m_s if up > 0 else limits.down_m_s
         state = autopilot.state
         velocity = (level.forward_m_s, -level.left_m_s, -up)

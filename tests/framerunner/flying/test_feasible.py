@@ -60,6 +60,6 @@ def test_more_speed_makes_a_faster_flight_possible():
 
 def test_no_flight_leads_through_a_wall():
     scenario = load_scenario("test-case-1")
-    wall = Wall(x_m=-5, y_m=-1.5, end_x_m=5, end_y_m=-1.5)  # between the start and all frames
+    wall = Wall(x_m=-5, y_m=-1.5, end_x_m=5, end_y_m=-1.5)  # between the start and all gates
     blocked = FlightPlan(scenario.model_copy(update={"walls": (wall,)}))
     assert isinstance(feasible(blocked, "contest"), str)

@@ -11,7 +11,7 @@ from framerunner.flying.judges import TelemetryJudge, TruthJudge, ask_referee, c
 from framerunner.flying.plan import FlightPlan
 from framerunner.wire.simulator_api import SimulatorApi
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from scenarios.loader import load_scenario
 from scenarios.result import RefereeReport
 from vision.types import Detections
@@ -138,7 +138,7 @@ async def test_another_camera_leaves_the_verdict_to_telemetry(url):
         assert judge.source == "telemetry"
 
 
-async def test_frames_are_where_the_referee_has_them():
+async def test_gates_are_where_the_referee_has_them():
     async with referee({**answer(), "source": "telemetry", "lift_m": 0.25}) as (root, session, _):
         _, plan = await choose_judge(PLAN, SimulatorApi(root), session)
     assert plan == PLAN.lifted(0.25)
@@ -204,7 +204,7 @@ async def test_a_referee_that_has_ended_has_no_standing():
 
 def moment(time_s, x, z, *, armed=True):
     state = DroneState(round(time_s * 1e6), x, -3.0, z, 1.0, (0.0, 0.0, 0.0), armed)
-    return Moment(state, VelocityCommand(), Detections(), "take_off.rise", time_s)
+    return Moment(state, VelocityFluCommand(), Detections(), "take_off.rise", time_s)
 
 
 async def test_telemetry_is_judged_tick_by_tick():

@@ -13,7 +13,7 @@ from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.lockstep import LockstepVehicle, fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Observer
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.mission import load_mission
 from offboard.perception import CAMERA_DEAD_S, CameraSilentError
 from scenarios.loader import load_scenario
@@ -58,7 +58,7 @@ class LateDrone:
                 stalled -= 1
                 missed.append(state)
                 if len(missed) == STAND_STILL_TICKS:
-                    self._drone.command(VelocityCommand())
+                    self._drone.command(VelocityFluCommand())
                 continue
             yield replace(state, missed=tuple(missed))
             missed.clear()
@@ -139,7 +139,7 @@ def test_a_drone_whose_camera_is_silent_hovers_and_then_flies_on(monkeypatch):
     result = fly_late(monkeypatch, "test-case-1", Lateness(silent_s=(14.0, 17.5)), moments.append).result
     assert result.verdict == "clean", result.reason
     hovering = [moment for moment in moments if moment.remark.startswith("hovers")]
-    assert {moment.command for moment in hovering} == {VelocityCommand()}
+    assert {moment.command for moment in hovering} == {VelocityFluCommand()}
     assert hovering[0].remark == "hovers: no image for 1.0 s"
     assert len(hovering) == pytest.approx(20 * 2.8, abs=4)  # until the next image that is processed
 

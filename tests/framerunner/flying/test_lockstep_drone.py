@@ -9,10 +9,10 @@ import pytest
 from firmware_py.status import CommandResult, FlightMode
 from framerunner.flying.lockstep import LockstepPerception
 from framerunner.flying.lockstep_drone import TICK_US, LockstepDrone
-from offboard.drone import DroneError, VelocityCommand
+from offboard.drone import DroneError, VelocityFluCommand
 from offboard.perception import CameraLostError
 from scenarios.loader import load_scenario
-from sitl.camera import Camera
+from sitl.camera import SimulatedCamera
 from sitl.simulation import Simulation
 
 START = (1.0, 2.0, 0.5, 0.3)  # not the simulation's own start: the axes must be aligned to this
@@ -42,12 +42,12 @@ async def in_the_air(drone):
     await drone.connect()
     await drone.ready()
     await drone.motors_on()
-    return await fly(drone, VelocityCommand(up_m_s=0.5), 60)
+    return await fly(drone, VelocityFluCommand(up_m_s=0.5), 60)
 
 
 async def test_ticks_are_on_the_50_ms_grid_in_the_arenas_axes(drone):
     await drone.ready()
-    states = await fly(drone, VelocityCommand(), 6)
+    states = await fly(drone, VelocityFluCommand(), 6)
     assert [state.time_us // TICK_US - states[0].time_us // TICK_US for state in states] == list(range(6))
     assert all(state.time_us % TICK_US < 4_000 for state in states)
     last = states[-1]
@@ -59,7 +59,7 @@ async def test_motors_run_only_in_offboard_and_a_velocity_holds_until_changed(dr
     await drone.ready()
     await drone.motors_on()
     assert simulation.autopilot.status.mode is FlightMode.OFFBOARD
-    drone.command(VelocityCommand(forward_m_s=0.4, up_m_s=0.4))
+    drone.command(VelocityFluCommand(forward_m_s=0.4, up_m_s=0.4))
     ticks = drone.ticks()
     states = [await anext(ticks) for _ in range(80)]  # 4 s without another command
     assert all(state.armed and state.offboard for state in states)
@@ -81,7 +81,7 @@ async def first_tick_after_arming(drone, simulation, *, confirmed=False):
     simulation.tick = noted
     await drone.ready()
     await drone.motors_on(confirmed=confirmed)
-    drone.command(VelocityCommand(up_m_s=1.0))
+    drone.command(VelocityFluCommand(up_m_s=1.0))
     state = await anext(drone.ticks())
     return state, (state.time_us - began_us[0]) / 1e6
 
@@ -93,17 +93,17 @@ async def test_it_flies_with_the_acknowledgement_or_when_a_heartbeat_has_confirm
     state, since_s = await first_tick_after_arming(drone, simulation, confirmed=confirmed)
     assert least_s <= since_s <= most_s
     assert state.armed and state.offboard
-    heights_m = [state.z for state in await fly(drone, VelocityCommand(up_m_s=1.0), 15)]
+    heights_m = [state.z for state in await fly(drone, VelocityFluCommand(up_m_s=1.0), 15)]
     assert heights_m[-1] > START[2] + 0.3
 
 
 async def test_until_a_heartbeat_has_shown_it_the_drone_is_armed_and_no_pilot_has_it(drone, simulation):
     await first_tick_after_arming(drone, simulation)
-    states = await fly(drone, VelocityCommand(up_m_s=0.5), 50)
+    states = await fly(drone, VelocityFluCommand(up_m_s=0.5), 50)
     assert all(state.armed and state.offboard for state in states)
     simulation.autopilot.disarm(force=True)
     with pytest.raises(DroneError, match="the vehicle was disarmed by others"):
-        await fly(drone, VelocityCommand(), 25)
+        await fly(drone, VelocityFluCommand(), 25)
 
 
 async def test_a_heartbeat_after_the_acknowledgement_that_shows_it_disarmed_ends_the_flight(
@@ -112,19 +112,19 @@ async def test_a_heartbeat_after_the_acknowledgement_that_shows_it_disarmed_ends
     await first_tick_after_arming(drone, simulation)
     simulation.autopilot.disarm(force=True)
     with pytest.raises(DroneError, match=r"the vehicle was disarmed by others; .*Disarmed by external"):
-        await fly(drone, VelocityCommand(), 25)
+        await fly(drone, VelocityFluCommand(), 25)
 
 
 async def test_an_arming_that_no_heartbeat_shows_ends_the_flight_after_the_limit(drone, simulation):
     see = drone._arming.see_heartbeat
     drone._arming.see_heartbeat = lambda _: see(False)
     first, _ = await first_tick_after_arming(drone, simulation)
-    states = await fly(drone, VelocityCommand(), 118)
+    states = await fly(drone, VelocityFluCommand(), 118)
     assert all(state.armed and state.offboard for state in states)
     assert (states[-1].time_us - first.time_us) / 1e6 == pytest.approx(5.9, abs=0.01)
     told = "arming was acknowledged, but telemetry still shows mode OFFBOARD, disarmed after 6 s; .*Armed"
     with pytest.raises(DroneError, match=told):
-        await fly(drone, VelocityCommand(), 4)
+        await fly(drone, VelocityFluCommand(), 4)
 
 
 async def test_before_a_heartbeat_has_shown_the_motors_on_they_can_be_stopped(drone, simulation):
@@ -138,7 +138,7 @@ async def test_before_a_heartbeat_has_shown_the_motors_on_they_can_be_stopped(dr
 
 async def test_before_a_heartbeat_has_shown_the_motors_on_the_drone_can_land(drone, simulation):
     await first_tick_after_arming(drone, simulation)
-    await fly(drone, VelocityCommand(up_m_s=1.0), 14)
+    await fly(drone, VelocityFluCommand(up_m_s=1.0), 14)
     assert drone._arming.shown is False
     await drone.land()
     assert not simulation.autopilot.status.armed
@@ -163,19 +163,19 @@ async def test_reports_that_another_mode_took_over(drone, simulation):
     await in_the_air(drone)
     simulation.autopilot.set_mode(FlightMode.HOLD)
     with pytest.raises(DroneError, match="the pilot or a failsafe took over: mode HOLD"):
-        await fly(drone, VelocityCommand(), 25)
+        await fly(drone, VelocityFluCommand(), 25)
 
 
 async def test_reports_that_it_was_disarmed(drone, simulation):
     await in_the_air(drone)
     simulation.autopilot.disarm(force=True)
     with pytest.raises(DroneError, match=r"disarmed by others; the vehicle says: .*Disarmed by external"):
-        await fly(drone, VelocityCommand(), 25)
+        await fly(drone, VelocityFluCommand(), 25)
 
 
 async def test_a_command_with_a_nan_brakes_as_a_packet_with_it_does(drone):
     await in_the_air(drone)
-    states = await fly(drone, VelocityCommand(up_m_s=nan), 40)
+    states = await fly(drone, VelocityFluCommand(up_m_s=nan), 40)
     assert states[-1].velocity_arena_m_s[2] == pytest.approx(0.0, abs=0.02)
 
 
@@ -202,7 +202,7 @@ async def test_reports_that_the_vehicles_clock_stands_still(drone, simulation, m
     sample = replace(simulation.world.sensors(), position_ned_m=(nan, nan, nan))
     monkeypatch.setattr(simulation.world, "sensors", lambda: sample)
     with pytest.raises(DroneError, match="link lost: the vehicle's clock stands still"):
-        await fly(drone, VelocityCommand(), 25)
+        await fly(drone, VelocityFluCommand(), 25)
     with pytest.raises(
         DroneError, match="offboard mode was acknowledged, but telemetry still shows mode HOLD"
     ):
@@ -231,8 +231,8 @@ def test_refuses_a_delay_that_does_not_fit_between_ticks(simulation, delay_us):
 
 def test_images_are_spaced_by_their_times_and_only_those_used_are_painted(simulation, monkeypatch):
     painted = []
-    render = Camera.render
-    monkeypatch.setattr(Camera, "render", lambda *args: painted.append(1) or render(*args))
+    render = SimulatedCamera.render
+    monkeypatch.setattr(SimulatedCamera, "render", lambda *args: painted.append(1) or render(*args))
     perception = LockstepPerception(simulation.scenario)
 
     def after(seconds):

@@ -7,7 +7,7 @@ import pytest
 
 from framerunner.flying.lockstep import LockstepVehicle, fly_lockstep
 from framerunner.flying.plan import FlightPlan
-from framerunner.flying.response import Response
+from framerunner.flying.response import ResponseDelay
 from offboard.app import fly_mission
 from offboard.mission import load_mission
 from offboard.response import ResponseEstimate
@@ -26,7 +26,7 @@ def test_explorer_with_a_soft_landing_comes_down_on_the_base_without_falling():
         ("explorer", "abejorro", None, 0.1, 0.5),
         ("explorer_soft_landing", "abejorro", None, 0.1, 0.5),
         ("racer", "abejorro", None, 0.1, 0.5),
-        ("explorer", "abejorro", Response(0.6, 0.15, 0.05), 0.3, 1.0),
+        ("explorer", "abejorro", ResponseDelay(0.6, 0.15, 0.05), 0.3, 1.0),
         ("explorer", "x500", None, 2.5, 4.0),  # as with PX4, it leaves the ground after three seconds
         ("frame_challenge", "abejorro", None, 1.0, 2.0),  # waits for the next heartbeat
     ],
@@ -78,9 +78,9 @@ def test_a_drone_that_is_flown_at_its_limits_is_not_taken_for_a_late_one(name):
     assert late_s == []
 
 
-def test_a_path_leads_on_from_a_frame_to_where_the_search_for_the_next_begins():
+def test_a_path_leads_on_from_a_gate_to_where_the_search_for_the_next_begins():
     plan = FlightPlan(load_scenario("calm-20037"), load_mission("racer"))
-    red = next(frame for frame in plan.layout.frames if frame.colour == "red")
+    red = next(gate for gate in plan.layout.frames if gate.colour == "red")
     ends_m = []
 
     def see(moment):

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from framerunner.flying.mission_reporter import HISTORY, MAX_HISTORY_PIECES, MissionReporter
-from framerunner.flying.navigation_reporter import MAX_FRAMES, MAX_POINTS, map_document
+from framerunner.flying.navigation_reporter import MAX_GATES, MAX_POINTS, map_document
 from framerunner.wire.mission_report import TransitionTaken, plain_value
 from framerunner.wire.mission_tunnel import DocumentAssembler, DocumentKind, split_document
 from offboard.app import Moment, fly_mission
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.engine import MissionEngine
 from offboard.mission import load_mission, mermaid
-from offboard.navigation.view import FrameEstimate, NavigationView
+from offboard.navigation.view import GateEstimate, NavigationView
 from offboard.pilot import Imu
 from scenarios.result import FlightResult
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone
@@ -69,7 +69,7 @@ def moment(tick, mission_state="red.turning", **changes):
     flying = changes.pop("flying", True)
     state = DroneState(50_000 * tick, 1.0, 2.0, 3.0, 0.5, armed=flying, offboard=flying)
     return replace(
-        Moment(state, VelocityCommand(0.1, 0.2, 0.3, 0.4), Detections(), mission_state, 0.0), **changes
+        Moment(state, VelocityFluCommand(0.1, 0.2, 0.3, 0.4), Detections(), mission_state, 0.0), **changes
     )
 
 
@@ -206,7 +206,7 @@ def test_each_image_s_detections_are_sent_once_with_the_image_s_size():
 
 
 def estimate(colour="red", position_m=(3.0, 2.0, 2.0), std_m=(0.02, 0.01, 0.03), yaw_rad=0.5):
-    return FrameEstimate(colour, position_m, yaw_rad, std_m, 0.1, False, True, 12, 0)
+    return GateEstimate(colour, position_m, yaw_rad, std_m, 0.1, False, True, 12, 0)
 
 
 def test_the_navigator_s_map_is_sent_twice_a_second_when_it_has_changed():
@@ -235,7 +235,7 @@ def test_the_navigator_s_map_is_sent_twice_a_second_when_it_has_changed():
     assert len(listener.contents(DocumentKind.MAP)) == 2
     listener.sending = ()
     for tick in range(40, 80):  # a map that changes at every tick
-        reporter.see(moment(tick, navigation=replace(first, frames=(estimate(position_m=(tick, 0.0, 1.0)),))))
+        reporter.see(moment(tick, navigation=replace(first, gates=(estimate(position_m=(tick, 0.0, 1.0)),))))
     assert [each["time_us"] // 50_000 for each in listener.contents(DocumentKind.MAP)[2:]] == [40, 50, 60, 70]
 
 
@@ -244,12 +244,12 @@ def test_a_large_map_is_thinned_and_unknown_numbers_are_null():
     random = np.random.default_rng(1)
     places = [tuple(place) for place in random.normal(0.0, 3.0, (100, 3))]
     path = tuple((0.1 * number, 0.0, 1.0) for number in range(100))
-    frames = (estimate(position_m=(nan, 0.0, 0.0)), *(estimate(position_m=place) for place in places))
+    gates = (estimate(position_m=(nan, 0.0, 0.0)), *(estimate(position_m=place) for place in places))
     unknown = estimate(std_m=(inf, 0.1, 0.1))
-    reporter.see(moment(0, navigation=NavigationView((unknown, *frames), path, "x" * 200)))
+    reporter.see(moment(0, navigation=NavigationView((unknown, *gates), path, "x" * 200)))
     (sent,) = listener.contents(DocumentKind.MAP)
     assert (len(sent["goal"]), sent["frames"][0]["std"]) == (80, None)
-    assert len(sent["frames"]) == MAX_FRAMES
+    assert len(sent["frames"]) == MAX_GATES
     assert sent["frames"][1]["p"] == pytest.approx(places[0], abs=0.001)
     assert len(sent["path"]) == MAX_POINTS
     assert (sent["path"][0], sent["path"][-1]) == ([0.0, 0.0, 1.0], [9.9, 0.0, 1.0])
@@ -259,12 +259,12 @@ def test_a_large_map_is_thinned_and_unknown_numbers_are_null():
 
 def test_a_usual_map_takes_a_few_pieces():
     random = np.random.default_rng(2)
-    frames = tuple(
+    gates = tuple(
         estimate(colour, tuple(random.normal(0.0, 3.0, 3)), tuple(random.uniform(0.01, 1.0, 3)), 0.1 * number)
         for number, colour in enumerate(("red", "green", "blue", "yellow", "white"))
     )
     path = tuple(tuple(point) for point in np.cumsum(random.normal(0.0, 0.2, (MAX_POINTS, 3)), axis=0))
-    view = NavigationView(frames, path, "look at green")
+    view = NavigationView(gates, path, "look at green")
     _, pieces = split_document(DocumentKind.MAP, asdict(map_document(view)))
     assert len(pieces) <= 6  # 1.5 kB a second at most
 

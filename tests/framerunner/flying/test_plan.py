@@ -19,9 +19,9 @@ def test_the_drone_stands_on_its_base_with_its_centre_half_its_height_above():
     assert z_m == SCENARIO.base.top_m + PLAN.airframe.envelope_m[2] / 2
 
 
-def test_without_a_base_frames_ceiling_and_box_are_higher_but_the_start_is_not():
+def test_without_a_base_gates_ceiling_and_box_are_higher_but_the_start_is_not():
     lifted = PLAN.lifted(0.4)
-    assert [frame.z_m for frame in lifted.layout.frames] == pytest.approx(
+    assert [gate.z_m for gate in lifted.layout.frames] == pytest.approx(
         [f.z_m + 0.4 for f in SCENARIO.frames]
     )
     assert lifted.layout.arena.height_m == pytest.approx(SCENARIO.arena.height_m + 0.4)

@@ -171,7 +171,7 @@ def test_left_and_yaw_have_the_arena_s_signs():
     assert yaw > 0.4
 
 
-def test_each_frame_and_the_landing_are_rewarded():
+def test_each_gate_and_the_landing_are_rewarded():
     episode = Episode(make(scenario=scenario(frame("red", 1.0), frame("green", 2.0))))
     episode.fly_to(0, 0, 1)
     episode.fly_to(1.5, 0, 1)
@@ -191,7 +191,7 @@ def test_each_frame_and_the_landing_are_rewarded():
         episode.env.unwrapped.step(UP)
 
 
-def test_landing_without_all_frames_is_not_rewarded():
+def test_landing_without_all_gates_is_not_rewarded():
     episode = Episode(make(scenario=scenario(frame("red", 3.0))))
     episode.fly_to(0, 0, 1.2)
     for _ in range(400):
@@ -211,7 +211,7 @@ def test_an_agent_that_never_takes_off_is_disarmed_by_the_autopilot():
     assert "preflight disarming" in episode.info["report"]["reason"]
 
 
-def test_a_frame_in_the_wrong_order_ends_the_episode():
+def test_a_gate_in_the_wrong_order_ends_the_episode():
     episode = Episode(make(scenario=scenario(frame("green", 1.0), frame("red", 3.0))))
     episode.fly_to(0, 0, 1)
     episode.fly_to(1.5, 0, 1)

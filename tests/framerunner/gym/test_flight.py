@@ -6,7 +6,7 @@ import pytest
 
 from framerunner.flying.lockstep_drone import LockstepDrone
 from framerunner.gym.flight import run_through
-from offboard.drone import VelocityCommand
+from offboard.drone import VelocityFluCommand
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 
@@ -15,7 +15,7 @@ TICKS = 40
 
 
 def command(tick):
-    return VelocityCommand(forward_m_s=0.3, up_m_s=0.8 - 0.01 * tick, yaw_rate_rad_s=0.5)
+    return VelocityFluCommand(forward_m_s=0.3, up_m_s=0.8 - 0.01 * tick, yaw_rate_rad_s=0.5)
 
 
 async def flown_by_a_mission():

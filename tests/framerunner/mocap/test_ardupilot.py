@@ -6,10 +6,10 @@ from math import cos, nan, pi, sin
 import pytest
 
 from framerunner.geometry.rotations import multiply
-from framerunner.mocap.facts import Origin, SendSettings, Unused
+from framerunner.mocap.facts import RoomOrigin, SendSettings, Unused
 from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison
-from framerunner.mocap.poses import Pose
+from framerunner.mocap.poses import MeasuredPose
 from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession
 from framerunner.mocap.sources import SitlSource, TimedPose
 from framerunner.wire.dialect import mavlink
@@ -18,7 +18,7 @@ from offboard.safety.check import Outcome
 from tests.framerunner.mocap.arducopter import TICK_US, FakeArduCopter
 
 AHEAD_S = 7.0  # of vehicle time, by this program's clock
-HALL = Origin(40.4168, -3.7038, 650.0)
+HALL = RoomOrigin(40.4168, -3.7038, 650.0)
 
 
 class HandHeldSource:
@@ -36,7 +36,9 @@ class HandHeldSource:
         if self.stopped or self._vehicle.time_us % 20_000:
             return []
         attitude = multiply(self._vehicle.attitude(time_us), self._turn)
-        return [TimedPose(Pose(nan, self._vehicle.position(time_us), attitude, self._velocity), now_s)]
+        return [
+            TimedPose(MeasuredPose(nan, self._vehicle.position(time_us), attitude, self._velocity), now_s)
+        ]
 
     def take(self, message, now_s):
         pass

@@ -7,7 +7,7 @@ import pytest
 
 from framerunner.geometry.rotations import quaternion_from_euler, rotated_by_rate
 from framerunner.mocap.motion import MotionCheck, SentPose
-from framerunner.mocap.poses import Axes, Pose, in_ned, with_forward
+from framerunner.mocap.poses import Axes, MeasuredPose, in_ned, with_forward
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.vehicle_telemetry import VehicleTelemetry
 
@@ -47,7 +47,7 @@ class ByHand:
         """The check, with poses that are later than their time stamps, and changed."""
         check = MotionCheck()
         for time_us, position, attitude, _ in self.track[::period]:
-            pose = change(Pose(time_us / 1e6, position, attitude))
+            pose = change(MeasuredPose(time_us / 1e6, position, attitude))
             check.note(SentPose(time_us + delay_us, pose.position_ned_m, pose.attitude))
         return check
 
@@ -133,6 +133,6 @@ def test_poses_tilted_by_a_body_that_was_not_level():
     def tilted(pose):
         from framerunner.geometry.rotations import multiply
 
-        return Pose(pose.time_s, pose.position_ned_m, multiply(pose.attitude, tilt))
+        return MeasuredPose(pose.time_s, pose.position_ned_m, multiply(pose.attitude, tilt))
 
     assert hand.checked(tilted).compare(*hand.report()).tilt_deg == pytest.approx(17.2, abs=0.2)

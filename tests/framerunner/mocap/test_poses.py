@@ -13,7 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from framerunner.geometry.rotations import euler_from_quaternion, quaternion_from_euler, rotation, to_world
-from framerunner.mocap.poses import Axes, Pose, PoseError, in_ned, parse_line, read_poses, with_forward
+from framerunner.mocap.poses import (
+    Axes,
+    MeasuredPose,
+    PoseError,
+    in_ned,
+    parse_line,
+    read_poses,
+    with_forward,
+)
 from framerunner.mocap.sources import (
     MAX_LATE_S,
     FileSource,
@@ -47,7 +55,7 @@ def line(**changes):
     ],
 )
 def test_one_pose_in_all_axes(axes, position, forward):
-    expected = Pose(0.0, (1.0, -2.0, -3.0), quaternion_from_euler(0.3, radians(20.0), radians(-90.0)))
+    expected = MeasuredPose(0.0, (1.0, -2.0, -3.0), quaternion_from_euler(0.3, radians(20.0), radians(-90.0)))
     w, x, y, z = expected.attitude
     # The same attitude from the convention's body axes to its room's: by hand, not by the tested functions.
     attitude = {
@@ -61,14 +69,14 @@ def test_one_pose_in_all_axes(axes, position, forward):
         fw, fx, fy, fz = (w, x, -y, -z)
         attitude = (half * (fw - fz), half * (fx - fy), half * (fx + fy), half * (fw + fz))
     assert to_world(rotation(attitude), 1.0, 0.0, 0.0) == pytest.approx(forward, abs=1e-4)
-    found = in_ned(Pose(0.0, position, attitude, position), axes)
+    found = in_ned(MeasuredPose(0.0, position, attitude, position), axes)
     assert found.position_ned_m == pytest.approx(expected.position_ned_m)
     assert found.velocity_ned_m_s == pytest.approx(expected.position_ned_m)
     assert euler_from_quaternion(found.attitude) == pytest.approx(euler_from_quaternion(expected.attitude))
 
 
 def test_the_forward_axis_of_a_body_can_be_turned():
-    turned = with_forward(Pose(0.0, (0.0, 0.0, 0.0), LEVEL), 90.0)  # forward is the body's left
+    turned = with_forward(MeasuredPose(0.0, (0.0, 0.0, 0.0), LEVEL), 90.0)  # forward is the body's left
     assert euler_from_quaternion(turned.attitude)[2] == pytest.approx(radians(-90.0))
 
 

@@ -10,13 +10,13 @@ from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import ONBOARD
 from firmware_py.setpoints import BodyVelocitySetpoint
 from firmware_py.status import FlightMode
-from framerunner.mocap.facts import Facts, Origin, SendSettings, Unused
+from framerunner.mocap.facts import Facts, RoomOrigin, SendSettings, Unused
 from framerunner.mocap.judgement import is_fused, judge, line
 from framerunner.mocap.motion import PoseComparison
-from framerunner.mocap.poses import Pose
+from framerunner.mocap.poses import MeasuredPose
 from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession
 from framerunner.mocap.sources import SitlSource, TimedPose
-from framerunner.mocap.vehicle import Vehicle
+from framerunner.mocap.vehicle import PoseVehicle
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.framing import PacketReader
 from framerunner.wire.session.record import Record
@@ -42,7 +42,7 @@ class TrackingSource:
             true, _ = simulation.true_state()
             noise_m = 1e-4 * (simulation.time_us // 20_000 % 7)
             north_m, east_m, down_m = true.position_ned_m
-            pose = Pose(nan, (north_m + noise_m, east_m, down_m), true.attitude)
+            pose = MeasuredPose(nan, (north_m + noise_m, east_m, down_m), true.attitude)
             self._waiting.append((now_s, pose))
         due = [pose for time_s, pose in self._waiting if time_s + self._delay_s <= now_s]
         self._waiting = self._waiting[len(due) :]
@@ -272,9 +272,9 @@ def test_a_right_setup_has_no_missing_finding():
     assert {finding.outcome for finding in judge(facts)} == {Outcome.PASS}
 
 
-@pytest.mark.parametrize("origin", [None, Origin(47.4, 8.5, 400.0)])
+@pytest.mark.parametrize("origin", [None, RoomOrigin(47.4, 8.5, 400.0)])
 def test_an_origin_is_set_in_a_px4_only_if_one_is_given(origin):
-    vehicle, reader = Vehicle(origin=origin), PacketReader()
+    vehicle, reader = PoseVehicle(origin=origin), PacketReader()
     heartbeat = mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3)
     for message in reader.feed(heartbeat.pack(mavlink.MAVLink(None, 1, 1))):
         vehicle.take(message, 0.0)
@@ -283,6 +283,6 @@ def test_an_origin_is_set_in_a_px4_only_if_one_is_given(origin):
 
 
 def test_no_origin_is_set_in_a_drone_that_has_one():
-    trial = Trial(origin=Origin(47.4, 8.5, 400.0)).run(6.0)
+    trial = Trial(origin=RoomOrigin(47.4, 8.5, 400.0)).run(6.0)
     assert trial.sent_of("SET_GPS_GLOBAL_ORIGIN") == []
     assert "origin" in {finding.name for finding in judge(trial.facts())}

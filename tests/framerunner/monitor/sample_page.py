@@ -1,4 +1,4 @@
-"""A page in the monitor's frame, with data that contains markup."""
+"""A page in the monitor's gate, with data that contains markup."""
 
 from fastapi import Request, Response
 

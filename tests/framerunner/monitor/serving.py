@@ -88,7 +88,7 @@ async def serving(monkeypatch, *modules, bind="127.0.0.1", port=0, password=None
         "framerunner.monitor.pages.login",
     )
     monkeypatch.setattr("framerunner.monitor.server.MODULES", (*own, *modules))
-    monkeypatch.setattr("framerunner.monitor.server.Fleet", make_fleet)
+    monkeypatch.setattr("framerunner.monitor.server.MonitoredFleet", make_fleet)
     lines: list[str] = []
     up = asyncio.Event()
 

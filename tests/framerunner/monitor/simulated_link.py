@@ -18,7 +18,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import asdict
 from math import inf, isfinite
 
-from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
+from firmware_py.mavlink.camera.model import FixedCamera, VideoEncoding, VideoStream
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.profiles import GROUND, ONBOARD
 from framerunner.flying.plan import FlightPlan
@@ -77,7 +77,7 @@ class SimulatedDrone:
                 self.system_id,
                 boot_unix_us=BOOT_UNIX_US + 1_000_000_000 * self.boots,
                 video=streams,
-                camera=CameraModel(320, 240, 1.57, 10.0) if streams else None,
+                camera=FixedCamera(320, 240, 1.57, 10.0) if streams else None,
             ),
         )
         self.boots += 1

@@ -10,7 +10,7 @@ import pytest
 
 from framerunner.monitor.addresses import Places, visitor_key
 from framerunner.monitor.settings import ConnectionLimits
-from framerunner.monitor.visitors.login_limit import Rate
+from framerunner.monitor.visitors.login_limit import RateLimit
 from tests.framerunner.monitor.serving import browser, serving
 
 SAMPLE = "tests.framerunner.monitor.sample_page"
@@ -205,7 +205,7 @@ async def guesses(served, forwarded):
 
 
 async def test_behind_a_proxy_the_true_address_counts_and_a_forged_one_does_not(monkeypatch):
-    monkeypatch.setattr("framerunner.monitor.visitors.login_limit.ONE_ADDRESS", Rate(2, 1000.0))
+    monkeypatch.setattr("framerunner.monitor.visitors.login_limit.ONE_ADDRESS", RateLimit(2, 1000.0))
     more = {"bind": "0.0.0.0", "password": PASSWORD}
     async with serving(monkeypatch, trusted_proxies=("127.0.0.1",), **more) as served:
         # What a client forges stands before what the proxy adds.

@@ -9,7 +9,7 @@ import pytest
 from pydantic import TypeAdapter
 from pymavlink.generator.mavcrc import x25crc
 
-from framerunner.monitor.fleet import Fleet
+from framerunner.monitor.fleet import MonitoredFleet
 from framerunner.monitor.live_messages import LiveMessage
 from framerunner.wire.dialect import mavlink
 from scenarios.loader import load_scenario
@@ -70,7 +70,7 @@ MESSAGE = TypeAdapter(LiveMessage)  # what the pages' scripts are checked with
 async def test_no_sequence_of_messages_causes_a_fault(seed):
     chance = random.Random(seed)
     scenario = load_scenario("test-case-1") if seed % 2 else None
-    fleet = Fleet(equipment(SimulatedLink(), scenario))
+    fleet = MonitoredFleet(equipment(SimulatedLink(), scenario))
     told = []
     fleet.subscribe(told.append)
     fleet._take([message for system in (1, 2) for message in parsed(autopilots_heartbeat(system))])
@@ -97,7 +97,7 @@ async def test_no_sequence_of_messages_causes_a_fault(seed):
 
 
 async def test_too_many_drones_are_reported_once():
-    fleet = Fleet(equipment(SimulatedLink()))
+    fleet = MonitoredFleet(equipment(SimulatedLink()))
     told = []
     fleet.subscribe(told.append)
     for _ in range(3):
@@ -109,7 +109,7 @@ async def test_too_many_drones_are_reported_once():
 
 
 async def test_ground_stations_cameras_and_companions_are_not_drones():
-    fleet = Fleet(equipment(SimulatedLink()))
+    fleet = MonitoredFleet(equipment(SimulatedLink()))
     for kind, autopilot, system, component in (
         (6, 8, 255, 190),
         (6, 12, 5, 1),
@@ -126,7 +126,7 @@ async def test_ground_stations_cameras_and_companions_are_not_drones():
 
 
 async def test_a_watcher_that_fails_does_not_affect_the_others():
-    fleet = Fleet(equipment(SimulatedLink()))
+    fleet = MonitoredFleet(equipment(SimulatedLink()))
     told = []
 
     def fail(_message):
@@ -143,7 +143,7 @@ async def test_a_watcher_that_fails_does_not_affect_the_others():
 
 
 async def test_texts_of_a_drone_are_limited_to_twenty_a_second():
-    fleet = Fleet(equipment(SimulatedLink()))
+    fleet = MonitoredFleet(equipment(SimulatedLink()))
     told = []
     fleet.subscribe(told.append)
     fleet._take(parsed(autopilots_heartbeat(1)))

@@ -15,9 +15,9 @@ from framerunner.flying.mission_reporter import MissionReporter
 from framerunner.monitor.vehicle.mission import MissionView
 from framerunner.wire.mission_tunnel import DOCUMENT_TYPE
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.mission import load_mission, mermaid
-from offboard.navigation.view import FrameEstimate, NavigationView
+from offboard.navigation.view import GateEstimate, NavigationView
 from scenarios.loader import load_scenario
 from tests.chromium import Complaints, until
 from tests.framerunner.monitor.page_server import JPEG, fake_monitor
@@ -140,7 +140,7 @@ async def width_of(page):
     return await page.evaluate("document.documentElement.scrollWidth")
 
 
-async def frames_drawn(page):
+async def gates_drawn(page):
     return int(await page.locator(".m-arena").get_attribute("data-frames") or 0)
 
 
@@ -305,7 +305,7 @@ async def test_keys_and_buttons_change_the_view_and_the_drone_is_drawn(solid_chr
     for name in ("follow", "orbit"):
         await page.locator(f'.m-views [data-view="{name}"]').click()
         await expect(arena).to_have_attribute("data-view", name)
-    before = await frames_drawn(page)
+    before = await gates_drawn(page)
     await fake.say("pose", drones=[pose(), pose(2, p=[0.0, 0.0, 1.0])])
     await until(page, f"document.querySelector('.m-arena').dataset.frames > {before}")
     await expect(page.locator(".m-arena-legend")).to_have_text("turning")
@@ -376,12 +376,12 @@ class Pipe:
 
 def reported_map():
     """The message that a navigator's view becomes on its way through the app's reporter and the monitor."""
-    red = FrameEstimate("red", (-2.5, 2.5, 1.0), 0.0, (0.4, 0.4, 0.1), 0.1, False, False, 2, 0)
-    other = FrameEstimate("constructor", (0.0, -2.5, 1.0), 1.0, (inf, inf, inf), 0.1, True, False, 1, 0)
+    red = GateEstimate("red", (-2.5, 2.5, 1.0), 0.0, (0.4, 0.4, 0.1), 0.1, False, False, 2, 0)
+    other = GateEstimate("constructor", (0.0, -2.5, 1.0), 1.0, (inf, inf, inf), 0.1, True, False, 1, 0)
     view = NavigationView((red, other), ((-4.0, 4.0, 1.0), (-1.0, 4.0, 1.0)), MARKUP)
     pipe = Pipe()
     reporter = MissionReporter(pipe, MISSION, "", "test-case-1")
-    seen = Moment(DroneState(0, 0.0, 0.0, 1.0, 0.0), VelocityCommand(), Detections(), "red.turning", 0.0)
+    seen = Moment(DroneState(0, 0.0, 0.0, 1.0, 0.0), VelocityFluCommand(), Detections(), "red.turning", 0.0)
     reporter.see(replace(seen, navigation=view))
     (message,) = (each for each in pipe.told if each["kind"] == "map")
     return message

@@ -103,7 +103,7 @@ async def monitor(monkeypatch, tmp_path, chromium):
         del fleets[-1].status[2]
         return fleets[-1]
 
-    monkeypatch.setattr("framerunner.monitor.server.Fleet", make_fleet)
+    monkeypatch.setattr("framerunner.monitor.server.MonitoredFleet", make_fleet)
     monkeypatch.setattr(manual_control, "SILENT_S", 20.0)  # a busy machine is not a page that fell silent
     monkeypatch.setattr(manual_control, "ABANDONED_S", 60.0)
     async with served(EQUIPMENT, tmp_path) as url:

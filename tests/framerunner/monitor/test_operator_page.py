@@ -68,7 +68,7 @@ async def monitor(folder, **changed):
 
 @pytest.fixture(autouse=True)
 def stub_fleet(monkeypatch):
-    monkeypatch.setattr("framerunner.monitor.server.Fleet", lambda _equipment: fleet())
+    monkeypatch.setattr("framerunner.monitor.server.MonitoredFleet", lambda _equipment: fleet())
 
 
 def fleet():

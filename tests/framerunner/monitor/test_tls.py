@@ -10,7 +10,7 @@ from pathlib import Path
 import aiohttp
 import pytest
 
-from framerunner.monitor.connections import Gate
+from framerunner.monitor.connections import ConnectionLimiter
 from framerunner.monitor.settings import ConnectionLimits, MonitorError, MonitorSettings
 from framerunner.monitor.tls import load_certificate
 from tests.chromium import Complaints
@@ -129,12 +129,12 @@ async def test_a_slow_viewer_holds_back_no_more_than_over_http(monkeypatch, pair
     """What waits for a viewer is old when it arrives: TLS must not make its buffer eight times as large."""
     gates = []
 
-    class Seen(Gate):
+    class Seen(ConnectionLimiter):
         def connection_made(self, transport):
             super().connection_made(transport)
             gates.append(transport)
 
-    monkeypatch.setattr("framerunner.monitor.tls.Gate", Seen)
+    monkeypatch.setattr("framerunner.monitor.tls.ConnectionLimiter", Seen)
     async with serving(monkeypatch, SAMPLE, **with_tls(pair)) as served, browser() as client:
         await client.get(served.url, ssl=trusting(pair))
         assert gates[0].get_write_buffer_limits()[1] <= 1 << 16

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from contextlib import asynccontextmanager
 
-from framerunner.monitor.fleet import Fleet
+from framerunner.monitor.fleet import MonitoredFleet
 from framerunner.monitor.vehicle.tries import TryEvent
 
 
@@ -17,7 +17,7 @@ class Watched:
         tries: events of tries.
     """
 
-    def __init__(self, fleet: Fleet) -> None:
+    def __init__(self, fleet: MonitoredFleet) -> None:
         self.fleet = fleet
         self.heard: list[dict] = []
         self.tries: list[TryEvent] = []
@@ -63,7 +63,7 @@ class Watched:
 @asynccontextmanager
 async def watching(equipment):
     """Run a fleet; no message may have failed inside when it ends."""
-    watched = Watched(Fleet(equipment))
+    watched = Watched(MonitoredFleet(equipment))
     task = asyncio.create_task(watched.fleet.run())
     try:
         yield watched

@@ -18,9 +18,9 @@ from framerunner.monitoring.run_library import RunFolders
 from framerunner.recording.mcap_writer import FlightRecording
 from framerunner.wire.mission_report import TransitionTaken
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.mission import load_mission
-from offboard.navigation.view import FrameEstimate, NavigationView
+from offboard.navigation.view import GateEstimate, NavigationView
 from scenarios.loader import load_scenario
 from vision.types import Detections
 
@@ -143,8 +143,8 @@ def test_what_could_not_be_read_is_not_read_again_until_it_changes(tmp_path, mon
 
 
 def test_the_navigators_map_of_a_recording_is_listed_when_it_changes(tmp_path):
-    frame = FrameEstimate("red", (3.0, 2.0, 2.0), 0.5, (inf, inf, inf), 0.1, True, False, 1, 0)
-    views = [None, NavigationView(goal="explore"), NavigationView((frame,), ((0.0, 0.0, 1.0),), "cross red")]
+    gate = GateEstimate("red", (3.0, 2.0, 2.0), 0.5, (inf, inf, inf), 0.1, True, False, 1, 0)
+    views = [None, NavigationView(goal="explore"), NavigationView((gate,), ((0.0, 0.0, 1.0),), "cross red")]
     folder, target = tmp_path / "flight", tmp_path / "target"
     folder.mkdir()
     target.mkdir()
@@ -152,7 +152,7 @@ def test_the_navigators_map_of_a_recording_is_listed_when_it_changes(tmp_path):
     with FlightRecording(folder / "flight.mcap", scenario, mission, None) as recording:
         for tick in range(30):
             state = DroneState(50_000 * tick, 0.0, 0.0, 1.0, 0.0)
-            moment = Moment(state, VelocityCommand(), Detections(), "a.b", 0.05 * tick)
+            moment = Moment(state, VelocityFluCommand(), Detections(), "a.b", 0.05 * tick)
             recording.see(replace(moment, navigation=views[tick // 10]))
     read_run(folder, target)
     maps = json.loads((target / RECORDING).read_text())["maps"]
@@ -179,7 +179,7 @@ def test_the_transitions_of_a_recording_have_ids_that_are_found_by_the_chart_if_
         for number, (source, arrived, when, ids) in enumerate(taken, 1):
             state = DroneState(1_000_000 * number, 0.0, 0.0, 1.0, 0.0)
             transition = TransitionTaken(source, arrived, when, (), state.time_us, 1.0, ids)
-            what = (state, VelocityCommand(), Detections(), arrived, float(number), transition)
+            what = (state, VelocityFluCommand(), Detections(), arrived, float(number), transition)
             recording.see(Moment(*what))
     read_run(folder, target)
     listed = json.loads((target / RECORDING).read_text())["transitions"]

@@ -13,20 +13,20 @@ from mcap.reader import make_reader
 from framerunner.recording.events import Crossed, RecordedImage, RecordingError
 from framerunner.recording.mcap_reader import McapRecording
 from framerunner.recording.mcap_writer import FlightRecording
-from framerunner.recording.messages import (
+from framerunner.recording.recording_messages import (
     box_edges,
     camera_transform,
     detections,
-    frame_map,
+    gate_map,
     map_scene,
     scene,
     time_of,
 )
 from framerunner.recording.schemas import TOPICS, schema_texts
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.mission import load_mission
-from offboard.navigation.view import FrameEstimate, NavigationView
+from offboard.navigation.view import GateEstimate, NavigationView
 from scenarios.loader import load_scenario, parse_scenario
 from scenarios.result import FlightResult
 from tests.framerunner.recording.conftest import record
@@ -56,7 +56,7 @@ def moment_at(time_us, state="a.b", **fields):
     drone = DroneState(time_us, 1.0, 2.0, 0.5, 0.25)
     seen = fields.get("seen", Detections())
     flight_time_s, navigation = fields.get("flight_time_s", 0.0), fields.get("navigation")
-    return Moment(drone, VelocityCommand(), seen, state, flight_time_s, navigation=navigation)
+    return Moment(drone, VelocityFluCommand(), seen, state, flight_time_s, navigation=navigation)
 
 
 def new_recording(path):
@@ -181,8 +181,8 @@ def test_crossings_have_the_vehicle_time_at_which_they_were_flown(tmp_path):
 
 
 def test_the_map_and_the_path_are_written_when_they_change_and_read_back(tmp_path):
-    sure = FrameEstimate("red", (3, 2, 2), 0.5, (0.02, 0.01, 0.03), 0.1, False, True, 12, 2_950_000)
-    guessed = FrameEstimate("yellow", (1, 0, 1), -1.5, (0.4, 0.5, 0.1), inf, True, False, 1, 2_900_000)
+    sure = GateEstimate("red", (3, 2, 2), 0.5, (0.02, 0.01, 0.03), 0.1, False, True, 12, 2_950_000)
+    guessed = GateEstimate("yellow", (1, 0, 1), -1.5, (0.4, 0.5, 0.1), inf, True, False, 1, 2_900_000)
     views = [
         None,
         NavigationView(goal="explore"),
@@ -209,12 +209,12 @@ def test_the_map_and_the_path_are_written_when_they_change_and_read_back(tmp_pat
     recording.close()
 
 
-def test_the_drawn_map_has_dashed_outlines_until_a_frame_is_certain():
-    sure = FrameEstimate("red", (3, 2, 2), 0.0, (0.02, 0.01, 0.03), 0.1, False, True, 12, 0)
-    unsure = FrameEstimate("green", (1, 1, 1), pi / 2, (inf, 0.1, 0.1), 0.1, False, False, 1, 0)
-    lost = FrameEstimate("blue", (nan, 1, 1), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 1, 0)
+def test_the_drawn_map_has_dashed_outlines_until_a_gate_is_certain():
+    sure = GateEstimate("red", (3, 2, 2), 0.0, (0.02, 0.01, 0.03), 0.1, False, True, 12, 0)
+    unsure = GateEstimate("green", (1, 1, 1), pi / 2, (inf, 0.1, 0.1), 0.1, False, False, 1, 0)
+    lost = GateEstimate("blue", (nan, 1, 1), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 1, 0)
     view = NavigationView((sure, unsure, lost))
-    assert [each["colour"] for each in frame_map(view, 0)["frames"]] == ["red", "green"]
+    assert [each["colour"] for each in gate_map(view, 0)["frames"]] == ["red", "green"]
     drawn = map_scene(view, load_scenario("test-case-1"), 0)
     assert [each["type"] for each in drawn["deletions"]] == [1]
     red, green = drawn["entities"]
@@ -254,7 +254,7 @@ def test_the_scene_shows_each_bar_the_base_and_the_drone():
     entities = {each["id"]: each for each in scene(scenario, 0)["entities"]}
     assert entities.keys() == {"arena", "base", "red frame", "green frame", "blue frame", "drone"}
     assert entities["drone"]["frame_id"] == "drone"
-    red = next(frame for frame in scenario.frames if frame.colour == "red")
+    red = next(gate for gate in scenario.frames if gate.colour == "red")
     bars = entities["red frame"]["cubes"]
     assert len(bars) == 4
     for axis, value in zip("xyz", red.position_arena_m, strict=True):

@@ -18,7 +18,7 @@ from framerunner.recording.open_recording import recorded_flight
 from framerunner.recording.replay import replay
 from framerunner.runs.recorder import VideoFile
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from sitl.video import VideoServer
 from tests.framerunner.recording.conftest import SEED
 from tests.framerunner.recording.logs import write_log
@@ -52,7 +52,7 @@ def lockstep_folder(flown, tmp_path, monkeypatch):
 
 def moment_at(time_us, state):
     return Moment(
-        DroneState(time_us, 0.0, 0.0, 0.5, 0.0), VelocityCommand(), Detections(), state, time_us / 1e6
+        DroneState(time_us, 0.0, 0.0, 0.5, 0.0), VelocityFluCommand(), Detections(), state, time_us / 1e6
     )
 
 

@@ -10,18 +10,18 @@ from matplotlib.patches import Ellipse
 from framerunner.runs import PlotError
 from framerunner.runs.plots import STATE_COLOURS, draw_scenario, draw_track, save_figure
 from framerunner.runs.track import Track
-from offboard.navigation.view import FrameEstimate
+from offboard.navigation.view import GateEstimate
 from scenarios.loader import load_scenario
-from scenarios.models import Arena, Base, Frame, Scenario, Start
+from scenarios.models import Arena, Base, Gate, Scenario, StartPose
 from scenarios.result import FlightResult
 
 SCENARIO = Scenario(
     name="two-frames",
     base=Base(x_m=-3, y_m=-3),
-    start=Start(x_m=-3, y_m=-3, yaw_rad=1.0),
+    start=StartPose(x_m=-3, y_m=-3, yaw_rad=1.0),
     frames=(
-        Frame(colour="red", x_m=3, y_m=2, z_m=2, yaw_rad=3),
-        Frame(colour="green", x_m=-2, y_m=1, z_m=0.5, yaw_rad=2),
+        Gate(colour="red", x_m=3, y_m=2, z_m=2, yaw_rad=3),
+        Gate(colour="green", x_m=-2, y_m=1, z_m=0.5, yaw_rad=2),
     ),
 )
 TRACK = Track(
@@ -83,13 +83,13 @@ def test_a_position_is_interpolated_over_samples_without_one():
     assert track.position_at(1.0) == pytest.approx((1.0, 0.0, 1.0))
 
 
-def test_the_plot_of_a_scenario_names_frames_and_heights():
+def test_the_plot_of_a_scenario_names_gates_and_heights():
     figure = draw_scenario(SCENARIO)
     assert {"two-frames", "red, 2 m", "green, 0.5 m", "start"} <= set(texts(figure))
     assert [axes.get_aspect() for axes in figure.axes[:2]] == [1.0, 1.0]
 
 
-def test_frames_have_their_true_colours():
+def test_gates_have_their_true_colours():
     figure = draw_scenario(SCENARIO)
     fills = {to_hex(patch.get_facecolor()) for patch in figure.axes[0].patches}
     assert {"#ff0000", "#00ff00"} <= fills
@@ -125,10 +125,10 @@ def test_the_legend_has_the_states_in_order_of_appearance():
     ]
 
 
-def test_estimated_frames_are_drawn_beside_the_true_ones():
-    red = FrameEstimate("red", (3.5, 1.0, 2.0), pi / 2, (0.25, 0.5, 0.1), 0.1, False, True, 9, 0)
-    other = FrameEstimate("constructor", (0.0, 0.0, 1.0), 0.0, (inf, 1.0, 1.0), 0.1, False, False, 1, 0)
-    lost = FrameEstimate("blue", (nan, 0.0, 1.0), 0.0, (1.0, 1.0, 1.0), 0.1, False, False, 1, 0)
+def test_estimated_gates_are_drawn_beside_the_true_ones():
+    red = GateEstimate("red", (3.5, 1.0, 2.0), pi / 2, (0.25, 0.5, 0.1), 0.1, False, True, 9, 0)
+    other = GateEstimate("constructor", (0.0, 0.0, 1.0), 0.0, (inf, 1.0, 1.0), 0.1, False, False, 1, 0)
+    lost = GateEstimate("blue", (nan, 0.0, 1.0), 0.0, (1.0, 1.0, 1.0), 0.1, False, False, 1, 0)
     figure = draw_track(SCENARIO, replace(TRACK, estimates=(red, other, lost)), RESULT)
     assert legend_entries(figure)[-1] == "frame as estimated"
     for axes, middle, (across, up), (width, height) in (

@@ -10,15 +10,19 @@ import pytest
 from framerunner.runs.recorder import FlightRecorder, RecordingCamera, VideoFile
 from framerunner.runs.track import TrackRecorder
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityCommand
-from offboard.navigation.view import FrameEstimate, NavigationView
+from offboard.drone import DroneState, VelocityFluCommand
+from offboard.navigation.view import GateEstimate, NavigationView
 from tests.disk import disk_that_takes
 from vision.types import CameraFrame, Detections
 
 
 def moment(time_us, mission_state="red.turning", x=0.0):
     return Moment(
-        DroneState(time_us, x, 2.0, 3.0, 0.0), VelocityCommand(), Detections(), mission_state, time_us / 1e6
+        DroneState(time_us, x, 2.0, 3.0, 0.0),
+        VelocityFluCommand(),
+        Detections(),
+        mission_state,
+        time_us / 1e6,
     )
 
 
@@ -42,13 +46,13 @@ def test_the_track_counts_from_motors_on():
     assert recorder.track(None).time_s[0] == 0.0
 
 
-def test_the_track_has_the_frames_as_they_were_last_estimated():
+def test_the_track_has_the_gates_as_they_were_last_estimated():
     recorder = TrackRecorder()
-    frames = [FrameEstimate("red", (x, 0, 1), 0, (1, 1, 1), 1, False, False, 1, 0) for x in (1.0, 2.0)]
-    for tick, known in enumerate(((), frames[:1], frames[1:], None)):
+    gates = [GateEstimate("red", (x, 0, 1), 0, (1, 1, 1), 1, False, False, 1, 0) for x in (1.0, 2.0)]
+    for tick, known in enumerate(((), gates[:1], gates[1:], None)):
         view = None if known is None else NavigationView(tuple(known))
         recorder.see(replace(moment(5_000_000 + 50_000 * tick, "a.b"), navigation=view))
-    assert recorder.track(None).estimates == (frames[1],)
+    assert recorder.track(None).estimates == (gates[1],)
 
 
 def test_the_real_time_factor_is_vehicle_time_by_wall_time(monkeypatch):

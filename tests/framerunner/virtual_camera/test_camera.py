@@ -14,10 +14,10 @@ from firmware_py.mavlink.telemetry.profiles import GROUND
 from framerunner.flying.plan import FlightPlan
 from framerunner.geometry.axes import Pose
 from framerunner.geometry.rotations import multiply, quaternion_from_euler, quaternion_from_yaw
-from framerunner.virtual_camera.camera import HELD_AFTER_FLIGHT_US, Placement, VirtualCamera
+from framerunner.virtual_camera.camera import HELD_AFTER_FLIGHT_US, StartPlacement, VirtualCamera
 from framerunner.wire.vehicle_telemetry import VehiclePose
 from scenarios.loader import load_scenario
-from sitl.camera import Camera, CameraFeed
+from sitl.camera import CameraFeed, SimulatedCamera
 from sitl.simulation import Simulation
 from tests.node_input import deliver
 from vision.detector import detect
@@ -58,7 +58,7 @@ def ready_camera(scenario=SCENARIO, yaw=0.0):
 
 def test_a_vehicle_at_rest_sees_what_the_start_shows_whatever_its_heading():
     half = START.yaw_rad / 2
-    wanted = Camera(SCENARIO).render(START.position_m, (cos(half), 0.0, 0.0, sin(half)))
+    wanted = SimulatedCamera(SCENARIO).render(START.position_m, (cos(half), 0.0, 0.0, sin(half)))
     for yaw in (0.0, 2.5, -pi):
         exposure_us, image = ready_camera(yaw=yaw).step()
         assert exposure_us == 936_000
@@ -115,7 +115,7 @@ def test_euler_angles_are_used_where_no_quaternion_is_received():
         camera.take(mavlink.MAVLink_local_position_ned_message(ms, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
     camera.take(heartbeat(False))
     half = START.yaw_rad / 2
-    wanted = Camera(SCENARIO).render(START.position_m, (cos(half), 0.0, 0.0, sin(half)))
+    wanted = SimulatedCamera(SCENARIO).render(START.position_m, (cos(half), 0.0, 0.0, sin(half)))
     difference = np.abs(camera.step()[1].astype(int) - wanted)
     assert np.mean(difference > 8) < 0.001  # single precision of the angles moves some edges
 
@@ -131,7 +131,7 @@ def test_a_level_camera_follows_the_heading_only():
             camera.take(mavlink.MAVLink_attitude_message(ms, 0.2, -0.3, 0.1, 0.0, 0.0, 0.0))
             camera.take(mavlink.MAVLink_local_position_ned_message(ms, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     half = (START.yaw_rad - 0.1) / 2
-    upright = Camera(SCENARIO).render(START.position_m, (cos(half), 0.0, 0.0, sin(half)))
+    upright = SimulatedCamera(SCENARIO).render(START.position_m, (cos(half), 0.0, 0.0, sin(half)))
     assert np.mean(np.abs(level.step()[1].astype(int) - upright) > 8) < 0.01
     assert np.mean(np.abs(tilted.step()[1].astype(int) - upright) > 8) > 0.2
 
@@ -151,14 +151,14 @@ def test_a_camera_on_the_vehicles_gimbal_looks_where_that_does(to_north):
         camera.take(mavlink.MAVLink_local_position_ned_message(ms, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert camera.has_gimbal
     level = multiply(quaternion_from_yaw(START.yaw_rad), quaternion_from_euler(0.0, 0.35, -0.3))  # FLU
-    wanted = Camera(SCENARIO).render(START.position_m, level)
+    wanted = SimulatedCamera(SCENARIO).render(START.position_m, level)
     assert np.mean(np.abs(camera.step()[1].astype(int) - wanted) > 8) < 0.05
     for time_us in range(1_120_000, 3_400_001, 20_000):
         send(camera, reports(time_us))
     assert not camera.has_gimbal  # it reports no more
 
 
-def test_the_referee_follows_a_flight_through_a_frame_and_back():
+def test_the_referee_follows_a_flight_through_a_gate_and_back():
     """Straight through red, back over it, down on the start: crossed and landed."""
     camera = ready_camera()
     red = SCENARIO.frames[0]
@@ -195,8 +195,8 @@ def test_without_a_base_the_layout_is_as_high_above_the_start_as_declared_above_
     assert lift_m == SCENARIO.base.top_m
     layout = camera.plan.layout
     assert layout.name == SCENARIO.name
-    for frame, raised in zip(SCENARIO.frames, layout.frames, strict=True):
-        assert raised.z_m - lift_m == pytest.approx(frame.z_m)
+    for gate, raised in zip(SCENARIO.frames, layout.frames, strict=True):
+        assert raised.z_m - lift_m == pytest.approx(gate.z_m)
     assert layout.arena.height_m - lift_m == pytest.approx(SCENARIO.arena.height_m)
     assert camera.plan.start_pose == START_POSE
 
@@ -250,7 +250,7 @@ def pose(position=(0.0, 0.0, 0.0), yaw=0.0, velocity=(0.0, 0.0, 0.0), roll=0.0, 
 
 def placed(position=(0.0, 0.0, 0.0), yaw=0.0):
     """A placement at a vehicle that stands disarmed."""
-    placement = Placement(PLACEMENT_START)
+    placement = StartPlacement(PLACEMENT_START)
     placement.see_pose(pose(position, yaw))
     placement.see_heartbeat(0, armed=False)
     return placement
@@ -297,7 +297,7 @@ def test_yaw_roll_and_pitch_are_the_same_in_the_arena(yaw, roll, pitch):
 
 
 def test_a_vehicle_in_the_air_has_no_arena():
-    placement = Placement(PLACEMENT_START)
+    placement = StartPlacement(PLACEMENT_START)
     placement.see_pose(pose())
     placement.see_heartbeat(0, armed=True)
     placement.see_pose(pose())
@@ -322,7 +322,7 @@ def test_the_arena_follows_a_vehicle_that_is_carried_before_its_flight():
 
 
 def test_noise_at_rest_is_averaged_also_across_south():
-    placement = Placement(PLACEMENT_START)
+    placement = StartPlacement(PLACEMENT_START)
     for north, yaw in ((0.02, pi - 0.02), (-0.02, -pi + 0.02)):
         placement.see_pose(pose((north, 0.0, 0.0), yaw))
     placement.see_heartbeat(0, armed=False)

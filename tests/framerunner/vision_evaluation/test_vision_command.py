@@ -14,14 +14,14 @@ from vision.detectors import new_detector
 def test_the_report_compares_both_detectors(tmp_path, capsys):
     assert run(["vision", "evaluate", "--images", "40", "--seed", "5", "--out", str(tmp_path)]) == 0
     report = json.loads((tmp_path / "vision.json").read_text())
-    boxes, frames = report["detectors"]
-    assert (boxes["kind"], frames["kind"]) == ("boxes", "frames")
-    assert frames["frames"] >= 20
-    assert frames["found"] == 1.0
-    assert frames["distance_median"] < 0.02 < boxes["distance_median"]
-    assert frames["deviation_rms"] < 1.5
+    boxes, gates = report["detectors"]
+    assert (boxes["kind"], gates["kind"]) == ("boxes", "frames")
+    assert gates["frames"] >= 20
+    assert gates["found"] == 1.0
+    assert gates["distance_median"] < 0.02 < boxes["distance_median"]
+    assert gates["deviation_rms"] < 1.5
     assert report["false_alarms"]["frames"] == 0
-    assert sum(row["frames"] for row in report["by_angle_deg"] if row["kind"] == "frames") == frames["frames"]
+    assert sum(row["frames"] for row in report["by_angle_deg"] if row["kind"] == "frames") == gates["frames"]
     assert cv2.imread(str(tmp_path / "vision.png")).shape[0] > 500
     printed = capsys.readouterr().out
     assert "by distance" in printed
@@ -36,8 +36,8 @@ def test_the_data_set_has_what_is_in_each_image(tmp_path):
     for entry in labels:
         assert cv2.imread(str(tmp_path / entry["image"])).shape == (240, 320, 3)
         assert len(entry["frames"]) == 5
-        for frame in entry["frames"]:
-            assert len(frame["corners_px"]) in (0, 4)
+        for gate in entry["frames"]:
+            assert len(gate["corners_px"]) in (0, 4)
     before = (tmp_path / "labels.json").read_bytes()
     assert run(["vision", "dataset", str(tmp_path), *options]) == 2
     assert (tmp_path / "labels.json").read_bytes() == before
@@ -46,13 +46,13 @@ def test_the_data_set_has_what_is_in_each_image(tmp_path):
 @pytest.mark.parametrize(
     "disturbance", [Disturbance(), Disturbance(noise=3, blur_px=0.6, light=0.7, jpeg=98)]
 )
-def test_frames_of_crowded_scenes_are_found_where_they_are(disturbance):
+def test_gates_of_crowded_scenes_are_found_where_they_are(disturbance):
     find = None
     found = whole = 0
     for labelled in labelled_images(load_level("crowded"), 60, 40, disturbance):
         find = find or new_detector("frames", focal_px=labelled.focal_px, rendered=True)
         sightings = find(labelled.image, None).frames
-        for label in labelled.frames:
+        for label in labelled.gates:
             if label.whole and label.distance_m < 4 and label.angle_deg < 70:
                 whole += 1
                 found += any(
@@ -73,7 +73,7 @@ def test_the_same_seed_gives_the_same_images():
     one, two = (list(labelled_images(load_level("calm"), 3, 9, Disturbance(noise=2))) for _ in range(2))
     for a, b in zip(one, two, strict=True):
         assert (a.image == b.image).all()
-        assert a.frames == b.frames
+        assert a.gates == b.gates
 
 
 def test_a_bad_option_is_named(capsys):

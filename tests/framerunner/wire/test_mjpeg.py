@@ -4,7 +4,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from framerunner.wire.mjpeg import STREAM_HEADERS, STREAM_START, MjpegReader, Part, StreamError, write_part
+from framerunner.wire.mjpeg import (
+    STREAM_HEADERS,
+    STREAM_START,
+    MjpegPart,
+    MjpegReader,
+    StreamError,
+    write_part,
+)
 
 CUT = "multipart/x-mixed-replace; boundary=cut"
 
@@ -24,13 +31,13 @@ def test_parts_in_pieces_of_any_size(size: int, *, length: bool) -> None:
     )
     reader = MjpegReader(CUT)
     got = [one for at in range(0, len(stream), size) for one in reader.feed(stream[at : at + size])]
-    assert got == [Part(body, i) for i, body in enumerate(bodies)]
+    assert got == [MjpegPart(body, i) for i, body in enumerate(bodies)]
 
 
 def test_boundary_with_dashes_bare_newlines_and_noise() -> None:
     reader = MjpegReader("multipart/x-mixed-replace; boundary=--cut")
     stream = b"noise\n\n--cut\nContent-Length: 3\n\nabc" + b"junk" * 1000 + b"--cut\n\ndef\r\n--cut"
-    assert reader.feed(stream) == [Part(b"abc", None), Part(b"def", None)]
+    assert reader.feed(stream) == [MjpegPart(b"abc", None), MjpegPart(b"def", None)]
 
 
 @pytest.mark.parametrize(
@@ -47,7 +54,7 @@ def test_boundary_with_dashes_bare_newlines_and_noise() -> None:
     ],
 )
 def test_only_a_sound_time_counts(line: str, time_us: int | None) -> None:
-    assert MjpegReader(CUT).feed(part(b"abc", line + "\r\n")) == [Part(b"abc", time_us)]
+    assert MjpegReader(CUT).feed(part(b"abc", line + "\r\n")) == [MjpegPart(b"abc", time_us)]
 
 
 def test_too_large_a_part_is_refused() -> None:
@@ -92,7 +99,7 @@ def test_any_bytes_do_no_harm(chunks: list[bytes]) -> None:
 )
 def test_boundary_of_a_content_type(content_type: str, boundary: str) -> None:
     stream = f"--{boundary}\r\nContent-Length: 3\r\n\r\nabc".encode()
-    assert MjpegReader(content_type).feed(stream) == [Part(b"abc", None)]
+    assert MjpegReader(content_type).feed(stream) == [MjpegPart(b"abc", None)]
 
 
 @pytest.mark.parametrize(
@@ -112,6 +119,10 @@ def test_another_kind_of_stream_is_refused(content_type: str) -> None:
 
 
 def test_what_is_written_can_be_read() -> None:
-    images = [Part(b"\xff\xd8one\xff\xd9", 7), Part(b"--frame\r\n\r\nx", 1 << 50), Part(b"three", None)]
+    images = [
+        MjpegPart(b"\xff\xd8one\xff\xd9", 7),
+        MjpegPart(b"--frame\r\n\r\nx", 1 << 50),
+        MjpegPart(b"three", None),
+    ]
     stream = STREAM_START + b"".join(write_part(image.data, image.time_us) for image in images)
     assert MjpegReader(STREAM_HEADERS["Content-Type"]).feed(stream) == images

@@ -11,10 +11,10 @@ import pytest
 from pydantic import Field
 
 from offboard.authoring import (
+    DiagramLayout,
     Document,
     EditError,
     EditSession,
-    Layout,
     LayoutError,
     StateBox,
     apply,
@@ -97,16 +97,16 @@ def test_positions_are_beside_the_mission_and_follow_it(tmp_path):
     path = tmp_path / "mission.yaml"
     document = opened("frame_challenge")
     path.write_bytes(document.data)
-    assert read_layout(path) == Layout()
+    assert read_layout(path) == DiagramLayout()
     boxes = {node.id: StateBox(x=10.0 * number, y=5.5) for number, node in enumerate(diagram(document).nodes)}
-    layout = Layout(states=boxes, corners={"red.turning/tick/0": ((1, 2), (3, 4))})
+    layout = DiagramLayout(states=boxes, corners={"red.turning/tick/0": ((1, 2), (3, 4))})
     assert write_layout(path, layout) == layout_path(path) == tmp_path / "mission.layout.json"
     assert read_layout(path) == layout
     assert path.read_bytes() == document.data
     later = layout_path(path).read_text().replace('"version": 1', '"version": 2')
     layout_path(path).write_text(later)
     with pytest.raises(LayoutError, match="version: "):
-        write_layout(path, Layout())
+        write_layout(path, DiagramLayout())
     assert layout_path(path).read_text() == later
     layout_path(path).unlink()
     write_layout(path, layout)
@@ -130,7 +130,7 @@ def test_positions_are_beside_the_mission_and_follow_it(tmp_path):
 def test_places_come_back_with_what_is_undone():
     document = opened("frame_challenge")
     boxes = {node.id: StateBox(x=10.0 * number, y=0) for number, node in enumerate(diagram(document).nodes)}
-    session = EditSession(document, Layout(states=boxes))
+    session = EditSession(document, DiagramLayout(states=boxes))
     session.apply(parse_edit({"kind": "rename_state", "state": "landing", "name": "home"}))
     session.apply(parse_edit({"kind": "delete_state", "state": "home"}))
     assert "home" not in session.layout.states

@@ -11,7 +11,7 @@ import pytest
 
 from offboard.authoring import Document, as_json, check_document, diagram
 from offboard.chart.conditions import Conditions
-from offboard.chart.messages import ENGLISH
+from offboard.chart.mission_texts import ENGLISH
 from offboard.chart.spanish import SPANISH
 from offboard.chart.vocabulary import Vocabulary
 from offboard.engine import MissionEngine
@@ -223,7 +223,7 @@ NEVER = {
 MAYBE = [
     "frame.d < 1 or frame.d > 2",
     "frame.d <= 1 and frame.d >= 1",
-    "frame.d > 1000 and frame.a > 200",  # infinite while the frame is not in view
+    "frame.d > 1000 and frame.a > 200",  # infinite while the gate is not in view
     "imu.x < 1 and imu.y > 2",
     "-8 < frame.e + frame.w < 8",
     "colour != 'red' and colour != 'green'",

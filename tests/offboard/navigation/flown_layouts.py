@@ -10,13 +10,13 @@ import numpy as np
 
 from framerunner.flying.lockstep import LockstepVehicle
 from framerunner.flying.plan import FlightPlan
-from framerunner.flying.response import Response
+from framerunner.flying.response import ResponseDelay
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
-from offboard.drone import DroneState, VelocityCommand
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.limits import VelocityLimits
 from offboard.navigation.following import PathFollower
-from offboard.navigation.goals import CONTEST, FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
+from offboard.navigation.goals import CONTEST, FlightStyle, Goal, Motion, Obstacles, PathGate, Point, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planner.timing import LEFT_M
 from offboard.navigation.planning import plan
@@ -28,7 +28,7 @@ from scenarios.result import RefereeReport
 STEP_S = 0.01
 
 
-def flown(state: DroneState, command: VelocityCommand) -> DroneState:
+def flown(state: DroneState, command: VelocityFluCommand) -> DroneState:
     """The state a tick later of a drone that flies as it is told."""
     c, s, forward, left = cos(state.yaw), sin(state.yaw), command.forward_m_s, command.left_m_s
     velocity = (c * forward - s * left, s * forward + c * left, command.up_m_s)
@@ -42,7 +42,7 @@ class Layout:
     """A scenario as the planner sees it, all of it known."""
 
     scenario: Scenario
-    gates: tuple[Gate, ...]
+    gates: tuple[PathGate, ...]
 
     @classmethod
     def random(cls, seed: int, level: str = "calm") -> Layout:
@@ -52,8 +52,8 @@ class Layout:
     @classmethod
     def of(cls, scenario: Scenario) -> Layout:
         """A scenario's layout."""
-        frames = sorted(scenario.frames, key=lambda frame: COLOURS.index(frame.colour))
-        return cls(scenario, tuple(Gate(frame.position_arena_m, frame.yaw_rad) for frame in frames))
+        gates = sorted(scenario.frames, key=lambda gate: COLOURS.index(gate.colour))
+        return cls(scenario, tuple(PathGate(gate.position_arena_m, gate.yaw_rad) for gate in gates))
 
     @property
     def goals(self) -> list[Goal]:
@@ -68,8 +68,8 @@ class Layout:
 
     @property
     def obstacles(self) -> Obstacles:
-        """All of them, with the frames."""
-        decoys = tuple(Gate(decoy.position_arena_m, decoy.yaw_rad) for decoy in self.scenario.decoys)
+        """All of them, with the gates."""
+        decoys = tuple(PathGate(decoy.position_arena_m, decoy.yaw_rad) for decoy in self.scenario.decoys)
         return Obstacles((*self.gates, *decoys), self.columns_m, self.scenario.base)
 
     @property
@@ -81,7 +81,7 @@ class Layout:
     def plan(
         self, start: Motion, goals: list[Goal], previous: Path | None = None, style: FlightStyle = CONTEST
     ) -> Path | Refusal:
-        """A plan with all frames and obstacles known."""
+        """A plan with all gates and obstacles known."""
         arena = self.scenario.arena
         return plan(start, goals, obstacles=self.obstacles, arena=arena, style=style, previous=previous)
 
@@ -115,7 +115,7 @@ class Sampled:
         vx, vy, vz = self.velocities.T
         return np.stack((c * vx + s * vy, c * vy - s * vx, vz), axis=1)
 
-    def offsets(self, gate: Gate) -> np.ndarray:
+    def offsets(self, gate: PathGate) -> np.ndarray:
         """From a gate, along and across it and up, shape (n, 3)."""
         away = self.positions - np.array(gate.centre_m)
         c, s = cos(gate.yaw_rad), sin(gate.yaw_rad)
@@ -124,7 +124,7 @@ class Sampled:
         )
 
 
-def touching(path: Sampled, gate: Gate) -> list[float]:
+def touching(path: Sampled, gate: PathGate) -> list[float]:
     """Times at which the drone's box, with a little room, is where a gate's bars are."""
     along, across, up = np.abs(path.offsets(gate)).T
     turn = path.yaws - gate.yaw_rad
@@ -136,7 +136,7 @@ def touching(path: Sampled, gate: Gate) -> list[float]:
     return [float(index * STEP_S) for index in np.flatnonzero(near & ~through & ~beside)]
 
 
-def crossed(path: Sampled, gates: tuple[Gate, ...]) -> list[int]:
+def crossed(path: Sampled, gates: tuple[PathGate, ...]) -> list[int]:
     """The gates that a path goes through, in order."""
     found: list[tuple[int, int]] = []
     for number, gate in enumerate(gates):
@@ -154,7 +154,7 @@ def least_margin(path: Sampled, arena: Arena) -> float:
 
 
 def fly(
-    layout: Layout, *, replan_s: float, response: Response | None = None
+    layout: Layout, *, replan_s: float, response: ResponseDelay | None = None
 ) -> tuple[RefereeReport, float, float]:
     """Fly a layout in lockstep, planning again all the time.
 

@@ -1,12 +1,12 @@
-"""Why an attempt to cross a frame is given up."""
+"""Why an attempt to cross a gate is given up."""
 
 from offboard.navigation.crossing_attempt import CrossingAttempt
-from offboard.navigation.goals import Gate
+from offboard.navigation.goals import PathGate
 from offboard.navigation.path import Crossing
-from offboard.navigation.view import FrameEstimate
+from offboard.navigation.view import GateEstimate
 
 OPENING_M = (0.38, 0.18)
-UNSURE = FrameEstimate("red", (2.0, 0.0, 1.0), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 3, 0)
+UNSURE = GateEstimate("red", (2.0, 0.0, 1.0), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 3, 0)
 
 
 def attempt():
@@ -31,7 +31,7 @@ def test_each_reason_is_said():
     slow.move((0.0, 0.0, 1.0), OPENING_M, 26.0)
     assert slow.refusal == "not through it within 25 s"
     near = attempt()
-    near.aim(Crossing(Gate((2.0, 0.0, 1.0), 0.0), 0.0, 1.0))
+    near.aim(Crossing(PathGate((2.0, 0.0, 1.0), 0.0), 0.0, 1.0))
     near.move((1.5, 0.0, 1.0), OPENING_M, 26.0)
     assert near.refusal == ""
     near.move((1.5, 0.0, 1.0), OPENING_M, 36.0)
@@ -47,7 +47,7 @@ def test_each_reason_is_said():
 def test_a_miss_is_refused_and_a_passage_is_not():
     for left_m, refusal in ((0.3, "passed its plane 0.30 m from its centre"), (0.05, "")):
         crossing = attempt()
-        crossing.aim(Crossing(Gate((2.0, 0.0, 1.0), 0.0), 0.0, 1.0))
+        crossing.aim(Crossing(PathGate((2.0, 0.0, 1.0), 0.0), 0.0, 1.0))
         for x_m in (1.9, 2.1):
             crossing.move((x_m, left_m, 1.0), OPENING_M, 1.0)
         assert (crossing.refusal, crossing.passed) == (refusal, not refusal)

@@ -1,4 +1,4 @@
-"""Where to look next for frames: searches of a drone that flies as asked, without images or physics."""
+"""Where to look next for gates: searches of a drone that flies as asked, without images or physics."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from framerunner.geometry.rotations import quaternion_from_yaw
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.exploration import Explorer
 from offboard.navigation.search.likelihood import Glimpses, LineOfSight
-from scenarios.models import Arena, Camera, Frame, Scenario
+from scenarios.models import Arena, Camera, Gate, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
 from vision.types import Detection, Detections, ObstacleEdge
 
@@ -20,17 +20,17 @@ CAMERA = CameraModel.of(Camera())
 STEP_S = 0.1  # one image
 
 
-def recognised(frame, position_m, yaw_rad):
-    """Whether a frame is wholly in view, within 6 m and less than 70 degrees off its normal."""
+def recognised(gate, position_m, yaw_rad):
+    """Whether a gate is wholly in view, within 6 m and less than 70 degrees off its normal."""
     pose = CAMERA.pose(position_m, quaternion_from_yaw(yaw_rad))
-    offset = [a - b for a, b in zip(frame.position_arena_m, pose.position_m, strict=True)]
+    offset = [a - b for a, b in zip(gate.position_arena_m, pose.position_m, strict=True)]
     distance_m = hypot(*offset)
-    normal = (cos(frame.yaw_rad), sin(frame.yaw_rad))
+    normal = (cos(gate.yaw_rad), sin(gate.yaw_rad))
     facing = abs(offset[0] * normal[0] + offset[1] * normal[1])
     if distance_m > 6.0 or facing < distance_m * cos(radians(70.0)):
         return False
     corners = [
-        (frame.x_m - side * normal[1], frame.y_m + side * normal[0], frame.z_m + up)
+        (gate.x_m - side * normal[1], gate.y_m + side * normal[0], gate.z_m + up)
         for side in (-0.21, 0.21)
         for up in (-0.11, 0.11)
     ]
@@ -42,7 +42,7 @@ def recognised(frame, position_m, yaw_rad):
 class Search:
     """A drone that flies to viewpoints at 1 m/s and turns at 0.9 rad/s meanwhile; it finds by two images."""
 
-    frames: tuple[Frame, ...]
+    frames: tuple[Gate, ...]
     position_m: tuple[float, float, float]
     yaw_rad: float
     explorer: Explorer = field(default_factory=lambda: Explorer(CAMERA, Arena()))
@@ -56,18 +56,18 @@ class Search:
         return cls(scenario.frames, (start.x_m, start.y_m, scenario.base.top_m), start.yaw_rad)
 
     def found(self):
-        return [frame for frame in self.frames if self.images.get(frame.colour, 0) >= 2]
+        return [gate for gate in self.frames if self.images.get(gate.colour, 0) >= 2]
 
     def run(self, limit_s, colours=("red", "green", "blue")):
-        """Search until some frames are found; returns the time."""
+        """Search until some gates are found; returns the time."""
         ticks = 0
         while self.time_s < limit_s and not set(colours) <= {each.colour for each in self.found()}:
-            for frame in self.frames:
-                if recognised(frame, self.position_m, self.yaw_rad):
-                    self.images[frame.colour] = self.images.get(frame.colour, 0) + 1
+            for gate in self.frames:
+                if recognised(gate, self.position_m, self.yaw_rad):
+                    self.images[gate.colour] = self.images.get(gate.colour, 0) + 1
             self.explorer.coverage.update(self.position_m, quaternion_from_yaw(self.yaw_rad))
             if ticks % 5 == 0:
-                known = [frame.position_arena_m for frame in self.found()]
+                known = [gate.position_arena_m for gate in self.found()]
                 self.viewpoints.append(self.explorer.next_viewpoint(self.position_m, self.yaw_rad, known))
             self.step(self.viewpoints[-1])
             ticks += 1
@@ -98,10 +98,10 @@ def test_random_layouts_are_found_soon():
         (0.3, 0.2, 0.12, 1.0),  # on the floor, seldom wholly in view from above
     ],
 )
-def test_a_frame_where_few_views_show_it_is_found(place):
+def test_a_gate_where_few_views_show_it_is_found(place):
     x_m, y_m, z_m, yaw_rad = place
-    frame = Frame(colour="red", x_m=x_m, y_m=y_m, z_m=z_m, yaw_rad=yaw_rad)
-    assert Search((frame,), (-1.0, -2.0, 0.5), 2.0).run(150.0, ("red",)) < 150.0
+    gate = Gate(colour="red", x_m=x_m, y_m=y_m, z_m=z_m, yaw_rad=yaw_rad)
+    assert Search((gate,), (-1.0, -2.0, 0.5), 2.0).run(150.0, ("red",)) < 150.0
 
 
 def test_what_is_not_there_is_looked_for_in_ever_new_places():
@@ -187,9 +187,9 @@ def test_a_wall_is_not_looked_through_but_flown_round():
     assert walled_view.position_m[1] > 1.0
 
 
-def test_a_frame_that_was_glimpsed_draws_a_line_of_sight_until_it_is_known():
+def test_a_gate_that_was_glimpsed_draws_a_line_of_sight_until_it_is_known():
     glimpses = Glimpses(CAMERA)
-    box = Detection(n=20.0, s=9.0, e=-138.0, w=-159.0)  # as high as a frame 3.2 m away
+    box = Detection(n=20.0, s=9.0, e=-138.0, w=-159.0)  # as high as a gate 3.2 m away
     level = quaternion_from_yaw(0.0)
     seen = ((0.0, 0.0, 1.0), level, Detections(red=box), ())
     glimpses.update(*seen, is_lookalike=lambda colour, line: colour == "red")

@@ -9,12 +9,12 @@ import pytest
 
 from framerunner.flying.lockstep import LockstepVehicle
 from framerunner.flying.plan import FlightPlan
-from framerunner.flying.response import Response
+from framerunner.flying.response import ResponseDelay
 from offboard.drone import DroneState
 from offboard.mission import load_mission
 from offboard.navigation.control.late_following import RATE_CHANGE_PER_S2, LateFollower
 from offboard.navigation.following import PathFollower
-from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, style_of
+from offboard.navigation.goals import CONTEST, Motion, Obstacles, PathGate, Point, style_of
 from offboard.navigation.path import Path
 from offboard.navigation.planning import plan
 from offboard.response import Prediction
@@ -33,7 +33,7 @@ def test_known_layout_is_flown_cleanly_while_planning_again(seed: int):
 
 
 def test_vehicle_that_answers_late_is_flown_cleanly_but_more_slowly():
-    late = Response(lag_s=0.6, dead_time_s=0.15, height_wander_m=0.05)
+    late = ResponseDelay(lag_s=0.6, dead_time_s=0.15, height_wander_m=0.05)
     report, _, limited_s = fly(Layout.random(203), replan_s=0.8, response=late)
     assert report.verdict == "clean"
     assert max(report.crossing_offsets_m) < 0.05
@@ -42,7 +42,7 @@ def test_vehicle_that_answers_late_is_flown_cleanly_but_more_slowly():
 
 def test_vehicle_that_was_pushed_aside_before_a_gate_waits_and_goes_on_when_it_is_back():
     answers = Learnt(level_dead_s=0.45, level_tilt_s=0.0, level_lag_s=0.8, turning=False, late=True)
-    gate, style = Gate((2.0, 0.0, 1.0), 0.0), CONTEST.adapted(answers)
+    gate, style = PathGate((2.0, 0.0, 1.0), 0.0), CONTEST.adapted(answers)
     start = Motion((0.0, 0.6, 1.0), yaw_rad=0.6)
     path = plan(start, [gate], obstacles=Obstacles((gate,)), arena=Arena(), style=style)
     assert isinstance(path, Path)
@@ -98,7 +98,7 @@ def test_a_drone_that_has_waited_hardly_speeds_up_in_a_gate(
     from_m: float, least_m_s2: float, most_m_s2: float
 ):
     """Speeding up tilts the drone, whose box then does not fit through the opening."""
-    gate = Gate((2.0, 0.0, 1.0), 0.0)
+    gate = PathGate((2.0, 0.0, 1.0), 0.0)
     path = plan(Motion((0.0, 0.0, 1.0)), [gate], obstacles=Obstacles((gate,)), arena=Arena(), style=CONTEST)
     assert isinstance(path, Path)
     follower, held, rises_m_s2, rate = PathFollower(), 0, [], 1.0
@@ -140,7 +140,7 @@ def test_drone_that_brakes_and_turns_stops_on_its_path():
     asyncio.run(drone.ready())
     asyncio.run(drone.motors_on())
     follower, state = PathFollower(), drone.next_state()
-    towards = -1.0 if state.x > 0.0 else 1.0  # through the arena, above all frames
+    towards = -1.0 if state.x > 0.0 else 1.0  # through the arena, above all gates
     goals = [Point((state.x, state.y, 3.4)), Point((state.x + 4.0 * towards, state.y, 3.4))]
     start = Motion((state.x, state.y, state.z), yaw_rad=state.yaw)
     path = plan(start, goals, obstacles=Obstacles(), arena=Arena(), style=CONTEST)

@@ -8,9 +8,9 @@ from framerunner.flying.plan import FlightPlan
 from offboard.drone import DroneState
 from offboard.mission import load_mission
 from offboard.navigation import path_flight
-from offboard.navigation.goals import Gate, Refusal
+from offboard.navigation.goals import PathGate, Refusal
 from offboard.navigation.navigator import Navigator
-from offboard.navigation.view import FrameEstimate
+from offboard.navigation.view import GateEstimate
 from offboard.navigation.world_model import WorldModel
 from scenarios.random_scenarios import load_level, random_scenario
 from tests.offboard.navigation.flown_layouts import flown
@@ -102,17 +102,17 @@ def test_a_drone_from_which_no_way_leads_on_flies_back_the_way_it_came(monkeypat
     assert min(xs_m[farthest_at(xs_m) :]) < 0.8
 
 
-def test_a_frame_that_is_not_certain_is_not_flown_through(monkeypatch):
+def test_a_gate_that_is_not_certain_is_not_flown_through(monkeypatch):
     """It seems to be above the ceiling, and no path is found to a place from which it would be looked at."""
     plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
     navigator, state = Navigator(plan.surroundings, plan.command_limits), replace(STATE, z=3.5)
     ceiling_m = plan.surroundings.arena.height_m
-    unsure = FrameEstimate("red", (3.0, 0.0, ceiling_m + 0.46), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 3, 0)
-    monkeypatch.setattr(WorldModel, "frame", lambda self, colour: unsure if colour == "red" else None)
+    unsure = GateEstimate("red", (3.0, 0.0, ceiling_m + 0.46), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 3, 0)
+    monkeypatch.setattr(WorldModel, "gate", lambda self, colour: unsure if colour == "red" else None)
 
     class Refusing(path_flight.Search):
         def path(self, start=None):
-            gate = isinstance(self.goals[0], Gate)
+            gate = isinstance(self.goals[0], PathGate)
             return super().path(start) if gate else Refusal("obstacles block the way")
 
     monkeypatch.setattr(path_flight, "Search", Refusing)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, Refusal
+from offboard.navigation.goals import CONTEST, Motion, Obstacles, PathGate, Point, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planner.clearance import Clearance
 from offboard.navigation.planner.detours import MOST_WORK
@@ -123,10 +123,10 @@ def test_a_search_in_parts_finds_the_same_and_begins_where_the_drone_has_come_to
 
 
 @pytest.mark.parametrize("height_m", [0.9, 1.1])
-def test_a_way_round_columns_does_not_lead_through_the_frame_at_its_corner(height_m: float):
+def test_a_way_round_columns_does_not_lead_through_the_gate_at_its_corner(height_m: float):
     wall = tuple((2.0, y_m, 0.2) for y_m in np.arange(-1.0, 5.0, 0.3))
-    frame = Gate((2.0, -1.45, height_m), 0.0)
-    obstacles = Obstacles((frame,), wall)
+    gate = PathGate((2.0, -1.45, height_m), 0.0)
+    obstacles = Obstacles((gate,), wall)
     goals = [Point((4.0, 0.0, 1.0))]
     path = plan(Motion((0.0, 0.0, 1.0)), goals, obstacles=obstacles, arena=Arena(), style=CONTEST)
     assert isinstance(path, Path)
@@ -143,7 +143,7 @@ def test_what_cannot_be_reached_is_refused():
 
 @pytest.mark.parametrize("home", [True, False])
 def test_a_drone_before_a_gate_by_a_wall_slows_down_and_stays_in_the_arena(home: bool):
-    gate = Gate((4.4, 0.0, 1.0), 0.0)
+    gate = PathGate((4.4, 0.0, 1.0), 0.0)
     goals = [gate, Point((0.0, 0.0, 1.0))] if home else [gate]
     start = Motion((3.6, 0.0, 1.0), (0.9, 0.0, 0.0))
     path = plan(start, goals, obstacles=Obstacles((gate,)), arena=Arena(), style=CONTEST)
@@ -167,32 +167,34 @@ def test_drone_that_hovers_low_over_the_base_finds_a_way_from_it(height_m: float
 
 
 @pytest.mark.parametrize(
-    ("start", "goal_m", "frames"),
+    ("start", "goal_m", "gates"),
     [
         (
             Motion((-0.88, -1.598, 0.3592), yaw_rad=-0.139),
             (3.787, -4.488, 0.8),
-            (Gate((-0.5365, -1.9318, 0.4932), 0.0675), Gate((-1.4264, -1.5211, 0.3593), -0.1406)),
+            (PathGate((-0.5365, -1.9318, 0.4932), 0.0675), PathGate((-1.4264, -1.5211, 0.3593), -0.1406)),
         ),
         (
             Motion((-1.9962, -4.3373, 0.6695), yaw_rad=2.98),
             (-2.0, -3.0, 0.6),
-            (Gate((-1.6539, -3.7981, 0.6779), 1.0825),),
+            (PathGate((-1.6539, -3.7981, 0.6779), 1.0825),),
         ),
     ],
     ids=["close before a low frame", "between a frame and a wall"],
 )
-def test_a_drone_in_a_narrow_place_moves_aside_first(start: Motion, goal_m: Vec3, frames: tuple[Gate, ...]):
-    path = plan(start, [Point(goal_m)], obstacles=Obstacles(frames), arena=Arena(), style=CONTEST)
+def test_a_drone_in_a_narrow_place_moves_aside_first(
+    start: Motion, goal_m: Vec3, gates: tuple[PathGate, ...]
+):
+    path = plan(start, [Point(goal_m)], obstacles=Obstacles(gates), arena=Arena(), style=CONTEST)
     assert isinstance(path, Path), path
-    assert [touching(Sampled(path), frame) for frame in frames] == [[] for _ in frames]
+    assert [touching(Sampled(path), gate) for gate in gates] == [[] for _ in gates]
     assert least_margin(Sampled(path), Arena()) > 0.2
 
 
 @pytest.mark.parametrize("along_m", [-0.07, 0.0, 0.04])
 @pytest.mark.parametrize("goal_m", [(0.3, 0.2, 3.0), (0.0, 3.0, 1.5), (-3.0, 0.0, 1.5)])
 def test_a_drone_that_was_stopped_in_an_opening_leaves_it_along_the_normal(along_m: float, goal_m: Vec3):
-    gate = Gate((0.0, 0.0, 1.5), 0.0)
+    gate = PathGate((0.0, 0.0, 1.5), 0.0)
     start = Motion((along_m, 0.01, 1.51))
     path = plan(start, [Point(goal_m)], obstacles=Obstacles((gate,)), arena=Arena(), style=CONTEST)
     assert isinstance(path, Path), path

@@ -12,7 +12,7 @@ from offboard.drone import DroneState
 from offboard.limits import CONTEST as CONTEST_LIMITS
 from offboard.navigation import path_flight
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.goals import CONTEST, Gate, Obstacles, Point
+from offboard.navigation.goals import CONTEST, Obstacles, PathGate, Point
 from offboard.navigation.path_flight import TICK_WORK, PathFlight
 from offboard.navigation.seen_space import SeenSpace, ViewedSpace
 from scenarios.models import Arena, Base, Camera
@@ -131,12 +131,12 @@ def test_a_drone_that_stops_before_unseen_space_does_not_fly_on_while_it_plans()
     assert most_m_s < 0.1
 
 
-def test_a_drone_stops_before_a_frame_that_turns_out_to_be_turned_if_there_is_no_other_way():
+def test_a_drone_stops_before_a_gate_that_turns_out_to_be_turned_if_there_is_no_other_way():
     beside = ((2.31, 0.32, 0.05), (1.69, -0.32, 0.05))  # before and behind its opening as it is
     seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
     state = DroneState(0, *HERE, yaw=0.0)
     for _ in range(80):
-        gate = Gate((2.0, 0.0, 1.0), 0.0 if state.x < 1.2 else 0.8)
+        gate = PathGate((2.0, 0.0, 1.0), 0.0 if state.x < 1.2 else 0.8)
         obstacles = Obstacles((gate,), () if state.x < 1.2 else beside)
         state = flown(state, flight.fly([gate], obstacles, state, seen, VIEWED))
     assert flight.path is None
@@ -145,7 +145,7 @@ def test_a_drone_stops_before_a_frame_that_turns_out_to_be_turned_if_there_is_no
 
 def test_where_obstacles_block_a_gate_no_tick_searches_for_long():
     ring = tuple((2.0 + 1.2 * cos(0.2 * i), 1.2 * sin(0.2 * i), 0.15) for i in range(32))
-    gate, obstacles = Gate((2.0, 0.0, 1.5), 0.3), Obstacles((Gate((2.0, 0.0, 1.5), 0.3),), ring)
+    gate, obstacles = PathGate((2.0, 0.0, 1.5), 0.3), Obstacles((PathGate((2.0, 0.0, 1.5), 0.3),), ring)
     seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
     works = []
     while not flight.refusal:
@@ -161,7 +161,7 @@ def test_where_obstacles_block_a_gate_no_tick_searches_for_long():
 def test_a_drone_that_stands_in_an_opening_finds_a_path_in_several_ticks(monkeypatch):
     monkeypatch.setattr(path_flight, "TICK_WORK", 1)
     seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
-    gate = Gate((2.0, 0.0, 1.5), 0.0)
+    gate = PathGate((2.0, 0.0, 1.5), 0.0)
     for tick in range(10):
         state = DroneState(50_000 * tick, 1.9, 0.002 * (tick % 2), 1.5, yaw=0.0)
         flight.fly([gate], Obstacles((gate,)), state, seen, VIEWED)
@@ -187,7 +187,7 @@ def test_a_path_is_made_at_the_next_tick_if_it_does_not_fit_into_this_one(monkey
     assert sum(works[None]) == sum(works[10**6])
 
 
-def height_after_a_metre(gate: Gate, *, needed: bool) -> float:
+def height_after_a_metre(gate: PathGate, *, needed: bool) -> float:
     """The height of a drone that flies to a gate as it is told, where it is a metre nearer."""
     seen, viewed = SeenSpace(CAMERA, Arena()), ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0))
     flight = PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
@@ -205,14 +205,14 @@ def height_after_a_metre(gate: Gate, *, needed: bool) -> float:
 
 
 def test_before_a_steep_flight_to_a_gate_the_drone_climbs_until_the_way_is_in_view():
-    gate = Gate((3.0, 0.0, 3.0), 0.0)
+    gate = PathGate((3.0, 0.0, 3.0), 0.0)
     assert height_after_a_metre(gate, needed=True) > height_after_a_metre(gate, needed=False) + 0.3
 
 
 def test_among_obstacles_a_drone_stops_on_its_path_and_looks_up_from_there():
     """Beside its path may be what it has not seen."""
     seen, viewed = seen_from(posts=[(4.0, 3.0, 0.2)]), ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0))
-    flight, gate = PathFlight(Arena(), CONTEST, CONTEST_LIMITS), Gate((3.0, 0.0, 3.0), 0.0)
+    flight, gate = PathFlight(Arena(), CONTEST, CONTEST_LIMITS), PathGate((3.0, 0.0, 3.0), 0.0)
     state, looking_m_s = DroneState(0, *HERE, yaw=0.0), []
     for _ in range(60):
         viewed.update(CAMERA.pose((state.x, state.y, state.z), quaternion_from_yaw(state.yaw)))

@@ -13,14 +13,14 @@ from framerunner.geometry.rotations import quaternion_from_euler, rotation, to_w
 from offboard.drone import DroneState
 from offboard.navigation.goals import CONTEST
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
-from offboard.navigation.view import FrameEstimate, Surroundings
+from offboard.navigation.view import GateEstimate, Surroundings
 from offboard.navigation.world_model import WorldModel
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Arena, Base, Camera, Gimbal
-from tests.offboard.navigation.sightings import corners_px, frame_at, sighting
-from vision.types import Detections, FrameCorner, FrameSighting
+from tests.offboard.navigation.sightings import corners_px, gate_at, sighting
+from vision.types import Detections, GateCorner, GateSighting
 
-RED = frame_at(2.0, 0.0, 1.0, 0.3)
+RED = gate_at(2.0, 0.0, 1.0, 0.3)
 TICK_US = 50_000
 TICKS = range(20, 61)  # two seconds of flight
 
@@ -64,7 +64,7 @@ def test_a_camera_on_a_gimbal_gives_the_place_of_what_it_looks_at():
         for tick in TICKS:
             due = [us for us in IMAGES_US if us // TICK_US == tick - 2]
             world.observe(at(tick * TICK_US), [image_of(us) for us in due])
-        red = world.frame("red")
+        red = world.gate("red")
         return inf if red is None else dist(red.position_m, RED.position_arena_m)
 
     assert place_of_red(Camera(gimbal=Gimbal()), seen) < 0.03
@@ -74,13 +74,13 @@ def test_a_camera_on_a_gimbal_gives_the_place_of_what_it_looks_at():
 IMAGES_US = range(1_030_000, 2_900_000, 100_000)  # exposed between ticks
 
 
-def red_after(ticks: Iterable[tuple[DroneState, list[Detections]]]) -> FrameEstimate | None:
+def red_after(ticks: Iterable[tuple[DroneState, list[Detections]]]) -> GateEstimate | None:
     """What is known of red after these ticks."""
     surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera())
     world = WorldModel(surroundings, CONTEST)
     for at, images in ticks:
         world.observe(at, images)
-    return world.frame("red")
+    return world.gate("red")
 
 
 def on_time(delay_us: int) -> list[tuple[DroneState, list[Detections]]]:
@@ -93,7 +93,7 @@ def on_time(delay_us: int) -> list[tuple[DroneState, list[Detections]]]:
     return ticks
 
 
-def error_m(estimate: FrameEstimate | None) -> float:
+def error_m(estimate: GateEstimate | None) -> float:
     assert estimate is not None
     return dist(estimate.position_m, (RED.x_m, RED.y_m, RED.z_m))
 
@@ -143,16 +143,16 @@ def test_what_seems_to_stand_at_the_start_leaves_room_for_the_drone() -> None:
     assert min(gaps_m) > DRONE_RADIUS_M + CONTEST.bar_margin_m
 
 
-def test_frame_that_seems_to_be_above_the_ceiling_is_crossed_below_it():
+def test_gate_that_seems_to_be_above_the_ceiling_is_crossed_below_it():
     surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera())
-    frame = FrameEstimate("red", (5.3, 0.0, 4.4), 0.5, (0.5, 0.5, 0.5), 0.1, True, False, 1, 0)
-    gate = WorldModel(surroundings, CONTEST).gate_of(frame)
+    other_gate = GateEstimate("red", (5.3, 0.0, 4.4), 0.5, (0.5, 0.5, 0.5), 0.1, True, False, 1, 0)
+    gate = WorldModel(surroundings, CONTEST).gate_of(other_gate)
     assert gate.centre_m == pytest.approx((5.0, 0.0, 3.89))
     assert gate.yaw_rad == pytest.approx(0.5)
 
 
 def rolled_error_m(readout_s: float) -> float:
-    """Error of a frame's position that a turning drone learns through a rolling shutter of 16 ms.
+    """Error of a gate's position that a turning drone learns through a rolling shutter of 16 ms.
 
     Args:
         readout_s: of the shutter, as the navigator knows it.
@@ -160,7 +160,7 @@ def rolled_error_m(readout_s: float) -> float:
     camera = Camera(effects=CameraEffects(readout_s=readout_s))
     surroundings = Surroundings(Arena(), Base(), camera)
     world = WorldModel(surroundings, CONTEST)
-    frame = frame_at(2.0, 0.3, 2.4, 0.2)  # high in the image, where rows are read early
+    gate = gate_at(2.0, 0.3, 2.4, 0.2)  # high in the image, where rows are read early
 
     def yaw(time_s: float) -> float:
         return 0.6 * (time_s - 1.0)
@@ -172,19 +172,19 @@ def rolled_error_m(readout_s: float) -> float:
             at_s = time_s - 0.03
             row_s = at_s
             for _ in range(3):  # the row depends on its own time
-                points = corners_px(frame, (0.0, 0.0, 1.5), quaternion_from_euler(0.0, 0.0, yaw(row_s)))
+                points = corners_px(gate, (0.0, 0.0, 1.5), quaternion_from_euler(0.0, 0.0, yaw(row_s)))
                 assert points is not None
                 row_s = at_s + 0.016 * float(points[:, 1].mean()) / camera.height_px
-            a, b, c, d = (FrameCorner(right, down, 0.2, 0.2) for right, down in points.tolist())
-            seen = FrameSighting("red", (a, b, c, d), True, ())
+            a, b, c, d = (GateCorner(right, down, 0.2, 0.2) for right, down in points.tolist())
+            seen = GateSighting("red", (a, b, c, d), True, ())
             images = [Detections(time_us=round(1e6 * at_s), frames=(seen,))]
         attitude = quaternion_from_euler(0.0, 0.0, yaw(time_s))
         now = DroneState(round(1e6 * time_s), 0.0, 0.0, 1.5, yaw(time_s), attitude_arena=attitude)
         world.observe(now, images)
         images = []
-    estimate = world.frame("red")
+    estimate = world.gate("red")
     assert estimate is not None
-    return dist(estimate.position_m, (frame.x_m, frame.y_m, frame.z_m))
+    return dist(estimate.position_m, (gate.x_m, gate.y_m, gate.z_m))
 
 
 def test_rows_of_a_rolling_shutter_are_used_at_their_own_time() -> None:

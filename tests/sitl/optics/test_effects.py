@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from framerunner.geometry.rotations import quaternion_from_euler
-from scenarios.imaging.effects import CameraEffects, Hall, Lens, Patch
+from scenarios.imaging.effects import CameraEffects, Hall, LensDistortion, Patch
 from scenarios.models import Camera, Light, Pole, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
-from sitl.camera import Camera as PaintedCamera
-from sitl.camera import Motion
+from sitl.camera import ExposureMotion
+from sitl.camera import SimulatedCamera as PaintedCamera
 from sitl.optics.sensor import SensorChain
 
 AHEAD = quaternion_from_euler(0.0, 0.0, 0.0)
-BARREL = Lens(k1=-0.28, k2=0.07, p1=0.001, p2=-0.0005)
+BARREL = LensDistortion(k1=-0.28, k2=0.07, p1=0.001, p2=-0.0005)
 
 
 def scene(effects, **parts):
@@ -68,7 +68,7 @@ def test_noise_is_that_of_reading_and_of_electrons(level):
 def test_noise_follows_from_seed_and_time():
     def image(seed, time_us):
         camera = PaintedCamera(scene(CameraEffects(read_noise=2.0)), seed)
-        return camera.render((0.0, 0.0, 2.0), AHEAD, motion=Motion(time_us))
+        return camera.render((0.0, 0.0, 2.0), AHEAD, motion=ExposureMotion(time_us))
 
     assert np.array_equal(image(1, 36_000), image(1, 36_000))
     assert not np.array_equal(image(1, 36_000), image(2, 36_000))
@@ -103,14 +103,18 @@ def pole_columns(effects, motion):
 
 def test_a_rolling_shutter_shears_what_a_turning_camera_sees():
     rate, readout_s = 1.2, 0.02
-    columns = pole_columns(CameraEffects(readout_s=readout_s), Motion(0, rate_frd_rad_s=(0.0, 0.0, rate)))
+    columns = pole_columns(
+        CameraEffects(readout_s=readout_s), ExposureMotion(0, rate_frd_rad_s=(0.0, 0.0, rate))
+    )
     slope = np.polyfit(np.arange(len(columns)), columns, 1)[0]
     # Turning right moves it left, the more the later a row is read.
     assert slope * 240 == pytest.approx(-160.1 * rate * readout_s, rel=0.1)
 
 
 def test_a_rolling_shutter_shears_what_a_flying_camera_passes():
-    columns = pole_columns(CameraEffects(readout_s=0.02), Motion(0, velocity_arena_m_s=(0.0, 2.0, 0.0)))
+    columns = pole_columns(
+        CameraEffects(readout_s=0.02), ExposureMotion(0, velocity_arena_m_s=(0.0, 2.0, 0.0))
+    )
     slope = np.polyfit(np.arange(len(columns)), columns, 1)[0]
     assert slope * 240 == pytest.approx(160.1 * 2.0 * 0.02 / 2.85, rel=0.1)
 
@@ -119,7 +123,7 @@ def test_motion_during_the_exposure_blurs():
     def edge_px(rate):
         pole = Pole(x_m=3.0, y_m=0.0, edge_m=0.6)
         camera = PaintedCamera(scene(CameraEffects(exposure_s=0.02), poles=[pole]))
-        motion = Motion(0, rate_frd_rad_s=(0.0, 0.0, rate))
+        motion = ExposureMotion(0, rate_frd_rad_s=(0.0, 0.0, rate))
         row = camera.render((0.0, 0.0, 2.0), AHEAD, motion=motion)[100].astype(float)[:, 1]
         share = (row[:160] - row[160]) / (row[120] - row[160])
         return np.count_nonzero((share > 0.05) & (share < 0.95))
@@ -130,14 +134,14 @@ def test_motion_during_the_exposure_blurs():
 
 def test_the_light_turns():
     scenario = random_scenario(load_level("calm"), 3)
-    frame = scenario.frames[0]
+    gate = scenario.frames[0]
     turning = scenario.model_copy(update={"light": Light(turn_rad_s=0.2)})
     camera = PaintedCamera(turning)
-    x, y = frame.x_m - 1.5 * cos(frame.yaw_rad), frame.y_m - 1.5 * sin(frame.yaw_rad)
-    pose = ((x, y, frame.z_m), quaternion_from_euler(0.0, radians(20.0), frame.yaw_rad))
-    early, late = (camera.render(*pose, motion=Motion(time_us)) for time_us in (0, 8_000_000))
+    x, y = gate.x_m - 1.5 * cos(gate.yaw_rad), gate.y_m - 1.5 * sin(gate.yaw_rad)
+    pose = ((x, y, gate.z_m), quaternion_from_euler(0.0, radians(20.0), gate.yaw_rad))
+    early, late = (camera.render(*pose, motion=ExposureMotion(time_us)) for time_us in (0, 8_000_000))
     assert not np.array_equal(early, late)
-    assert np.array_equal(early, camera.render(*pose, motion=Motion(0)))
+    assert np.array_equal(early, camera.render(*pose, motion=ExposureMotion(0)))
     assert np.array_equal(early, PaintedCamera(scenario).render(*pose))
 
 
@@ -158,6 +162,6 @@ def test_unused_parts_are_not_written():
 
 def test_bad_effects_are_refused():
     with pytest.raises(ValueError, match="folds the image's corners"):
-        Camera(effects=CameraEffects(lens=Lens(k1=-0.9)))
+        Camera(effects=CameraEffects(lens=LensDistortion(k1=-0.9)))
     with pytest.raises(ValueError, match="is a wall of the hall, and there is none"):
         scene(None, patches=[Patch(surface="back", colour="red", across_m=0, up_m=1, width_m=1, height_m=1)])

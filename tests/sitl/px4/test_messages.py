@@ -14,7 +14,7 @@ from framerunner.vehicle.measurements import (
     Sensors,
 )
 from framerunner.wire.framing import PacketReader
-from sitl.px4.messages import ActuatorControls, SensorMessages
+from sitl.px4.simulator_messages import ActuatorControls, SensorMessages
 
 ORIGIN = GeodeticPoint(47.4, 8.5, 485.0)  # 3 m below the true position
 IMU = ImuSample(4000, 4000, (0.1, -0.2, 0.3), (0.5, -0.6, -9.8))

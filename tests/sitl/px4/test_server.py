@@ -23,9 +23,9 @@ from sitl.autopilots.sensors import with_estimable_sensors
 from sitl.pacing.time_grants import Grant, TimeGrants
 from sitl.px4.build import Px4Process, find_build
 from sitl.px4.link import FIRST_PORT, Px4GoneError, Px4Link
-from sitl.px4.messages import ActuatorControls
 from sitl.px4.server import Px4Server
 from sitl.px4.simulation import MotionError, Px4Simulation
+from sitl.px4.simulator_messages import ActuatorControls
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance
 from tests.sitl.px4.fake_px4 import FakePx4, connect

@@ -8,9 +8,9 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from scenarios.faults.declaration import parse_fault
 from scenarios.loader import load_scenario
-from sitl.px4.messages import ActuatorControls
 from sitl.px4.side_link import CAMERA_PORT, PERIOD_US, SideLink
 from sitl.px4.simulation import Px4Simulation
+from sitl.px4.simulator_messages import ActuatorControls
 from sitl.px4.words import FailsafeWords
 from sitl.server_settings import ServerSettings
 from tests.processes import free_instance

@@ -10,9 +10,9 @@ from framerunner.errors import SettingError
 from scenarios.faults.declaration import FaultError, parse_fault
 from scenarios.loader import load_scenario
 from sitl.ardupilot.simulation import ArduPilotSimulation
-from sitl.px4.messages import ActuatorControls
 from sitl.px4.parameters import RC_PARAMETERS
 from sitl.px4.simulation import Px4Simulation
+from sitl.px4.simulator_messages import ActuatorControls
 from sitl.px4.transmitter import CENTRED, Joystick, open_transmitter
 from sitl.simulation import Simulation
 

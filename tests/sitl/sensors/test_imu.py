@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from framerunner.vehicle.airframe import GRAVITY_M_S2
-from sitl.sensors.imu import Imu, InertialTriad
+from sitl.sensors.imu import ImuSensor, InertialTriad
 from sitl.sensors.suite import load_suite
 from tests.sitl.sensors.statistics import (
     AIRFRAME,
@@ -28,7 +28,7 @@ def rates_and_forces(imu, count, **parts):
 
 def test_white_noise_of_the_installed_suite_is_the_data_sheets():
     """At averaging times far below those of the drift, the Allan deviation is N / sqrt(time)."""
-    rates, forces = rates_and_forces(Imu(SPEC, AIRFRAME, 1), 100_000)
+    rates, forces = rates_and_forces(ImuSensor(SPEC, AIRFRAME, 1), 100_000)
     times_s = np.array([0.1, 0.4, 1.0])
     densities = (
         SPEC.gyroscope.noise_density_rad_s_sqrt_hz,
@@ -65,7 +65,7 @@ def test_drift_and_white_noise_have_the_allan_deviation_of_their_theory():
 
 
 def test_biases_and_scales_of_many_drones_spread_as_declared():
-    drones = [Imu(SPEC, AIRFRAME, seed) for seed in range(300)]
+    drones = [ImuSensor(SPEC, AIRFRAME, seed) for seed in range(300)]
     biases = np.array([each._gyroscope._constant_bias for each in drones])
     scales = np.array([each._accelerometer._scale for each in drones]) - 1.0
     assert biases.std() == pytest.approx(SPEC.gyroscope.turn_on_bias_rad_s, rel=0.1)
@@ -81,7 +81,7 @@ def test_without_errors_it_measures_the_mean_motion():
         }
     )
     rate, force = (0.1, -0.2, 0.3), (1.0, 2.0, -9.0)
-    sample = Imu(spec, AIRFRAME, 1).sample(
+    sample = ImuSensor(spec, AIRFRAME, 1).sample(
         motion(8000, angular_rate_frd_rad_s=rate, specific_force_frd_m_s2=force, motor_speeds_rad_s=HOVER)
     )
     assert (sample.time_us, sample.period_us) == (8000, TICK_US)
@@ -91,7 +91,9 @@ def test_without_errors_it_measures_the_mean_motion():
 
 def test_vibration_grows_with_the_mean_squared_rotor_speed_and_is_absent_at_rest():
     def spread(speed_rad_s):
-        rates, forces = rates_and_forces(Imu(SPEC, AIRFRAME, 3), 5000, motor_speeds_rad_s=(speed_rad_s,) * 4)
+        rates, forces = rates_and_forces(
+            ImuSensor(SPEC, AIRFRAME, 3), 5000, motor_speeds_rad_s=(speed_rad_s,) * 4
+        )
         return rates.std(axis=0).mean(), forces.std(axis=0).mean()
 
     hover_rad_s = AIRFRAME.hover_speed_rad_s
@@ -102,7 +104,7 @@ def test_vibration_grows_with_the_mean_squared_rotor_speed_and_is_absent_at_rest
 
 
 def test_it_saturates_at_full_scale_on_each_axis_by_itself():
-    sample = Imu(SPEC, AIRFRAME, 1).sample(
+    sample = ImuSensor(SPEC, AIRFRAME, 1).sample(
         motion(angular_rate_frd_rad_s=(99.0, 1.0, -99.0), specific_force_frd_m_s2=(0.0, 500.0, -500.0))
     )
     full_rad_s, full_m_s2 = SPEC.gyroscope.max_rate_rad_s, SPEC.accelerometer.max_specific_force_m_s2
@@ -112,5 +114,5 @@ def test_it_saturates_at_full_scale_on_each_axis_by_itself():
 
 
 def test_at_rest_it_measures_gravity_upwards_but_for_its_bias():
-    _, forces = rates_and_forces(Imu(SPEC, AIRFRAME, 5), 2500)
+    _, forces = rates_and_forces(ImuSensor(SPEC, AIRFRAME, 5), 2500)
     assert forces.mean(axis=0) == pytest.approx((0.0, 0.0, -GRAVITY_M_S2), abs=0.25)

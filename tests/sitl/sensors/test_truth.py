@@ -4,12 +4,12 @@ from math import acos, cos, degrees, dist, pi, sin
 
 import pytest
 
-from firmware_py.commands import VelocityCommand
+from firmware_py.commands import VelocityFrdCommand
 from firmware_py.control.stabiliser import Stabiliser
 from framerunner.geometry.rotations import quaternion_from_euler, rotated_by_rate, rotation, to_world
 from framerunner.geometry.vectors import ZERO3
 from framerunner.vehicle.airframe import GRAVITY_M_S2, load_airframe
-from scenarios.models import Base, Frame, Pole, Scenario, Start, ground_height
+from scenarios.models import Base, Gate, Pole, Scenario, StartPose, ground_height
 from sitl.sensors.truth import MotionTracker
 from sitl.world import CONTROL_PERIOD_US, World
 from tests.flight import state_of
@@ -24,8 +24,8 @@ def motions_of_flight(seconds):
     scenario = Scenario(
         name="test",
         base=Base(x_m=-2.0),
-        start=Start(x_m=-2.0),
-        frames=(Frame(colour="red", x_m=0.0, y_m=0.0, z_m=1.5),),
+        start=StartPose(x_m=-2.0),
+        frames=(Gate(colour="red", x_m=0.0, y_m=0.0, z_m=1.5),),
         poles=(Pole(x_m=2.0, y_m=0.0),),
     )
     world = World(scenario, AIRFRAME)
@@ -52,7 +52,7 @@ def motions_of_flight(seconds):
         if 10.0 < time_s < 20.0:
             velocity = (0.8 * (2.0 - x_m), 0.8 * y_m, 0.0)  # towards the pole
         state = state_of(world.dynamics, world.time_us)
-        world.step(stabiliser.step(state, VelocityCommand(velocity, 1.5 * sin(time_s))).speeds_rad_s)
+        world.step(stabiliser.step(state, VelocityFrdCommand(velocity, 1.5 * sin(time_s))).speeds_rad_s)
         touched |= "pole" in world.touched
     assert touched
     return motions

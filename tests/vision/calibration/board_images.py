@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from framerunner.geometry.lens import rays_of_pixels
-from vision.calibration.board import Board
+from vision.calibration.board import CharucoBoard
 from vision.calibration.model import Calibration
 
 TRUE = Calibration(
@@ -20,7 +20,7 @@ TRUE = Calibration(
     cy_px=236.8,
     distortion=(-0.22, 0.07, 0.0008, -0.0006, 0.0),
 )
-BOARD = Board()
+BOARD = CharucoBoard()
 _PX_PER_MM = 3.0
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from framerunner.geometry.lens import distorted
 from tests.vision.calibration.board_images import BOARD, TRUE, board_image, board_images
-from vision.calibration.board import Board
+from vision.calibration.board import CharucoBoard
 from vision.calibration.model import CalibrationError
 
 
@@ -65,10 +65,10 @@ def test_nothing_is_found_without_a_board():
 
 
 def test_the_page_prints_in_true_size():
-    page = Board().page()
+    page = CharucoBoard().page()
     per_metre = int.from_bytes(page[page.index(b"pHYs") + 4 :][:4], "big")
     picture = cv2.imdecode(np.frombuffer(page, np.uint8), cv2.IMREAD_GRAYSCALE)
     rows, columns = np.nonzero(picture[: int(0.9 * picture.shape[0])] < 128)
     assert (np.ptp(columns) + 1) / per_metre == pytest.approx(0.24, abs=0.001)
     assert (np.ptp(rows) + 1) / per_metre == pytest.approx(0.15, abs=0.001)
-    assert "240 x 150 mm" in Board().text
+    assert "240 x 150 mm" in CharucoBoard().text

@@ -1,4 +1,4 @@
-"""Colours of frames learnt from swatches."""
+"""Colours of gates learnt from swatches."""
 
 import numpy as np
 import pytest
@@ -17,8 +17,8 @@ def swatch(colour: tuple[int, int, int], noise: float = 2.0) -> Image:
     return np.clip(random.normal(colour, noise, (60, 80, 3)), 0, 255).astype(np.uint8)
 
 
-def hall_with_a_frame(colour: tuple[int, int, int]) -> Image:
-    """A red frame of 84 x 44 pixels before a grey wall."""
+def hall_with_a_gate(colour: tuple[int, int, int]) -> Image:
+    """A red gate of 84 x 44 pixels before a grey wall."""
     image = swatch((120, 125, 130))
     image = np.tile(image, (4, 4, 1))
     image[100:144, 110:194] = colour
@@ -38,7 +38,7 @@ def test_paint_under_a_lamp_is_seen_after_learning() -> None:
 def test_the_detectors_use_it_and_grey_stays_grey() -> None:
     matrix = learn_colours({name: swatch(colour) for name, colour in PAINT.items()})
     calibration = Calibration.ideal(320, 240, 200.0).model_copy(update={"colour_matrix": matrix})
-    image = hall_with_a_frame(PAINT["green"])
+    image = hall_with_a_gate(PAINT["green"])
     for kind in ("boxes", "frames"):
         assert not new_detector(kind, focal_px=200.0)(image, None).green.seen
         found = new_detector(kind, calibration=calibration)(image, None)

@@ -1,11 +1,11 @@
-"""The mounting of a camera from frames seen in flight: found where it can be known, and refused where not."""
+"""The mounting of a camera from gates seen in flight: found where it can be known, and refused where not."""
 
 from math import degrees, radians
 
 import numpy as np
 import pytest
 
-from tests.vision.calibration.seen_frames import FOCAL_PX, FRAMES, TRUE, fly, sightings, survey
+from tests.vision.calibration.seen_gates import FOCAL_PX, GATES, TRUE, fly, sightings, survey
 from vision.calibration.mounting import MountingFit, fit_mounting, missing_for, movement_of
 from vision.calibration.sightings import Values
 
@@ -18,7 +18,7 @@ def errors_deg(fit: MountingFit | None, true: Values = TRUE) -> list[float]:
 
 
 @pytest.mark.parametrize("angles_deg", [(2, 5, -3), (-4, -30, 8), (0, 25, -12)])
-def test_it_is_found_among_frames_and_a_poster(angles_deg: tuple[float, float, float]) -> None:
+def test_it_is_found_among_gates_and_a_poster(angles_deg: tuple[float, float, float]) -> None:
     roll, pitch, yaw = map(radians, angles_deg)
     true = Values((roll, pitch, yaw), TRUE.position_flu_m, 0.0)
     images, motion = fly(survey, 40.0, true=true)
@@ -27,8 +27,8 @@ def test_it_is_found_among_frames_and_a_poster(angles_deg: tuple[float, float, f
     assert max(map(abs, errors_deg(fit, true))) < 0.15
     assert missing_for(movement_of(seen, motion, fit), fit) == ()
     assert fit is not None and "green" in fit.sightings.colours
-    for place in fit.frames_m:  # the poster, 2.2 times as large as a frame, is none
-        assert min(np.linalg.norm(place - np.array(each.position_m)) for each in FRAMES) < 0.05
+    for place in fit.gates_m:  # the poster, 2.2 times as large as a gate, is none
+        assert min(np.linalg.norm(place - np.array(each.position_m)) for each in GATES) < 0.05
 
 
 def test_the_delay_of_images_without_times_is_found() -> None:
@@ -67,8 +67,8 @@ def test_without_movement_it_is_said_what_is_missing() -> None:
         fit = fit_mounting(seen, motion, FOCAL_PX, RULER)
         return missing_for(movement_of(seen, motion, fit), fit)
 
-    frames, *_ = missing(survey, rectangles=())
-    assert frames.startswith("let the camera see frames") and "0 different views so far" in frames
+    gates, *_ = missing(survey, rectangles=())
+    assert gates.startswith("let the camera see frames") and "0 different views so far" in gates
     *_, turn, approach = missing(hovering)
     assert turn.startswith("yaw the drone by 20 degrees at least") and "(2 so far)" in turn
     assert approach.startswith("fly towards a frame and away from it, by 0.6 m at least")

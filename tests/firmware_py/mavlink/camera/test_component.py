@@ -6,13 +6,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from firmware_py.mavlink.camera.component import CameraComponent
-from firmware_py.mavlink.camera.model import CameraModel, PictureSpace, VideoEncoding, VideoStream
+from firmware_py.mavlink.camera.model import FixedCamera, PictureSpace, VideoEncoding, VideoStream
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import VehicleState
 from framerunner.vehicle.geodesy import GeodeticPoint
 from framerunner.wire.dialect import mavlink
 
-MODEL = CameraModel(320, 240, radians(90.0), 10.0)
+MODEL = FixedCamera(320, 240, radians(90.0), 10.0)
 STREAMS = (
     VideoStream("5600", VideoEncoding.H264_RTP, 320, 240, 10.0, 90.0),
     VideoStream("http://127.0.0.1:8100/video", VideoEncoding.MJPEG_HTTP, 320, 240, 10.0, 90.0),

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_py.mavlink.commands.maintenance import MaintenanceCommands
-from firmware_py.mavlink.service import Command
+from firmware_py.mavlink.service import VehicleCommand
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult
 
@@ -26,7 +26,7 @@ class Breaker:
 
 
 def inject_failure(autopilot, breaker, *numbers):
-    command = Command(None, (*numbers, 0.0))
+    command = VehicleCommand(None, (*numbers, 0.0))
     return MaintenanceCommands(autopilot, breaker).commands[420](command)
 
 

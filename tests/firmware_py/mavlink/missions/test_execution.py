@@ -2,12 +2,12 @@ from math import nan, radians
 
 import pytest
 
-from firmware_py.mavlink.camera.model import CameraModel
+from firmware_py.mavlink.camera.model import FixedCamera
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.status import CommandResult
 
 START, ARM, SET_HOME = 2000, 400, 179
-CAMERA = {"camera": CameraModel(320, 240, radians(90.0), 10.0)}
+CAMERA = {"camera": FixedCamera(320, 240, radians(90.0), 10.0)}
 
 
 def order(autopilot, peer, command, *params):

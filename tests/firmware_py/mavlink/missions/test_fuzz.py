@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from firmware_py.missions.executor import MissionExecutor
-from firmware_py.missions.flight import View
+from firmware_py.missions.flight import VehicleView
 from firmware_py.missions.geofence import Geofence
 from firmware_py.missions.items import PlanType, opaque_id
 from firmware_py.navigator import return_place
@@ -152,7 +152,7 @@ def fly(autopilot):
     """Accepted plans cause no error in flight, even if they are not valid."""
     store = autopilot.missions
     store.valid = bool(store.mission.items)
-    view = View(projection=LocalProjection(HOME), home_ned_m=(0.0, 0.0, 0.0))
+    view = VehicleView(projection=LocalProjection(HOME), home_ned_m=(0.0, 0.0, 0.0))
     executor = MissionExecutor(store, autopilot.parameters)
     fence = Geofence(store, autopilot.parameters)
     executor.enter(view)

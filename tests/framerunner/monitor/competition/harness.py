@@ -9,7 +9,7 @@ import aiohttp
 from framerunner.monitor import run, server
 from framerunner.monitor.settings import MonitorSettings
 from framerunner.monitor.vehicle.tries import TryEvent
-from scenarios.models import Frame, Scenario
+from scenarios.models import Gate, Scenario
 from scenarios.result import RefereeReport
 
 PASSWORD = "only for these tests"
@@ -22,18 +22,18 @@ MODULES = (
 
 
 def scenario(name, colours=COLOURS):
-    frames = tuple(Frame(colour=colour, x_m=index, y_m=2, z_m=1.5) for index, colour in enumerate(colours))
+    frames = tuple(Gate(colour=colour, x_m=index, y_m=2, z_m=1.5) for index, colour in enumerate(colours))
     return Scenario(name=name, frames=frames)
 
 
-FRAMES = {"case": COLOURS, "calm": COLOURS, "two": COLOURS[:2], "no": ()}
+GATES = {"case": COLOURS, "calm": COLOURS, "two": COLOURS[:2], "no": ()}
 
 
 def load(name):
     kind = name.partition("-")[0]
-    if kind not in FRAMES:
+    if kind not in GATES:
         raise ValueError(f"scenario {name} is unknown")
-    return scenario(name, FRAMES[kind])
+    return scenario(name, GATES[kind])
 
 
 EQUIPMENT = SimpleNamespace(
@@ -139,7 +139,7 @@ class Contest:
 @asynccontextmanager
 async def contest(database, monkeypatch, port=0):
     """A monitor with an open database; port 0 is a free one."""
-    monkeypatch.setattr("framerunner.monitor.server.Fleet", FakeFleet)
+    monkeypatch.setattr("framerunner.monitor.server.MonitoredFleet", FakeFleet)
     monkeypatch.setattr(server, "MODULES", MODULES)
     said = []
     settings = MonitorSettings(

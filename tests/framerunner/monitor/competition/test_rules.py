@@ -58,7 +58,7 @@ def test_a_total_is_the_sum_of_three():
     assert row.total_s == 392.75
 
 
-def test_what_was_not_flown_counts_as_if_all_frames_were_missing():
+def test_what_was_not_flown_counts_as_if_all_gates_were_missing():
     assert totals({1: "One"}, []) == {1: 3 * 360.0}
     two = [("a", COLOURS[:2]), ("b", COLOURS)]
     (row,) = rank({1: "One"}, two, [], Rule())
@@ -101,7 +101,7 @@ def test_the_rule_can_be_set():
         ([], ()),
     ],
 )
-def test_a_frame_crossed_too_early_is_missing(crossed, counted):
+def test_a_gate_crossed_too_early_is_missing(crossed, counted):
     assert crossed_in_order(crossed, COLOURS) == counted
 
 
@@ -115,7 +115,7 @@ def test_invalid_values_in_a_report_count_as_not_completed(value, told):
     assert counted_cs(result, Rule()) == 36000
 
 
-def test_a_verdict_without_its_frames_is_not_completed():
+def test_a_verdict_without_its_gates_is_not_completed():
     report = RefereeReport(verdict="clean", frames_crossed=("red",))
     assert not read_report(report, COLOURS).completed
     assert read_report(report, ("red",)).completed
@@ -176,7 +176,7 @@ def test_more_time_or_penalty_never_counts_less(result, time_s, penalty_s):
 
 
 @given(results(), st.sampled_from(COLOURS))
-def test_one_frame_fewer_never_counts_less(result, colour):
+def test_one_gate_fewer_never_counts_less(result, colour):
     fewer = tuple(each for each in result.crossed if each != colour)
     less = replace(result, crossed=fewer, completed=result.completed and fewer == result.crossed)
     if result.try_time_s + result.penalty_s <= 180:

@@ -221,7 +221,7 @@ async def test_a_bad_draw_is_refused(url, pool, count, words):
         assert service._board.draws == ()
 
 
-async def test_scenarios_with_all_frames_can_be_drawn(url):
+async def test_scenarios_with_all_gates_can_be_drawn(url):
     async with serving(url) as service:
         assert service.scenarios == ("case-1", "case-2", "case-3", "case-4")
 
@@ -232,7 +232,7 @@ async def test_shuffling_can_give_every_order(url):
         assert len(orders) == 6 and all(sorted(order) == [1, 2, 3] for order in orders)
 
 
-async def test_frames_are_those_of_the_scenario_or_all(url):
+async def test_gates_are_those_of_the_scenario_or_all(url):
     async with serving(url) as service:
         for key, name in (("a", "two-1"), ("b", "unknown"), ("c", "../x"), ("d", "")):
             service.on_try_event(event("ended", key, name))

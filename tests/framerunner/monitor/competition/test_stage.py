@@ -22,7 +22,7 @@ async def stage(running):
 
 
 async def fly(running, key, team, times, scenario="case-1", verdict="clean"):
-    """A try that crosses a frame at each of the times and ends ten seconds later."""
+    """A try that crosses a gate at each of the times and ends ten seconds later."""
     began = event("began", key, scenario, time_s=0.0)
     known = {"verdict": verdict, "crossed": COLOURS[: len(times)], "time_s": times[-1] + 10}
     ended = event("ended", key, scenario, told={"crossing_times_s": times}, **known)

@@ -4,7 +4,7 @@ import pytest
 
 from framerunner.monitor.ports import Equipment
 from framerunner.monitor.vehicle.link_quality import LinkQuality
-from framerunner.monitor.vehicle.vehicle import Vehicle, VehicleCallbacks
+from framerunner.monitor.vehicle.vehicle import MonitoredVehicle, VehicleCallbacks
 from framerunner.wire.dialect import mavlink
 
 
@@ -57,7 +57,10 @@ def boot_time_requests(unix_us):
     sent = []
     silent = Equipment(None, None, None, None, None, None)
     callbacks = VehicleCallbacks(sent.append, *[lambda *_: None] * 3)
-    vehicle, packer = Vehicle(1, silent, callbacks, 0.0), mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    vehicle, packer = (
+        MonitoredVehicle(1, silent, callbacks, 0.0),
+        mavlink.MAVLink(None, srcSystem=1, srcComponent=1),
+    )
     for second in range(120):
         messages = [mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)]
         if unix_us is not None:

@@ -1,7 +1,7 @@
-"""What an image says of a frame's pose: where the corners of its outline are, and how exactly that is known.
+"""What an image says of a gate's pose: where the corners of its outline are, and how exactly that is known.
 
-A frame is upright and the drone's attitude is known, so its pose has four numbers: the state (x, y, z, yaw).
-The corners are those of a rectangle in the frame's middle plane. All arrays are small; what is called for
+A gate is upright and the drone's attitude is known, so its pose has four numbers: the state (x, y, z, yaw).
+The corners are those of a rectangle in the gate's middle plane. All arrays are small; what is called for
 every image uses plain numbers up to the last step.
 """
 
@@ -15,15 +15,15 @@ import numpy as np
 import numpy.typing as npt
 
 from offboard.navigation.camera_model import NEAREST_M, CameraModel, CameraPose
-from offboard.navigation.goals import FRAME_HEIGHT_M, FRAME_WIDTH_M
+from offboard.navigation.goals import GATE_HEIGHT_M, GATE_WIDTH_M
 from offboard.navigation.pose_history import DronePose
 from scenarios.models import Arena
-from vision.types import FrameCorner, FrameSighting
+from vision.types import GateCorner, GateSighting
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 
-HALF_WIDTH_M = FRAME_WIDTH_M / 2
-HALF_HEIGHT_M = FRAME_HEIGHT_M / 2
+HALF_WIDTH_M = GATE_WIDTH_M / 2
+HALF_HEIGHT_M = GATE_HEIGHT_M / 2
 # To the right and up: upper left, upper right, lower right, lower left as seen.
 _CORNERS_M = (
     (-HALF_WIDTH_M, HALF_HEIGHT_M),
@@ -32,9 +32,9 @@ _CORNERS_M = (
     (-HALF_WIDTH_M, -HALF_HEIGHT_M),
 )
 
-EDGE_ON = 0.1  # sine of the angle to the frame's plane below which its outline says little
-PIXEL_STD_PX = 0.1  # added to what the finder of frames states: its edges' errors are not all independent
-# Angles between a frame's normal and the line of sight, and their deviation: together they cover all that can
+EDGE_ON = 0.1  # sine of the angle to the gate's plane below which its outline says little
+PIXEL_STD_PX = 0.1  # added to what the finder of gates states: its edges' errors are not all independent
+# Angles between a gate's normal and the line of sight, and their deviation: together they cover all that can
 # be seen, and within each the measurement is nearly linear.
 YAWS_RAD = (-1.1, -0.66, -0.22, 0.22, 0.66, 1.1)
 YAW_STD_RAD = 0.22
@@ -44,11 +44,11 @@ _YAW_STEP_RAD = 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """A frame's corners in one image, k of which are seen.
+class GateView:
+    """A gate's corners in one image, k of which are seen.
 
     Attributes:
-        colour: of the frame.
+        colour: of the gate.
         whole: nothing of it is hidden.
         time_us: vehicle time of the image.
         camera: where it was taken.
@@ -87,7 +87,7 @@ class Solution:
     log_weight: float
 
 
-def view_of(sighting: FrameSighting, model: CameraModel, pose: DronePose) -> View | None:
+def view_of(sighting: GateSighting, model: CameraModel, pose: DronePose) -> GateView | None:
     """A sighting as a measurement; None if no corner is seen."""
     seen = [corner for corner in sighting.corners if corner is not None]
     if not seen:
@@ -98,7 +98,7 @@ def view_of(sighting: FrameSighting, model: CameraModel, pose: DronePose) -> Vie
     noise = np.diag(variances) + pose.attitude_std_rad**2 * (turned @ turned.T)
     a, b, c, d = (corner is not None for corner in sighting.corners)
     camera = model.pose(pose.position_m, pose.attitude_arena)
-    return View(
+    return GateView(
         colour=sighting.colour,
         whole=sighting.whole,
         time_us=pose.time_us,
@@ -111,7 +111,7 @@ def view_of(sighting: FrameSighting, model: CameraModel, pose: DronePose) -> Vie
     )
 
 
-def _turned(corner: FrameCorner, focal_px: float) -> tuple[tuple[float, float, float], ...]:
+def _turned(corner: GateCorner, focal_px: float) -> tuple[tuple[float, float, float], ...]:
     """How a corner moves in the image when the camera turns about forward, left and up, pixels a radian."""
     right, down = corner.right_px, corner.down_px
     return (
@@ -120,15 +120,15 @@ def _turned(corner: FrameCorner, focal_px: float) -> tuple[tuple[float, float, f
     )
 
 
-def predicted(state: Floats, view: View) -> tuple[Floats, Floats, Floats] | None:
-    """Where a frame's corners should be in a view, pixels, their Jacobian, and their curvature in the yaw.
+def predicted(state: Floats, view: GateView) -> tuple[Floats, Floats, Floats] | None:
+    """Where a gate's corners should be in a view, pixels, their Jacobian, and their curvature in the yaw.
 
     Args:
-        state: x, y, z (metres), yaw (radians) of the frame.
+        state: x, y, z (metres), yaw (radians) of the gate.
         view: says from where and which corners.
 
     Returns:
-        Shapes (2 k,), (2 k, 4) and (2 k,), the second derivative; None if the frame is seen edge-on or is
+        Shapes (2 k,), (2 k, 4) and (2 k,), the second derivative; None if the gate is seen edge-on or is
         not before the camera.
     """
     x, y, z, yaw = state.tolist()
@@ -166,7 +166,7 @@ def predicted(state: Floats, view: View) -> tuple[Floats, Floats, Floats] | None
     return np.array(numbers), np.array(rows), np.array(curvature)
 
 
-def noise_of(view: View, jacobian: Floats) -> Floats:
+def noise_of(view: GateView, jacobian: Floats) -> Floats:
     """Covariance of a view's errors, pixels squared: that of the drone's position included."""
     moved = jacobian[:, :3]
     noise: Floats = view.noise_px2 + view.position_var_m2 * (moved @ moved.T)
@@ -175,7 +175,7 @@ def noise_of(view: View, jacobian: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """Where a frame can be, before anything is seen: somewhere in the arena, with one of several yaws."""
+    """Where a gate can be, before anything is seen: somewhere in the arena, with one of several yaws."""
 
     state: Floats
     information: Floats  # inverse of the covariance, shape (4, 4)
@@ -188,7 +188,7 @@ class Prior:
         return cls(np.array((0.0, 0.0, arena.height_m / 2, 0.0)), np.diag((*information, YAW_STD_RAD**-2)))
 
 
-def solutions(views: list[View], prior: Prior) -> list[Solution]:
+def solutions(views: list[GateView], prior: Prior) -> list[Solution]:
     """The poses that explain views, the likeliest first: one for each of several yaws; none if none can.
 
     The first view must have a whole upright edge, from whose height the search begins.
@@ -200,7 +200,7 @@ def solutions(views: list[View], prior: Prior) -> list[Solution]:
     return sorted((one for one in found if one is not None), key=lambda solution: -solution.log_weight)
 
 
-def upright_edges(view: View) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+def upright_edges(view: GateView) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """The upright edges that are seen from end to end: upper and lower end, each right and down, pixels."""
     places = iter([(right, down) for right, down in view.corners_px.reshape(-1, 2).tolist()])
     corner = [next(places) if seen else None for seen in view.seen]
@@ -208,7 +208,7 @@ def upright_edges(view: View) -> list[tuple[tuple[float, float], tuple[float, fl
     return [(high, low) for high, low in ends if high is not None and low is not None]
 
 
-def _starts(view: View) -> list[Floats]:
+def _starts(view: GateView) -> list[Floats]:
     """States to begin the search at: the distance from the height of an upright edge, several yaws."""
     heights = [low[1] - high[1] for high, low in upright_edges(view)]
     if not heights or min(heights) < 0.5:
@@ -223,7 +223,7 @@ def _starts(view: View) -> list[Floats]:
     return [np.array((*place, bearing + offset)) for offset in YAWS_RAD]
 
 
-def _solve(views: list[View], prior: Prior, start: Floats) -> Solution | None:
+def _solve(views: list[GateView], prior: Prior, start: Floats) -> Solution | None:
     """Least squares from a start (Levenberg and Marquardt's method); None if it does not converge."""
     state, damping = start, 1e-3
     system = _normal_equations(views, prior, state)
@@ -249,7 +249,7 @@ def _solve(views: list[View], prior: Prior, start: Floats) -> Solution | None:
 
 
 def _normal_equations(
-    views: list[View], prior: Prior, state: Floats
+    views: list[GateView], prior: Prior, state: Floats
 ) -> tuple[Floats, Floats, float, float] | None:
     """Information, gradient, cost with the prior's, cost of the views alone; None if one shows nothing."""
     away = prior.state - state

@@ -1,6 +1,6 @@
-"""Things that look like frames and have another size, such as pictures on walls.
+"""Things that look like gates and have another size, such as pictures on walls.
 
-One image cannot tell a frame from a larger one farther away. While the drone moves, parallax says how far
+One image cannot tell a gate from a larger one farther away. While the drone moves, parallax says how far
 away a thing is, whatever its size: all its sightings then agree on one place and one size.
 """
 
@@ -15,11 +15,11 @@ import numpy.typing as npt
 
 from framerunner.geometry.rotations import to_world
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.frames.frame_measurement import (
+from offboard.navigation.gates.gate_measurement import (
     HALF_HEIGHT_M,
     HALF_WIDTH_M,
     Floats,
-    View,
+    GateView,
     upright_edges,
 )
 
@@ -31,9 +31,9 @@ APART_RAD = 0.25  # in another direction
 BASE_M = 0.5  # between two places whose parallax is used
 AGREEING = 6  # sightings that must agree
 LEFT = 4  # of them, without those of one place
-SIZES = (0.2, 8.0)  # that are considered, times that of a frame
-OTHER_SIZE = 1.25  # a thing that is so many times larger or smaller than a frame is none,
-SURE = 20.0  # if the sum of its squared deviations is by so much less than with the size of a frame
+SIZES = (0.2, 8.0)  # that are considered, times that of a gate
+OTHER_SIZE = 1.25  # a thing that is so many times larger or smaller than a gate is none,
+SURE = 20.0  # if the sum of its squared deviations is by so much less than with the size of a gate
 AGREES = 3.0  # deviations
 
 # Standard deviations of a sighting; the position's is stated with each view.
@@ -44,13 +44,13 @@ EDGE_STD = 0.03  # share of an edge's length
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lookalike:
-    """A thing that looks like a frame.
+    """A thing that looks like a gate.
 
     Attributes:
-        colour: of the frame.
+        colour: of the gate.
         place_m: its centre, arena axes, shape (3,).
-        size: times that of a frame.
-        seemed_m: where frames would have been that look like its sightings, shape (n, 3).
+        size: times that of a gate.
+        seemed_m: where gates would have been that look like its sightings, shape (n, 3).
     """
 
     colour: str
@@ -87,8 +87,8 @@ class Lookalikes:
         self._sightings: dict[str, _Sightings] = {}  # of nothing known, by colour
         self._found: list[Lookalike] = []
 
-    def note(self, view: View) -> Lookalike | None:
-        """Remember a view; returns what is now known to be no frame, if this view has shown it."""
+    def note(self, view: GateView) -> Lookalike | None:
+        """Remember a view; returns what is now known to be no gate, if this view has shown it."""
         sighting = _sighting_of(view) if view.whole else None
         if sighting is None or self.shows(view):
             return None
@@ -106,7 +106,7 @@ class Lookalikes:
         self._found.append(lookalike)
         return lookalike
 
-    def shows(self, view: View) -> bool:
+    def shows(self, view: GateView) -> bool:
         """Whether a view is of such a thing."""
         found = [each for each in self._found if each.colour == view.colour]
         sighting = _sighting_of(view) if found else None
@@ -123,7 +123,7 @@ class _Sightings(NamedTuple):
     Attributes:
         eyes_m: places of the camera, arena axes, shape (n, 3).
         directions: to the middle of the outline, unit vectors, shape (n, 3).
-        away_m: distance of a frame that looks as large, shape (n,).
+        away_m: distance of a gate that looks as large, shape (n,).
         stds: standard deviations of that distance, as a share, and of the place, metres; shape (n, 2).
     """
 
@@ -147,11 +147,11 @@ class _Sightings(NamedTuple):
         return not bool((near & same).any())
 
     def seemed_m(self) -> Floats:
-        """Where frames would be that look so, shape (n, 3)."""
+        """Where gates would be that look so, shape (n, 3)."""
         return np.asarray(self.eyes_m + self.away_m[:, None] * self.directions)
 
 
-def _sighting_of(view: View) -> _Sightings | None:
+def _sighting_of(view: GateView) -> _Sightings | None:
     """What a view says of direction and distance; None if no upright edge is seen from end to end."""
     rotation, focal_px = view.camera.rotation, view.focal_px
 
@@ -209,7 +209,7 @@ def _agree(sightings: _Sightings, places_m: Floats, sizes: Floats) -> Mask:
 
 
 def _thing_of(sightings: _Sightings) -> tuple[Floats, float, Mask] | None:
-    """What the last sighting is of, if it is surely no frame: its place, its size and its sightings' mask.
+    """What the last sighting is of, if it is surely no gate: its place, its size and its sightings' mask.
 
     The sightings may be of several things: each earlier one together with the last suggests a place and a
     size, and the one that most others agree with is taken (random sample consensus, with all pairs; Fischler
@@ -229,29 +229,29 @@ def _thing_of(sightings: _Sightings) -> tuple[Floats, float, Mask] | None:
     # A few sightings of another thing can bend a size: it must follow without those of any one place, too.
     apart_m = np.linalg.norm(some.eyes_m[:, None, :] - some.eyes_m, axis=2)
     parts = (some, *(some.some(row) for row in apart_m > BASE_M))
-    if len(some.away_m) < AGREEING or not all(_is_no_frame(part, float(sizes[best])) for part in parts):
+    if len(some.away_m) < AGREEING or not all(_is_no_gate(part, float(sizes[best])) for part in parts):
         return None
-    place_m, size, _ = _fit(some, float(sizes[best]), is_frame=False)
+    place_m, size, _ = _fit(some, float(sizes[best]), is_gate=False)
     return place_m, size, chosen
 
 
-def _is_no_frame(sightings: _Sightings, size: float) -> bool:
-    """Whether sightings are surely of one thing that has another size than a frame, about the one given."""
+def _is_no_gate(sightings: _Sightings, size: float) -> bool:
+    """Whether sightings are surely of one thing that has another size than a gate, about the one given."""
     if len(sightings.away_m) < LEFT:
         return False
-    _, size, cost = _fit(sightings, size, is_frame=False)
+    _, size, cost = _fit(sightings, size, is_gate=False)
     if 1.0 / OTHER_SIZE < size < OTHER_SIZE or cost > AGREES**2 * len(sightings.away_m):
         return False
-    return _fit(sightings, 1.0, is_frame=True)[2] - cost > SURE
+    return _fit(sightings, 1.0, is_gate=True)[2] - cost > SURE
 
 
-def _fit(sightings: _Sightings, size: float, *, is_frame: bool) -> tuple[Floats, float, float]:
+def _fit(sightings: _Sightings, size: float, *, is_gate: bool) -> tuple[Floats, float, float]:
     """Place and size that fit sightings best (linear least squares), and the sum of squared deviations.
 
     Args:
         sightings: of one thing.
         size: about.
-        is_frame: the size is that of a frame, and only the place is found.
+        is_gate: the size is that of a gate, and only the place is found.
     """
     away_std, place_std_m = sightings.stds.T
     away_m = size * sightings.away_m
@@ -263,7 +263,7 @@ def _fit(sightings: _Sightings, size: float, *, is_frame: bool) -> tuple[Floats,
     seen = np.einsum("nij,nj->ni", rows, sightings.eyes_m)
     sized = np.zeros_like(seen)
     sized[:, 3] = along * sightings.away_m
-    if is_frame:
+    if is_gate:
         place_m = np.linalg.lstsq(rows.reshape(-1, 3), (seen + sized).ravel(), rcond=None)[0]
     else:
         system = np.concatenate((rows, -sized[:, :, None]), axis=2).reshape(-1, 4)

@@ -1,8 +1,8 @@
-"""The pose of a frame from four points of its middle plane.
+"""The pose of a gate from four points of its middle plane.
 
 A rectangle seen from one side has, in general, two poses that explain its image nearly as well as each other:
 tilted to one side or to the other. Both follow from how the image of the middle changes with its place on
-the frame (T. Collins, A. Bartoli, "Infinitesimal plane-based pose estimation", International Journal of
+the gate (T. Collins, A. Bartoli, "Infinitesimal plane-based pose estimation", International Journal of
 Computer Vision, 2014). OpenCV has a solver for this, too; for a rectangle and in plain numbers it is several
 times quicker, and an image that is symmetric to the last digit is no special case.
 """
@@ -16,11 +16,11 @@ import cv2
 import numpy as np
 
 from framerunner.geometry.vectors import Vec3
-from vision.frame_model import AXES_CORNERS, AXES_HEIGHT_M, AXES_WIDTH_M, Floats, ModelPose, Point
-from vision.types import FramePose
+from vision.gate_model import AXES_CORNERS, AXES_HEIGHT_M, AXES_WIDTH_M, Floats, ModelPose, Point
+from vision.types import GatePose
 
 _NEAREST_M = 0.03
-_MIN_UPRIGHT = 0.6  # cosine of the largest tilt of the camera, about 53 degrees: frames are upright
+_MIN_UPRIGHT = 0.6  # cosine of the largest tilt of the camera, about 53 degrees: gates are upright
 _MAX_STEPS = 12
 _DAMPING = 1e-6 * np.eye(6)
 _SMALL_STEP = 1e-3  # metres and radians
@@ -35,7 +35,7 @@ _Rows = tuple[Vec3, Vec3, Vec3]
 
 
 def find_poses(axes_corners: Sequence[Point], focal_px: float, max_error_px: float) -> list[ModelPose]:
-    """Find the poses of a frame.
+    """Find the poses of a gate.
 
     Args:
         axes_corners: where the axes of its bars meet, upper left, upper right, lower right, lower left:
@@ -52,17 +52,17 @@ def find_poses(axes_corners: Sequence[Point], focal_px: float, max_error_px: flo
     return sorted(found, key=lambda pose: pose.error_px)
 
 
-def as_seen(pose: ModelPose) -> FramePose:
+def as_seen(pose: ModelPose) -> GatePose:
     """The pose as others use it, in the camera's axes forward, left, up."""
     right, down, ahead = pose.rotation[:, 2].tolist()
     x, y, z = pose.shift_m.tolist()
     if right * x + down * y + ahead * z > 0.0:  # the normal points to the side from which it is seen
         right, down, ahead = -right, -down, -ahead
-    return FramePose((z, -x, -y), (ahead, -right, -down), pose.error_px)
+    return GatePose((z, -x, -y), (ahead, -right, -down), pose.error_px)
 
 
 def _rotations(image: list[Point]) -> list[_Rows]:
-    """The two rotations, by rows, with which a small part of the frame's middle looks as it does.
+    """The two rotations, by rows, with which a small part of the gate's middle looks as it does.
 
     Args:
         image: the four corners, in units of the focal length.
@@ -79,7 +79,7 @@ def _rotations(image: list[Point]) -> list[_Rows]:
     depth = 1.0 + 0.5 * (g + h)
     if depth < _FLAT:
         return []
-    # The image of the middle, and how it changes with the place on the frame, for each metre.
+    # The image of the middle, and how it changes with the place on the gate, for each metre.
     p, q = (0.5 * (along[0] + down[0]) + x0) / depth, (0.5 * (along[1] + down[1]) + y0) / depth
     per_x, per_y = 1.0 / (depth * AXES_WIDTH_M), 1.0 / (depth * AXES_HEIGHT_M)
     j00, j01 = (along[0] - p * g) * per_x, (down[0] - p * h) * per_y
@@ -153,7 +153,7 @@ def poses_of_three(
     focal_px: float,
     guesses: Sequence[ModelPose] = (),
 ) -> list[ModelPose]:
-    """Find the poses of a frame of which one side is not seen.
+    """Find the poses of a gate of which one side is not seen.
 
     Args:
         lines: (a, b, c) of a x + b y = c for the axis of each side, pixels from the optical axis; one is

@@ -1,4 +1,4 @@
-"""The frame finder on painted images of known geometry."""
+"""The gate finder on painted images of known geometry."""
 
 from math import atan2, cos, degrees, hypot, radians, sin
 
@@ -8,27 +8,27 @@ import pytest
 
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.vectors import Quaternion, Vec3
-from scenarios.imaging.effects import CameraEffects, Hall, Lens, Patch
-from scenarios.models import Base, Frame, Pole, Scenario
+from scenarios.imaging.effects import CameraEffects, Hall, LensDistortion, Patch
+from scenarios.models import Base, Gate, Pole, Scenario
 from scenarios.models import Camera as ScenarioCamera
-from sitl.camera import Camera
+from sitl.camera import SimulatedCamera
 from vision.calibration.model import Calibration, CalibrationError
 from vision.detectors import new_detector
-from vision.types import Detections, FrameSighting
+from vision.types import Detections, GateSighting
 
-FRAME = Frame(colour="green", x_m=0, y_m=0, z_m=1.5, yaw_rad=0.4)
-SCENARIO = Scenario(name="one", frames=(FRAME,), base=Base(x_m=4.5, y_m=4.5))
-CAMERA = Camera(SCENARIO)
+GATE = Gate(colour="green", x_m=0, y_m=0, z_m=1.5, yaw_rad=0.4)
+SCENARIO = Scenario(name="one", frames=(GATE,), base=Base(x_m=4.5, y_m=4.5))
+CAMERA = SimulatedCamera(SCENARIO)
 FIND = new_detector("frames", focal_px=CAMERA.focal_px, rendered=True)
 
 
 def look(
     distance: float, turn: float = 0.0, roll: float = 0.0, pitch: float = 0.0, aside: float = 0.0
 ) -> tuple[Vec3, Quaternion]:
-    """Pose with the camera `distance` from the frame's centre, `turn` round it, looking at it."""
-    yaw = FRAME.yaw_rad + turn
+    """Pose with the camera `distance` from the gate's centre, `turn` round it, looking at it."""
+    yaw = GATE.yaw_rad + turn
     reach = distance + 0.08
-    position = (-reach * cos(yaw), -reach * sin(yaw), FRAME.z_m)
+    position = (-reach * cos(yaw), -reach * sin(yaw), GATE.z_m)
     return position, quaternion_from_euler(roll, pitch, yaw + aside)
 
 
@@ -36,7 +36,7 @@ def see(position: Vec3, attitude: Quaternion) -> Detections:
     return FIND(CAMERA.render(position, attitude), 7)
 
 
-def only(found: Detections) -> FrameSighting:
+def only(found: Detections) -> GateSighting:
     (sighting,) = found.frames
     assert sighting.colour == "green"
     return sighting
@@ -57,19 +57,19 @@ def test_one_of_the_poses_is_right(distance: float, turn: float) -> None:
 @pytest.mark.parametrize("turn", [-1.0, 1.0])  # mirror images: the solver answers NaN to one of them
 def test_the_signed_angle_says_where_to_fly(turn: float) -> None:
     found = see(*look(0.8, turn))
-    # Turned counter-clockwise round the frame, the camera is on the right of its axis: left is the way.
+    # Turned counter-clockwise round the gate, the camera is on the right of its axis: left is the way.
     assert found.green.signed_a == pytest.approx(degrees(turn), abs=4.0)
     assert found.green.seen
     assert found.time_us == 7
     assert not found.red.seen
 
 
-def test_a_frame_behind_is_not_seen() -> None:
+def test_a_gate_behind_is_not_seen() -> None:
     position, _ = look(1.0)
-    assert see(position, quaternion_from_euler(0.0, 0.0, FRAME.yaw_rad + radians(180))).frames == ()
+    assert see(position, quaternion_from_euler(0.0, 0.0, GATE.yaw_rad + radians(180))).frames == ()
 
 
-def test_a_frame_that_the_border_cuts_has_its_sure_corners() -> None:
+def test_a_gate_that_the_border_cuts_has_its_sure_corners() -> None:
     sighting = only(see(*look(0.6, 0.3, aside=-0.75)))
     assert not sighting.whole
     upper_left, upper_right, lower_right, lower_left = sighting.corners
@@ -79,11 +79,11 @@ def test_a_frame_that_the_border_cuts_has_its_sure_corners() -> None:
     assert upper_right.down_px < lower_right.down_px
 
 
-def test_a_frame_behind_another_is_seen_through_it() -> None:
-    blue = Frame(colour="blue", x_m=2, y_m=-0.4, z_m=1.5, yaw_rad=0.3)
-    red = Frame(colour="red", x_m=0.8, y_m=0, z_m=1.5, yaw_rad=0)
+def test_a_gate_behind_another_is_seen_through_it() -> None:
+    blue = Gate(colour="blue", x_m=2, y_m=-0.4, z_m=1.5, yaw_rad=0.3)
+    red = Gate(colour="red", x_m=0.8, y_m=0, z_m=1.5, yaw_rad=0)
     scenario = Scenario(name="two", frames=(red, blue), base=Base(x_m=4.5, y_m=4.5))
-    image = Camera(scenario).render((-0.08, 0.0, 1.5), (1.0, 0.0, 0.0, 0.0))
+    image = SimulatedCamera(scenario).render((-0.08, 0.0, 1.5), (1.0, 0.0, 0.0, 0.0))
     found = {sighting.colour: sighting for sighting in FIND(image, None).frames}
     assert found["red"].whole
     assert not found["blue"].whole
@@ -96,7 +96,7 @@ def test_a_frame_behind_another_is_seen_through_it() -> None:
             assert corner.down_px == pytest.approx(-CAMERA.focal_px * 0.11 * up / ahead, abs=1.0)
 
 
-def test_what_looks_like_a_frame_but_is_none_is_refused() -> None:
+def test_what_looks_like_a_gate_but_is_none_is_refused() -> None:
     image = np.full((240, 320, 3), 200, np.uint8)
     cv2.rectangle(image, (60, 60), (140, 102), (0, 0, 255), -1)  # filled
     cv2.rectangle(image, (200, 60), (240, 180), (0, 255, 0), 6)  # upright
@@ -107,8 +107,8 @@ def test_what_looks_like_a_frame_but_is_none_is_refused() -> None:
 
 def test_obstacles_end_where_they_stand() -> None:
     pole = Pole(x_m=2.0, y_m=0.0, edge_m=0.3)
-    scenario = Scenario(name="pole", frames=(FRAME,), base=Base(x_m=4.5, y_m=4.5), poles=(pole,))
-    image = Camera(scenario).render((-0.08, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    scenario = Scenario(name="pole", frames=(GATE,), base=Base(x_m=4.5, y_m=4.5), poles=(pole,))
+    image = SimulatedCamera(scenario).render((-0.08, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
     edges = [edge for edge in FIND(image, None).obstacle_edges if not edge.cut]
     assert edges
     for edge in edges:
@@ -140,7 +140,7 @@ def test_any_image_gets_an_answer() -> None:
             assert any(sighting.corners)
 
 
-BARREL = Lens(k1=-0.25, k2=0.07, p1=0.001, p2=-0.001)
+BARREL = LensDistortion(k1=-0.25, k2=0.07, p1=0.001, p2=-0.001)
 
 
 @pytest.mark.parametrize(
@@ -149,9 +149,9 @@ BARREL = Lens(k1=-0.25, k2=0.07, p1=0.001, p2=-0.001)
 def test_a_calibrated_camera_gives_corners_and_poses_of_an_ideal_one(distance_m, aside_deg, angle_deg):
     aside, angle = np.radians((aside_deg, angle_deg))
     x, y = distance_m * np.cos(aside), distance_m * np.sin(aside)
-    frame = Frame(colour="red", x_m=x, y_m=y, z_m=1.2, yaw_rad=float(aside + angle))
+    gate = Gate(colour="red", x_m=x, y_m=y, z_m=1.2, yaw_rad=float(aside + angle))
     camera = ScenarioCamera(position_flu_m=(0.0, 0.0, 0.0), effects=CameraEffects(lens=BARREL))
-    image = Camera(Scenario(name="lens", frames=[frame], camera=camera)).render(
+    image = SimulatedCamera(Scenario(name="lens", frames=[gate], camera=camera)).render(
         (0.0, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0)
     )
     calibration = Calibration.ideal(320, 240, camera.focal_px, BARREL.coefficients)
@@ -160,7 +160,7 @@ def test_a_calibrated_camera_gives_corners_and_poses_of_an_ideal_one(distance_m,
     assert sighting.poses[0].position_flu_m == pytest.approx((x, y, 0.0), abs=0.015 * distance_m)
     ideal = new_detector("frames", focal_px=camera.focal_px, rendered=True, smooth=True)
     blind = ideal(image, None).frames
-    if distance_m < 1.0:  # without the calibration it is no frame, or elsewhere
+    if distance_m < 1.0:  # without the calibration it is no gate, or elsewhere
         assert (
             not blind
             or not blind[0].poses
@@ -175,21 +175,21 @@ def test_images_of_another_size_than_calibrated_are_refused():
 
 
 @pytest.mark.parametrize("border_m", [None, 0.14, 0.012])
-def test_sheets_and_drawn_rectangles_are_no_frames(border_m):
+def test_sheets_and_drawn_rectangles_are_no_gates(border_m):
     poster = Patch(
         surface="front", colour="red", across_m=0.0, up_m=1.2, width_m=1.2, height_m=0.6, border_m=border_m
     )
     scenario = Scenario(name="poster", hall=Hall(), patches=[poster])
-    image = Camera(scenario).render((3.5, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0))
+    image = SimulatedCamera(scenario).render((3.5, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0))
     assert not [sighting for sighting in FIND(image, None).frames if sighting.poses]
 
 
 @pytest.mark.parametrize("up_m", [1.3, 1.05])
-def test_a_frame_before_a_poster_of_its_colour_is_found(up_m):
-    frame = Frame(colour="red", x_m=2.0, y_m=0.0, z_m=1.2, yaw_rad=0.2)
+def test_a_gate_before_a_poster_of_its_colour_is_found(up_m):
+    gate = Gate(colour="red", x_m=2.0, y_m=0.0, z_m=1.2, yaw_rad=0.2)
     poster = Patch(surface="front", colour="red", across_m=0.3, up_m=up_m, width_m=0.3, height_m=1.2)
     camera = ScenarioCamera(position_flu_m=(0.0, 0.0, 0.0))
-    scenario = Scenario(name="poster", frames=[frame], camera=camera, hall=Hall(), patches=[poster])
-    image = Camera(scenario).render((0.9, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0))
+    scenario = Scenario(name="poster", frames=[gate], camera=camera, hall=Hall(), patches=[poster])
+    image = SimulatedCamera(scenario).render((0.9, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0))
     whole = [sighting for sighting in FIND(image, None).frames if sighting.whole and sighting.poses]
     assert whole[0].poses[0].position_flu_m == pytest.approx((1.1, 0.0, 0.0), abs=0.03)

@@ -19,10 +19,10 @@ from framerunner.vehicle.airframe import load_airframe
 from framerunner.wire.mission_report import Plain
 from offboard.app import Moment
 from offboard.drone import DroneState
-from offboard.navigation.view import FrameEstimate, NavigationView
-from scenarios.imaging.effects import Lens
+from offboard.navigation.view import GateEstimate, NavigationView
+from scenarios.imaging.effects import LensDistortion
 from scenarios.models import COLOURS, Arena, Scenario
-from sitl.solids import frame_solids
+from sitl.solids import gate_solids
 from vision.intrinsics import camera_matrix
 from vision.types import Detection, Detections
 
@@ -40,7 +40,7 @@ _DECOY_RGBA: dict[str, Message] = {
     "cyan": {"r": 0.0, "g": 0.8, "b": 0.8, "a": 1.0},
     "magenta": {"r": 1.0, "g": 0.0, "b": 1.0, "a": 1.0},
 }
-_OTHER = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}  # a frame that is no part of the task
+_OTHER = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}  # a gate that is no part of the task
 _FLOOR = {"r": 0.88, "g": 0.69, "b": 0.22, "a": 0.6}
 _BORDER = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 0.7}
 _BASE = {"r": 0.67, "g": 0.67, "b": 0.67, "a": 1.0}
@@ -51,7 +51,7 @@ _CLEAR = {"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0}
 _LABEL = {"r": 1.0, "g": 1.0, "b": 1.0, "a": 1.0}
 _INFO = 2
 _FLOOR_M = 0.01
-_FRAME_SIZE_M = (0.42, 0.22)  # outer width and height of one that is no part of the scenario
+_GATE_SIZE_M = (0.42, 0.22)  # outer width and height of one that is no part of the scenario
 _DASHES_A_LEG = 4
 _MAX_TEXT = 80  # characters of a goal
 
@@ -218,7 +218,7 @@ def _guard_value(name: str, value: Plain) -> Message:
 
 
 def crossing(time_us: int, colour: str, time_s: float, offset_m: float, side: str) -> Message:
-    """A frame was crossed; see `scenarios.crossing.Passage`."""
+    """A gate was crossed; see `scenarios.crossing.Passage`."""
     return {
         "timestamp": time_of(time_us),
         "colour": colour,
@@ -234,26 +234,26 @@ def log(time_us: int, name: str, text: str) -> Message:
     return {"timestamp": timestamp, "level": _INFO, "message": text, "name": name, "file": "", "line": 0}
 
 
-def frame_map(view: NavigationView, time_us: int) -> Message:
-    """The navigator's map; a number that is not finite is left out, with its frame if that has no place."""
-    frames = [_mapped_frame(frame) for frame in view.frames if has_place(frame)]
-    return {"timestamp": time_of(time_us), "goal": view.goal[:_MAX_TEXT], "frames": frames}
+def gate_map(view: NavigationView, time_us: int) -> Message:
+    """The navigator's map; a number that is not finite is left out, with its gate if that has no place."""
+    gates = [_mapped_gate(gate) for gate in view.gates if has_place(gate)]
+    return {"timestamp": time_of(time_us), "goal": view.goal[:_MAX_TEXT], "frames": gates}
 
 
-def _mapped_frame(frame: FrameEstimate) -> Message:
+def _mapped_gate(gate: GateEstimate) -> Message:
     message = {
-        "colour": frame.colour,
-        "position_arena_m": _vector(frame.position_m),
-        "yaw_rad": frame.yaw_rad,
-        "ambiguous": frame.ambiguous,
-        "certain": frame.certain,
-        "views": frame.views,
-        "seen": time_of(frame.seen_us),
+        "colour": gate.colour,
+        "position_arena_m": _vector(gate.position_m),
+        "yaw_rad": gate.yaw_rad,
+        "ambiguous": gate.ambiguous,
+        "certain": gate.certain,
+        "views": gate.views,
+        "seen": time_of(gate.seen_us),
     }
-    if all(map(isfinite, frame.position_std_m)):
-        message["position_std_m"] = _vector(frame.position_std_m)
-    if isfinite(frame.yaw_std_rad):
-        message["yaw_std_rad"] = frame.yaw_std_rad
+    if all(map(isfinite, gate.position_std_m)):
+        message["position_std_m"] = _vector(gate.position_std_m)
+    if isfinite(gate.yaw_std_rad):
+        message["yaw_std_rad"] = gate.yaw_std_rad
     return message
 
 
@@ -267,33 +267,33 @@ def path(view: NavigationView, time_us: int) -> Message:
 def map_scene(view: NavigationView, scenario: Scenario, time_us: int) -> Message:
     """The map as a drawing: outlines, dashed until certain, with ellipsoids of two standard deviations."""
     sizes_m: dict[str, tuple[float, float]] = {
-        frame.colour: (frame.outer_width_m, frame.outer_height_m) for frame in scenario.frames
+        gate.colour: (gate.outer_width_m, gate.outer_height_m) for gate in scenario.frames
     }
     entities = [
         _entity(
             time_us,
-            f"{number} {frame.colour}",
+            f"{number} {gate.colour}",
             ARENA,
-            **_drawn_estimate(frame, sizes_m.get(frame.colour, _FRAME_SIZE_M)),
+            **_drawn_estimate(gate, sizes_m.get(gate.colour, _GATE_SIZE_M)),
         )
-        for number, frame in enumerate(view.frames)
-        if has_place(frame)
+        for number, gate in enumerate(view.gates)
+        if has_place(gate)
     ]
     return {"deletions": [{"timestamp": time_of(time_us), "type": 1, "id": ""}], "entities": entities}
 
 
-def _drawn_estimate(frame: FrameEstimate, size_m: tuple[float, float]) -> dict[str, list[Message]]:
-    colour = RGBA.get(frame.colour, _OTHER)
+def _drawn_estimate(gate: GateEstimate, size_m: tuple[float, float]) -> dict[str, list[Message]]:
+    colour = RGBA.get(gate.colour, _OTHER)
     half_width, half_height = size_m[0] / 2, size_m[1] / 2
-    c, s = cos(frame.yaw_rad), sin(frame.yaw_rad)
-    x, y, z = frame.position_m
+    c, s = cos(gate.yaw_rad), sin(gate.yaw_rad)
+    x, y, z = gate.position_m
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]
     loop = [(x - s * a * half_width, y + c * a * half_width, z + b * half_height) for a, b in corners]
-    lines = [_lines(_dashes(loop) if not frame.certain else _pairs(loop), colour, 2.0)]
-    if not all(map(isfinite, frame.position_std_m)):
+    lines = [_lines(_dashes(loop) if not gate.certain else _pairs(loop), colour, 2.0)]
+    if not all(map(isfinite, gate.position_std_m)):
         return {"lines": lines}
-    sigma_x, sigma_y, sigma_z = frame.position_std_m
-    sphere = _cube(frame.position_m, (4 * sigma_x, 4 * sigma_y, 4 * sigma_z), {**colour, "a": 0.25})
+    sigma_x, sigma_y, sigma_z = gate.position_std_m
+    sphere = _cube(gate.position_m, (4 * sigma_x, 4 * sigma_y, 4 * sigma_z), {**colour, "a": 0.25})
     return {"lines": lines, "spheres": [sphere]}
 
 
@@ -320,11 +320,11 @@ def scene(scenario: Scenario, time_us: int) -> Message:
         _entity(time_us, "arena", ARENA, cubes=[floor], lines=[_border(arena)]),
         _entity(time_us, "base", ARENA, cubes=[_solid(scenario.base.solid, _BASE)]),
     ]
-    for frame in scenario.frames:
-        bars = [_solid(bar, RGBA[frame.colour]) for bar in frame_solids(frame)]
-        entities.append(_entity(time_us, f"{frame.colour} frame", ARENA, cubes=bars))
+    for gate in scenario.frames:
+        bars = [_solid(bar, RGBA[gate.colour]) for bar in gate_solids(gate)]
+        entities.append(_entity(time_us, f"{gate.colour} frame", ARENA, cubes=bars))
     obstacles = [
-        _solid(bar, _DECOY_RGBA[decoy.colour]) for decoy in scenario.decoys for bar in frame_solids(decoy)
+        _solid(bar, _DECOY_RGBA[decoy.colour]) for decoy in scenario.decoys for bar in gate_solids(decoy)
     ]
     obstacles += [_solid(prism, _PRISM) for prism in scenario.prisms]
     if obstacles:
@@ -349,7 +349,7 @@ def camera_transform(scenario: Scenario, time_us: int) -> Message:
 def calibration(scenario: Scenario, time_us: int) -> Message:
     """The camera of the scenario: a pinhole camera and the distortion of its lens."""
     camera = scenario.camera
-    lens = Lens() if camera.effects is None else camera.effects.lens
+    lens = LensDistortion() if camera.effects is None else camera.effects.lens
     matrix = camera_matrix(camera.width_px, camera.height_px, camera.horizontal_fov_rad).tolist()
     return {
         "timestamp": time_of(time_us),

@@ -1,4 +1,4 @@
-"""Where the corners of a frame are in an image, and what one image tells of its pose."""
+"""Where the corners of a gate are in an image, and what one image tells of its pose."""
 
 from dataclasses import replace
 from math import pi
@@ -8,13 +8,13 @@ import pytest
 
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.frames.frame_measurement import Prior, View, predicted, solutions, view_of
-from offboard.navigation.frames.frame_track import half_turn
+from offboard.navigation.gates.gate_measurement import GateView, Prior, predicted, solutions, view_of
+from offboard.navigation.gates.gate_track import half_turn
 from offboard.navigation.pose_history import DronePose
 from scenarios.models import Arena
-from tests.offboard.navigation.sightings import CAMERA, corners_px, frame_at, sighting
+from tests.offboard.navigation.sightings import CAMERA, corners_px, gate_at, sighting
 
-FRAME = frame_at(0.3, -0.2, 1.5, 0.4)
+GATE = gate_at(0.3, -0.2, 1.5, 0.4)
 STATE = np.array((0.3, -0.2, 1.5, 0.4))
 # Frontal, beside, beside and above, from the rear and below, partly out of view, oblique.
 PLACES: list[tuple[Vec3, float]] = [
@@ -27,10 +27,10 @@ PLACES: list[tuple[Vec3, float]] = [
 ]
 
 
-def view(place_m: Vec3, yaw_rad: float, noise: float = 0.0) -> View:
-    """What is seen of the frame from a place."""
+def view(place_m: Vec3, yaw_rad: float, noise: float = 0.0) -> GateView:
+    """What is seen of the gate from a place."""
     attitude = quaternion_from_euler(0.04, 0.08, yaw_rad)
-    seen = sighting(FRAME, place_m, attitude, np.random.default_rng(5), noise)
+    seen = sighting(GATE, place_m, attitude, np.random.default_rng(5), noise)
     assert seen is not None
     made = view_of(seen, CAMERA, DronePose(0, place_m, attitude))
     assert made is not None
@@ -38,12 +38,12 @@ def view(place_m: Vec3, yaw_rad: float, noise: float = 0.0) -> View:
 
 
 @pytest.mark.parametrize(("place_m", "yaw_rad"), PLACES)
-def test_predicted_corners_are_those_of_the_frame_as_seen(place_m: Vec3, yaw_rad: float) -> None:
+def test_predicted_corners_are_those_of_the_gate_as_seen(place_m: Vec3, yaw_rad: float) -> None:
     seen = view(place_m, yaw_rad)
     prediction = predicted(STATE, seen)
     assert prediction is not None
     assert prediction[0] == pytest.approx(seen.corners_px, abs=1e-6)
-    truth = corners_px(FRAME, place_m, quaternion_from_euler(0.04, 0.08, yaw_rad))
+    truth = corners_px(GATE, place_m, quaternion_from_euler(0.04, 0.08, yaw_rad))
     assert truth is not None
     assert sum(seen.seen) == sum(CAMERA.contains(right, down) for right, down in truth)
 

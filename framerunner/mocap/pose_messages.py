@@ -7,14 +7,14 @@ from math import nan
 from framerunner.geometry.rotations import euler_from_quaternion
 from framerunner.mocap.facts import SendSettings
 from framerunner.mocap.motion import body_velocity
-from framerunner.mocap.poses import Pose
+from framerunner.mocap.poses import MeasuredPose
 from framerunner.wire.dialect import Message, mavlink
 
 _DIAGONAL = (0, 6, 11, 15, 18, 20)
 _QUALITY = 100
 
 
-def odometry(pose: Pose, stamp_us: int, settings: SendSettings, frame: int) -> Message:
+def odometry(pose: MeasuredPose, stamp_us: int, settings: SendSettings, frame: int) -> Message:
     """An ODOMETRY of the type VISION.
 
     Args:
@@ -43,7 +43,7 @@ def odometry(pose: Pose, stamp_us: int, settings: SendSettings, frame: int) -> M
     )
 
 
-def vision_position(pose: Pose, stamp_us: int, settings: SendSettings) -> Message:
+def vision_position(pose: MeasuredPose, stamp_us: int, settings: SendSettings) -> Message:
     """A VISION_POSITION_ESTIMATE; it has no velocity.
 
     Args:

@@ -22,7 +22,7 @@ from firmware_py.missions.items import (
     ROI_WPINDEX,
     ROI_WPNEXT,
     Do,
-    Frame,
+    MavFrame,
     MissionItem,
     PlanType,
 )
@@ -43,36 +43,36 @@ _WITHOUT_PLACE = (
 )
 _OF_OTHER_PLANS = frozenset(_FENCE | {Do.RALLY_POINT})
 _SHORT_FRAMES: dict[int, int] = {
-    Frame.GLOBAL_INT: Frame.GLOBAL,
-    Frame.GLOBAL_RELATIVE_ALT_INT: Frame.GLOBAL_RELATIVE_ALT,
+    MavFrame.GLOBAL_INT: MavFrame.GLOBAL,
+    MavFrame.GLOBAL_RELATIVE_ALT_INT: MavFrame.GLOBAL_RELATIVE_ALT,
 }
 _INT_FRAMES = {short: long for long, short in _SHORT_FRAMES.items()}
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class ItemRefusal:
     """An item that cannot be taken."""
 
     result: int  # MAV_MISSION_RESULT
     reason: str
 
 
-def read_item(message: Message, plan_type: PlanType) -> MissionItem | Refusal:
+def read_item(message: Message, plan_type: PlanType) -> MissionItem | ItemRefusal:
     """The item in a MISSION_ITEM or MISSION_ITEM_INT, if a plan of that type may have it."""
     is_int = message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT
     frame, command = message.frame, message.command
     if frame in GLOBAL_FRAMES and (is_int or frame not in _SHORT_FRAMES):
         accepted = command in _WITH_PLACE[plan_type]
-    elif frame == Frame.MISSION:
+    elif frame == MavFrame.MISSION:
         accepted = plan_type is PlanType.MISSION and command in _WITHOUT_PLACE
     else:
-        return Refusal(mavlink.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {frame} is not supported")
+        return ItemRefusal(mavlink.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {frame} is not supported")
     if not accepted:
         misplaced = plan_type is PlanType.MISSION and command in _OF_OTHER_PLANS
         result = mavlink.MAV_MISSION_ERROR if misplaced else mavlink.MAV_MISSION_UNSUPPORTED
-        return Refusal(result, f"command {command} is not supported in frame {frame}")
+        return ItemRefusal(result, f"command {command} is not supported in frame {frame}")
     x, y = float(message.x), float(message.y)
-    if is_int and frame != Frame.MISSION:
+    if is_int and frame != MavFrame.MISSION:
         x = nan if message.x == _NOT_GIVEN else message.x * 1e-7
         y = nan if message.y == _NOT_GIVEN else message.y * 1e-7
     params = (message.param1, message.param2, message.param3, message.param4)
@@ -80,26 +80,26 @@ def read_item(message: Message, plan_type: PlanType) -> MissionItem | Refusal:
     return next(_faults(item), item)
 
 
-def _faults(item: MissionItem) -> Iterator[Refusal]:
+def _faults(item: MissionItem) -> Iterator[ItemRefusal]:
     """The faults in the numbers of an item."""
     first, second = item.params[0], item.params[1]
     with_place = item.frame in GLOBAL_FRAMES
     if with_place and not _is_angle(item.x, 90.0, optional=item.has_place):
-        yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM5_X, f"latitude {item.x:g} is no place")
+        yield ItemRefusal(mavlink.MAV_MISSION_INVALID_PARAM5_X, f"latitude {item.x:g} is no place")
     if with_place and not _is_angle(item.y, 180.0, optional=item.has_place):
-        yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM6_Y, f"longitude {item.y:g} is no place")
+        yield ItemRefusal(mavlink.MAV_MISSION_INVALID_PARAM6_Y, f"longitude {item.y:g} is no place")
     if with_place and isinf(item.z):
-        yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM7, f"altitude {item.z:g} cannot be flown")
+        yield ItemRefusal(mavlink.MAV_MISSION_INVALID_PARAM7, f"altitude {item.z:g} cannot be flown")
     if item.command in _REGIONS and first not in (_REGION_PLACES if with_place else _REGION_WAYPOINTS):
-        yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM1, f"region mode {first:g} is not supported")
+        yield ItemRefusal(mavlink.MAV_MISSION_INVALID_PARAM1, f"region mode {first:g} is not supported")
     if item.command == Do.JUMP and not isfinite(first):
-        yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM1, f"index {first:g} to jump to is none")
+        yield ItemRefusal(mavlink.MAV_MISSION_INVALID_PARAM1, f"index {first:g} to jump to is none")
     if item.command == Do.JUMP and not isfinite(second):
-        yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM2, f"count {second:g} of jumps is none")
+        yield ItemRefusal(mavlink.MAV_MISSION_INVALID_PARAM2, f"count {second:g} of jumps is none")
     if item.command in CIRCLES and not (isfinite(first) and first >= 0.0):
-        yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM1, f"radius {first:g} is none")
+        yield ItemRefusal(mavlink.MAV_MISSION_INVALID_PARAM1, f"radius {first:g} is none")
     if item.command in POLYGONS and vertex_count(item) < MIN_VERTICES:
-        yield Refusal(mavlink.MAV_MISSION_ERROR, f"a polygon needs {MIN_VERTICES} vertices")
+        yield ItemRefusal(mavlink.MAV_MISSION_ERROR, f"a polygon needs {MIN_VERTICES} vertices")
 
 
 def _is_angle(angle_deg: float, max_deg: float, *, optional: bool) -> bool:
@@ -116,7 +116,7 @@ def item_message(
     x: float = item.x
     y: float = item.y
     if as_int:
-        scale = 1.0 if item.frame == Frame.MISSION else 1e7
+        scale = 1.0 if item.frame == MavFrame.MISSION else 1e7
         x, y = _as_int(item.x, scale), _as_int(item.y, scale)
     return build(
         *target,

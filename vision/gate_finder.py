@@ -1,4 +1,4 @@
-"""Find frames by their shape: corners and poses of every frame in an image, and the feet of obstacles."""
+"""Find gates by their shape: corners and poses of every gate in an image, and the feet of obstacles."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ import numpy.typing as npt
 from vision.calibration.lens import Lens, straight_box
 from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
 from vision.detector import measure
-from vision.frame_fit import FittedFrame, fit_frame
-from vision.frame_model import Sides
+from vision.gate_fit import FittedGate, fit_gate
+from vision.gate_model import Sides
 from vision.outer_sides import outer_sides, sides_by_opening
-from vision.patch import Patch, cut_patch
+from vision.patch import ImagePatch, cut_patch
 from vision.types import (
     NOT_SEEN,
     Detection,
     Detections,
-    FramePose,
-    FrameSighting,
+    GatePose,
+    GateSighting,
     Image,
     ObstacleEdge,
 )
@@ -46,8 +46,8 @@ _SHEET_PX, _SHEET_SHARE = 5.0, 0.9
 _OPENING_PX = 12  # a region smaller than this is not looked at for an opening
 
 
-class FrameFinder:
-    """Finds frames of known size by colour and shape.
+class GateFinder:
+    """Finds gates of known size by colour and shape.
 
     Args:
         focal_px: focal length of the camera; its optical axis is in the middle of the image.
@@ -63,14 +63,14 @@ class FrameFinder:
         self._lens = lens
 
     def find(self, image: Image, time_us: int | None = None) -> Detections:
-        """Find all frames and obstacles.
+        """Find all gates and obstacles.
 
         Args:
             image: BGR, shape (height, width, 3), uint8.
             time_us: vehicle time of the image, passed on.
 
         Returns:
-            The frames by shape, the obstacles' lower ends, and for the largest region of red, green and blue
+            The gates by shape, the obstacles' lower ends, and for the largest region of red, green and blue
             the paper's six numbers with the signed angle.
 
         Raises:
@@ -82,7 +82,7 @@ class FrameFinder:
         masks = find_colours(image)
         if not masks:
             return Detections(time_us=time_us)
-        sightings: list[FrameSighting] = []
+        sightings: list[GateSighting] = []
         boxes: dict[str, Detection] = {}
         edges: tuple[ObstacleEdge, ...] = ()
         for mask in masks:
@@ -107,9 +107,9 @@ class FrameFinder:
 
     def _find_colour(
         self, mask: ColourMask, others: Sequence[ColourMask]
-    ) -> tuple[list[FrameSighting], Detection]:
-        """The frames of one colour, and the paper's numbers of the largest one."""
-        found: list[tuple[_Box, FrameSighting]] = []
+    ) -> tuple[list[GateSighting], Detection]:
+        """The gates of one colour, and the paper's numbers of the largest one."""
+        found: list[tuple[_Box, GateSighting]] = []
         for group in _groups(mask, others):
             sighting = self._sighting(mask, others, np.concatenate(group))
             if sighting is not None:
@@ -133,8 +133,8 @@ class FrameFinder:
 
     def _sighting(
         self, mask: ColourMask, others: Sequence[ColourMask], points: _Contour
-    ) -> tuple[_Box, FrameSighting] | None:
-        """The frame that a group of fragments shows, if it is one."""
+    ) -> tuple[_Box, GateSighting] | None:
+        """The gate that a group of fragments shows, if it is one."""
         height, width = mask.mask.shape
         box = _bounding_box(points)
         if _is_filled(mask, points, box):
@@ -148,14 +148,14 @@ class FrameFinder:
             # Something of its colour behind it may spoil its outline, but not that of its opening.
             best = self._best_fit(patch, sides_by_opening(mask.mask, box, self._lens))
         return (
-            None if best is None else (box, FrameSighting(mask.colour, best.corners, best.whole, best.poses))
+            None if best is None else (box, GateSighting(mask.colour, best.corners, best.whole, best.poses))
         )
 
-    def _best_fit(self, patch: Patch, candidates: Sequence[Sides]) -> FittedFrame | None:
-        """The likeliest frame of several first estimates."""
-        best: FittedFrame | None = None
+    def _best_fit(self, patch: ImagePatch, candidates: Sequence[Sides]) -> FittedGate | None:
+        """The likeliest gate of several first estimates."""
+        best: FittedGate | None = None
         for sides in candidates:
-            fitted = fit_frame(patch, sides, self._focal_px, self._spread_px)
+            fitted = fit_gate(patch, sides, self._focal_px, self._spread_px)
             if fitted is not None and (
                 best is None or (fitted.whole, -fitted.cost) > (best.whole, -best.cost)
             ):
@@ -164,7 +164,7 @@ class FrameFinder:
 
 
 def _is_filled(mask: ColourMask, points: _Contour, box: _Box) -> bool:
-    """Whether a region wholly inside the image is a sheet, so large that a frame's opening would show."""
+    """Whether a region wholly inside the image is a sheet, so large that a gate's opening would show."""
     column, row, columns, rows = box
     height, width = mask.mask.shape
     if (
@@ -189,7 +189,7 @@ def _bounding_box(points: _Contour) -> _Box:
 
 
 def _groups(mask: ColourMask, others: Sequence[ColourMask]) -> list[list[_Contour]]:
-    """The outlines of a colour's fragments; those that may be parts of one frame together."""
+    """The outlines of a colour's fragments; those that may be parts of one gate together."""
     column, row, columns, rows = mask.box
     crop = mask.mask[row : row + rows, column : column + columns]
     contours, hierarchy = cv2.findContours(
@@ -203,7 +203,7 @@ def _groups(mask: ColourMask, others: Sequence[ColourMask]) -> list[list[_Contou
         outer = [c for _, c in sorted(large, key=lambda one: -one[0])[:_MAX_FRAGMENTS]]
     if len(outer) < 2:
         return [[c] for c in outer]
-    # Parts of one frame are joined by what hides the rest of it, or are so near that noise parted them.
+    # Parts of one gate are joined by what hides the rest of it, or are so near that noise parted them.
     joined = cv2.dilate(crop, np.ones((3, 3), np.uint8))
     for other in others:
         cv2.bitwise_or(joined, other.mask[row : row + rows, column : column + columns], dst=joined)
@@ -215,7 +215,7 @@ def _groups(mask: ColourMask, others: Sequence[ColourMask]) -> list[list[_Contou
     return list(groups.values())
 
 
-def _signed_angle(pose: FramePose) -> float:
+def _signed_angle(pose: GatePose) -> float:
     """Angle of the line of sight to the normal, degrees, positive if flying left makes it smaller."""
     ahead, left, up = pose.position_flu_m
     along = -(ahead * pose.normal_flu[0] + left * pose.normal_flu[1] + up * pose.normal_flu[2])

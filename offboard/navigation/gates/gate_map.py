@@ -1,4 +1,4 @@
-"""The map of frames: every frame seen is remembered, and each image makes its pose better known.
+"""The map of gates: every gate seen is remembered, and each image makes its pose better known.
 
 How it works is in docs/navigation.md.
 """
@@ -11,66 +11,66 @@ from math import cos, hypot, sin
 import numpy as np
 
 from offboard.navigation.camera_model import CameraModel, CameraPose
-from offboard.navigation.frames.frame_measurement import (
+from offboard.navigation.gates.gate_measurement import (
     HALF_HEIGHT_M,
     HALF_WIDTH_M,
     Floats,
+    GateView,
     Prior,
-    View,
     solutions,
     view_of,
 )
-from offboard.navigation.frames.frame_track import GATES, Fit, FrameTrack, load_filters
-from offboard.navigation.frames.lookalikes import Lookalikes
+from offboard.navigation.gates.gate_track import CHI_SQUARED, Fit, GateTrack, load_filters
+from offboard.navigation.gates.lookalikes import Lookalikes
 from offboard.navigation.pose_history import DronePose
 from offboard.navigation.search.likelihood import LineOfSight
-from offboard.navigation.view import FrameEstimate
+from offboard.navigation.view import GateEstimate
 from scenarios.models import Arena
 from vision.types import Detections, ObstacleEdge
 
-# A frame that is nearer, less oblique and farther inside the image than this is found in all but few images.
+# A gate that is nearer, less oblique and farther inside the image than this is found in all but few images.
 SURELY_FOUND_M = 5.0
 SURELY_FOUND_COSINE = 0.5
 SURELY_FOUND_MARGIN_PX = 8.0
-HIDING_MARGIN_PX = 4.0  # what comes nearer than this to a frame before it may be hidden
+HIDING_MARGIN_PX = 4.0  # what comes nearer than this to a gate before it may be hidden
 OBSTACLE_STEP_PX = 8.0  # likewise to an obstacle, of which every eighth column is known
-BEHIND_M = 0.5  # an obstacle that seems so much farther away than a frame does not hide it
-NEAR_PX = 8.0  # a sighting whose centre is this near to where a frame should be is of that frame,
+BEHIND_M = 0.5  # an obstacle that seems so much farther away than a gate does not hide it
+NEAR_PX = 8.0  # a sighting whose centre is this near to where a gate should be is of that gate,
 NEAR_SHARE = 0.75  # or this share of its width
-DUPLICATE_M = 0.25  # two frames cannot be nearer to each other,
-SEEMED_M = 0.6  # a frame that is so near to where one seemed to be was seen there
+DUPLICATE_M = 0.25  # two gates cannot be nearer to each other,
+SEEMED_M = 0.6  # a gate that is so near to where one seemed to be was seen there
 DUPLICATE_CERTAIN_M = 0.6  # nor as near as this to a certain one: what seemed to be there was seen badly
 
 
-class FrameMap:
-    """The frames seen so far.
+class GateMap:
+    """The gates seen so far.
 
     Args:
         camera: of the drone.
-        arena: frames are in it.
+        arena: gates are in it.
 
     Attributes:
-        frames: all that were seen, of every colour, in the order in which they were found.
+        gates: all that were seen, of every colour, in the order in which they were found.
     """
 
     def __init__(self, camera: CameraModel, arena: Arena) -> None:
         self._camera = camera
         self._arena = arena
         self._prior = Prior.of(arena)
-        self._tracks: list[FrameTrack] = []
+        self._tracks: list[GateTrack] = []
         self._lookalikes = Lookalikes()
-        self.frames: tuple[FrameEstimate, ...] = ()
-        self._best: dict[str, FrameEstimate] = {}  # by colour
+        self.gates: tuple[GateEstimate, ...] = ()
+        self._best: dict[str, GateEstimate] = {}  # by colour
         self._largest_m = hypot(arena.length_x_m, arena.width_y_m)
         self._time_us = -1
         load_filters()
 
-    def best(self, colour: str) -> FrameEstimate | None:
-        """The frame of a colour; the one best known if there are several, None if there is none."""
+    def best(self, colour: str) -> GateEstimate | None:
+        """The gate of a colour; the one best known if there are several, None if there is none."""
         return self._best.get(colour)
 
     def is_lookalike(self, colour: str, line: LineOfSight) -> bool:
-        """Whether what is seen in a direction looks like a frame of a colour, and is known to be none."""
+        """Whether what is seen in a direction looks like a gate of a colour, and is known to be none."""
         return self._lookalikes.are_at(colour, line.origin_m, line.direction)
 
     def observe(
@@ -79,9 +79,9 @@ class FrameMap:
         """Use an image; one that is not later than the last is ignored.
 
         Args:
-            detections: the frames in it.
+            detections: the gates in it.
             pose: of the drone when it was exposed.
-            poses: with a rolling shutter, of the drone when the rows of each frame were read out.
+            poses: with a rolling shutter, of the drone when the rows of each gate were read out.
         """
         if pose.time_us <= self._time_us:
             return
@@ -111,8 +111,8 @@ class FrameMap:
         for view in views:
             self._compare_sizes(view)
 
-    def _compare_sizes(self, view: View) -> None:
-        """Frames that turn out to be larger or smaller things elsewhere are taken from the map."""
+    def _compare_sizes(self, view: GateView) -> None:
+        """Gates that turn out to be larger or smaller things elsewhere are taken from the map."""
         best = self._best.get(view.colour)
         lookalike = None if best is not None and best.certain else self._lookalikes.note(view)
         if lookalike is None:
@@ -126,19 +126,19 @@ class FrameMap:
         self._estimate()
 
     def _estimate(self) -> None:
-        """Note what is known of each frame now: it is asked for far more often than images come."""
+        """Note what is known of each gate now: it is asked for far more often than images come."""
         tracks = [track for track in self._tracks if track.is_inside(self._arena)]
-        self.frames = tuple(track.estimate() for track in tracks)
+        self.gates = tuple(track.estimate() for track in tracks)
         self._best = {}
-        best: dict[str, FrameTrack] = {}
-        for track, estimate in zip(tracks, self.frames, strict=True):
+        best: dict[str, GateTrack] = {}
+        for track, estimate in zip(tracks, self.gates, strict=True):
             other = best.get(track.colour)
             if other is None or track.rank > other.rank:
                 best[track.colour], self._best[track.colour] = track, estimate
 
-    def _match(self, views: list[View], unseen: list[FrameTrack]) -> list[View]:
-        """Give views to the frames that they fit best; returns those that fit none."""
-        fits: list[tuple[float, int, FrameTrack, Fit]] = []
+    def _match(self, views: list[GateView], unseen: list[GateTrack]) -> list[GateView]:
+        """Give views to the gates that they fit best; returns those that fit none."""
+        fits: list[tuple[float, int, GateTrack, Fit]] = []
         for number, view in enumerate(views):
             for track in unseen:
                 if track.colour == view.colour:
@@ -154,8 +154,8 @@ class FrameMap:
                 unseen.remove(track)
         return [view for number, view in enumerate(views) if number not in matched]
 
-    def _explain(self, view: View, unseen: list[FrameTrack]) -> None:
-        """A view that fits no frame contradicts the one that should be seen there, or is of a new one."""
+    def _explain(self, view: GateView, unseen: list[GateTrack]) -> None:
+        """A view that fits no gate contradicts the one that should be seen there, or is of a new one."""
         for track in self._tracks:
             if track.colour == view.colour and self._is_near(track, view):
                 if track in unseen:
@@ -166,13 +166,13 @@ class FrameMap:
         if sum(view.seen) < 3:
             return
         found = solutions([view], self._prior)
-        if found and found[0].cost <= GATES[sum(view.seen)]:
-            track = FrameTrack(found, view)
+        if found and found[0].cost <= CHI_SQUARED[sum(view.seen)]:
+            track = GateTrack(found, view)
             if track.keep_inside(self._arena):
                 self._tracks.append(track)
 
-    def _is_near(self, track: FrameTrack, view: View) -> bool:
-        """Whether a view is where a frame should be in the image."""
+    def _is_near(self, track: GateTrack, view: GateView) -> bool:
+        """Whether a view is where a gate should be in the image."""
         x, y, z, _ = track.state.tolist()
         centre = self._camera.project(view.camera, (x, y, z))
         if centre is None:
@@ -184,9 +184,9 @@ class FrameMap:
         return hypot(right - centre[0], down - centre[1]) <= near_px
 
     def _should_be_seen(
-        self, track: FrameTrack, camera: CameraPose, obstacles: tuple[ObstacleEdge, ...]
+        self, track: GateTrack, camera: CameraPose, obstacles: tuple[ObstacleEdge, ...]
     ) -> bool:
-        """Whether an image must show a frame: it is near, not oblique, wholly inside, hidden by nothing."""
+        """Whether an image must show a gate: it is near, not oblique, wholly inside, hidden by nothing."""
         at = camera.position_m
         x, y, _, yaw = track.state.tolist()
         distance_m = _distance_m(track, camera)
@@ -207,7 +207,7 @@ class FrameMap:
         return not any(self._hides(edge, outline, distance_m, camera) for edge in obstacles)
 
     def _outline(self, state: Floats, camera: CameraPose) -> tuple[float, float, float, float] | None:
-        """The box around a frame in the image: left, top, right, bottom; None if not before the camera."""
+        """The box around a gate in the image: left, top, right, bottom; None if not before the camera."""
         x, y, z, yaw = state.tolist()
         sx, sy = -sin(yaw) * HALF_WIDTH_M, cos(yaw) * HALF_WIDTH_M
         corners = [
@@ -228,7 +228,7 @@ class FrameMap:
         distance_m: float,
         camera: CameraPose,
     ) -> bool:
-        """Whether an obstacle's column of the image may be before a frame: where it stands says how far."""
+        """Whether an obstacle's column of the image may be before a gate: where it stands says how far."""
         if not outline[0] - OBSTACLE_STEP_PX <= edge.right_px <= outline[2] + OBSTACLE_STEP_PX:
             return False
         if edge.cut:
@@ -244,8 +244,8 @@ class FrameMap:
         return away_m < distance_m + BEHIND_M or away_m > self._largest_m
 
     def _drop_duplicates(self) -> None:
-        """Of frames of one colour that cannot both be there, keep the better known."""
-        kept: list[FrameTrack] = []
+        """Of gates of one colour that cannot both be there, keep the better known."""
+        kept: list[GateTrack] = []
         for track in self._tracks:
             twin = next((other for other in kept if _are_one(other, track)), None)
             if twin is None:
@@ -255,7 +255,7 @@ class FrameMap:
         self._tracks = kept
 
 
-def _distance_m(track: FrameTrack, camera: CameraPose) -> float:
+def _distance_m(track: GateTrack, camera: CameraPose) -> float:
     x, y, z, _ = track.state.tolist()
     at = camera.position_m
     return hypot(at[0] - x, at[1] - y, at[2] - z)
@@ -266,8 +266,8 @@ def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float,
     return a[0] < b[2] + margin and b[0] < a[2] + margin and a[1] < b[3] + margin and b[1] < a[3] + margin
 
 
-def _are_one(a: FrameTrack, b: FrameTrack) -> bool:
-    """Whether two tracks are of one frame: of one colour, and too near to each other for two frames."""
+def _are_one(a: GateTrack, b: GateTrack) -> bool:
+    """Whether two tracks are of one gate: of one colour, and too near to each other for two gates."""
     if a.colour != b.colour:
         return False
     x, y, z, _ = (a.state - b.state).tolist()

@@ -29,13 +29,13 @@ from framerunner.editing.documents.open_document import OpenDocument
 from offboard.authoring import (
     SPANISH,
     Catalogue,
-    Change,
     Diagram,
     Finding,
     Positions,
     Span,
     StateBox,
     StrictModel,
+    TextChange,
     catalogue,
     diagram,
     findings_of,
@@ -171,7 +171,7 @@ def document_message(opened: OpenDocument) -> dict[str, object]:
     return {**_state(opened), "kind": "document", "text": opened.document.text}
 
 
-def changed_message(opened: OpenDocument, before: str, changes: Sequence[Change]) -> dict[str, object]:
+def changed_message(opened: OpenDocument, before: str, changes: Sequence[TextChange]) -> dict[str, object]:
     """The document after changes of a text."""
     written = []
     for change in changes:

@@ -1,4 +1,4 @@
-"""Poses of a frame from its corners, compared with OpenCV's solver."""
+"""Poses of a gate from its corners, compared with OpenCV's solver."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vision.frame_model import AXES_CORNERS, ModelPose
-from vision.frame_pose import find_poses
+from vision.gate_model import AXES_CORNERS, ModelPose
+from vision.gate_pose import find_poses
 
 FOCAL_PX = 160.0
 
 
 def seen_at(turns_rad, shift_m):
-    """The corners of a frame that is turned about its upright axis, then about right and ahead, and moved."""
+    """The corners of a gate that is turned about its upright axis, then about right and ahead, and moved."""
     about_down, about_right, about_ahead = turns_rad
     vectors = ([about_right, 0.0, 0.0], [0.0, 0.0, about_ahead], [0.0, about_down, 0.0])
     first, second, third = (cv2.Rodrigues(np.array(vector))[0] for vector in vectors)
@@ -42,7 +42,7 @@ def test_poses_are_the_upright_ones_of_opencv_with_the_better_one_first(noise_px
             assert pose.shift_m == pytest.approx(answer[2][at][:, 0], rel=1e-5, abs=1e-5)
 
 
-def test_a_frame_seen_exactly_from_the_front_has_a_pose():
+def test_a_gate_seen_exactly_from_the_front_has_a_pose():
     poses = find_poses([(-20.0, -10.0), (20.0, -10.0), (20.0, 10.0), (-20.0, 10.0)], FOCAL_PX, 0.1)
     assert poses
     assert poses[0].shift_m == pytest.approx([0.0, 0.0, 1.6])

@@ -1,6 +1,6 @@
-"""One frame in the map: its hypotheses, how much it is believed, and whether the images contradict it.
+"""One gate in the map: its hypotheses, how much it is believed, and whether the images contradict it.
 
-A hypothesis of where the frame is is an extended Kalman filter that measures the corners of its outline.
+A hypothesis of where the gate is is an extended Kalman filter that measures the corners of its outline.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from offboard.navigation.frames.frame_measurement import (
+from offboard.navigation.gates.gate_measurement import (
     Floats,
+    GateView,
     Prior,
     Solution,
-    View,
     noise_of,
     predicted,
     solutions,
 )
-from offboard.navigation.view import FrameEstimate
+from offboard.navigation.view import GateEstimate
 from scenarios.models import Arena
 
 if TYPE_CHECKING:
     from filterpy.kalman import ExtendedKalmanFilter
 
-# A frame does not move, but the drone's position may drift against it.
+# A gate does not move, but the drone's position may drift against it.
 DRIFT_STD_M = 0.004  # after a second
 DRIFT_STD_RAD = 0.003
 
@@ -57,10 +57,10 @@ class Update:
     log_likelihood: float
 
 
-class FrameFilter:
-    """An extended Kalman filter of one frame's state.
+class GateFilter:
+    """An extended Kalman filter of one gate's state.
 
-    The measurement is far from linear while a frame is known badly, so it is linearised where the update
+    The measurement is far from linear while a gate is known badly, so it is linearised where the update
     leads, not where it begins (iterated extended Kalman filter; Bell & Cathey, 1993).
 
     Attributes:
@@ -89,13 +89,13 @@ class FrameFilter:
         self._ekf.Q = elapsed_s * _DRIFT
         self._ekf.predict()
 
-    def trial(self, view: View) -> Update | None:
+    def trial(self, view: GateView) -> Update | None:
         """What a view would make of the filter, which stays as it is; None if it cannot be seen so."""
         ekf = self._ekf
         before, covariance = ekf.x, ekf.P
         at, update = before, None
         # The linear part of a function of the yaw leaves out the square, as does that of a cosine near zero:
-        # a frame seen from before would seem to tell its yaw (second-order filter; Athans et al., 1968).
+        # a gate seen from before would seem to tell its yaw (second-order filter; Athans et al., 1968).
         unknown = 0.5 * float(covariance[3, 3]) ** 2
         for _ in range(_LINEARISATIONS):
             prediction = predicted(at, view)
@@ -118,7 +118,7 @@ class FrameFilter:
                 break
         return update
 
-    def absorb(self, other: FrameFilter) -> None:
+    def absorb(self, other: GateFilter) -> None:
         """Become one with a hypothesis of nearly the same state: mean and covariance of both."""
         share = 1.0 / (1.0 + exp(min(50.0, self.log_weight - other.log_weight)))
         away = other.state - self.state
@@ -148,27 +148,27 @@ def _new_filter() -> ExtendedKalmanFilter:
 
 
 def half_turn(yaw_rad: float) -> float:
-    """The heading of a frame's normal in -pi/2..pi/2: half a turn leaves a frame as it is."""
+    """The heading of a gate's normal in -pi/2..pi/2: half a turn leaves a gate as it is."""
     return (yaw_rad + pi / 2) % pi - pi / 2
 
 
 # Squares of innovations that one view in a thousand exceeds by chance (chi-squared), by number of corners,
 # with half of it added: edges in an image have larger errors now and then.
-GATES = (0.0, 20.7, 27.7, 33.7, 39.2)
+CHI_SQUARED = (0.0, 20.7, 27.7, 33.7, 39.2)
 
 NOVEL_PX = 0.5  # root mean square of the corners' shift from which on a view has errors of its own
 NOVEL_US = 1_000_000  # or this long after the last one
-OUTSIDE_M = 0.5  # a frame farther outside the arena is none
+OUTSIDE_M = 0.5  # a gate farther outside the arena is none
 BEYOND_M = 0.05  # one that is by this, and by a standard deviation, is somewhere else
 
-# Belief: an image that shows a frame adds this much, one that should and does not takes 1.
+# Belief: an image that shows a gate adds this much, one that should and does not takes 1.
 SEEN_BELIEF = 2
 MOST_BELIEF = 30
-TENTATIVE_BELIEF = 6  # a frame that is believed less is forgotten
+TENTATIVE_BELIEF = 6  # a gate that is believed less is forgotten
 TENTATIVE_US = 3_000_000  # if it is not seen for so long
-DOUBTED_MISSES = 3  # in a row; then another frame of the colour is preferred
+DOUBTED_MISSES = 3  # in a row; then another gate of the colour is preferred
 
-PREDICTED_S = 0.3  # a frame does not move, and drifts slowly
+PREDICTED_S = 0.3  # a gate does not move, and drifts slowly
 
 # Hypotheses are made anew after so many views that contradict them all, and one more for so much belief.
 MISFITS = 3
@@ -194,7 +194,7 @@ class Fit:
     Attributes:
         updates: what the view would make of each hypothesis; None if it cannot be seen so.
         distance2: square of the smallest Mahalanobis distance.
-        gate: the largest that belongs to the frame.
+        gate: the largest that belongs to the gate.
     """
 
     updates: tuple[Update | None, ...]
@@ -203,15 +203,15 @@ class Fit:
 
     @property
     def inside(self) -> bool:
-        """Whether the view can be of this frame."""
+        """Whether the view can be of this gate."""
         return self.distance2 <= self.gate
 
 
-class FrameTrack:
-    """A frame that has been seen.
+class GateTrack:
+    """A gate that has been seen.
 
     Attributes:
-        colour: of the frame.
+        colour: of the gate.
         belief: twice the images that showed it, minus those that should have; negative: there is none.
         missed: images in a row that should have shown it.
         time_us: vehicle time of the last prediction.
@@ -219,13 +219,13 @@ class FrameTrack:
         views: how many were used.
     """
 
-    def __init__(self, found: list[Solution], view: View) -> None:
+    def __init__(self, found: list[Solution], view: GateView) -> None:
         self.colour = view.colour
         self.belief, self.missed, self.views = SEEN_BELIEF, 0, 1
         self.time_us = self.seen_us = view.time_us
-        self._hypotheses = [FrameFilter(solution) for solution in found]
+        self._hypotheses = [GateFilter(solution) for solution in found]
         self._used = view
-        self._misfits: list[View] = []
+        self._misfits: list[GateView] = []
         self._prune()
 
     @property
@@ -245,7 +245,7 @@ class FrameTrack:
 
     @property
     def rank(self) -> tuple[bool, bool, int, float]:
-        """The larger, the better is it known: to choose among frames of a colour."""
+        """The larger, the better is it known: to choose among gates of a colour."""
         variance_m2 = float(np.trace(self.covariance[:3, :3]))
         return (not self.is_doubted, self.estimate().certain, self.belief, -variance_m2)
 
@@ -258,13 +258,13 @@ class FrameTrack:
         for hypothesis in self._hypotheses:
             hypothesis.predict(elapsed_s)
 
-    def fit(self, view: View) -> Fit:
+    def fit(self, view: GateView) -> Fit:
         """How a view fits."""
         updates = tuple(hypothesis.trial(view) for hypothesis in self._hypotheses)
         distance2 = min((update.distance2 for update in updates if update is not None), default=np.inf)
-        return Fit(updates, distance2, GATES[sum(view.seen)])
+        return Fit(updates, distance2, CHI_SQUARED[sum(view.seen)])
 
-    def accept(self, view: View, fit: Fit) -> None:
+    def accept(self, view: GateView, fit: Fit) -> None:
         """Use a view that fits; one from nearly the same place as the last adds nothing but belief."""
         self._saw(view)
         self._misfits.clear()
@@ -279,11 +279,11 @@ class FrameTrack:
                 hypothesis.log_weight -= fit.gate
         self._prune()
 
-    def contradict(self, view: View, prior: Prior) -> None:
-        """A whole view of this frame that fits none of its hypotheses; after several, they are made anew.
+    def contradict(self, view: GateView, prior: Prior) -> None:
+        """A whole view of this gate that fits none of its hypotheses; after several, they are made anew.
 
-        What hides a frame shifts its outline, and from another place shifts it otherwise. So the views must
-        be from several places and agree, more of them for a frame that is well known.
+        What hides a gate shifts its outline, and from another place shifts it otherwise. So the views must
+        be from several places and agree, more of them for a gate that is well known.
         """
         misfits = self._misfits
         if predicted(self.state, view) is None or (misfits and not _is_moved(view, misfits[-1])):
@@ -293,17 +293,17 @@ class FrameTrack:
             return
         some = misfits[:: -(-len(misfits) // MISFITS_USED)]
         found = solutions(some, prior)
-        if not found or found[0].cost > sum(GATES[sum(view.seen)] for view in some):
+        if not found or found[0].cost > sum(CHI_SQUARED[sum(view.seen)] for view in some):
             del misfits[: len(misfits) // 2]
             return
-        self._hypotheses = [FrameFilter(solution) for solution in found]
+        self._hypotheses = [GateFilter(solution) for solution in found]
         self._prune()
         self.belief, self.missed, self.views = SEEN_BELIEF * len(misfits), 0, len(some)
         self.seen_us, self._used = view.time_us, view
         misfits.clear()
 
     def is_believed(self, time_us: int) -> bool:
-        """Whether there is such a frame."""
+        """Whether there is such a gate."""
         return self.belief >= (TENTATIVE_BELIEF if time_us - self.seen_us > TENTATIVE_US else 0)
 
     def miss(self) -> None:
@@ -324,7 +324,7 @@ class FrameTrack:
         return bool(self._hypotheses)
 
     def is_inside(self, arena: Arena) -> bool:
-        """Whether the frame is in the arena by its estimate: one that is surely outside was seen badly."""
+        """Whether the gate is in the arena by its estimate: one that is surely outside was seen badly."""
         x, y, z, _ = self.state.tolist()
         vx, vy, vz, _ = self.covariance.diagonal().tolist()
         beyond_m = (
@@ -334,8 +334,8 @@ class FrameTrack:
         )
         return all(away_m < BEYOND_M + sqrt(variance_m2) for away_m, variance_m2 in beyond_m)
 
-    def estimate(self) -> FrameEstimate:
-        """What is known of the frame."""
+    def estimate(self) -> GateEstimate:
+        """What is known of the gate."""
         x, y, z, yaw = self.state.tolist()
         vx, vy, vz, v_yaw = self.covariance.diagonal().tolist()
         weights = [hypothesis.log_weight for hypothesis in self._hypotheses]
@@ -344,7 +344,7 @@ class FrameTrack:
         shared = 2.0 * nx * ny * float(self.covariance[0, 1])
         along, aside = nx * nx * vx + ny * ny * vy + shared, ny * ny * vx + nx * nx * vy - shared
         exact = max(along / 4.0, aside, vz) <= CERTAIN_M**2 and v_yaw <= CERTAIN_RAD**2
-        return FrameEstimate(
+        return GateEstimate(
             colour=self.colour,
             position_m=(x, y, z),
             yaw_rad=half_turn(yaw),
@@ -356,14 +356,14 @@ class FrameTrack:
             seen_us=self.seen_us,
         )
 
-    def _saw(self, view: View) -> None:
+    def _saw(self, view: GateView) -> None:
         self.seen_us = view.time_us
         self.missed = 0
         self.belief = min(self.belief + SEEN_BELIEF, MOST_BELIEF)
 
     def _prune(self) -> None:
         """Likeliest first; drop those that are far less likely, or became the same as a likelier one."""
-        kept: list[FrameFilter] = []
+        kept: list[GateFilter] = []
         for hypothesis in sorted(self._hypotheses, key=lambda hypothesis: -hypothesis.log_weight):
             far_less = bool(kept) and hypothesis.log_weight < kept[0].log_weight - PRUNED
             same = next((other for other in kept if _same(hypothesis, other)), None)
@@ -374,7 +374,7 @@ class FrameTrack:
         self._hypotheses = kept
 
 
-def _same(a: FrameFilter, b: FrameFilter) -> bool:
+def _same(a: GateFilter, b: GateFilter) -> bool:
     away = (a.state - b.state).tolist()
     vx, vy, vz, v_yaw = (a.covariance + b.covariance).diagonal().tolist()
     return abs(half_turn(away[3])) < max(SAME_YAW_RAD, 0.5 * sqrt(v_yaw)) and hypot(*away[:3]) < max(
@@ -382,7 +382,7 @@ def _same(a: FrameFilter, b: FrameFilter) -> bool:
     )
 
 
-def _is_moved(view: View, last: View) -> bool:
+def _is_moved(view: GateView, last: GateView) -> bool:
     """Whether a view's errors differ from those of an earlier one: edges fall on other parts of pixels."""
     if view.seen != last.seen:
         return True

@@ -1,4 +1,4 @@
-"""What a camera that is turned on a drone sees of frames while the drone flies, without painting images."""
+"""What a camera that is turned on a drone sees of gates while the drone flies, without painting images."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,15 +8,15 @@ import numpy as np
 
 from framerunner.geometry.rotations import quaternion_from_euler, rotation, rotation_rows
 from vision.calibration.sightings import (
-    Motion,
     MotionReport,
+    PoseSpline,
     Sightings,
     Values,
     mounting_matrix,
     sightings_of,
 )
-from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M
-from vision.types import Detections, FrameCorner, FramePose, FrameSighting
+from vision.gate_model import GATE_HEIGHT_M, GATE_WIDTH_M
+from vision.types import Detections, GateCorner, GatePose, GateSighting
 
 FOCAL_PX, HALF_WIDTH_PX, HALF_HEIGHT_PX = 160.0, 160.0, 120.0
 TRUE = Values(tuple(map(radians, (2.0, 5.0, -3.0))), (0.08, 0.0, 0.02), 0.0)
@@ -26,7 +26,7 @@ Path = Callable[[float], tuple[float, float, float, float, float, float]]
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A frame, or with another size something that looks like one; it faces +x when its yaw is 0."""
+    """A gate, or with another size something that looks like one; it faces +x when its yaw is 0."""
 
     colour: str
     position_m: tuple[float, float, float]
@@ -34,7 +34,7 @@ class Rectangle:
     size: float = 1.0
 
 
-FRAMES = (
+GATES = (
     Rectangle("red", (3.2, 0.3, 1.3), 3.0),
     Rectangle("green", (0.5, 3.0, 0.9), -1.2),
     Rectangle("blue", (-2.6, -1.5, 1.8), 0.9),
@@ -52,14 +52,14 @@ def survey(time_s: float) -> tuple[float, float, float, float, float, float]:
 def fly(
     path: Path,
     seconds: float,
-    rectangles: tuple[Rectangle, ...] = (*FRAMES, POSTER),
+    rectangles: tuple[Rectangle, ...] = (*GATES, POSTER),
     true: Values = TRUE,
     *,
     seed: int = 0,
     noise_px: float = 0.15,
     rate_hz: float = 8.0,
     delay_s: float = 0.0,
-) -> tuple[list[Detections], Motion]:
+) -> tuple[list[Detections], PoseSpline]:
     """The images, whose times are those of their arrival, and the reported motion."""
     stream = np.random.default_rng(seed)
     reports = [report(path, time_s) for time_s in np.arange(0.0, seconds + 0.5, 0.05)]
@@ -70,9 +70,9 @@ def fly(
         camera = body @ mounting_matrix(true.angles_frd_rad)
         eye = np.array((x, y, z)) + body @ np.array(true.position_flu_m)
         found = (sighting(each, eye, camera, stream, noise_px) for each in rectangles)
-        frames = tuple(each for each in found if each is not None)
-        images.append(Detections(time_us=round(1e6 * (time_s + delay_s)), frames=frames))
-    return images, Motion(reports)
+        gates = tuple(each for each in found if each is not None)
+        images.append(Detections(time_us=round(1e6 * (time_s + delay_s)), frames=gates))
+    return images, PoseSpline(reports)
 
 
 def report(path: Path, time_s: float) -> MotionReport:
@@ -84,13 +84,13 @@ def report(path: Path, time_s: float) -> MotionReport:
 
 def sighting(
     rectangle: Rectangle, eye: np.ndarray, camera: np.ndarray, stream: np.random.Generator, noise_px: float
-) -> FrameSighting | None:
+) -> GateSighting | None:
     """Of a rectangle that is wholly in view."""
     centre, yaw = np.array(rectangle.position_m), rectangle.yaw_rad
     normal = np.array([cos(yaw), sin(yaw), 0.0])
     side = 1.0 if normal @ (eye - centre) > 0 else -1.0
     left = side * np.array([-sin(yaw), cos(yaw), 0.0])  # to the right as seen
-    half = np.array([FRAME_WIDTH_M, FRAME_HEIGHT_M]) / 2 * rectangle.size
+    half = np.array([GATE_WIDTH_M, GATE_HEIGHT_M]) / 2 * rectangle.size
     signs = np.array([(-1, 1), (1, 1), (1, -1), (-1, -1)])
     corners = centre + signs[:, :1] * half[0] * left + signs[:, 1:] * half[1] * np.array([0.0, 0.0, 1.0])
     seen = (corners - eye) @ camera
@@ -102,10 +102,10 @@ def sighting(
     pixels = pixels + stream.normal(0.0, noise_px, pixels.shape)
     place = (centre - eye) @ camera / rectangle.size
     facing = side * normal @ camera
-    pose = FramePose(tuple(place.tolist()), tuple(facing.tolist()), 0.1)
-    a, b, c, d = (FrameCorner(right, down, noise_px, noise_px) for right, down in pixels.tolist())
-    return FrameSighting(rectangle.colour, (a, b, c, d), whole=True, poses=(pose,))
+    pose = GatePose(tuple(place.tolist()), tuple(facing.tolist()), 0.1)
+    a, b, c, d = (GateCorner(right, down, noise_px, noise_px) for right, down in pixels.tolist())
+    return GateSighting(rectangle.colour, (a, b, c, d), whole=True, poses=(pose,))
 
 
-def sightings(images: list[Detections], motion: Motion, delay_s: float = 0.0) -> Sightings:
+def sightings(images: list[Detections], motion: PoseSpline, delay_s: float = 0.0) -> Sightings:
     return sightings_of(images, motion, HALF_HEIGHT_PX, 0.0, delay_s)

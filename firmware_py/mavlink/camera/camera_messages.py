@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import nan
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.camera.model import CameraModel, PictureSpace, VideoEncoding, VideoStream
+from firmware_py.mavlink.camera.model import FixedCamera, PictureSpace, VideoEncoding, VideoStream
 from firmware_py.mavlink.telemetry.connection import OWN_VERSION
 from framerunner.wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres
 from framerunner.wire.exchange import Exchange
@@ -27,7 +27,7 @@ _INTERVAL_SET = 2  # image_status of CAMERA_CAPTURE_STATUS
 _URI_BYTES, _NAME_BYTES, _LABEL_BYTES, _FILE_BYTES = 160, 32, 32, 205
 
 
-def information(camera: CameraModel, *, streams: bool, records: bool, time_us: int) -> Message:
+def information(camera: FixedCamera, *, streams: bool, records: bool, time_us: int) -> Message:
     """CAMERA_INFORMATION; `streams`: whether there are video streams, `records`: whether it records video."""
     major, minor, patch = OWN_VERSION
     flags = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE

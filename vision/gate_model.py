@@ -1,6 +1,6 @@
-"""The frame as a solid: four square bars, and where their edges are beside their axes in an image.
+"""The gate as a solid: four square bars, and where their edges are beside their axes in an image.
 
-Axes of the model: x to the right and y down as the camera sees the frame, z away from the camera; its origin
+Axes of the model: x to the right and y down as the camera sees the gate, z away from the camera; its origin
 is the centre of the opening. The sides are numbered clockwise: top, right, bottom, left; corner k is where
 side k - 1 and side k meet: upper left, upper right, lower right, lower left.
 """
@@ -17,10 +17,10 @@ Point = tuple[float, float]
 Segment = tuple[Point, Point]
 Sides = tuple[Segment | None, Segment | None, Segment | None, Segment | None]
 
-FRAME_WIDTH_M, FRAME_HEIGHT_M, BAR_M = 0.42, 0.22, 0.02
+GATE_WIDTH_M, GATE_HEIGHT_M, BAR_M = 0.42, 0.22, 0.02
 """Outer width and height, and the edge of the square bars."""
-AXES_WIDTH_M, AXES_HEIGHT_M = FRAME_WIDTH_M - BAR_M, FRAME_HEIGHT_M - BAR_M
-"""Of the rectangle of the bars' axes, which is in the frame's middle plane."""
+AXES_WIDTH_M, AXES_HEIGHT_M = GATE_WIDTH_M - BAR_M, GATE_HEIGHT_M - BAR_M
+"""Of the rectangle of the bars' axes, which is in the gate's middle plane."""
 
 _NEAREST_M = 0.03  # in front of the camera; nearer bars are not projected
 
@@ -31,13 +31,13 @@ def rectangle(width_m: float, height_m: float) -> Floats:
     return np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
 
 
-OUTER_CORNERS = rectangle(FRAME_WIDTH_M, FRAME_HEIGHT_M)
+OUTER_CORNERS = rectangle(GATE_WIDTH_M, GATE_HEIGHT_M)
 AXES_CORNERS = rectangle(AXES_WIDTH_M, AXES_HEIGHT_M)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelPose:
-    """Where a frame is: a point p of the model is at `rotation @ p + shift_m` from the camera.
+    """Where a gate is: a point p of the model is at `rotation @ p + shift_m` from the camera.
 
     Attributes:
         rotation: shape (3, 3); camera axes are right, down, ahead.
@@ -81,14 +81,14 @@ def bar_offsets(
     """How far a bar's outer and inner edge are from its axis in the image.
 
     Args:
-        pose: of the frame.
+        pose: of the gate.
         steep: per side, whether distances are measured along rows, not columns.
         inward: per side, 1 if the opening is on the side of larger columns (rows), else -1.
         spans: per side two columns (rows if steep) from the optical axis, shape (4, 2).
         focal_px: focal length.
 
     Returns:
-        Pixels towards the opening, shape (4, 2 edges, 2 places), outer edge first; None if the frame is so
+        Pixels towards the opening, shape (4, 2 edges, 2 places), outer edge first; None if the gate is so
         near that a part of it is beside the camera.
     """
     flat = pose.project(_BAR_EDGES, focal_px)

@@ -1,4 +1,4 @@
-"""Whether a frame would be recognised: cells of the arena, headings of a frame's normal, views of them.
+"""Whether a gate would be recognised: cells of the arena, headings of a gate's normal, views of them.
 
 What could be seen from a fixed set of places and headings is in tables, made once for a camera and an arena.
 """
@@ -16,13 +16,13 @@ import numpy.typing as npt
 
 from framerunner.geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.goals import FRAME_HEIGHT_M, FRAME_WIDTH_M
+from offboard.navigation.goals import GATE_HEIGHT_M, GATE_WIDTH_M
 from scenarios.models import Arena
 
 Floats = npt.NDArray[np.float32]
 Bools = npt.NDArray[np.bool_]
 
-HEADINGS: Final = 8  # of a frame's normal, over half a turn: both sides of a frame look alike
+HEADINGS: Final = 8  # of a gate's normal, over half a turn: both sides of a gate look alike
 BEST_QUALITY: Final = 0.98  # of any view: no place is ever certain to be empty
 _CELL_M: Final = 0.5
 _MOST_CELLS: Final = 20  # along one axis; a larger arena has larger cells
@@ -87,29 +87,29 @@ def block_means(cells: Floats) -> Floats:
     return means
 
 
-class FrameVisibility:
-    """How well a camera would recognise a frame, by the frame's place in the camera's axes."""
+class GateVisibility:
+    """How well a camera would recognise a gate, by the gate's place in the camera's axes."""
 
     def __init__(self, camera: CameraModel) -> None:
         self._right = np.float32(camera.half_width_px / camera.focal_px)
         self._up = np.float32(camera.half_height_px / camera.focal_px)
 
     def in_view(self, ahead: Floats, left: Floats, up: Floats, margin_m: float) -> Bools:
-        """Whether a frame is wholly in the image, with a margin to its edges; metres in the camera's axes."""
-        side = np.abs(left) + np.float32(FRAME_WIDTH_M / 2 + margin_m)
-        height = np.abs(up) + np.float32(FRAME_HEIGHT_M / 2 + margin_m)
+        """Whether a gate is wholly in the image, with a margin to its edges; metres in the camera's axes."""
+        side = np.abs(left) + np.float32(GATE_WIDTH_M / 2 + margin_m)
+        height = np.abs(up) + np.float32(GATE_HEIGHT_M / 2 + margin_m)
         seen: Bools = (side <= ahead * self._right) & (height <= ahead * self._up)
         return seen
 
 
 def view_qualities(dx_m: Floats, dy_m: Floats, dz_m: Floats) -> Floats:
-    """How surely a frame is recognised that is wholly in view, 0 to `BEST_QUALITY`, for each heading.
+    """How surely a gate is recognised that is wholly in view, 0 to `BEST_QUALITY`, for each heading.
 
-    It falls with the distance beyond 3 m and with the angle of the line of sight to the frame's normal
+    It falls with the distance beyond 3 m and with the angle of the line of sight to the gate's normal
     beyond 50 degrees, to nothing at 75 degrees.
 
     Args:
-        dx_m: from the camera to the frame, arena axes, any shape.
+        dx_m: from the camera to the gate, arena axes, any shape.
         dy_m: likewise.
         dz_m: likewise.
 
@@ -150,7 +150,7 @@ YAWS: Final = tuple(remainder(index * tau / 12, tau) for index in range(12))
 _PLACES: Final = 9  # along x and y
 _WALL_M: Final = 1.0  # from the outermost places to the arena's sides
 _LOW_M, _MIDDLE_M, _BELOW_CEILING_M = 0.6, 1.5, 1.3
-_EDGE_RAD: Final = 0.08  # at the sides of the image, where a frame is cut
+_EDGE_RAD: Final = 0.08  # at the sides of the image, where a gate is cut
 _NEAREST_M: Final = 0.7
 _TABLES_KEPT: Final = 4  # of 5 MB each
 
@@ -214,7 +214,7 @@ class ViewTable:
 
         Args:
             seen: quality of the best view so far, shape (HEADINGS, blocks).
-            weights: how likely a frame is in each block, shape (blocks,).
+            weights: how likely a gate is in each block, shape (blocks,).
             clear: which blocks, in plan, obstacles leave in sight: shape (grounds, blocks x * blocks y).
 
         Returns:

@@ -1,7 +1,7 @@
-"""One frame in one image: its corners and poses, from the pixels of one region.
+"""One gate in one image: its corners and poses, from the pixels of one region.
 
 The axes of the bars are fitted, a pose follows, from that where the edges of the bars should be beside their
-axes, and with it the axes are fitted again. What cannot be a frame, or a part of one, is refused: along the
+axes, and with it the axes are fitted again. What cannot be a gate, or a part of one, is refused: along the
 bars' axes there must be nothing but pixels of the region and what may hide it.
 """
 
@@ -16,10 +16,10 @@ import numpy as np
 from vision.bar_edges import BarEdges, Widths, expected_widths, find_edges
 from vision.bar_lines import BarLine, BarLines, Meeting, fit_lines, meeting
 from vision.calibration.lens import Lens
-from vision.frame_model import (
+from vision.gate_model import (
     AXES_CORNERS,
-    FRAME_HEIGHT_M,
-    FRAME_WIDTH_M,
+    GATE_HEIGHT_M,
+    GATE_WIDTH_M,
     OUTER_CORNERS,
     Floats,
     ModelPose,
@@ -27,18 +27,18 @@ from vision.frame_model import (
     Sides,
     bar_offsets,
 )
-from vision.frame_pose import as_seen, find_poses, poses_of_three
-from vision.patch import Patch
-from vision.types import FrameCorner, FramePose
+from vision.gate_pose import as_seen, find_poses, poses_of_three
+from vision.patch import ImagePatch
+from vision.types import GateCorner, GatePose
 
-Corners = tuple[FrameCorner | None, FrameCorner | None, FrameCorner | None, FrameCorner | None]
+Corners = tuple[GateCorner | None, GateCorner | None, GateCorner | None, GateCorner | None]
 _Meetings = list[Meeting | None]
 
 _MAX_EMPTY = 0.15  # share of a bar where neither the bar nor anything that could hide it is seen
 _MAX_OWN_UNSEEN = 0.4  # share of a bar that seems to be seen although it was not found
 _WHOLE = 0.9  # share of a bar that is seen if nothing hides it; shaded and thin bars may have gaps
 _MAX_CORNER_STD_PX = 2.5
-_EDGE_ON, _OBLIQUE = 0.13, 0.23  # cosines: the bars of a frame that is seen edge-on hide one another
+_EDGE_ON, _OBLIQUE = 0.13, 0.23  # cosines: the bars of a gate that is seen edge-on hide one another
 _LEAST_ERROR_PX = 0.4  # may be between the corners of a pose and of the lines, besides two deviations
 _TILT_RAD = 0.2  # standard deviation of the camera's tilt, to tell which sides are upright
 _ROUGH = 2.5  # before the bars' edges are corrected by a pose, errors may be larger by this factor
@@ -46,16 +46,16 @@ _CLEAR_OPEN, _THIN_PX = 0.7, 3.0
 _CLEAR_PX = 4.5  # a side that is shorter may be a part of a longer one
 _TOO_NARROW = 1.2
 _OPEN_SIDE = 0.5  # share of a bar at which its inner edge is seen, too
-# Sides of frames, pixels: from here on some of an opening is seen, at two bars at least, and bars' widths.
+# Sides of gates, pixels: from here on some of an opening is seen, at two bars at least, and bars' widths.
 _OPENING_SEEN_PX, _OPENING_CLEAR_PX, _BARS_SEEN_PX = 4.0, 9.0, 6.0
 _TOO_THIN = (0.3, 0.2)  # half a bar's width may be smaller than expected by so much and this share of it
-_TOO_WIDE = (1.3, 0.1)  # or larger: frames that are seen past their edges and blurred ones look so
+_TOO_WIDE = (1.3, 0.1)  # or larger: gates that are seen past their edges and blurred ones look so
 _TURNING_RAD_S, _FLYING_M_S = 0.5, 0.5  # standard deviations of a camera's motion while a frame is read out
 _WIDTH_SHARE, _WIDTH_SHARE_STD = 0.75, 0.15  # of half a bar's image that is half of the bar's width
 
 
-class FittedFrame(NamedTuple):
-    """What `vision.types.FrameSighting` tells, without the colour; and how likely it is.
+class FittedGate(NamedTuple):
+    """What `vision.types.GateSighting` tells, without the colour; and how likely it is.
 
     The cost is the sum of squares, in standard deviations, of the corners' distances from the better pose's
     and of the camera's tilt if that is the pose.
@@ -63,12 +63,12 @@ class FittedFrame(NamedTuple):
 
     corners: Corners
     whole: bool
-    poses: tuple[FramePose, ...]
+    poses: tuple[GatePose, ...]
     cost: float
 
 
-def fit_frame(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> FittedFrame | None:
-    """Fit a frame to a region; None if the region is no frame and no sure part of one.
+def fit_gate(patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float) -> FittedGate | None:
+    """Fit a gate to a region; None if the region is no gate and no sure part of one.
 
     Args:
         patch: the region.
@@ -91,7 +91,7 @@ def _least_length(sides: Sides) -> float:
     )
 
 
-def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> FittedFrame | None:
+def _fit_any(patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float) -> FittedGate | None:
     lines, meetings, poses = _fit(patch, sides, focal_px, spread_px)
     known = [(met.x, met.y) for met in meetings if met is not None]
     if len(known) == 4:
@@ -119,9 +119,9 @@ def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> F
 def _has_bars(
     lines: BarLines, axes_corners: Sequence[Point], pose: ModelPose, focal_px: float, spread_px: float
 ) -> bool:
-    """Whether there is an opening where it is large enough to be seen, and the bars are as wide as a frame's.
+    """Whether there is an opening where it is large enough to be seen, and the bars are as wide as a gate's.
 
-    Posters and drawn rectangles are not. The limits let through all frames of some thousand images, rendered
+    Posters and drawn rectangles are not. The limits let through all gates of some thousand images, rendered
     with and without noise and blur.
     """
     known = [line for line in lines if line is not None]
@@ -146,17 +146,17 @@ def _has_bars(
     return -least_px <= wider_px <= most_px
 
 
-def _fitted(corners: Corners, whole: bool, poses: list[ModelPose], meetings: _Meetings) -> FittedFrame:
+def _fitted(corners: Corners, whole: bool, poses: list[ModelPose], meetings: _Meetings) -> FittedGate:
     deviation_px = 0.5 * (_max_error_px(meetings) - _LEAST_ERROR_PX)
     costs = [
         (pose.error_px / max(deviation_px, 0.1)) ** 2 + (acos(min(1.0, pose.rotation[1, 1])) / _TILT_RAD) ** 2
         for pose in poses
     ]
-    return FittedFrame(corners, whole, tuple(map(as_seen, poses)), min(costs, default=inf))
+    return FittedGate(corners, whole, tuple(map(as_seen, poses)), min(costs, default=inf))
 
 
 def _fit(
-    patch: Patch, sides: Sides, focal_px: float, spread_px: float
+    patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float
 ) -> tuple[BarLines, _Meetings, list[ModelPose]]:
     """The axes of the sides, where they meet (sides k - 1 and k) and the poses that follow."""
     edges = find_edges(patch, sides, expected_widths(sides, spread_px))
@@ -176,7 +176,7 @@ def _fit(
         lines, meetings, poses = _lines_and_poses(patch, edges, offsets, poses, focal_px)
         if wider is None or not poses:
             break
-        edges = find_edges(patch, sides, wider)  # a side that is cut looked like one of a smaller frame
+        edges = find_edges(patch, sides, wider)  # a side that is cut looked like one of a smaller gate
     return lines, meetings, _explaining(poses, meetings)
 
 
@@ -204,7 +204,7 @@ def _wider(edges: BarEdges, offsets: Floats) -> Widths | None:
 
 
 def _lines_and_poses(
-    patch: Patch, edges: BarEdges, offsets: Floats | None, guesses: Sequence[ModelPose], focal_px: float
+    patch: ImagePatch, edges: BarEdges, offsets: Floats | None, guesses: Sequence[ModelPose], focal_px: float
 ) -> tuple[BarLines, _Meetings, list[ModelPose]]:
     lines = [line if _is_sure(line) else None for line in fit_lines(edges, focal_px, offsets)]
     meetings = [meeting(lines[k - 1], lines[k]) for k in range(4)]
@@ -214,15 +214,15 @@ def _lines_and_poses(
 
 
 def _sheared(meetings: _Meetings, lens: Lens) -> _Meetings:
-    """Where lines meet, with what a rolling shutter may shear from the first to the last row of a frame."""
+    """Where lines meet, with what a rolling shutter may shear from the first to the last row of a gate."""
     known = [met for met in meetings if met is not None]
     if len(known) < 2:
         return meetings
     rights, downs = [met.x for met in known], [met.y for met in known]
     rows = max(downs) - min(downs)
-    width_px = max(max(rights) - min(rights), rows * FRAME_WIDTH_M / FRAME_HEIGHT_M)
+    width_px = max(max(rights) - min(rights), rows * GATE_WIDTH_M / GATE_HEIGHT_M)
     # Turning moves all of it alike; flying moves what is near, and widens it.
-    nearer_px = _FLYING_M_S * width_px * width_px / (2.0 * FRAME_WIDTH_M * lens.focal_px)
+    nearer_px = _FLYING_M_S * width_px * width_px / (2.0 * GATE_WIDTH_M * lens.focal_px)
     px = lens.readout_s * rows / lens.size_px[1] * (_TURNING_RAD_S * lens.focal_px + nearer_px)
     return [
         None if met is None else met._replace(std_x=hypot(met.std_x, px), std_y=hypot(met.std_y, px))
@@ -236,7 +236,7 @@ def _is_sure(line: BarLine | None) -> bool:
 
 
 def _poses(
-    patch: Patch, lines: BarLines, meetings: _Meetings, guesses: Sequence[ModelPose], focal_px: float
+    patch: ImagePatch, lines: BarLines, meetings: _Meetings, guesses: Sequence[ModelPose], focal_px: float
 ) -> list[ModelPose]:
     """The poses that explain four or three lines."""
     known = [met for met in meetings if met is not None]
@@ -264,7 +264,7 @@ def _weights(line: BarLine | None, start: Meeting | None, end: Meeting | None) -
     return (1.0 / sqrt(one), 1.0 / sqrt(other))
 
 
-def _explains(patch: Patch, pose: ModelPose, missing: int, focal_px: float) -> bool:
+def _explains(patch: ImagePatch, pose: ModelPose, missing: int, focal_px: float) -> bool:
     """Whether a pose has the bars where they are seen, and the missing one where it cannot be seen."""
     corners = pose.project(AXES_CORNERS, focal_px)
     if corners is None:
@@ -275,7 +275,7 @@ def _explains(patch: Patch, pose: ModelPose, missing: int, focal_px: float) -> b
 
 
 def _outer_corners(meetings: _Meetings, pose: ModelPose, focal_px: float, whole: bool) -> Corners | None:
-    """The corners of the outline in the frame's middle plane, from those of the bars' axes."""
+    """The corners of the outline in the gate's middle plane, from those of the bars' axes."""
     outer, axes = pose.project(OUTER_CORNERS, focal_px), pose.project(AXES_CORNERS, focal_px)
     if outer is None or axes is None:
         return None
@@ -295,17 +295,17 @@ def _outer_corners(meetings: _Meetings, pose: ModelPose, focal_px: float, whole:
 
 
 def _facing(pose: ModelPose) -> float:
-    """Cosine of the angle between the line of sight and the frame's normal."""
+    """Cosine of the angle between the line of sight and the gate's normal."""
     return abs(float(pose.rotation[:, 2] @ pose.shift_m)) / hypot(*pose.shift_m.tolist())
 
 
-def _corners_without_pose(patch: Patch, lines: BarLines, spread_px: float) -> Corners:
-    """Corners of the outline if too little of a frame is seen for a pose: where two bars are seen to meet.
+def _corners_without_pose(patch: ImagePatch, lines: BarLines, spread_px: float) -> Corners:
+    """Corners of the outline if too little of a gate is seen for a pose: where two bars are seen to meet.
 
     They are half a bar outside the axes. A bar's depth is seen beside its width, how much of it depends on
     the unknown pose.
     """
-    found: list[FrameCorner | None] = [None] * 4
+    found: list[GateCorner | None] = [None] * 4
     for k in range(4):
         before, after = lines[k - 1], lines[k]
         met = meeting(before, after)
@@ -328,18 +328,18 @@ def _point(line: BarLine) -> tuple[float, float]:
 
 
 def _moved_outward(line: BarLine, spread_px: float) -> BarLine:
-    """From the axis of a bar to its outer edge in the frame's middle plane."""
+    """From the axis of a bar to its outer edge in the gate's middle plane."""
     half_px = max(line.half_px - spread_px, 0.0)
     at = line.at - line.inward * _WIDTH_SHARE * half_px
     return line._replace(at=at, var_at=line.var_at + (_WIDTH_SHARE_STD * half_px) ** 2)
 
 
-def _corner(met: Meeting, right_px: float, down_px: float, whole: bool) -> FrameCorner | None:
-    """A corner as others use it, moved; None if it is not sure and the frame is not seen whole."""
+def _corner(met: Meeting, right_px: float, down_px: float, whole: bool) -> GateCorner | None:
+    """A corner as others use it, moved; None if it is not sure and the gate is not seen whole."""
     if not whole and max(met.std_x, met.std_y) > _MAX_CORNER_STD_PX:
         return None
-    return FrameCorner(met.x + right_px, met.y + down_px, met.std_x, met.std_y)
+    return GateCorner(met.x + right_px, met.y + down_px, met.std_x, met.std_y)
 
 
-def _corners(found: list[FrameCorner | None]) -> Corners:
+def _corners(found: list[GateCorner | None]) -> Corners:
     return (found[0], found[1], found[2], found[3])

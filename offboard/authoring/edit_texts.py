@@ -1,11 +1,11 @@
-"""What is said of edits that cannot be applied: a table for each language; see `offboard.chart.messages`."""
+"""What is said of edits that cannot be applied: tables by language; see `offboard.chart.mission_texts`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from framerunner.errors import UserError
-from offboard.chart.messages import Message
+from offboard.chart.mission_texts import Message
 
 EDIT_ENGLISH: Mapping[str, str] = {
     "edit.field": "{where} {given}: {what}; correct the edit",
@@ -137,7 +137,7 @@ EDIT_SPANISH: Mapping[str, str] = {
 }
 
 
-class EditMessage(Message):
+class EditText(Message):
     """A text about an edit."""
 
     english = EDIT_ENGLISH
@@ -155,5 +155,5 @@ class EditError(UserError):
     """
 
     def __init__(self, code: str, **values: object) -> None:
-        self.message = EditMessage(code, **values)
+        self.message = EditText(code, **values)
         super().__init__(str(self.message))

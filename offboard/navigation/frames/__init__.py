@@ -1,1 +1,0 @@
-"""The map of frames: where each one is, by all images so far."""
