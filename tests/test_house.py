@@ -29,6 +29,15 @@ LARGE_FOLDERS = {}
 LARGE_CLASSES = {
     "offboard/mavsdk_drone.py MavsdkDrone": "implements the port `Drone`",
 }
+# Modules of the pages' messages: a class has the name of its message, or of a part of it.
+MESSAGES = (
+    "framerunner/editing/documents/document_messages.py",
+    "framerunner/editing/editor_messages.py",
+    "framerunner/monitor/competition/views.py",
+    "framerunner/monitor/live_messages.py",
+    "framerunner/monitor/manual_channel.py",
+    "framerunner/wire/operator_messages.py",
+)
 # Literals that are only unpacked into calls, each with its reason.
 UNPACKED = {}
 HASHED = re.compile(r"\S+==[^\n]* \\\n( {4}--hash=sha256:[0-9a-f]{64}( \\)?\n)+( {4}#.*\n?)*\Z")
@@ -385,6 +394,23 @@ def test_no_room_has_two_classes_of_one_name():
             if isinstance(node, ast.ClassDef):
                 found[room_of(module_name(path)), node.name].append(name_of(path))
     assert {key: places for key, places in found.items() if len(places) > 1} == {}
+
+
+def test_no_two_public_classes_have_one_name():
+    found = defaultdict(list)
+    for path in MODULES:
+        for node in parsed(path).body:
+            if (
+                isinstance(node, ast.ClassDef)
+                and not node.name.startswith("_")
+                and name_of(path) not in MESSAGES
+            ):
+                found[node.name].append(name_of(path))
+    assert {name: places for name, places in found.items() if len(places) > 1} == {}
+
+
+def test_modules_of_messages_are_named_for_what_they_hold():
+    assert [name_of(path) for path in MODULES if path.name == "messages.py"] == []
 
 
 def test_nothing_is_decided_by_the_name_of_a_scenario():
