@@ -204,9 +204,9 @@ def obstructed(
     """
     near = _near(places_m, obstacles, style)
     others = tuple(
-        other_gate
-        for other_gate in near.gates
-        if all(dist(other_gate.centre_m, gate.centre_m) >= SAME_GATE_M for gate in gates)
+        other
+        for other in near.gates
+        if all(dist(other.centre_m, gate.centre_m) >= SAME_GATE_M for gate in gates)
     )
     if not others and not near.columns_m:
         return False

@@ -12,8 +12,8 @@ GATE = Gate(colour="red", x_m=0, y_m=0, z_m=1)  # its plane is x = 0
 BOUNDARY = Boundary(Arena())  # x and y within ±5, z up to 4
 
 
-def passages(other_gate, points):
-    gate = GateWatch(other_gate)
+def passages(other, points):
+    gate = GateWatch(other)
     found = [gate.follow(a, b) for a, b in zip([points[0], *points], points, strict=False)]
     return [passage for passage in found if passage is not None]
 

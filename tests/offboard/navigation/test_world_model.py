@@ -145,8 +145,8 @@ def test_what_seems_to_stand_at_the_start_leaves_room_for_the_drone() -> None:
 
 def test_gate_that_seems_to_be_above_the_ceiling_is_crossed_below_it():
     surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera())
-    other_gate = GateEstimate("red", (5.3, 0.0, 4.4), 0.5, (0.5, 0.5, 0.5), 0.1, True, False, 1, 0)
-    gate = WorldModel(surroundings, CONTEST).gate_of(other_gate)
+    other = GateEstimate("red", (5.3, 0.0, 4.4), 0.5, (0.5, 0.5, 0.5), 0.1, True, False, 1, 0)
+    gate = WorldModel(surroundings, CONTEST).gate_of(other)
     assert gate.centre_m == pytest.approx((5.0, 0.0, 3.89))
     assert gate.yaw_rad == pytest.approx(0.5)
 
