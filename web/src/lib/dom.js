@@ -23,7 +23,9 @@ export function make(tag, attributes = {}, ...children) {
  * @param {string} text
  */
 export function setText(element, text) {
-  if (/** @type {Element} */ (element).textContent !== text) /** @type {Element} */ (element).textContent = text;
+  if (/** @type {Element} */ (element).textContent !== text) {
+    /** @type {Element} */ (element).textContent = text;
+  }
 }
 
 /**

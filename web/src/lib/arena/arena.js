@@ -20,8 +20,8 @@ import { reasonOf } from "../request.js";
 /**
  * @typedef {"orbit"|"follow"|"onboard"} View
  * @typedef {Pose & {id: number}} DronePose
- * @typedef {{scenario: Record<string, any>|null, lift_m: number, source: string}} World as in the message "world"
- * @typedef {string[]|Record<number, string[]>} States ids of the mission's states, the same for all or by drone
+ * @typedef {{scenario: Record<string, any>|null, lift_m: number, source: string}} World the message "world"
+ * @typedef {string[]|Record<number, string[]>} States ids of the mission's, the same for all or by drone
  * @typedef {import("./scene.js").ArenaScene|import("./arena_above.js").ArenaAbove} Painter
  */
 
@@ -161,7 +161,8 @@ export class Arena {
 
   /** Draw the map unless it is switched off. */
   #showMap() {
-    const shown = /** @type {HTMLButtonElement} */ (this.#mapButton).getAttribute("aria-pressed") === "true" ? this.#map : null;
+    const shown = /** @type {HTMLButtonElement} */ (this.#mapButton).getAttribute("aria-pressed") === "true"
+      ? this.#map : null;
     setText(/** @type {HTMLElement} */ (this.#goal), shown ? `navigator: ${shown.goal}` : "");
     /** @type {HTMLElement} */ (this.#goal).hidden = !shown?.goal;
     setAttribute(this.#box, "data-mapped", shown ? shown.frames.map((each) => each.colour).join(" ") : null);
@@ -188,7 +189,9 @@ export class Arena {
     } catch (error) {
       console.info(`no 3-D here (${reasonOf(error)}); the arena is drawn from above`);
       this.#painter = new ArenaAbove(this.#box, "This browser draws no 3-D here, so the arena is shown from above.");
-      for (const button of [...Object.values(this.#buttons), /** @type {HTMLButtonElement} */ (this.#sizeButton)]) button.hidden = true;
+      for (const button of [
+        ...Object.values(this.#buttons), /** @type {HTMLButtonElement} */ (this.#sizeButton),
+      ]) button.hidden = true;
     }
     for (const what of this.#waiting.splice(0)) what(this.#painter);
   }
@@ -217,7 +220,8 @@ export class Arena {
     const title = "show the drone no larger than it is";
     this.#sizeButton = make("button", { type: "button", "aria-pressed": "false", title }, "True size");
     this.#sizeButton.addEventListener("click", () => {
-      const isTrue = /** @type {HTMLButtonElement} */ (this.#sizeButton).getAttribute("aria-pressed") !== "true";
+      const isTrue =
+        /** @type {HTMLButtonElement} */ (this.#sizeButton).getAttribute("aria-pressed") !== "true";
       setAttribute(/** @type {HTMLButtonElement} */ (this.#sizeButton), "aria-pressed", String(isTrue));
       this.#do((painter) => painter.setTrueSize(isTrue));
     });
@@ -230,7 +234,11 @@ export class Arena {
     return bar;
   }
 
-  /** The colour of a drone's state; with motors on it goes to the trail, so the legend says what it means. @param {Pose} pose @param {States} states */
+  /**
+   * The colour of a drone's state; with motors on it goes to the trail, so the legend says what it means.
+   * @param {Pose} pose
+   * @param {States} states
+   */
   #colour(pose, states) {
     const id = pose.id ?? 1;
     const list = Array.isArray(states) ? states : states?.[id];

@@ -100,7 +100,10 @@ export class ArenaEye {
     return this.#follow(drone, passed_s, still);
   }
 
-  /** Where a place is on the page, in pixels of the box; null if it is behind. @param {import("three").Vector3} place */
+  /**
+   * Where a place is on the page, in pixels of the box; null if it is behind.
+   * @param {import("three").Vector3} place
+   */
   toScreen(place) {
     const seen = place.clone().project(this.camera);
     if (seen.z > 1) return null;
@@ -194,7 +197,9 @@ export class ArenaEye {
     const turns = /** @type {Record<string, number[]|undefined>} */ ({
       ArrowLeft: [-KEY_RAD, 0], ArrowRight: [KEY_RAD, 0], ArrowUp: [0, -KEY_RAD], ArrowDown: [0, KEY_RAD],
     })[event.key];
-    const nearer = /** @type {Record<string, number|undefined>} */ ({ "+": 0.88, "=": 0.88, "-": 1.14 })[event.key];
+    const nearer = /** @type {Record<string, number|undefined>} */ ({
+      "+": 0.88, "=": 0.88, "-": 1.14,
+    })[event.key];
     if (!turns && !nearer) return;
     event.preventDefault();
     this.#isTouched = true;

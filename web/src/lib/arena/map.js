@@ -51,7 +51,10 @@ export function halfSizeOf(frame, scenario) {
   return [(AROUND * width) / 2, (height + (AROUND - 1) * width) / 2];
 }
 
-/** Half axes of the ellipsoid of a frame's place along x, y, z, metres; null if not known. @param {MappedFrame} frame */
+/**
+ * Half axes of the ellipsoid of a frame's place along x, y, z, metres; null if not known.
+ * @param {MappedFrame} frame
+ */
 export function halfAxesOf({ std }) {
   return std ? std.map((sigma) => Math.min(MOST_M, Math.max(LEAST_M, SIGMAS * sigma))) : null;
 }

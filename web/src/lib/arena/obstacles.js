@@ -1,7 +1,7 @@
 /** Poles and walls of a scenario as boxes that stand on the floor. */
 
 /**
- * What is drawn of a scenario: a part of `Scenario` in scenarios/models.py. Those of older simulators have less.
+ * What is drawn of a scenario: a part of `Scenario` in scenarios/models.py. Older simulators' have less.
  * @typedef {object} Scenario
  * @property {{length_x_m: number, width_y_m: number, height_m: number}} arena
  * @property {{x_m: number, y_m: number, edge_m: number, top_m: number}} base

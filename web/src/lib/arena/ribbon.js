@@ -70,7 +70,11 @@ export class Ribbon {
     this.#publish();
   }
 
-  /** Set how wide it is, pixels, on a picture of some size. @param {number} width @param {number[]} picture */
+  /**
+   * Set how wide it is, pixels, on a picture of some size.
+   * @param {number} width
+   * @param {number[]} picture
+   */
   fit(width, picture) {
     this.material.uniforms.width.value = width;
     this.material.uniforms.size.value.set(...picture);

@@ -246,7 +246,10 @@ export class ArenaScene {
     if (moves) this.#ask();
   }
 
-  /** Wait for the picture, and draw the next ones no more often than the machine can bear. @param {number} began ms */
+  /**
+   * Wait for the picture, and draw the next ones no more often than the machine can bear.
+   * @param {number} began ms
+   */
   #measure(began) {
     const context = this.#renderer.getContext();
     context.readPixels(0, 0, 1, 1, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(4));

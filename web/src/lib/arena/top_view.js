@@ -46,13 +46,18 @@ export class TopView {
     this.setWorld(null);
   }
 
-  /** Show an arena, and no drone. @param {Record<string, any>|null} scenario as the messages have it; null: not known yet */
+  /**
+   * Show an arena, and no drone.
+   * @param {Record<string, any>|null} scenario as the messages have it; null: not known yet
+   */
   setWorld(scenario) {
     this.#arena = scenario?.arena ?? ARENA;
     const { length_x_m, width_y_m } = this.#arena;
     const [width, height] = [length_x_m * this.#scale, width_y_m * this.#scale];
     this.picture.setAttribute("viewBox", `0 0 ${LEFT_PX + width + SCALE_PX} ${TOP_PX + height + BOTTOM_PX}`);
-    this.#things.replaceChildren(...this.#ground(), ...this.#heights(), ...(scenario ? this.#contents(/** @type {Scenario} */ (scenario)) : []));
+    this.#things.replaceChildren(
+      ...this.#ground(), ...this.#heights(),
+      ...(scenario ? this.#contents(/** @type {Scenario} */ (scenario)) : []));
     for (const group of [this.#map, this.#tracks, this.#hits, this.#drones]) group.replaceChildren();
     this.#drawn.clear();
   }
@@ -91,9 +96,14 @@ export class TopView {
     this.#hits.replaceChildren(...places.map(([x, y]) => svg("path", { d: `M ${this.#x(x)} ${this.#y(y)} m -6 -6 l 12 12 m 0 -12 l -12 12`, class: "t-hit" })));
   }
 
-  /** Show what a navigator knows. @param {import("./map.js").NavigationMap|null} map null: nothing @param {Record<string, any>|null} scenario */
+  /**
+   * Show what a navigator knows.
+   * @param {import("./map.js").NavigationMap|null} map null: nothing
+   * @param {Record<string, any>|null} scenario
+   */
   setMap(map, scenario) {
-    const frames = (map?.frames ?? []).map((frame) => this.#mappedFrame(frame, /** @type {Scenario|null} */ (scenario)));
+    const frames = (map?.frames ?? []).map(
+      (frame) => this.#mappedFrame(frame, /** @type {Scenario|null} */ (scenario)));
     const path = map ? [svg("polyline", { points: this.#points(map.path), class: "t-path", stroke: PATH_COLOUR })] : [];
     this.#map.replaceChildren(...frames, ...path);
   }

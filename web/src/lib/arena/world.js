@@ -8,7 +8,7 @@ import { Ribbon } from "./ribbon.js";
  * @typedef {import("./obstacles.js").Scenario} Scenario
  * @typedef {import("./obstacles.js").Frame} Frame
  * @typedef {import("./obstacles.js").Solid} Solid
- * @typedef {Solid & {colour: number[], isPure?: boolean}} Painted a box in its colour; a pure one is hardly shaded
+ * @typedef {Solid & {colour: number[], isPure?: boolean}} Painted a pure colour is hardly shaded
  */
 
 // Colours as the simulated camera paints them, so that the onboard view looks like its image.
@@ -69,7 +69,10 @@ export function buildWorld(scenario, lift_m) {
   return group;
 }
 
-/** The camera's view as four lines from its place and a pale window at some distance, in body axes. @param {Scenario["camera"]} camera */
+/**
+ * The camera's view as four lines from its place and a pale window at some distance, in body axes.
+ * @param {Scenario["camera"]} camera
+ */
 export function buildCone(camera) {
   const reach_m = 0.9;
   const right = reach_m * Math.tan(camera.horizontal_fov_rad / 2);
@@ -102,7 +105,10 @@ export function discard(group) {
 function paintMats(floor, arena) {
   const rows = Math.min(20, Math.max(1, Math.round(arena.length_x_m / MAT_M)));
   const columns = Math.min(20, Math.max(1, Math.round(arena.width_y_m / MAT_M)));
-  const [x, y] = [(/** @type {number} */ i) => (i / rows - 0.5) * arena.length_x_m, (/** @type {number} */ j) => (j / columns - 0.5) * arena.width_y_m];
+  const [x, y] = [
+    (/** @type {number} */ i) => (i / rows - 0.5) * arena.length_x_m,
+    (/** @type {number} */ j) => (j / columns - 0.5) * arena.width_y_m,
+  ];
   for (let i = 0; i < rows; i += 1) {
     for (let j = (i + 1) % 2; j < columns; j += 2) floor.rectangle(x(i), x(i + 1), y(j), y(j + 1), MAT);
   }
@@ -113,7 +119,11 @@ function baseBox({ x_m, y_m, edge_m, top_m }) {
   return { centre: [x_m, y_m, top_m / 2], half: [edge_m / 2, edge_m / 2, top_m / 2], yaw: 0, colour: BASE };
 }
 
-/** The four bars: top and bottom over the whole width, left and right between them. @param {Frame} frame @param {number} lift_m */
+/**
+ * The four bars: top and bottom over the whole width, left and right between them.
+ * @param {Frame} frame
+ * @param {number} lift_m
+ */
 function frameBars(frame, lift_m) {
   const bar = frame.bar_m / 2;
   const [wide, high] = [frame.outer_width_m / 2, frame.outer_height_m / 2];
@@ -207,7 +217,8 @@ class Painter {
 
   /**
    * A level rectangle that is seen from above.
-   * @param {number} x0 @param {number} x1 @param {number} y0 @param {number} y1 @param {number[]} rgb @param {number} [z]
+   * @param {number} x0 @param {number} x1 @param {number} y0 @param {number} y1
+   * @param {number[]} rgb @param {number} [z]
    */
   rectangle(x0, x1, y0, y1, rgb, z = 0) {
     this.polygon([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]], [0, 0, 1], rgb);
@@ -273,7 +284,9 @@ function hull(points) {
     /** @type {number[][]} */
     const chain = [];
     for (const point of list) {
-      while (chain.length > 1 && isRight(/** @type {number[]} */ (chain.at(-2)), /** @type {number[]} */ (chain.at(-1)), point)) chain.pop();
+      while (chain.length > 1 && isRight(
+        /** @type {number[]} */ (chain.at(-2)), /** @type {number[]} */ (chain.at(-1)), point,
+      )) chain.pop();
       chain.push(point);
     }
     return chain.slice(0, -1);

@@ -123,7 +123,9 @@ export class Statechart {
 
   /** @param {"follow"|"whole"|"free"} mode follow: the active state with as much around it as can be read; free: as somebody moved it */
   #setMode(mode) {
-    for (const name of /** @type {const} */ (["follow", "whole"])) setAttribute(/** @type {Buttons} */ (this.#buttons)[name], "aria-pressed", String(mode === name));
+    for (const name of /** @type {const} */ (["follow", "whole"])) {
+      setAttribute(/** @type {Buttons} */ (this.#buttons)[name], "aria-pressed", String(mode === name));
+    }
     if (mode === "free") this.#view.hold();
     else if (mode === "whole") this.#view.whole();
     else this.#view.fit();
@@ -144,7 +146,10 @@ export class Statechart {
       this.#view.viewport.zoom(factor);
     };
     this.#buttons = {
-      follow: add("follow", "Follow", "follow the active state, with as much around it as can be read", () => this.#setMode(/** @type {Buttons} */ (this.#buttons).follow.getAttribute("aria-pressed") === "true" ? "free" : "follow")),
+      follow: add(
+        "follow", "Follow", "follow the active state, with as much around it as can be read",
+        () => this.#setMode(/** @type {Buttons} */ (this.#buttons).follow.getAttribute("aria-pressed") === "true"
+          ? "free" : "follow")),
       whole: add("whole", "Whole", "show the whole diagram", () => this.#setMode("whole")),
       out: add("out", "−", "go away", () => zoom(1 / 1.35)),
       nearer: add("nearer", "+", "come nearer", () => zoom(1.35)),

@@ -23,7 +23,7 @@ export async function ask(path) {
  * Have something done; only judges may.
  * @param {string} path below /api/competition/
  * @param {object} form
- * @returns {Promise<any>} what the path gives; throws an Error with one line for people; its `status` is that of HTTP
+ * @returns {Promise<any>} throws an Error with one line for people; its `status` is that of HTTP
  */
 export function send(path, form) {
   return request(`/api/competition/${path}`, form);

@@ -9,7 +9,7 @@ const NAMED_AFTER_NEXT = 3;
 
 /**
  * The lines of those who fly, the team that is called and those in the queue.
- * @param {{running: RunningTry[], called: Call|null, queue: Pick<Queue, "teams">}} state as the interface tells it
+ * @param {{running: RunningTry[], called: Call|null, queue: Pick<Queue, "teams">}} state
  * @returns {{lines: HTMLElement[], clocks: [HTMLElement, number][]}} clocks: an element and the seconds it shows
  */
 export function nowLines({ running, called, queue }) {

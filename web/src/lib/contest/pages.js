@@ -41,7 +41,10 @@ export class Pages {
     this.#show();
   }
 
-  /** The largest size with which all fit; if none does, the largest with the fewest pages. @param {HTMLElement[]} rows */
+  /**
+   * The largest size with which all fit; if none does, the largest with the fewest pages.
+   * @param {HTMLElement[]} rows
+   */
   #choose(rows) {
     const cuts = SIZES.map((size) => {
       this.#box.style.setProperty("--fit", String(size));

@@ -325,7 +325,9 @@ export class DiagramView {
   #showEnds() {
     const [source, target] = this.#endsOf(this.#held);
     for (const [end, point] of /** @type {const} */ ([["source", source], ["target", target]])) {
-      /** @type {{setAttribute(name: string, value: string|number): void}} which takes a number for its text */
+      /**
+       * @type {{setAttribute(name: string, value: string|number): void}} which takes a number for its text
+       */
       const circle = this.#ends[end];
       circle.setAttribute("visibility", point ? "visible" : "hidden");
       circle.setAttribute("cx", point?.x ?? 0);

@@ -3,9 +3,9 @@ import { make, number, setText } from "../dom.js";
 
 /**
  * @import {Live} from "../messages.js"
- * @typedef {Pick<Live.Detections, "width"|"height"|"boxes"> & {t?: number|null}} Seen what was detected in an image
- * @typedef {[number, number, number, number, number|null, number|null]} Box edges n, s, e, w from the middle, pixels;
- *   distance, metres; angle, degrees
+ * @typedef {Pick<Live.Detections, "width"|"height"|"boxes"> & {t?: number|null}} Seen in an image
+ * @typedef {[number, number, number, number, number|null, number|null]} Box edges
+ *   n, s, e, w from the middle, pixels; distance, metres; angle, degrees
  * @typedef {{jpeg: Blob, t: number|null, detections: Seen|null}} ShownImage
  */
 
@@ -106,7 +106,10 @@ export class CameraView {
     this.#draw();
   }
 
-  /** Say something about the image, such as that it is the last one; "" takes it away. @param {string} words */
+  /**
+   * Say something about the image, such as that it is the last one; "" takes it away.
+   * @param {string} words
+   */
   setNote(words) {
     setText(this.#note, words);
     this.#note.hidden = words === "";

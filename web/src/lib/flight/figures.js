@@ -96,11 +96,14 @@ export class Figures {
 
   /** @param {Live.Figures|null} figures */
   #setTime(figures) {
-    const share = figures?.limit_s ? Math.min(1, /** @type {number} */ (figures.try_time_s) / figures.limit_s) : 0;
+    const share = figures?.limit_s
+      ? Math.min(1, /** @type {number} */ (figures.try_time_s) / figures.limit_s) : 0;
     this.#bar.style.transform = `scaleX(${Number.isFinite(share) ? share : 0})`;
     setAttribute(this.#bar, "data-over", Boolean(figures?.time_over));
-    const left_s = figures ? /** @type {number} */ (figures.limit_s) - /** @type {number} */ (figures.try_time_s) : null;
-    const words = left_s === null ? "no referee" : /** @type {Live.Figures} */ (figures).limit_s === null ? "" : `limit ${/** @type {Live.Figures} */ (figures).limit_s} s${left_s >= 0 ? "" : ", time over"}`;
+    const left_s = figures
+      ? /** @type {number} */ (figures.limit_s) - /** @type {number} */ (figures.try_time_s) : null;
+    const words = left_s === null ? "no referee" : /** @type {Live.Figures} */ (figures).limit_s === null ? ""
+      : `limit ${/** @type {Live.Figures} */ (figures).limit_s} s${left_s >= 0 ? "" : ", time over"}`;
     setText(this.#limit, words);
   }
 
@@ -113,7 +116,8 @@ export class Figures {
       const place = crossed.indexOf(colour);
       const state = place >= 0 ? "crossed" : figures?.next_colour === colour ? "next" : "open";
       setAttribute(chip, "data-state", state);
-      const time_s = place >= 0 ? /** @type {Live.Figures} */ (figures).crossing_times_s?.[place] ?? null : null;
+      const time_s = place >= 0
+        ? /** @type {Live.Figures} */ (figures).crossing_times_s?.[place] ?? null : null;
       setAttribute(chip, "data-value", time_s);
       const told = { crossed: time_s === null ? "✓" : `✓ ${number(time_s)} s`, next: "next", open: "–" }[state];
       setText(words, told);
@@ -127,7 +131,9 @@ export class Figures {
   #setFaults(figures) {
     const faults = figures?.faults ?? [];
     const words = faults.map(({ fault, active }) => `fault: ${fault}${active ? "" : " (over)"}`);
-    if (words.length && /** @type {Live.Figures} */ (figures).failsafe) words.push(/** @type {Live.Figures} */ (figures).failsafe);
+    if (words.length && /** @type {Live.Figures} */ (figures).failsafe) {
+      words.push(/** @type {Live.Figures} */ (figures).failsafe);
+    }
     setText(this.#faults, words.join("; "));
     this.#faults.hidden = words.length === 0;
   }
@@ -137,7 +143,10 @@ export class Figures {
     const decided = figures && (figures.over || figures.final || FINAL_WORDS.has(figures.verdict));
     let verdict = "not judged";
     if (decided) verdict = figures.verdict;
-    else if (figures) verdict = figures.motors_on ? "under way" : /** @type {number} */ (figures.try_time_s) > 0 ? "motors off" : "before the start";
+    else if (figures) {
+      verdict = figures.motors_on ? "under way"
+        : /** @type {number} */ (figures.try_time_s) > 0 ? "motors off" : "before the start";
+    }
     setText(this.#verdict, verdict);
     setAttribute(this.#verdict, "data-value", figures?.verdict ?? null);
     const look = !decided ? "open" : ["clean", "completed"].includes(verdict) ? "good" : "bad";

@@ -58,7 +58,10 @@ export class Fleet {
     return drone;
   }
 
-  /** Take what drones say of themselves; those that are not among them are gone. @param {Live.DroneStatus[]} list */
+  /**
+   * Take what drones say of themselves; those that are not among them are gone.
+   * @param {Live.DroneStatus[]} list
+   */
   setStatus(list) {
     const there = new Set(list.map((status) => status.id));
     for (const status of list) this.of(status.id).status = status;

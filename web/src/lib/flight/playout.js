@@ -25,8 +25,8 @@ import { onBeat } from "../beat.js";
  * @property {DronePose[]} poses all drones' now
  * @property {DronePose[]} passed as they were heard since the last call
  * @property {DronePose|null} chosen that drone's pose now
- * @property {(VideoImage & {detections: Detections|null})|null} image if there is another than before; its detections
- *   null if none are known
+ * @property {(VideoImage & {detections: Detections|null})|null} image if there is another than
+ *   before; its detections null if none are known
  */
 
 const MIN_DELAY_S = 0.1; // without images: evens out how poses arrive
@@ -95,7 +95,9 @@ export class Playout {
       this.#loose = image;
     } else {
       this.#note(track.newest - image.t);
-      if (this.#images.length > 0 && image.t <= /** @type {TimedImage} */ (this.#images.at(-1)).t) this.#images = [];
+      if (this.#images.length > 0 && image.t <= /** @type {TimedImage} */ (this.#images.at(-1)).t) {
+        this.#images = [];
+      }
       this.#images.push(/** @type {TimedImage} */ (image));
       if (this.#images.length > MAX_IMAGES) this.#images.shift();
     }
@@ -162,7 +164,11 @@ export class Playout {
       const until = count < 0 ? track.poses.length : count;
       const fresh = /** @type {DronePose} */ (track.poses.at(-1)).fresh;
       for (const pose of track.poses.slice(track.isTaken ? 1 : 0, until)) passed.push(pose);
-      poses.push({ ...between(track.poses[Math.max(0, until - 1)], track.poses[until], /** @type {number} */ (track.shown)), fresh });
+      poses.push({
+        ...between(
+          track.poses[Math.max(0, until - 1)], track.poses[until], /** @type {number} */ (track.shown)),
+        fresh,
+      });
       if (until > 0) {
         track.poses.splice(0, until - 1); // the last one passed is where the next stretch begins
         track.isTaken = true;
@@ -187,12 +193,16 @@ export class Playout {
     const isFar = track.shown === null || Math.abs(wanted - track.shown) > JUMP_S;
     const share = Math.min(1, CATCH_UP * passed_s); // with few beats a second, all of it
     const aim = isFar ? wanted
-      : /** @type {number} */ (track.shown) + Math.max(0, passed_s + share * (wanted - /** @type {number} */ (track.shown) - passed_s));
+      : /** @type {number} */ (track.shown)
+        + Math.max(0, passed_s + share * (wanted - /** @type {number} */ (track.shown) - passed_s));
     track.shown = Math.min(track.newest, Math.max(track.poses[0].t, aim));
     return track.shown < track.newest;
   }
 
-  /** The newest image of a moment, with what was detected in it; null: none, or the one that is shown. @param {number|null} time */
+  /**
+   * The newest image of a moment, with what was detected in it; null: none, or the one that is shown.
+   * @param {number|null} time
+   */
   #imageAt(time) {
     const loose = this.#loose;
     if (loose) {
@@ -222,7 +232,8 @@ export class Playout {
 
   /** What was detected in an image. @param {VideoImage} image */
   #of(image) {
-    return this.#detections.find((each) => each.t !== null && Math.abs(each.t - /** @type {number} */ (image.t)) < SAME_S) ?? null;
+    return this.#detections.find(
+      (each) => each.t !== null && Math.abs(each.t - /** @type {number} */ (image.t)) < SAME_S) ?? null;
   }
 }
 

@@ -54,7 +54,11 @@ export class Bar {
     this.#show();
   }
 
-  /** A mark for each crossing: pressed, it goes there. @param {import("./run.js").Run} run @param {number} row */
+  /**
+   * A mark for each crossing: pressed, it goes there.
+   * @param {import("./run.js").Run} run
+   * @param {number} row
+   */
   #addMarks(run, row) {
     const { begin, end } = this.#clock;
     run.crossings.forEach(({ t, colour }) => {

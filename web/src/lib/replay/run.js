@@ -10,7 +10,7 @@ import { request } from "../request.js";
  */
 
 /**
- * @typedef {object} Recording a run as in docs/monitor-channels.md, section 6; times in seconds since motors on
+ * @typedef {object} Recording a run as in docs/monitor-channels.md, section 6; seconds since motors on
  * @property {string} name
  * @property {import("../arena/arena.js").World} world
  * @property {import("../chart/statechart.js").Chart|null} chart
@@ -21,7 +21,7 @@ import { request } from "../request.js";
  * @property {Live.Transition[]} transitions oldest first
  * @property {number[]} images their times
  * @property {Crossing[]} crossings
- * @property {{verdict: string, reason: string, [field: string]: any}|null} result result.json; null: nobody judged
+ * @property {{verdict: string, reason: string, [field: string]: any}|null} result null: not judged
  */
 
 const OLD_IMAGE_S = 1; // boxes of an image older than this are not drawn
@@ -194,7 +194,8 @@ export class Run {
 
   /** @param {string} colour */
   #hasFrame(colour) {
-    return (this.world.scenario?.frames ?? []).some((/** @type {{colour: string}} */ frame) => frame.colour === colour);
+    return (this.world.scenario?.frames ?? []).some(
+      (/** @type {{colour: string}} */ frame) => frame.colour === colour);
   }
 
   /** @param {Pose} pose */
