@@ -10,6 +10,20 @@ import { request } from "../request.js";
  */
 
 /**
+ * @typedef {object} Result what is used of result.json; what has its default may be missing
+ * @property {string} verdict
+ * @property {string} reason
+ * @property {number} [try_time_s]
+ * @property {number} [penalty_s]
+ * @property {number} [total_time_s]
+ * @property {number} [contacts]
+ * @property {string[]} [contact_frames]
+ * @property {number[]} [contact_times_s]
+ * @property {string[]} [frames_crossed]
+ * @property {number[]} [crossing_times_s]
+ */
+
+/**
  * @typedef {object} Recording a run as in docs/monitor-channels.md, section 6; seconds since motors on
  * @property {string} name
  * @property {import("../arena/arena.js").World} world
@@ -21,7 +35,7 @@ import { request } from "../request.js";
  * @property {Live.Transition[]} transitions oldest first
  * @property {number[]} images their times
  * @property {Crossing[]} crossings
- * @property {{verdict: string, reason: string, [field: string]: any}|null} result null: not judged
+ * @property {Result|null} result null: not judged
  */
 
 const OLD_IMAGE_S = 1; // boxes of an image older than this are not drawn
