@@ -6,7 +6,7 @@ export const STATE_COLOURS = [
   "#aa4499", "#44aa99", "#000000", "#ddaa33", "#777777", "#882255",
 ];
 
-/** The pure colours of frames and decoys. */
+/** The pure colours of frames and decoys. @type {Record<string, string>} */
 export const FRAME_COLOURS = { red: "#ff0000", green: "#00ff00", blue: "#0000ff", cyan: "#00ffff", magenta: "#ff00ff" };
 
 /**
@@ -30,7 +30,7 @@ export function stateColour(stateId, order) {
   return STATE_COLOURS[number % STATE_COLOURS.length];
 }
 
-/** Red, green and blue of "#rrggbb", 0..255. */
+/** Red, green and blue of "#rrggbb", 0..255. @param {string} colour */
 export function channels(colour) {
   return [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
 }

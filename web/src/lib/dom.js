@@ -17,12 +17,23 @@ export function make(tag, attributes = {}, ...children) {
   return element;
 }
 
-/** Set a text, but only if it is another: a live region would read it out again. */
+/**
+ * Set a text, but only if it is another: a live region would read it out again.
+ * @param {Element|null} element which must be there
+ * @param {string} text
+ */
 export function setText(element, text) {
-  if (element.textContent !== text) element.textContent = text;
+  if (/** @type {Element} */ (element).textContent !== text) {
+    /** @type {Element} */ (element).textContent = text;
+  }
 }
 
-/** Set or take away an attribute, only if that changes something. */
+/**
+ * Set or take away an attribute, only if that changes something.
+ * @param {Element} element
+ * @param {string} name
+ * @param {string|number|boolean|null} value null and false: taken away
+ */
 export function setAttribute(element, name, value) {
   if (value === null || value === false) {
     if (element.hasAttribute(name)) element.removeAttribute(name);
@@ -31,14 +42,22 @@ export function setAttribute(element, name, value) {
   }
 }
 
-/** A number for people; a dash if there is none. */
+/**
+ * A number for people; a dash if there is none.
+ * @param {number|null|undefined} value
+ * @param {number} [decimals]
+ */
 export function number(value, decimals = 1) {
   if (typeof value !== "number" || !Number.isFinite(value)) return "–";
   const text = value.toFixed(decimals);
   return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
 }
 
-/** A colour of the theme as the browser computes it, for canvases. @param {string} name such as "--ink" */
+/**
+ * A colour of the theme as the browser computes it, for canvases.
+ * @param {Element} element in the page
+ * @param {string} name such as "--ink"
+ */
 export function themeColour(element, name) {
   const probe = make("span", { hidden: true });
   probe.style.color = `var(${name})`;
@@ -48,7 +67,7 @@ export function themeColour(element, name) {
   return colour;
 }
 
-/** Whether the page is dark now. */
+/** Whether the page is dark now. @param {Element} element in the page */
 export function isDark(element) {
   const channels = themeColour(element, "--ground").match(/[\d.]+/g) ?? ["255"];
   return Number(channels[0]) < 128;
@@ -64,7 +83,7 @@ export function wantsStillness() {
   return matchMedia("(prefers-reduced-motion: reduce)").matches;
 }
 
-/** Whether a key goes to a field that is being filled in. */
+/** Whether a key goes to a field that is being filled in. @param {Event} event */
 export function isTyping(event) {
   return event.target instanceof Element && event.target.closest("input, textarea, select, [contenteditable]") !== null;
 }

@@ -1,6 +1,7 @@
 /** The header's words on pages that have two languages. */
 import { language } from "./language.js";
 
+/** @type {Record<string, string>} */
 const SPANISH = {
   "Live": "En vivo", "Statechart": "Diagrama", "Editor": "Editor", "Course": "Curso", "Pilot": "Piloto", "Competition": "Competición",
   "Ranking": "Clasificación", "Stage": "Proyección", "Replay": "Repetición", "Log in": "Entrar", "Log out": "Salir", "Skip to the content": "Ir al contenido",

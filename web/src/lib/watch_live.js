@@ -17,6 +17,7 @@ export function watchLive(hear, line, onChange = () => {}) {
   const channel = new LiveChannel();
   let [lostAt, lastPose, hiding] = /** @type {[number|null, number|null, number]} */ ([null, null, 0]);
 
+  /** @param {string} text @param {string} look */
   const say = (text, look) => {
     clearTimeout(hiding);
     line.hidden = false;

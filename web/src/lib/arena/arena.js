@@ -17,7 +17,13 @@ import { reasonOf } from "../request.js";
  * @property {boolean} [fresh] true if there is none
  */
 
-/** @typedef {"orbit"|"follow"|"onboard"} View */
+/**
+ * @typedef {"orbit"|"follow"|"onboard"} View
+ * @typedef {Pose & {id: number}} DronePose
+ * @typedef {{scenario: Record<string, any>|null, lift_m: number, source: string}} World the message "world"
+ * @typedef {string[]|Record<number, string[]>} States ids of the mission's, the same for all or by drone
+ * @typedef {import("./scene.js").ArenaScene|import("./arena_above.js").ArenaAbove} Painter
+ */
 
 const VIEWS = { orbit: "Orbit", follow: "Follow", onboard: "Onboard" };
 const NO_STATE = "#5c6773";
@@ -28,17 +34,25 @@ export class Arena {
   #box;
   #labels;
   #legend;
+  /** @type {Set<string>} */
   #kinds = new Set();
+  /** @type {Record<string, HTMLButtonElement>} by view */
   #buttons = {};
+  /** @type {HTMLButtonElement|undefined} made by the constructor, as the next ones */
   #sizeButton;
+  /** @type {HTMLButtonElement|undefined} */
   #mapButton;
+  /** @type {HTMLElement|undefined} */
   #goal;
   /** @type {import("./map.js").NavigationMap|null} */
   #map = null;
-  /** @type {any} */
-  #painter = null; // an ArenaScene or an ArenaAbove, once it is there
+  /** @type {Painter|null} */
+  #painter = null; // once it is there
+  /** @type {((painter: Painter) => void)[]} */
   #waiting = [];
+  /** @type {Map<number, Pose>} */
   #last = new Map(); // newest pose by drone
+  /** @type {Map<number, {list: string[], order: string[]}>} */
   #orders = new Map();
 
   /** @param {HTMLElement} element an empty box with a size; its size is followed */
@@ -52,7 +66,7 @@ export class Arena {
     this.ready = this.#open();
   }
 
-  /** @param {{scenario: object|null, lift_m: number, source: string}} world as in the message "world" */
+  /** @param {World} world */
   setWorld(world) {
     this.#do((painter) => painter.setWorld(world));
   }
@@ -61,7 +75,7 @@ export class Arena {
    * Where the drones are now; moves on smoothly from where they were, and draws on at their trails.
    * A trail begins anew when the motors come on, and when time goes back.
    * @param {Pose[]} poses
-   * @param {string[]|Object<number, string[]>} states ids of the mission's states, the same for all or by drone
+   * @param {States} states
    */
   setPoses(poses, states) {
     this.#do((painter) => {
@@ -75,10 +89,11 @@ export class Arena {
    * Where the drones are at one moment: drawn exactly there, at once.
    * @param {Pose[]} poses
    * @param {Pose[]} passed through which they came since the last call; the trail goes through all of them
-   * @param {string[]|Object<number, string[]>} states as in `setPoses`
+   * @param {States} states
    */
   showMoment(poses, passed, states) {
     this.#do((painter) => {
+      /** @param {Pose} pose */
       const colourOf = (pose) => this.#colour(pose, states);
       for (const pose of passed) {
         this.#watchForNew(pose);
@@ -97,7 +112,7 @@ export class Arena {
   setMap(map) {
     if (map === this.#map) return;
     this.#map = map;
-    this.#mapButton.hidden = !map;
+    /** @type {HTMLButtonElement} */ (this.#mapButton).hidden = !map;
     this.#showMap();
   }
 
@@ -125,14 +140,14 @@ export class Arena {
   /**
    * Draw a whole trail at once, for a replay that jumps; the next `setPoses` goes on from its end.
    * @param {Pose[]} poses
-   * @param {string[]} states
+   * @param {States} states
    * @param {number} [id]
    */
   setTrail(poses, states, id = 1) {
     this.clearTrail(id);
     this.#do((painter) => {
       painter.addTrail(id, poses, (pose) => this.#colour({ ...pose, id }, states));
-      if (poses.length > 0) this.#last.set(id, poses.at(-1));
+      if (poses.length > 0) this.#last.set(id, /** @type {Pose} */ (poses.at(-1)));
     });
   }
 
@@ -146,20 +161,21 @@ export class Arena {
 
   /** Draw the map unless it is switched off. */
   #showMap() {
-    const shown = this.#mapButton.getAttribute("aria-pressed") === "true" ? this.#map : null;
-    setText(this.#goal, shown ? `navigator: ${shown.goal}` : "");
-    this.#goal.hidden = !shown?.goal;
+    const shown = /** @type {HTMLButtonElement} */ (this.#mapButton).getAttribute("aria-pressed") === "true"
+      ? this.#map : null;
+    setText(/** @type {HTMLElement} */ (this.#goal), shown ? `navigator: ${shown.goal}` : "");
+    /** @type {HTMLElement} */ (this.#goal).hidden = !shown?.goal;
     setAttribute(this.#box, "data-mapped", shown ? shown.frames.map((each) => each.colour).join(" ") : null);
     this.#do((painter) => painter.setMap(shown));
   }
 
-  /** A trail begins anew with a flight. */
+  /** A trail begins anew with a flight. @param {Pose} pose */
   #watchForNew(pose) {
     const before = this.#last.get(pose.id ?? 1);
     if (before && (pose.t < before.t - BACK_S || (pose.on && !before.on))) this.clearTrail(pose.id ?? 1);
   }
 
-  /** Done at once, or when the graphics are there. */
+  /** Done at once, or when the graphics are there. @param {(painter: Painter) => void} what */
   #do(what) {
     if (this.#painter) what(this.#painter);
     else this.#waiting.push(what);
@@ -173,7 +189,9 @@ export class Arena {
     } catch (error) {
       console.info(`no 3-D here (${reasonOf(error)}); the arena is drawn from above`);
       this.#painter = new ArenaAbove(this.#box, "This browser draws no 3-D here, so the arena is shown from above.");
-      for (const button of [...Object.values(this.#buttons), this.#sizeButton]) button.hidden = true;
+      for (const button of [
+        ...Object.values(this.#buttons), /** @type {HTMLButtonElement} */ (this.#sizeButton),
+      ]) button.hidden = true;
     }
     for (const what of this.#waiting.splice(0)) what(this.#painter);
   }
@@ -194,14 +212,17 @@ export class Arena {
     const mapTitle = "show the frames as the navigator estimates them, and its path";
     this.#mapButton = make("button", { type: "button", class: "m-map-button", "aria-pressed": "true", title: mapTitle, hidden: true }, "Map");
     this.#mapButton.addEventListener("click", () => {
-      setAttribute(this.#mapButton, "aria-pressed", String(this.#mapButton.getAttribute("aria-pressed") !== "true"));
+      setAttribute(
+        /** @type {HTMLButtonElement} */ (this.#mapButton), "aria-pressed",
+        String(/** @type {HTMLButtonElement} */ (this.#mapButton).getAttribute("aria-pressed") !== "true"));
       this.#showMap();
     });
     const title = "show the drone no larger than it is";
     this.#sizeButton = make("button", { type: "button", "aria-pressed": "false", title }, "True size");
     this.#sizeButton.addEventListener("click", () => {
-      const isTrue = this.#sizeButton.getAttribute("aria-pressed") !== "true";
-      setAttribute(this.#sizeButton, "aria-pressed", String(isTrue));
+      const isTrue =
+        /** @type {HTMLButtonElement} */ (this.#sizeButton).getAttribute("aria-pressed") !== "true";
+      setAttribute(/** @type {HTMLButtonElement} */ (this.#sizeButton), "aria-pressed", String(isTrue));
       this.#do((painter) => painter.setTrueSize(isTrue));
     });
     this.#goal = make("p", { class: "m-arena-goal", hidden: true });
@@ -213,7 +234,11 @@ export class Arena {
     return bar;
   }
 
-  /** The colour of a drone's state; with motors on it goes to the trail, so the legend says what it means. */
+  /**
+   * The colour of a drone's state; with motors on it goes to the trail, so the legend says what it means.
+   * @param {Pose} pose
+   * @param {States} states
+   */
   #colour(pose, states) {
     const id = pose.id ?? 1;
     const list = Array.isArray(states) ? states : states?.[id];
@@ -221,11 +246,12 @@ export class Arena {
     if (state === undefined) return NO_STATE;
     // Kinds are numbered as they first stand in the mission, so that all who watch see the same colours.
     if (this.#orders.get(id)?.list !== list) {
+      /** @type {string[]} */
       const order = [];
       for (const each of list) stateColour(each, order);
       this.#orders.set(id, { list, order });
     }
-    const colour = stateColour(state, this.#orders.get(id).order);
+    const colour = stateColour(state, /** @type {{order: string[]}} */ (this.#orders.get(id)).order);
     const kind = kindOf(state);
     if (pose.on && !this.#kinds.has(kind)) {
       this.#kinds.add(kind);

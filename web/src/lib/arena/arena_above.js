@@ -10,7 +10,7 @@ const MOST_POINTS = 6000;
 
 export class ArenaAbove {
   #view;
-  /** @type {any} */
+  /** @type {Record<string, any>|null} */
   #scenario = null;
   /** @type {Map<number, {place: number[], colour: string}[]>} */
   #trails = new Map();
@@ -30,7 +30,7 @@ export class ArenaAbove {
     this.#view = new TopView(drawing);
   }
 
-  /** @param {{scenario: object|null}|null} world */
+  /** @param {import("./arena.js").World} world */
   setWorld(world) {
     this.#scenario = world?.scenario ?? null;
     this.#view.setWorld(this.#scenario);

@@ -7,12 +7,15 @@ const TRAIL_POINTS = 6000; // four minutes at full speed; after that it gets coa
 const LATEST_MS = 600; // rotors stand still when no more poses come
 const ROTOR_RAD_S = 26; // far slower than true, so that the eye sees it turn
 
+/** @typedef {import("./arena.js").Pose} Pose */
+
 /** A drone as it is drawn. */
 export class DroneModel {
   /** @param {THREE.Scene} scene */
   constructor(scene) {
     this.group = new THREE.Group(); // place and attitude
     this.body = new THREE.Group(); // drawn larger from far away
+    /** @type {THREE.Group[]} */
     this.rotors = [];
     this.#build();
     this.group.add(this.body);
@@ -25,11 +28,18 @@ export class DroneModel {
     this.from = { p: new THREE.Vector3(), q: new THREE.Quaternion() };
     this.to = { p: new THREE.Vector3(), q: new THREE.Quaternion() };
     this.began = -1; // when it set out from `from`; -1: it has never been anywhere
+    /** @type {Pose|null} */
     this.pose = null;
+    /** @type {THREE.Group|null} */
     this.cone = null;
   }
 
-  /** Set where it is to be soon, from where it is drawn now; at once, if so exactly. */
+  /**
+   * Set where it is to be soon, from where it is drawn now; at once, if so exactly.
+   * @param {Pose} pose
+   * @param {number} now ms
+   * @param {boolean} [isExact]
+   */
   aim(pose, now, isExact = false) {
     this.pose = pose;
     const [w, x, y, z] = pose.q;
@@ -41,7 +51,12 @@ export class DroneModel {
     this.began = now;
   }
 
-  /** Draw it where it is at a time; returns whether it moves on by itself. */
+  /**
+   * Draw it where it is at a time; returns whether it moves on by itself.
+   * @param {number} now ms
+   * @param {number} span_ms from one pose to the next
+   * @param {number} turn seconds for which the rotors turn on
+   */
   advance(now, span_ms, turn) {
     const share = Math.min(1, Math.max(0, now - this.began) / span_ms);
     this.group.position.lerpVectors(this.from.p, this.to.p, share);
@@ -55,14 +70,16 @@ export class DroneModel {
     return share < 1 || (turns && turn > 0);
   }
 
-  /** Its size on the screen: true, or as large as it takes to be seen. */
+  /** Its size on the screen: true, or as large as it takes to be seen. @param {number} scale */
   setScale(scale) {
     this.body.scale.setScalar(scale);
     this.shadow.scale.setScalar(scale);
   }
 
+  /** @param {boolean} fresh */
   setFresh(fresh) {
     if (this.isFresh === fresh) return;
+    /** @type {boolean|undefined} */
     this.isFresh = fresh;
     this.body.traverse((/** @type {any} */ part) => {
       if (part.material) part.material.opacity = fresh ? part.material.userData.opacity : 0.3;
@@ -71,6 +88,7 @@ export class DroneModel {
     });
   }
 
+  /** @param {boolean} visible */
   setVisible(visible) {
     this.body.visible = this.shadow.visible = this.thread.visible = visible;
   }
@@ -83,6 +101,7 @@ export class DroneModel {
   }
 
   #build() {
+    /** @param {string} color @param {number} [opacity] */
     const paint = (color, opacity = 1) => {
       const material = new THREE.MeshLambertMaterial({ color, opacity, transparent: opacity < 1, depthWrite: opacity === 1 });
       material.userData.opacity = opacity;
@@ -90,6 +109,10 @@ export class DroneModel {
     };
     const [dark, arm, nose, blade] = [paint("#2b3440"), paint("#4d5967"), paint("#ff8c1a"), paint("#11161c")];
     const disc = { front: paint("#ff8c1a", 0.45), rear: paint("#9fb2c8", 0.5) };
+    /**
+     * @param {THREE.BufferGeometry} geometry @param {THREE.Material} material
+     * @param {number} x @param {number} y @param {number} z @param {number} [yaw]
+     */
     const add = (geometry, material, x, y, z, yaw = 0) => {
       const part = new THREE.Mesh(geometry, material);
       part.position.set(x, y, z);

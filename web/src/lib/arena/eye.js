@@ -2,6 +2,12 @@
 import { Matrix4, PerspectiveCamera, Quaternion, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
+/**
+ * @typedef {import("three").Object3D} Object3D
+ * @typedef {import("./arena.js").View} View
+ * @typedef {import("./obstacles.js").Scenario} Scenario
+ */
+
 const ORBIT_FOV_DEG = 42;
 const FOLLOW_FOV_DEG = 55;
 const BEHIND_M = 1.5;
@@ -30,6 +36,7 @@ export class ArenaEye {
   constructor(box, ask) {
     this.#box = box;
     this.#ask = ask;
+    /** @type {View} */
     this.view = "orbit";
     this.rectangle = [0, 0, 1, 1];
     this.overview_m = 14; // how far away all of the arena is seen
@@ -54,6 +61,7 @@ export class ArenaEye {
     return this.view === "orbit" ? this.#orbitCamera : this.#otherCamera;
   }
 
+  /** @param {View} view */
   setView(view) {
     this.view = view;
     this.#heading = null;
@@ -61,12 +69,14 @@ export class ArenaEye {
     this.#frame();
   }
 
+  /** @param {number} width @param {number} height */
   setSize(width, height) {
     this.#size = [width, height];
     this.#frame();
     if (!this.#isTouched) this.#overview();
   }
 
+  /** @param {Scenario["arena"]} arena @param {Scenario["camera"]} camera */
   setArena(arena, camera) {
     this.#arena = arena;
     this.#onboard = camera;
@@ -76,7 +86,9 @@ export class ArenaEye {
 
   /**
    * Look where the view looks.
-   * @param {object|null} drone a three.js `Group` with its place and attitude
+   * @param {Object3D|null} drone with its place and attitude
+   * @param {number} passed_s since the last picture
+   * @param {boolean} still nothing moves by itself
    * @returns {boolean} whether the view moves on by itself
    */
   look(drone, passed_s, still) {
@@ -88,7 +100,10 @@ export class ArenaEye {
     return this.#follow(drone, passed_s, still);
   }
 
-  /** Where a place is on the page, in pixels of the box; null if it is behind. */
+  /**
+   * Where a place is on the page, in pixels of the box; null if it is behind.
+   * @param {import("three").Vector3} place
+   */
   toScreen(place) {
     const seen = place.clone().project(this.camera);
     if (seen.z > 1) return null;
@@ -149,6 +164,7 @@ export class ArenaEye {
     this.#controls.update();
   }
 
+  /** @param {Object3D} drone */
   #lookOut(drone) {
     // A camera of three.js looks along its -z with y up; the drone's looks along x with z up.
     const turn = new Quaternion().setFromRotationMatrix(
@@ -159,6 +175,7 @@ export class ArenaEye {
     camera.updateMatrixWorld();
   }
 
+  /** @param {Object3D} drone @param {number} passed_s @param {boolean} still */
   #follow(drone, passed_s, still) {
     const ahead = new Vector3(1, 0, 0).applyQuaternion(drone.quaternion).setZ(0).normalize();
     const share = still || this.#heading === null ? 1 : 1 - Math.exp(-passed_s / LAG_S);
@@ -174,11 +191,15 @@ export class ArenaEye {
     return left > 0.002;
   }
 
-  /** Arrows turn, + and - come nearer and go away. */
+  /** Arrows turn, + and - come nearer and go away. @param {KeyboardEvent} event */
   #key(event) {
     if (event.target !== this.#box || this.view !== "orbit") return;
-    const turns = { ArrowLeft: [-KEY_RAD, 0], ArrowRight: [KEY_RAD, 0], ArrowUp: [0, -KEY_RAD], ArrowDown: [0, KEY_RAD] }[event.key];
-    const nearer = { "+": 0.88, "=": 0.88, "-": 1.14 }[event.key];
+    const turns = /** @type {Record<string, number[]|undefined>} */ ({
+      ArrowLeft: [-KEY_RAD, 0], ArrowRight: [KEY_RAD, 0], ArrowUp: [0, -KEY_RAD], ArrowDown: [0, KEY_RAD],
+    })[event.key];
+    const nearer = /** @type {Record<string, number|undefined>} */ ({
+      "+": 0.88, "=": 0.88, "-": 1.14,
+    })[event.key];
     if (!turns && !nearer) return;
     event.preventDefault();
     this.#isTouched = true;

@@ -25,7 +25,12 @@ const AROUND = 1.35; // an outline is drawn so much larger, around the frame whe
 export const NORMAL_M = 0.3; // how far the line along its normal goes, to each side
 const [LEAST_M, MOST_M] = [0.005, 4]; // half axes of an ellipsoid
 
-/** The map of a message "map"; null if it is empty, which it is where there is no navigator. */
+/**
+ * The map of a message "map"; null if it is empty, which it is where there is no navigator.
+ * @template {NavigationMap} Message
+ * @param {Message} message
+ * @returns {Message|null}
+ */
 export function mapIn(message) {
   return message.frames.length > 0 || message.path.length > 0 || message.goal !== "" ? message : null;
 }
@@ -38,7 +43,7 @@ export function colourOf(colour) {
 /**
  * Half the width and the height of a frame's outline, metres.
  * @param {MappedFrame} frame
- * @param {object|null} scenario
+ * @param {import("./obstacles.js").Scenario|null} scenario
  */
 export function halfSizeOf(frame, scenario) {
   const known = scenario?.frames.find((each) => each.colour === frame.colour);
@@ -46,7 +51,10 @@ export function halfSizeOf(frame, scenario) {
   return [(AROUND * width) / 2, (height + (AROUND - 1) * width) / 2];
 }
 
-/** Half axes of the ellipsoid of a frame's place along x, y, z, metres; null if not known. */
+/**
+ * Half axes of the ellipsoid of a frame's place along x, y, z, metres; null if not known.
+ * @param {MappedFrame} frame
+ */
 export function halfAxesOf({ std }) {
   return std ? std.map((sigma) => Math.min(MOST_M, Math.max(LEAST_M, SIGMAS * sigma))) : null;
 }

@@ -7,6 +7,7 @@ import { GAP, Ribbon } from "./ribbon.js";
 /**
  * @typedef {import("./map.js").MappedFrame} MappedFrame
  * @typedef {import("./map.js").NavigationMap} NavigationMap
+ * @typedef {import("./obstacles.js").Scenario} Scenario
  */
 
 const DASHES = 3; // of each edge of a frame that is not certain
@@ -17,6 +18,7 @@ export class MapModel {
   #outlines;
   #path;
   #ball;
+  /** @type {THREE.Mesh<THREE.SphereGeometry, THREE.MeshBasicMaterial>[]} */
   #balls = [];
 
   /** @param {THREE.Scene} scene */
@@ -32,7 +34,7 @@ export class MapModel {
   /**
    * Draw a map in place of the last one.
    * @param {NavigationMap|null} map
-   * @param {object|null} scenario
+   * @param {Scenario|null} scenario
    */
   set(map, scenario) {
     this.#outlines.clear();
@@ -51,10 +53,12 @@ export class MapModel {
     this.#path.fit(2.5, picture);
   }
 
+  /** @param {MappedFrame} frame @param {Scenario|null} scenario */
   #addFrame(frame, scenario) {
     const [wide, high] = halfSizeOf(frame, scenario);
     const [c, s] = [Math.cos(frame.yaw), Math.sin(frame.yaw)];
     const [x, y, z] = frame.p;
+    /** @param {number} ahead @param {number} left @param {number} up */
     const at = (ahead, left, up) => [x + c * ahead - s * left, y + s * ahead + c * left, z + up];
     const corners = [[-wide, -high], [wide, -high], [wide, high], [-wide, high]].map(([left, up]) => at(0, left, up));
     const rgb = rgbOf(colourOf(frame.colour));
@@ -64,7 +68,10 @@ export class MapModel {
     if (axes) this.#addBall(frame, axes);
   }
 
-  /** A line in some dashes; one is the whole line. */
+  /**
+   * A line in some dashes; one is the whole line.
+   * @param {number[]} from @param {number[]} to @param {number[]} rgb @param {number} dashes
+   */
   #addLine(from, to, rgb, dashes) {
     const parts = 2 * dashes - 1;
     for (let index = 0; index <= parts; index += 1) {
@@ -73,6 +80,7 @@ export class MapModel {
     }
   }
 
+  /** @param {MappedFrame} frame @param {number[]} axes its half axes, metres */
   #addBall(frame, axes) {
     const paint = { color: colourOf(frame.colour), transparent: true, opacity: 0.3, depthWrite: false };
     const ball = new THREE.Mesh(this.#ball, new THREE.MeshBasicMaterial(paint));
@@ -83,6 +91,7 @@ export class MapModel {
   }
 }
 
+/** @param {string} colour */
 function rgbOf(colour) {
   return channels(colour).map((channel) => channel / 255);
 }

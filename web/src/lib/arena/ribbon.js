@@ -26,6 +26,7 @@ export class Ribbon {
     const corners = [0, -1, 0, 1, -1, 0, 1, 1, 0, 0, 1, 0]; // share of the way, side
     this.geometry.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
     this.geometry.setIndex([0, 1, 2, 0, 2, 3]);
+    /** @param {number} size @param {number} offset */
     const part = (size, offset) => new THREE.InterleavedBufferAttribute(this.#buffer, size, offset);
     this.geometry.setAttribute("start", part(3, 0)); // a stretch reads its end from the next point
     this.geometry.setAttribute("finish", part(3, 6));
@@ -44,6 +45,7 @@ export class Ribbon {
    * Go on to a place.
    * @param {number[]} p metres
    * @param {number[]} rgb 0..1, or `GAP`
+   * @returns {boolean} whether it was far enough from the last one
    */
   add(p, rgb) {
     const array = this.#array;
@@ -68,7 +70,11 @@ export class Ribbon {
     this.#publish();
   }
 
-  /** Set how wide it is, pixels, on a picture of some size. */
+  /**
+   * Set how wide it is, pixels, on a picture of some size.
+   * @param {number} width
+   * @param {number[]} picture
+   */
   fit(width, picture) {
     this.material.uniforms.width.value = width;
     this.material.uniforms.size.value.set(...picture);

@@ -8,6 +8,13 @@ import { MapModel } from "./map_model.js";
 import { channels } from "../colours.js";
 import { isDark, make, onTheme, setAttribute, setText, wantsStillness } from "../dom.js";
 
+/**
+ * @typedef {import("./arena.js").Pose} Pose
+ * @typedef {import("./arena_above.js").ColourOf} ColourOf
+ * @typedef {import("./obstacles.js").Scenario} Scenario
+ * @typedef {DroneModel & {label: HTMLElement}} Labelled
+ */
+
 const SLOW_FRAME_MS = 1000 / 12; // where the processor has to draw, it has other things to do too
 const SLOWEST_FRAME_MS = 400;
 const SLOW_SHARE = 4; // there, it draws for a quarter of the time at most
@@ -25,13 +32,14 @@ export class ArenaScene {
   #scene;
   #fog;
   #eye;
-  /** @type {any} */
+  /** @type {THREE.Group|null} */
   #world = null;
-  /** @type {any} */
+  /** @type {Scenario|null} */
   #scenario = null;
   #mapModel;
-  /** @type {any} */
+  /** @type {import("./map.js").NavigationMap|null} */
   #map = null;
+  /** @type {Map<number, Labelled>} */
   #drones = new Map();
   /** @type {number|null} */
   #selected = null;
@@ -66,22 +74,22 @@ export class ArenaScene {
     this.#watch(canvas);
   }
 
-  /** See `Arena`. */
+  /** See `Arena`. @param {import("./arena.js").World} world */
   setWorld(world) {
-    const scenario = world?.scenario ?? null;
+    const scenario = /** @type {Scenario|null} */ (world?.scenario ?? null);
     if (this.#world) discard(this.#world);
     this.#world = scenario ? buildWorld(scenario, world.lift_m ?? 0) : null;
     this.#scenario = scenario;
     this.#mapModel.set(this.#map, scenario);
     for (const drone of this.#drones.values()) this.#setCone(drone);
     if (scenario) {
-      this.#scene.add(this.#world);
+      this.#scene.add(/** @type {THREE.Group} */ (this.#world));
       this.#eye.setArena(scenario.arena, scenario.camera);
     }
     this.#ask();
   }
 
-  /** See `Arena`. */
+  /** See `Arena`. @param {import("./map.js").NavigationMap|null} map */
   setMap(map) {
     this.#map = map;
     this.#mapModel.set(map, this.#scenario);
@@ -89,8 +97,8 @@ export class ArenaScene {
   }
 
   /**
-   * @param {import("./arena.js").Pose[]} poses
-   * @param {function(object): string} colourOf a pose
+   * @param {Pose[]} poses
+   * @param {ColourOf} colourOf
    * @param {boolean} [isExact] drawn there at once; else they move there smoothly
    */
   setPoses(poses, colourOf, isExact = false) {
@@ -111,28 +119,37 @@ export class ArenaScene {
     this.#ask();
   }
 
-  /** Draw on at a trail where the motors are on. */
+  /**
+   * Draw on at a trail where the motors are on.
+   * @param {number} id
+   * @param {Pose[]} poses
+   * @param {ColourOf} colourOf
+   */
   addTrail(id, poses, colourOf) {
     const { trail } = this.#drone(id);
     for (const pose of poses) if (pose.on) trail.add(pose.p, rgbOf(colourOf(pose)));
     this.#ask();
   }
 
+  /** @param {number} [id] */
   clearTrail(id) {
     for (const [each, drone] of this.#drones) if (id === undefined || id === each) drone.trail.clear();
     this.#ask();
   }
 
+  /** @param {import("./arena.js").View} view */
   setView(view) {
     this.#eye.setView(view);
     this.#ask();
   }
 
+  /** @param {number} id */
   select(id) {
     this.#selected = id;
     this.#ask();
   }
 
+  /** @param {boolean} isTrue */
   setTrueSize(isTrue) {
     this.#isTrueSize = isTrue;
     this.#ask();
@@ -142,6 +159,7 @@ export class ArenaScene {
     this.#renderer.dispose();
   }
 
+  /** @param {HTMLCanvasElement} canvas @param {WebGL2RenderingContext} context */
   #makeRenderer(canvas, context) {
     const told = context.getExtension("WEBGL_debug_renderer_info");
     const name = told ? String(context.getParameter(told.UNMASKED_RENDERER_WEBGL)) : "";
@@ -154,7 +172,7 @@ export class ArenaScene {
     return renderer;
   }
 
-  /** Draw again when the page, its theme or its size asks for it. */
+  /** Draw again when the page, its theme or its size asks for it. @param {HTMLCanvasElement} canvas */
   #watch(canvas) {
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => this.#ask());
@@ -180,10 +198,11 @@ export class ArenaScene {
     }).observe(this.#box);
   }
 
+  /** @param {number} id @returns {Labelled} */
   #drone(id) {
     let drone = this.#drones.get(id);
     if (!drone) {
-      drone = new DroneModel(this.#scene);
+      drone = /** @type {Labelled} */ (new DroneModel(this.#scene));
       drone.label = make("span", {}, String(id));
       this.#labels.append(drone.label);
       this.#drones.set(id, drone);
@@ -193,6 +212,7 @@ export class ArenaScene {
     return drone;
   }
 
+  /** @param {DroneModel} drone */
   #setCone(drone) {
     if (drone.cone) discard(drone.cone);
     drone.cone = this.#scenario ? buildCone(this.#scenario.camera) : null;
@@ -203,6 +223,7 @@ export class ArenaScene {
     if (this.#renderer && this.#isSeen && !document.hidden) onBeat(this, (now) => this.#draw(now));
   }
 
+  /** @param {number} now ms */
   #draw(now) {
     if (!this.#renderer) return;
     const passed_s = Math.min(0.2, (now - this.#drawn) / 1000);
@@ -210,7 +231,7 @@ export class ArenaScene {
     const still = wantsStillness();
     let moves = false;
     for (const drone of this.#drones.values()) moves = drone.advance(now, SPAN_MS, still ? 0 : passed_s) || moves;
-    const chosen = this.#drones.get(this.#selected) ?? null;
+    const chosen = this.#drones.get(/** @type {number} */ (this.#selected)) ?? null;
     moves = this.#eye.look(chosen?.group ?? null, passed_s, still) || moves;
     this.#dressWorld();
     for (const [id, drone] of this.#drones) this.#dress(id, drone, chosen);
@@ -225,7 +246,10 @@ export class ArenaScene {
     if (moves) this.#ask();
   }
 
-  /** Wait for the picture, and draw the next ones no more often than the machine can bear. */
+  /**
+   * Wait for the picture, and draw the next ones no more often than the machine can bear.
+   * @param {number} began ms
+   */
   #measure(began) {
     const context = this.#renderer.getContext();
     context.readPixels(0, 0, 1, 1, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(4));
@@ -253,7 +277,12 @@ export class ArenaScene {
     });
   }
 
-  /** Size, label and parts of a drone as this view wants them. */
+  /**
+   * Size, label and parts of a drone as this view wants them.
+   * @param {number} id
+   * @param {Labelled} drone
+   * @param {Labelled|null} chosen
+   */
   #dress(id, drone, chosen) {
     const { camera, view, rectangle: [, , wide, high] } = this.#eye;
     const [isThere, isOnboard] = [drone.began >= 0, view === "onboard"];
@@ -275,8 +304,10 @@ export class ArenaScene {
   }
 }
 
+/** @type {Map<string, number[]>} */
 const rgbs = new Map();
 
+/** @param {string} colour */
 function rgbOf(colour) {
   let rgb = rgbs.get(colour);
   if (!rgb) {

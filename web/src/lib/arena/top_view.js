@@ -14,6 +14,7 @@ const DISC = "M 5 0 A 5 5 0 1 1 5 -0.01 Z"; // if that is not known
 const ENGLISH = { label: "arena from above", x: "x, forward (m)", y: "y, left (m)", z: "height (m)" };
 
 /**
+ * @typedef {import("./obstacles.js").Scenario} Scenario
  * @typedef {[number, number, number]} Place x, y, z
  * @typedef {{group: SVGGElement, shape: SVGPathElement, words: SVGTextElement, mark: SVGPathElement}} Drawn
  */
@@ -45,13 +46,18 @@ export class TopView {
     this.setWorld(null);
   }
 
-  /** Show an arena, and no drone. @param {any} scenario null: not known yet */
+  /**
+   * Show an arena, and no drone.
+   * @param {Record<string, any>|null} scenario as the messages have it; null: not known yet
+   */
   setWorld(scenario) {
     this.#arena = scenario?.arena ?? ARENA;
     const { length_x_m, width_y_m } = this.#arena;
     const [width, height] = [length_x_m * this.#scale, width_y_m * this.#scale];
     this.picture.setAttribute("viewBox", `0 0 ${LEFT_PX + width + SCALE_PX} ${TOP_PX + height + BOTTOM_PX}`);
-    this.#things.replaceChildren(...this.#ground(), ...this.#heights(), ...(scenario ? this.#contents(scenario) : []));
+    this.#things.replaceChildren(
+      ...this.#ground(), ...this.#heights(),
+      ...(scenario ? this.#contents(/** @type {Scenario} */ (scenario)) : []));
     for (const group of [this.#map, this.#tracks, this.#hits, this.#drones]) group.replaceChildren();
     this.#drawn.clear();
   }
@@ -90,14 +96,19 @@ export class TopView {
     this.#hits.replaceChildren(...places.map(([x, y]) => svg("path", { d: `M ${this.#x(x)} ${this.#y(y)} m -6 -6 l 12 12 m 0 -12 l -12 12`, class: "t-hit" })));
   }
 
-  /** Show what a navigator knows. @param {import("./map.js").NavigationMap|null} map null: nothing @param {any} scenario */
+  /**
+   * Show what a navigator knows.
+   * @param {import("./map.js").NavigationMap|null} map null: nothing
+   * @param {Record<string, any>|null} scenario
+   */
   setMap(map, scenario) {
-    const frames = (map?.frames ?? []).map((frame) => this.#mappedFrame(frame, scenario));
+    const frames = (map?.frames ?? []).map(
+      (frame) => this.#mappedFrame(frame, /** @type {Scenario|null} */ (scenario)));
     const path = map ? [svg("polyline", { points: this.#points(map.path), class: "t-path", stroke: PATH_COLOUR })] : [];
     this.#map.replaceChildren(...frames, ...path);
   }
 
-  /** @param {import("./map.js").MappedFrame} frame @param {any} scenario */
+  /** @param {import("./map.js").MappedFrame} frame @param {Scenario|null} scenario */
   #mappedFrame(frame, scenario) {
     const [half] = halfSizeOf(frame, scenario), axes = halfAxesOf(frame), scale = this.#scale;
     const colour = colourOf(frame.colour);
@@ -154,7 +165,9 @@ export class TopView {
     const { length_x_m, width_y_m } = this.#arena;
     const [x0, x1, y0, y1] = [this.#x(-length_x_m / 2), this.#x(length_x_m / 2), this.#y(-width_y_m / 2), this.#y(width_y_m / 2)];
     const step = Math.ceil(Math.max(length_x_m, width_y_m) / MAX_LINES);
+    /** @type {SVGElement[]} */
     const parts = [svg("rect", { x: x0, y: y1, width: x1 - x0, height: y0 - y1, class: "t-ground" })];
+    /** @param {number} at */
     const label = (at) => number(at, 0);
     for (let at = -Math.floor(length_x_m / 2 / step) * step; at <= length_x_m / 2; at += step) {
       parts.push(svg("path", { d: `M ${this.#x(at)} ${y0} V ${y1}`, class: at === 0 ? "t-axis" : "t-grid" }));
@@ -176,6 +189,7 @@ export class TopView {
   /** The scale of heights. */
   #heights() {
     const [x, y0, y1] = [this.#scaleX, this.#z(0), this.#z(this.#arena.height_m)];
+    /** @type {SVGElement[]} */
     const parts = [svg("path", { d: `M ${x} ${y0} V ${y1}`, class: "t-axis" })];
     const step = Math.ceil(this.#arena.height_m / MAX_LINES);
     for (let at = 0; at <= this.#arena.height_m; at += step) {
@@ -187,10 +201,11 @@ export class TopView {
     return parts;
   }
 
-  /** Base, obstacles, goals and frames. @param {any} scenario */
+  /** Base, obstacles, goals and frames. @param {Scenario} scenario */
   #contents(scenario) {
     const { base } = scenario;
     const edge = base.edge_m * this.#scale;
+    /** @type {SVGElement[]} */
     const parts = [svg("rect", { x: this.#x(base.x_m) - edge / 2, y: this.#y(base.y_m) - edge / 2, width: edge, height: edge, class: "t-base" })];
     for (const { centre, half, yaw } of prismsOf(scenario)) {
       const corners = [[1, 1], [1, -1], [-1, -1], [-1, 1]].map(([u, v]) => [u * half[0], v * half[1]]).map(([u, v]) => [
@@ -210,7 +225,12 @@ export class TopView {
     return parts;
   }
 
-  /** A point to reach, or from where to look at a frame. */
+  /**
+   * A point to reach, or from where to look at a frame.
+   * @param {import("./obstacles.js").Goal} goal
+   * @param {string} label
+   * @param {import("./obstacles.js").Frame[]} frames
+   */
   #goal({ hold_m, face, radius_m, distance_m }, label, frames) {
     if (hold_m) {
       const [x, y] = [this.#x(hold_m[0]), this.#y(hold_m[1])];

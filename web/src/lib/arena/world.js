@@ -4,6 +4,13 @@ import { channels, FRAME_COLOURS } from "../colours.js";
 import { allFrames, PRISM, prismsOf } from "./obstacles.js";
 import { Ribbon } from "./ribbon.js";
 
+/**
+ * @typedef {import("./obstacles.js").Scenario} Scenario
+ * @typedef {import("./obstacles.js").Frame} Frame
+ * @typedef {import("./obstacles.js").Solid} Solid
+ * @typedef {Solid & {colour: number[], isPure?: boolean}} Painted a pure colour is hardly shaded
+ */
+
 // Colours as the simulated camera paints them, so that the onboard view looks like its image.
 export const SKY = "#d0dae4";
 export const GROUND = "#868684";
@@ -20,9 +27,8 @@ const SEEN_THROUGH = 0.45; // opacity of poles and walls, except in the onboard 
 
 /**
  * Make the world.
- * @param {object} scenario with all its fields
+ * @param {Scenario} scenario
  * @param {number} lift_m how much higher the frames, the ceiling and the tops of obstacles are
- * @returns {object} a THREE.Group
  */
 export function buildWorld(scenario, lift_m) {
   const group = new THREE.Group();
@@ -63,7 +69,10 @@ export function buildWorld(scenario, lift_m) {
   return group;
 }
 
-/** The camera's view as four lines from its place and a pale window at some distance, in body axes. */
+/**
+ * The camera's view as four lines from its place and a pale window at some distance, in body axes.
+ * @param {Scenario["camera"]} camera
+ */
 export function buildCone(camera) {
   const reach_m = 0.9;
   const right = reach_m * Math.tan(camera.horizontal_fov_rad / 2);
@@ -83,29 +92,38 @@ export function buildCone(camera) {
   return cone;
 }
 
-/** Free what a group holds on the graphics card. */
+/** Free what a group holds on the graphics card. @param {THREE.Object3D} group */
 export function discard(group) {
-  group.traverse((part) => {
+  group.traverse((/** @type {any} */ part) => {
     part.geometry?.dispose();
     part.material?.dispose();
   });
   group.removeFromParent();
 }
 
+/** @param {Painter} floor @param {Scenario["arena"]} arena */
 function paintMats(floor, arena) {
   const rows = Math.min(20, Math.max(1, Math.round(arena.length_x_m / MAT_M)));
   const columns = Math.min(20, Math.max(1, Math.round(arena.width_y_m / MAT_M)));
-  const [x, y] = [(i) => (i / rows - 0.5) * arena.length_x_m, (j) => (j / columns - 0.5) * arena.width_y_m];
+  const [x, y] = [
+    (/** @type {number} */ i) => (i / rows - 0.5) * arena.length_x_m,
+    (/** @type {number} */ j) => (j / columns - 0.5) * arena.width_y_m,
+  ];
   for (let i = 0; i < rows; i += 1) {
     for (let j = (i + 1) % 2; j < columns; j += 2) floor.rectangle(x(i), x(i + 1), y(j), y(j + 1), MAT);
   }
 }
 
+/** @param {Scenario["base"]} base */
 function baseBox({ x_m, y_m, edge_m, top_m }) {
   return { centre: [x_m, y_m, top_m / 2], half: [edge_m / 2, edge_m / 2, top_m / 2], yaw: 0, colour: BASE };
 }
 
-/** The four bars: top and bottom over the whole width, left and right between them. */
+/**
+ * The four bars: top and bottom over the whole width, left and right between them.
+ * @param {Frame} frame
+ * @param {number} lift_m
+ */
 function frameBars(frame, lift_m) {
   const bar = frame.bar_m / 2;
   const [wide, high] = [frame.outer_width_m / 2, frame.outer_height_m / 2];
@@ -121,10 +139,15 @@ function frameBars(frame, lift_m) {
   }));
 }
 
-/** A frame's outline, which stays wide enough to be seen from far away, and a thread to the floor below it. */
+/**
+ * A frame's outline, which stays wide enough to be seen from far away, and a thread to the floor below it.
+ * @param {Frame} frame
+ * @param {number} lift_m
+ */
 function frameLines(frame, lift_m) {
   const [c, s] = [Math.cos(frame.yaw_rad), Math.sin(frame.yaw_rad)];
   const z = frame.z_m + lift_m;
+  /** @param {number} y @param {number} up @returns {[number, number, number]} */
   const at = (y, up) => [frame.x_m - s * y, frame.y_m + c * y, z + up];
   const [wide, high] = [(frame.outer_width_m - frame.bar_m) / 2, (frame.outer_height_m - frame.bar_m) / 2];
   const ring = new Ribbon(5, { rim: 0 });
@@ -142,8 +165,10 @@ function frameLines(frame, lift_m) {
   return group;
 }
 
+/** @param {number} x @param {number} y @param {number} height */
 function outline(x, y, height) {
   const plan = [[x, y], [-x, y], [-x, -y], [x, -y]];
+  /** @type {THREE.Vector3[]} */
   const points = [];
   plan.forEach(([x0, y0], index) => {
     const [x1, y1] = plan[(index + 1) % 4];
@@ -158,18 +183,24 @@ function outline(x, y, height) {
 
 /** Collects flat polygons with one colour each, shaded by Lambert's law, and makes one mesh of them. */
 class Painter {
+  /** @type {number[]} */
   #places = [];
+  /** @type {number[]} */
   #colours = [];
   #sun;
   #ambient;
 
+  /** @param {Scenario["light"]} light */
   constructor(light) {
     const length = Math.hypot(...light.sun_direction_arena);
     this.#sun = light.sun_direction_arena.map((part) => part / length);
     this.#ambient = light.ambient;
   }
 
-  /** A convex polygon, its corners in order; a pure colour is hardly shaded. */
+  /**
+   * A convex polygon, its corners in order; a pure colour is hardly shaded.
+   * @param {number[][]} corners @param {number[]} normal @param {number[]} rgb @param {boolean} [isPure]
+   */
   polygon(corners, normal, rgb, isPure = false) {
     const facing = -(normal[0] * this.#sun[0] + normal[1] * this.#sun[1] + normal[2] * this.#sun[2]);
     const lit = Math.max(DARKEST, this.#ambient + (1 - this.#ambient) * Math.max(0, facing));
@@ -184,11 +215,16 @@ class Painter {
     }
   }
 
-  /** A level rectangle that is seen from above. */
+  /**
+   * A level rectangle that is seen from above.
+   * @param {number} x0 @param {number} x1 @param {number} y0 @param {number} y1
+   * @param {number[]} rgb @param {number} [z]
+   */
   rectangle(x0, x1, y0, y1, rgb, z = 0) {
     this.polygon([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]], [0, 0, 1], rgb);
   }
 
+  /** @param {Painted} box */
   box(box) {
     for (const axis of [0, 1, 2]) {
       for (const sign of [1, -1]) {
@@ -205,10 +241,11 @@ class Painter {
     }
   }
 
-  /** What a box keeps from the sun, on the floor. */
+  /** What a box keeps from the sun, on the floor. @param {Solid} box */
   shadow(box) {
     const sun = this.#sun;
     if (sun[2] >= -1e-3) return;
+    /** @type {number[][]} */
     const cast = [];
     for (const a of [-1, 1]) {
       for (const b of [-1, 1]) {
@@ -221,6 +258,7 @@ class Painter {
     this.polygon(hull(cast), [0, 0, 1], [0, 0, 0]);
   }
 
+  /** @param {THREE.MeshBasicMaterialParameters} settings */
   mesh(settings) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.Float32BufferAttribute(this.#places, 3));
@@ -229,20 +267,26 @@ class Painter {
   }
 }
 
+/** A corner of a box. @param {Solid} box @param {number[]} signs which, by axis: -1 or 1 */
 function placed({ centre, half, yaw }, signs) {
   const [c, s] = [Math.cos(yaw), Math.sin(yaw)];
   const [x, y, z] = signs.map((sign, axis) => sign * half[axis]);
   return [centre[0] + c * x - s * y, centre[1] + s * x + c * y, centre[2] + z];
 }
 
-/** Convex hull in the plane (Andrew's monotone chain), counter-clockwise. */
+/** Convex hull in the plane (Andrew's monotone chain), counter-clockwise. @param {number[][]} points */
 function hull(points) {
   const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  /** @param {number[]} o @param {number[]} a @param {number[]} b */
   const isRight = (o, a, b) => (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]) <= 0;
+  /** @param {number[][]} list */
   const half = (list) => {
+    /** @type {number[][]} */
     const chain = [];
     for (const point of list) {
-      while (chain.length > 1 && isRight(chain.at(-2), chain.at(-1), point)) chain.pop();
+      while (chain.length > 1 && isRight(
+        /** @type {number[]} */ (chain.at(-2)), /** @type {number[]} */ (chain.at(-1)), point,
+      )) chain.pop();
       chain.push(point);
     }
     return chain.slice(0, -1);

@@ -5,6 +5,12 @@ import { readMermaid } from "../diagram/from_mermaid.js";
 import { lookAt } from "../diagram/look.js";
 import { reasonOf } from "../request.js";
 
+/** @import {Live} from "../messages.js" */
+/**
+ * @typedef {{name: string, mermaid: string, states: string[], source: string}} Chart
+ * @typedef {Record<"follow"|"whole"|"out"|"nearer", HTMLButtonElement>} Buttons
+ */
+
 const NONE = "no mission yet; fly one: framerunner fly test-case-1";
 
 /** A mission's diagram with its active state lit, and its last transitions. */
@@ -18,9 +24,10 @@ export class Statechart {
   #rows;
   #table;
   #source;
+  /** @type {Buttons|undefined} made by the constructor */
   #buttons;
   #view;
-  /** @type {{name: string, mermaid: string, states: string[], source: string}|null} */
+  /** @type {Chart|null} */
   #chart = null;
   /** @type {string|null} */
   #active = null;
@@ -55,7 +62,7 @@ export class Statechart {
     if (live) setInterval(() => onBeat(this.#seconds, () => this.#count()), 200);
   }
 
-  /** @param {{name: string, mermaid: string, states: string[], source: string}|null} chart */
+  /** @param {Chart|null} chart */
   setChart(chart) {
     const same = chart && this.#chart && chart.mermaid === this.#chart.mermaid && chart.name === this.#chart.name;
     this.#chart = chart;
@@ -95,13 +102,13 @@ export class Statechart {
     this.#light();
   }
 
-  /** @param {object[]} list as in the message "transitions", newest first */
+  /** @param {Live.Transition[]} list newest first */
   setTransitions(list) {
     this.#rows.replaceChildren(...list.slice(0, 10).map((each) => this.#row(each)));
     this.#table.hidden = list.length === 0;
   }
 
-  /** Say something in place of the diagram; "": show the diagram. */
+  /** Say something in place of the diagram; "": show the diagram. @param {string} words */
   #say(words) {
     setText(this.#words, words);
     this.#words.hidden = words === "";
@@ -116,7 +123,9 @@ export class Statechart {
 
   /** @param {"follow"|"whole"|"free"} mode follow: the active state with as much around it as can be read; free: as somebody moved it */
   #setMode(mode) {
-    for (const name of ["follow", "whole"]) setAttribute(this.#buttons[name], "aria-pressed", String(mode === name));
+    for (const name of /** @type {const} */ (["follow", "whole"])) {
+      setAttribute(/** @type {Buttons} */ (this.#buttons)[name], "aria-pressed", String(mode === name));
+    }
     if (mode === "free") this.#view.hold();
     else if (mode === "whole") this.#view.whole();
     else this.#view.fit();
@@ -124,18 +133,23 @@ export class Statechart {
 
   #makeButtons() {
     const bar = make("span", { class: "m-chart-buttons small-buttons", role: "toolbar", "aria-label": "view of the diagram" });
+    /** @param {string} name @param {string} words @param {string} label @param {() => void} act */
     const add = (name, words, label, act) => {
       const button = make("button", { type: "button", "aria-label": label, title: label }, words);
       button.addEventListener("click", act);
       bar.append(button);
       return button;
     };
+    /** @param {number} factor */
     const zoom = (factor) => {
       this.#setMode("free");
       this.#view.viewport.zoom(factor);
     };
     this.#buttons = {
-      follow: add("follow", "Follow", "follow the active state, with as much around it as can be read", () => this.#setMode(this.#buttons.follow.getAttribute("aria-pressed") === "true" ? "free" : "follow")),
+      follow: add(
+        "follow", "Follow", "follow the active state, with as much around it as can be read",
+        () => this.#setMode(/** @type {Buttons} */ (this.#buttons).follow.getAttribute("aria-pressed") === "true"
+          ? "free" : "follow")),
       whole: add("whole", "Whole", "show the whole diagram", () => this.#setMode("whole")),
       out: add("out", "−", "go away", () => zoom(1 / 1.35)),
       nearer: add("nearer", "+", "come nearer", () => zoom(1.35)),
@@ -152,8 +166,10 @@ export class Statechart {
     return table;
   }
 
+  /** @param {Live.Transition} transition */
   #row({ time_s, from, to, when, values, seconds }) {
     const told = (values ?? []).map(([name, value]) => `${name} = ${written(value)}`).join(", ");
+    /** @param {string} name @param {string} text */
     const cell = (name, text) => make("td", { "data-name": name }, text);
     return make(
       "tr", {}, cell("time", `${number(time_s)} s`), cell("from", from || "start"), cell("to", to),
@@ -166,6 +182,7 @@ export class Statechart {
   }
 }
 
+/** @param {number|boolean|string|null} value */
 function written(value) {
   if (value === null) return "∞";
   if (typeof value === "number" && !Number.isInteger(value)) return String(Number(value.toPrecision(4)));

@@ -10,7 +10,7 @@ const latest = { running: /** @type {Contest.RunningView[]} */ ([]), messages: 0
 /**
  * Request something. The tries of an answer are replaced by those that the WebSocket sent while it was under way.
  * @param {string} path below /api/competition/
- * @returns {Promise<object>} throws an Error with one line for people
+ * @returns {Promise<any>} what the path gives; throws an Error with one line for people
  */
 export async function ask(path) {
   const before = latest.messages;
@@ -23,7 +23,7 @@ export async function ask(path) {
  * Have something done; only judges may.
  * @param {string} path below /api/competition/
  * @param {object} form
- * @returns {Promise<object>} throws an Error with one line for people; its `status` is that of HTTP
+ * @returns {Promise<any>} throws an Error with one line for people; its `status` is that of HTTP
  */
 export function send(path, form) {
   return request(`/api/competition/${path}`, form);
@@ -57,6 +57,7 @@ export function watch(hear) {
  * @returns {function(): Promise<void>} done when what was wanted by then was asked for
  */
 export function oneAtATime(work, fail) {
+  /** @type {Promise<void>|null} */
   let going = null;
   let again = false;
   const run = async () => {

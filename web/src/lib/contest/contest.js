@@ -1,10 +1,12 @@
 /** What the contest knows of who flies, for pages that show a flight. */
 import { ask, oneAtATime, watch } from "./channel.js";
 
+/** @import {RunningTry, Stage} from "./answers" */
+
 /**
  * @typedef {object} Contest
- * @property {any[]} running tries that are being flown, as in `/ws/competition`
- * @property {any} stage as `/api/competition/stage` answers; null before the first answer
+ * @property {RunningTry[]} running tries that are being flown, as in `/ws/competition`
+ * @property {any} stage a `Stage`, as `/api/competition/stage` answers; null before the first answer
  */
 
 /**
@@ -15,6 +17,7 @@ export function watchContest(hear) {
   /** @type {Contest} */
   const known = { running: [], stage: null };
   const refresh = oneAtATime(async () => {
+    /** @type {Stage} */
     const stage = await ask("stage");
     Object.assign(known, { stage, running: stage.running });
     hear(known);
@@ -33,7 +36,7 @@ export function watchContest(hear) {
  * Whose flight a drone's is: the try that is being flown, else its last.
  * @param {Contest} contest
  * @param {number} id of the drone
- * @returns {object|null} with team_name and scenario; null if nobody knows
+ * @returns {any} a `RunningTry` or a `FlownTry`; null if nobody knows
  */
 export function tryOf({ running, stage }, id) {
   const known = [...running, stage?.interrupted, stage?.last];
@@ -44,10 +47,10 @@ export function tryOf({ running, stage }, id) {
  * What the contest last knew of a drone's try that nobody judges any more, for `Figures`.
  * @param {Contest} contest
  * @param {number} id of the drone
- * @returns {object|null} as the live channel's figures; null if there is no such try
+ * @returns {import("../messages.js").Live.Figures|null} null if there is no such try
  */
 export function interruptedFigures({ running, stage }, id) {
-  const found = stage?.interrupted;
+  const found = /** @type {Stage|null} */ (stage)?.interrupted;
   if (found?.drone_id !== id || running.some((each) => each.drone_id === id)) return null;
   return {
     try_time_s: found.try_time_s, penalty_s: found.penalty_s, total_time_s: found.total_s, contacts: null, limit_s: null,

@@ -3,14 +3,17 @@
 import { frameMarks, nameOf, notCounted } from "./words.js";
 import { make } from "../dom.js";
 
+/** @import {Call, Queue, Queued, RunningTry} from "./answers" */
+
 const NAMED_AFTER_NEXT = 3;
 
 /**
  * The lines of those who fly, the team that is called and those in the queue.
- * @param {{running: object[], called: ?object, queue: {teams: object[]}}} state as the interface tells it
+ * @param {{running: RunningTry[], called: Call|null, queue: Pick<Queue, "teams">}} state
  * @returns {{lines: HTMLElement[], clocks: [HTMLElement, number][]}} clocks: an element and the seconds it shows
  */
 export function nowLines({ running, called, queue }) {
+  /** @type {[HTMLElement, number][]} */
   const clocks = [];
   const lines = running.map((each) => {
     const clock = make("span", { class: "clock" }, each.try_time_s.toFixed(1));
@@ -32,11 +35,17 @@ export function nowLines({ running, called, queue }) {
   return { lines, clocks };
 }
 
-/** Whether a team is called and has not taken off yet. @param {?object} called */
+/**
+ * Whether a team is called and has not taken off yet.
+ * @template {{try: number|null}} Call
+ * @param {Call|null} called
+ * @returns {called is Call}
+ */
 export function isWaiting(called) {
   return called !== null && called.try === null;
 }
 
+/** @param {Queued} first @param {Queued[]} others */
 function nextLine(first, others) {
   const then = others.slice(0, NAMED_AFTER_NEXT).flatMap((each, index) =>
     [index === 0 ? "then " : ", ", nameOf(each.team_name)]);

@@ -41,7 +41,10 @@ export class Pages {
     this.#show();
   }
 
-  /** The largest size with which all fit; if none does, the largest with the fewest pages. */
+  /**
+   * The largest size with which all fit; if none does, the largest with the fewest pages.
+   * @param {HTMLElement[]} rows
+   */
   #choose(rows) {
     const cuts = SIZES.map((size) => {
       this.#box.style.setProperty("--fit", String(size));
@@ -53,17 +56,21 @@ export class Pages {
     this.#pages = cuts[best];
   }
 
-  /** Pages of about the same length. */
+  /** Pages of about the same length. @param {HTMLElement[]} rows */
   #cut(rows) {
     const places = rows.map((row) => row.getBoundingClientRect());
     const room = this.#box.getBoundingClientRect().bottom - places[0].top;
+    /** @param {number} from @param {number} to */
     const fits = (from, to) => places[to - 1].bottom - places[from].top <= room;
+    /** @param {number} from */
     const filled = (from) => {
       let to = from + 1;
       while (to < rows.length && fits(from, to + 1)) to += 1;
       return to;
     };
+    /** @param {(from: number) => number} end */
     const cut = (end) => {
+      /** @type {HTMLElement[][]} */
       const pages = [];
       for (let from = 0; from < rows.length;) {
         const to = end(from);

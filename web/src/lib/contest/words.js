@@ -2,7 +2,9 @@
 
 import { make } from "../dom.js";
 
-/** Seconds with hundredths. */
+/** @import {Result, Try} from "./answers" */
+
+/** Seconds with hundredths. @param {number} value */
 export function seconds(value) {
   return value.toFixed(2);
 }
@@ -15,7 +17,7 @@ export function moment(iso) {
   return sameDay ? time : `${date.toLocaleDateString()} ${time}`;
 }
 
-/** What a try is worth, in a few words. @param {object} each a try */
+/** What a try is worth, in a few words. @param {Try} each */
 export function standing(each) {
   if (each.state === "running") return "running";
   if (each.state === "interrupted" && !each.judged) return "interrupted, to be judged";
@@ -23,7 +25,7 @@ export function standing(each) {
   return each.verdict || worth(each.result);
 }
 
-/** @param {object} result of a try */
+/** @param {Pick<Result, "completed"|"missing">} result of a try */
 export function worth(result) {
   if (result.completed) return "completed";
   const missing = result.missing.length;
@@ -31,12 +33,20 @@ export function worth(result) {
   return `not completed, ${missing} ${missing === 1 ? "frame" : "frames"} missing`;
 }
 
-/** A name that somebody typed: shown as text, and not turning the text around it. */
+/**
+ * A name that somebody typed: shown as text, and not turning the text around it.
+ * @param {string} text
+ * @param {Record<string, string>} [attributes]
+ */
 export function nameOf(text, attributes = {}) {
   return make("bdi", attributes, text);
 }
 
-/** The frames of a try as marks: filled when crossed; each says its name. */
+/**
+ * The frames of a try as marks: filled when crossed; each says its name.
+ * @param {string[]} frames
+ * @param {string[]} crossed
+ */
 export function frameMarks(frames, crossed) {
   const marks = make("span", { class: "marks" });
   for (const colour of frames) {
@@ -51,12 +61,15 @@ export function frameMarks(frames, crossed) {
 
 const MARKED = ["not drawn", "open class"];
 
-/** A mark on a try that no ranking has for its scenario or class; null for all others. @param {object} each a try, also a running one */
+/**
+ * A mark on a try that no ranking has for its scenario or class; null for all others.
+ * @param {{barrier: string}} each a try, also a running one
+ */
 export function notCounted(each) {
   return MARKED.includes(each.barrier) ? make("span", { class: "tag warn" }, `${each.barrier}: does not count`) : null;
 }
 
-/** Whether there is a team, scenario or none: a dash for none. */
+/** Whether there is a team, scenario or none: a dash for none. @param {string} text */
 export function orDash(text) {
   return text === "" ? "–" : text;
 }

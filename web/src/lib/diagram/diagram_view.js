@@ -66,7 +66,9 @@ export class DiagramView {
   #touching = new Map();
   /** @type {Map<string, string[]>} */
   #children = new Map();
+  /** @type {Map<string, string>} */
   #parents = new Map();
+  /** @type {Map<string, string>} */
   #initials = new Map();
   /** @type {Map<string, import("../messages.js").Documents.Edge>} */
   #edges = new Map();
@@ -149,7 +151,7 @@ export class DiagramView {
     this.#index();
     this.#stateElements.clear();
     this.#transitionElements.clear();
-    const plain = [], around = [];
+    const plain = /** @type {SVGGElement[]} */ ([]), around = /** @type {SVGGElement[]} */ ([]);
     for (const state of this.#diagram.nodes) (this.#children.has(state.id) ? around : plain).push(this.#state(state));
     this.#superstates.replaceChildren(...around);
     this.#states.replaceChildren(...plain);
@@ -189,6 +191,7 @@ export class DiagramView {
     return this.#unkept;
   }
 
+  /** @param {Object<string, Point>} kept */
   #remember(kept) {
     this.#unkept = {};
     for (const { id, parent } of this.#whole.nodes) {
@@ -322,6 +325,9 @@ export class DiagramView {
   #showEnds() {
     const [source, target] = this.#endsOf(this.#held);
     for (const [end, point] of /** @type {const} */ ([["source", source], ["target", target]])) {
+      /**
+       * @type {{setAttribute(name: string, value: string|number): void}} which takes a number for its text
+       */
       const circle = this.#ends[end];
       circle.setAttribute("visibility", point ? "visible" : "hidden");
       circle.setAttribute("cx", point?.x ?? 0);
@@ -345,10 +351,13 @@ export class DiagramView {
 
   /** @param {Finding[]} findings */
   #mark(findings) {
+    /** @type {Record<string, number>} */
     const worst = { advice: 1, warning: 2, error: 3 };
+    /** @type {Map<string, Finding["severity"]>} */
     const found = new Map();
+    /** @param {string} key @param {Finding["severity"]} severity */
     const note = (key, severity) => {
-      if ((worst[found.get(key)] ?? 0) < worst[severity]) found.set(key, severity);
+      if ((worst[/** @type {string} */ (found.get(key))] ?? 0) < worst[severity]) found.set(key, severity);
     };
     for (const { nodes, event, index, severity } of findings) {
       for (const node of nodes) note(event === null ? `s ${node}` : `t ${node}/${event}/${index}`, severity);
@@ -386,6 +395,7 @@ export class DiagramView {
 
   #showLight() {
     const [active, counts, taken] = this.#light;
+    /** @param {string} path */
     const inside = (path) => this.#closed.has(path) && [...active].some((id) => id.startsWith(`${path}.`));
     for (const [path, group] of this.#stateElements) group.classList.toggle("e-active", active.has(path) || inside(path));
     for (const [id, { group, label }] of this.#transitionElements) {
@@ -431,6 +441,7 @@ export class DiagramView {
 
   #look() {
     if (this.#whole.nodes.length === 0) return;
+    /** @param {Map<string, Box>} boxes */
     const fits = (boxes) => this.viewport.scaleOf(...sizeOf(boxes)) >= READABLE;
     const isThere = this.#whole.nodes.some(({ id }) => id === this.#focus);
     const around = this.#chain(isThere ? this.#focus : this.#whole.initial);
@@ -534,7 +545,7 @@ export class DiagramView {
 
   /** @param {string} id @returns {string} "" of a state at the top */
   parentOf(id) {
-    return this.#parents.get(id);
+    return /** @type {string} */ (this.#parents.get(id));
   }
 
   /** Where a state is drawn within another one; null: the state is not there any more. @param {string} id @param {string} parent */

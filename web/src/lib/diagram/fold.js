@@ -18,6 +18,7 @@ export function fold(diagram, closed) {
   if (closed.size === 0) return diagram;
   const parents = new Map(diagram.nodes.map(({ id, parent }) => [id, parent]));
   const shown = new Map(diagram.nodes.map(({ id }) => [id, chainOf(parents, id).find((each) => closed.has(each)) ?? id]));
+  /** @param {string} id */
   const at = (id) => shown.get(id) ?? id;
   const edges = diagram.edges.map((edge) => ({ ...edge, source: at(edge.source), target: edge.missing ? edge.target : at(edge.target) }));
   return {

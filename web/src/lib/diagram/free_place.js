@@ -41,7 +41,15 @@ export function freePlace(size, others, near, view, isInner) {
   return best;
 }
 
-/** Where a new box would be best: below those it belongs to, or in the middle of what is seen. @returns {Point} */
+/**
+ * Where a new box would be best: below those it belongs to, or in the middle of what is seen.
+ * @param {{width: number, height: number}} size
+ * @param {Box[]} others
+ * @param {Box[]} near
+ * @param {Box|null} view
+ * @param {{right: number, bottom: number}} edges of all others
+ * @returns {Point}
+ */
 function anchorOf(size, others, near, view, { right, bottom }) {
   if (near.length > 0) {
     const middles = near.map(centre);
@@ -51,6 +59,7 @@ function anchorOf(size, others, near, view, { right, bottom }) {
   const last = others.at(-1); // the one before it in the mission
   if (last && (!view || overlap(last, view) > 0)) return { x: last.x, y: last.y + last.height + 2 * MARGIN.beside };
   if (!view) return { x: 0, y: bottom + MARGIN.beside };
+  /** @param {number} value @param {number} low @param {number} high */
   const clamp = (value, low, high) => Math.max(low, Math.min(value, high));
   return {
     x: clamp(view.x + (view.width - size.width) / 2, 0, right + MARGIN.beside),

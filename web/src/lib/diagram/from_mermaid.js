@@ -20,6 +20,7 @@ export function readMermaid(text) {
   /** @type {Map<string, number>} */
   const counts = new Map();
   const around = [""];
+  /** @param {string} id @param {string} [name] @returns {StateNode} */
   const node = (id, name = id.split(".").at(-1) ?? id) => {
     const known = nodes.get(id);
     if (known) return known;

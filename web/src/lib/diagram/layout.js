@@ -82,6 +82,7 @@ function family(diagram) {
 
 /** The transitions of each level, between its states. @param {Diagram} diagram @param {Map<string, string>} parents @returns {Map<string, Join[]>} */
 function joinsOfLevels(diagram, parents) {
+  /** @param {string} path */
   const chain = (path) => {
     const found = [];
     for (let at = path; at; at = parents.get(at) ?? "") found.unshift(at);
@@ -116,6 +117,7 @@ function joinsOfLevels(diagram, parents) {
 function placeLevel(parent, paths, joins, boxes, before) {
   const level = new Map(paths.map((path) => [path, /** @type {Box} */ (boxes.get(path))]));
   const hasSuper = [...level.values()].some(({ height }) => height > LEAF.height);
+  /** @type {string[]} */
   const fresh = [];
   /** @type {Map<string, Box>} */
   const placed = new Map();
@@ -176,9 +178,11 @@ export function renamed(before, after) {
   const gone = new Map();
   /** @type {Map<string, string[]>} */
   const come = new Map();
+  /** @param {Map<string, string[]>} map @param {string} key @param {string} value */
   const add = (map, key, value) => map.set(key, [...(map.get(key) ?? []), value]);
   for (const [id, parent] of old) if (!now.has(id) && (parent === "" || now.has(parent))) add(gone, parent, id);
   for (const { id, parent } of after.nodes) if (!old.has(id) && (parent === "" || old.has(parent))) add(come, parent, id);
+  /** @type {Map<string, string>} */
   const found = new Map();
   for (const [parent, ids] of come) {
     const left = gone.get(parent) ?? [];

@@ -23,6 +23,7 @@ export function lookAt(view, box) {
     const share = other ? 0.5 : 1; // of two fingers each moves it by half
     viewport.mover()((now.x - before.x) * share, (now.y - before.y) * share);
     if (other) {
+      /** @param {{x: number, y: number}} place */
       const apart = (place) => Math.max(10, Math.hypot(place.x - other.x, place.y - other.y));
       viewport.zoom(apart(now) / apart(before), { clientX: (now.x + other.x) / 2, clientY: (now.y + other.y) / 2 });
     }

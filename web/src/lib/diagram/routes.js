@@ -81,6 +81,7 @@ export class Router {
 
   /** Whether a state is in the way of a transition: not those that are around its ends. @param {Route} route @returns {(key: string) => boolean} */
   #isInTheWay({ from, to }) {
+    /** @param {string} outer @param {string} inner */
     const isAround = (outer, inner) => outer.length < inner.length && inner.startsWith(`${outer}.`);
     return (key) => key === "" || !(isAround(key, from) || isAround(key, to));
   }

@@ -4,7 +4,13 @@ const LONGEST_LABEL = 34;
 
 export const HANDLE = 6; // radius, in the drawing's units
 
-/** @param {string} tag @param {Object<string, string|number>} [attributes] @returns {any} */
+/**
+ * @template {keyof SVGElementTagNameMap} Tag
+ * @param {Tag} tag
+ * @param {Object<string, string|number>} [attributes]
+ * @param {...(Node|string)} children
+ * @returns {SVGElementTagNameMap[Tag]}
+ */
 export function svg(tag, attributes = {}, ...children) {
   const element = document.createElementNS(SVG, tag);
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
@@ -12,6 +18,7 @@ export function svg(tag, attributes = {}, ...children) {
   return element;
 }
 
+/** @param {string} text */
 const shorten = (text) => (text.length > LONGEST_LABEL ? `${text.slice(0, LONGEST_LABEL - 1)}…` : text);
 
 /**

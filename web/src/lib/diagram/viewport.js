@@ -60,7 +60,10 @@ export class Viewport {
   show(box, all, [least, largest]) {
     const { width, height } = this.#svg.getBoundingClientRect();
     const scale = Math.min(largest, Math.max(least, this.scaleOf(box.width + MARGIN, box.height + MARGIN)));
-    /** In the middle, but nothing empty beside the drawing if it is larger than what is seen. */
+    /**
+     * In the middle, but nothing empty beside the drawing if it is larger than what is seen.
+     * @param {number} start @param {number} size @param {number} whole @param {number} seen
+     */
     const place = (start, size, whole, seen) => {
       if (whole * scale <= seen) return (seen - whole * scale) / 2;
       return Math.min(0, Math.max(seen - whole * scale, seen / 2 - (start + size / 2) * scale));
@@ -77,10 +80,12 @@ export class Viewport {
   reveal(box) {
     const { width, height } = this.#svg.getBoundingClientRect();
     const { x, y, scale } = this.#view;
+    /** @param {number} offset @param {number} start @param {number} size @param {number} whole */
     const moved = (offset, start, size, whole) => {
       const from = start * scale + offset, to = from + Math.min(size * scale, whole - 2 * MARGIN);
       return offset + (from < MARGIN ? MARGIN - from : to > whole - MARGIN ? whole - MARGIN - to : 0);
     };
+    /** @param {number} start @param {number} size @param {number} whole */
     const isSeen = (start, size, whole) => start >= 0 && start + size <= whole;
     if (isSeen(box.x * scale + x, box.width * scale, width) && isSeen(box.y * scale + y, box.height * scale, height)) return;
     this.#set({ x: moved(x, box.x, box.width, width), y: moved(y, box.y, box.height, height), scale });
@@ -92,6 +97,7 @@ export class Viewport {
     return (dx, dy) => this.#set({ ...before, x: before.x + dx, y: before.y + dy });
   }
 
+  /** @param {{x: number, y: number, scale: number}} view */
   #set(view) {
     this.#view = view;
     this.#world.setAttribute("transform", `translate(${view.x},${view.y}) scale(${view.scale})`);

@@ -1,7 +1,16 @@
 import { onBeat } from "../beat.js";
 import { make, number, setText } from "../dom.js";
 
+/**
+ * @import {Live} from "../messages.js"
+ * @typedef {Pick<Live.Detections, "width"|"height"|"boxes"> & {t?: number|null}} Seen in an image
+ * @typedef {[number, number, number, number, number|null, number|null]} Box edges
+ *   n, s, e, w from the middle, pixels; distance, metres; angle, degrees
+ * @typedef {{jpeg: Blob, t: number|null, detections: Seen|null}} ShownImage
+ */
+
 // Bright edges with dark ones beside them, so that they are seen on any image. The colour's name stands there too.
+/** @type {Record<string, string>} */
 const EDGES = { red: "#ff4d4d", green: "#3df03d", blue: "#6f9dff" };
 
 /** The camera's image with what the app saw in it drawn over it. */
@@ -14,14 +23,14 @@ export class CameraView {
   #address = null;
   /** @type {string|null} */
   #owned = null;
-  /** @type {any} */
+  /** @type {Seen|null} */
   #message = null;
   #drawn = "";
   #again = 0;
   #note;
   /** @type {ImageBitmap|null} */
   #bitmap = null;
-  /** @type {any} */
+  /** @type {ShownImage|null} */
   #wanted = null;
 
   /** @param {HTMLElement} element an empty box; the view takes its width */
@@ -65,7 +74,7 @@ export class CameraView {
 
   /**
    * Show an image and what was detected in this very image, both at once.
-   * @param {{jpeg: Blob, t: number|null, detections: object|null}} frame
+   * @param {ShownImage} frame
    */
   async showFrame(frame) {
     this.#wanted = frame;
@@ -81,7 +90,7 @@ export class CameraView {
     this.#message = frame.detections;
     this.#box.style.setProperty("--shape", `${bitmap.width} / ${bitmap.height}`);
     this.#box.dataset.time = String(frame.t ?? "");
-    this.#box.dataset.boxesTime = frame.detections?.t ?? "";
+    /** @type {Record<string, any>} */ (this.#box.dataset).boxesTime = frame.detections?.t ?? "";
     this.#words.hidden = true;
     this.#draw();
   }
@@ -97,13 +106,16 @@ export class CameraView {
     this.#draw();
   }
 
-  /** Say something about the image, such as that it is the last one; "" takes it away. */
+  /**
+   * Say something about the image, such as that it is the last one; "" takes it away.
+   * @param {string} words
+   */
   setNote(words) {
     setText(this.#note, words);
     this.#note.hidden = words === "";
   }
 
-  /** @param {{width: number, height: number, boxes: object}|null} message as "detections"; null: nothing known */
+  /** @param {Seen|null} message null: nothing known */
   setDetections(message) {
     this.#message = message;
     if (message && message.width > 0 && message.height > 0) {
@@ -115,6 +127,7 @@ export class CameraView {
     onBeat(this, () => this.#draw());
   }
 
+  /** @param {boolean} shown */
   #showImage(shown) {
     this.#image.hidden = !shown;
     this.#words.hidden = shown;
@@ -148,10 +161,17 @@ export class CameraView {
     const scale = width / message.width;
     for (const colour of ["red", "green", "blue"]) {
       const box = message.boxes?.[colour];
-      if (box) this.#drawBox(pen, colour, box, message, scale);
+      if (box) this.#drawBox(pen, colour, /** @type {Box} */ (box), message, scale);
     }
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} pen
+   * @param {string} colour
+   * @param {Box} box
+   * @param {Seen} message
+   * @param {number} scale
+   */
   #drawBox(pen, colour, [n, s, e, w, d, a], message, scale) {
     if ([n, s, e, w].some((edge) => edge === null)) return;
     const [cu, cv] = [message.width / 2, message.height / 2];
@@ -175,6 +195,14 @@ export class CameraView {
     this.#label(pen, `${colour}  d ${d === null ? "–" : `${number(d, 2)} m`}  α ${alpha}`, left, top, bottom, EDGES[colour]);
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} pen
+   * @param {string} text
+   * @param {number} left
+   * @param {number} top
+   * @param {number} bottom
+   * @param {string} edge its colour
+   */
   #label(pen, text, left, top, bottom, edge) {
     const { clientWidth: width, clientHeight: height } = this.#box;
     const size = Math.max(12, Math.min(26, width / 36)); // read from afar on a large picture

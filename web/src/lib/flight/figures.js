@@ -1,15 +1,19 @@
 import { make, number, setAttribute, setText } from "../dom.js";
 
-const COLOURS = ["red", "green", "blue"];
+/** @import {Live} from "../messages.js" */
+/** @typedef {{chip: HTMLElement, words: HTMLElement}} Chip */
+
+const COLOURS = /** @type {const} */ (["red", "green", "blue"]);
 const FINAL_WORDS = new Set(["wrong order", "timed out", "crashed"]); // nothing that comes can mend these
 
 /** The Game Monitor's figures: times, penalty, crossings, verdict. Each number stands in full in `data-value`. */
 export class Figures {
   #root;
+  /** @type {Record<string, HTMLOutputElement>} */
   #numbers = {};
   #bar;
   #limit;
-  #chips = {};
+  #chips = /** @type {Record<"red"|"green"|"blue", Chip> & {list: HTMLElement}} */ ({});
   #next;
   #warning;
   #faults;
@@ -48,13 +52,13 @@ export class Figures {
   }
 
   /**
-   * @param {object|null} figures as in the live channel's status; null: nobody judges
-   * @param {object} [status] the drone's whole status, if there is one
+   * @param {Live.Figures|null} figures null: nobody judges
+   * @param {Live.DroneStatus} [status] the drone's whole status, if there is one
    */
   set(figures, status) {
     setAttribute(this.#root, "data-empty", !figures);
     for (const [name, output] of Object.entries(this.#numbers)) {
-      const value = figures?.[name] ?? null;
+      const value = /** @type {Record<string, any>|null} */ (figures)?.[name] ?? null;
       setAttribute(output, "data-value", value);
       setText(output, name === "contacts" ? number(value, 0) : number(value));
     }
@@ -70,6 +74,7 @@ export class Figures {
     setAttribute(this.#warning, "data-figure", warnings.length ? "warning" : null);
   }
 
+  /** @param {string} name @param {string} title @param {string} unit @param {string} [look] */
   #number(name, title, unit, look = "") {
     const output = make("output", { "data-figure": name, "aria-live": "off" }, "–");
     this.#numbers[name] = output;
@@ -89,15 +94,20 @@ export class Figures {
     return list;
   }
 
+  /** @param {Live.Figures|null} figures */
   #setTime(figures) {
-    const share = figures?.limit_s ? Math.min(1, figures.try_time_s / figures.limit_s) : 0;
+    const share = figures?.limit_s
+      ? Math.min(1, /** @type {number} */ (figures.try_time_s) / figures.limit_s) : 0;
     this.#bar.style.transform = `scaleX(${Number.isFinite(share) ? share : 0})`;
     setAttribute(this.#bar, "data-over", Boolean(figures?.time_over));
-    const left_s = figures ? figures.limit_s - figures.try_time_s : null;
-    const words = left_s === null ? "no referee" : figures.limit_s === null ? "" : `limit ${figures.limit_s} s${left_s >= 0 ? "" : ", time over"}`;
+    const left_s = figures
+      ? /** @type {number} */ (figures.limit_s) - /** @type {number} */ (figures.try_time_s) : null;
+    const words = left_s === null ? "no referee" : /** @type {Live.Figures} */ (figures).limit_s === null ? ""
+      : `limit ${/** @type {Live.Figures} */ (figures).limit_s} s${left_s >= 0 ? "" : ", time over"}`;
     setText(this.#limit, words);
   }
 
+  /** @param {Live.Figures|null} figures */
   #setCrossings(figures) {
     const crossed = figures?.crossed ?? [];
     setAttribute(this.#chips.list, "data-value", figures ? crossed.join(",") : null);
@@ -106,7 +116,8 @@ export class Figures {
       const place = crossed.indexOf(colour);
       const state = place >= 0 ? "crossed" : figures?.next_colour === colour ? "next" : "open";
       setAttribute(chip, "data-state", state);
-      const time_s = place >= 0 ? figures.crossing_times_s?.[place] ?? null : null;
+      const time_s = place >= 0
+        ? /** @type {Live.Figures} */ (figures).crossing_times_s?.[place] ?? null : null;
       setAttribute(chip, "data-value", time_s);
       const told = { crossed: time_s === null ? "✓" : `✓ ${number(time_s)} s`, next: "next", open: "–" }[state];
       setText(words, told);
@@ -116,27 +127,35 @@ export class Figures {
     setText(this.#next, !figures ? "" : next ? `next frame: ${next}` : `all frames crossed${figures.over ? "" : ", back to the base"}`);
   }
 
-  /** What has failed on purpose, and the autopilot's failsafe. */
+  /** What has failed on purpose, and the autopilot's failsafe. @param {Live.Figures|null} figures */
   #setFaults(figures) {
     const faults = figures?.faults ?? [];
     const words = faults.map(({ fault, active }) => `fault: ${fault}${active ? "" : " (over)"}`);
-    if (words.length && figures.failsafe) words.push(figures.failsafe);
+    if (words.length && /** @type {Live.Figures} */ (figures).failsafe) {
+      words.push(/** @type {Live.Figures} */ (figures).failsafe);
+    }
     setText(this.#faults, words.join("; "));
     this.#faults.hidden = words.length === 0;
   }
 
+  /** @param {Live.Figures|null} figures @param {Live.DroneStatus|undefined} status */
   #setOutcome(figures, status) {
     const decided = figures && (figures.over || figures.final || FINAL_WORDS.has(figures.verdict));
     let verdict = "not judged";
     if (decided) verdict = figures.verdict;
-    else if (figures) verdict = figures.motors_on ? "under way" : figures.try_time_s > 0 ? "motors off" : "before the start";
+    else if (figures) {
+      verdict = figures.motors_on ? "under way"
+        : /** @type {number} */ (figures.try_time_s) > 0 ? "motors off" : "before the start";
+    }
     setText(this.#verdict, verdict);
     setAttribute(this.#verdict, "data-value", figures?.verdict ?? null);
     const look = !decided ? "open" : ["clean", "completed"].includes(verdict) ? "good" : "bad";
     setAttribute(this.#verdict, "data-look", look);
     const without = status ? "this drone has no referee: start framerunner monitor --scenario NAME" : "";
     setText(this.#reason, decided ? figures.reason ?? "" : figures ? "" : without);
-    const by = { truth: "judged by the simulator's truth", telemetry: "judged by telemetry" }[figures?.source];
+    const by = /** @type {Record<string, string|undefined>} */ ({
+      truth: "judged by the simulator's truth", telemetry: "judged by telemetry",
+    })[/** @type {string} */ (figures?.source)];
     const standing = figures?.final ? "final" : "so far";
     setText(this.#source, figures ? `${by ?? `judged by ${figures.source}`}, ${standing}` : "");
     setAttribute(this.#source, "data-value", figures?.source ?? null);

@@ -1,17 +1,20 @@
 /** All that was heard of the drones, and which one is looked at. */
 
+/** @import {Live} from "../messages.js" */
+
 /**
  * @typedef {object} Known
  * @property {number} id
- * @property {object|null} pose
- * @property {object|null} status
- * @property {object|null} chart
- * @property {object|null} map of its navigator
- * @property {object[]} transitions newest first
- * @property {object[]} recent poses of the last minute
+ * @property {Live.DronePose|null} pose
+ * @property {Live.DroneStatus|null} status
+ * @property {Live.Chart|null} chart
+ * @property {import("../arena/map.js").NavigationMap|null} map of its navigator
+ * @property {Live.Transition[]} transitions newest first
+ * @property {import("../arena/arena.js").DronePose[]} recent poses of the last minute
  */
 
 export class Fleet {
+  /** @type {Map<number, Known>} */
   #drones = new Map();
   #tabs;
   #hear;
@@ -36,14 +39,14 @@ export class Fleet {
 
   /** Who is looked at; null before anybody was heard. @returns {Known|null} */
   get chosen() {
-    return this.#drones.get(this.#chosen) ?? null;
+    return this.#drones.get(/** @type {number} */ (this.#chosen)) ?? null;
   }
 
   get several() {
     return this.#drones.size > 1;
   }
 
-  /** What is known of a drone, known from now on. @returns {Known} */
+  /** What is known of a drone, known from now on. @param {number} id @returns {Known} */
   of(id) {
     let drone = this.#drones.get(id);
     if (!drone) {
@@ -55,20 +58,24 @@ export class Fleet {
     return drone;
   }
 
-  /** Take what drones say of themselves; those that are not among them are gone. */
+  /**
+   * Take what drones say of themselves; those that are not among them are gone.
+   * @param {Live.DroneStatus[]} list
+   */
   setStatus(list) {
     const there = new Set(list.map((status) => status.id));
     for (const status of list) this.of(status.id).status = status;
     const gone = [...this.#drones.keys()].filter((id) => !there.has(id));
     for (const id of gone) this.#drones.delete(id);
     if (gone.length > 0 || list.length > 0) this.#show();
-    if (gone.includes(this.#chosen)) {
+    if (gone.includes(/** @type {number} */ (this.#chosen))) {
       this.#chosen = null;
       const next = list[0]?.id;
       if (next !== undefined) this.choose(next);
     }
   }
 
+  /** @param {number} id */
   choose(id) {
     this.#chosen = id;
     this.#show();
@@ -98,7 +105,7 @@ export class Fleet {
     }
     for (const button of this.#buttons) {
       const id = Number(button.dataset.drone);
-      const { status } = this.#drones.get(id);
+      const { status } = /** @type {Known} */ (this.#drones.get(id));
       const link = status?.link?.state;
       const note = status?.over && link !== "live" ? ", flight over" : link && link !== "live" ? `, link ${link}` : "";
       const words = `${status?.name || `drone ${id}`}${note}`;

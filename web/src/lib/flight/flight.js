@@ -3,6 +3,11 @@ import { posesOf } from "./history.js";
 import { Playout } from "./playout.js";
 import { FrameStream } from "./video.js";
 
+/**
+ * @import {Live} from "../messages.js"
+ * @typedef {import("../arena/arena.js").DronePose} DronePose
+ */
+
 const LATE_IMAGE_MS = 2000;
 const LOOK_MS = 500;
 
@@ -14,7 +19,7 @@ export class Flight {
   #hear;
   /** @type {number|null} */
   #chosen = null;
-  /** @type {import("../messages.js").Live.DroneStatus|null} */
+  /** @type {Live.DroneStatus|null} */
   #status = null;
   #image = false; // there is one to be seen
   #imageAt = 0;
@@ -22,7 +27,7 @@ export class Flight {
   /**
    * @param {import("../arena/arena.js").Arena} arena
    * @param {import("./camera.js").CameraView} camera
-   * @param {{states: function(): object, passed: function(object): void}} hear
+   * @param {{states: () => Record<number, string[]>, passed: (pose: DronePose) => void}} hear
    *   states: of the missions, by drone; passed: told each drone's poses once their moment has come
    */
   constructor(arena, camera, hear) {
@@ -42,7 +47,7 @@ export class Flight {
     this.#forgetImage();
   }
 
-  /** @param {object|null} status of the chosen drone */
+  /** @param {Live.DroneStatus|null} status of the chosen drone */
   setStatus(status) {
     this.#status = status;
     this.#stream.watch(status?.video ? `/video/${status.id}/frames` : null);
@@ -50,20 +55,20 @@ export class Flight {
     this.#note();
   }
 
-  /** @param {object[]} drones of the message "pose" */
+  /** @param {Live.DronePose[]} drones of the message "pose" */
   addPoses(drones) {
     this.#playout.addPoses(drones);
   }
 
-  /** @param {object} message "detections" of the chosen drone */
+  /** @param {Live.Detections} message of the chosen drone */
   addDetections(message) {
     this.#playout.addDetections(message);
   }
 
   /**
    * Draw a flight's trail so far.
-   * @param {object} message "history"
-   * @returns {object[]} its poses
+   * @param {Live.FlightHistory} message
+   * @returns {DronePose[]} its poses
    */
   setHistory({ id, poses: rows }) {
     const poses = posesOf(id, rows);
@@ -72,9 +77,11 @@ export class Flight {
     return [...poses]; // the arena may draw its own later
   }
 
+  /** @param {import("./playout.js").Moment} moment */
   #show({ poses, passed, image }) {
     for (const pose of passed) this.#hear.passed(pose);
     // A drone whose flight is over stands where it ended; it is not drawn as one that is missed.
+    /** @param {DronePose} pose */
     const isOver = (pose) => pose.id === this.#chosen && this.#status?.over;
     this.#arena.showMoment(poses.map((pose) => (isOver(pose) ? { ...pose, fresh: true } : pose)), passed, this.#hear.states());
     if (!image) return;
@@ -98,7 +105,7 @@ export class Flight {
   }
 }
 
-/** Whether a drone is being flown. @param {object|null} status */
+/** Whether a drone is being flown. @param {Live.DroneStatus|null|undefined} status */
 export function isFlying(status) {
   if (!status || (status.over && status.link?.state === "lost")) return false;
   return Boolean(status.figures ? status.figures.motors_on && !status.figures.over : status.armed);

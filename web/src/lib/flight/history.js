@@ -3,7 +3,7 @@
 /**
  * @param {number} id of the drone
  * @param {any[][]} rows t, x, y, z, yaw, velocity forward, left, up, turn rate, the four commanded, motors, state
- * @returns {import("../arena/arena.js").Pose[]} with the attitude level
+ * @returns {import("../arena/arena.js").DronePose[]} with the attitude level
  */
 export function posesOf(id, rows) {
   return rows.map(([t, x, y, z, yaw, forward, left, up, r, cx, cy, cz, cr, on, s]) => ({

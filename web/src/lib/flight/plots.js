@@ -49,6 +49,7 @@ export class Plots {
   /** @param {HTMLElement} element an empty box; its width is followed */
   constructor(element) {
     this.#element = element;
+    /** @param {string} look @param {string} words */
     const key = (look, words) => make("span", { class: "m-key", "data-look": look }, words);
     const reach = make("span", { class: "m-reach" }, `the last ${WINDOW_S} s, lines every ${LINES_S} s`);
     const legend = make("p", { class: "m-legend" }, key("measured", "measured"), key("commanded", "commanded"), reach);
@@ -109,6 +110,7 @@ export class Plots {
 
   /** @param {Plot} plot @returns {import("uplot").Options} */
   #options(plot) {
+    /** @param {string} look @param {number} width @param {number[]|undefined} dash */
     const line = (look, width, dash) => (
       { stroke: () => this.#colours[look], width, dash, points: { show: false }, spanGaps: false }
     );
@@ -177,6 +179,7 @@ export class Plots {
 function columns(samples, { measured, commanded, wraps }) {
   /** @type {[number[], (number|null)[], (number|null)[]]} */
   const [times, aims, values] = [[], [], []];
+  /** @param {number} value */
   const known = (value) => (Number.isFinite(value) ? value : null);
   for (const sample of samples) {
     const value = known(sample[measured]);

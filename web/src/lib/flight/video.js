@@ -1,5 +1,7 @@
 /** Reads a drone's camera image by image, each with the vehicle time of its exposure. */
 
+/** @typedef {{t: number|null, jpeg: Blob}} VideoImage t: seconds, vehicle time; null if not known */
+
 const HEAD_BYTES = 12; // time in microseconds (int64, -1: not known) and length of the JPEG (uint32)
 const MAX_IMAGE_BYTES = 8 << 20;
 const RETRY_MS = 2000;
@@ -12,7 +14,7 @@ export class FrameStream {
   /** @type {AbortController|null} */
   #control = null;
 
-  /** @param {function({t: number|null, jpeg: Blob}): void} hear told each image; t: seconds, null if not known */
+  /** @param {(image: VideoImage) => void} hear told each image */
   constructor(hear) {
     this.#hear = hear;
     addEventListener("pagehide", () => this.#control?.abort());
@@ -41,6 +43,7 @@ export class FrameStream {
     }
   }
 
+  /** @param {ReadableStreamDefaultReader<Uint8Array<ArrayBuffer>>} reader @param {AbortSignal} signal */
   async #read(reader, signal) {
     let rest = new Uint8Array(0);
     for (;;) {
@@ -62,6 +65,7 @@ export class FrameStream {
   }
 }
 
+/** @param {Uint8Array<ArrayBuffer>} before @param {Uint8Array<ArrayBuffer>} after */
 function join(before, after) {
   if (before.length === 0) return after;
   const joined = new Uint8Array(before.length + after.length);

@@ -24,6 +24,7 @@ export class Bar {
   constructor(element, clock, runs, { keys = true } = {}) {
     this.#clock = clock;
     this.#runs = runs;
+    /** @param {string} words @param {string} label @param {() => void} act @param {string|null} [keys] */
     const button = (words, label, act, keys = /** @type {string|null} */ (null)) => {
       const made = make("button", { type: "button", "aria-label": label, title: keys ? `${label} (${keys})` : label }, words);
       made.addEventListener("click", act);
@@ -53,7 +54,11 @@ export class Bar {
     this.#show();
   }
 
-  /** A mark for each crossing: pressed, it goes there. */
+  /**
+   * A mark for each crossing: pressed, it goes there.
+   * @param {import("./run.js").Run} run
+   * @param {number} row
+   */
   #addMarks(run, row) {
     const { begin, end } = this.#clock;
     run.crossings.forEach(({ t, colour }) => {
@@ -65,11 +70,13 @@ export class Bar {
     });
   }
 
+  /** @param {number} seconds */
   #step(seconds) {
     this.#clock.pause();
     this.#clock.seek(this.#clock.t + seconds);
   }
 
+  /** @param {number} by */
   #changeSpeed(by) {
     const index = SPEEDS.indexOf(this.#clock.speed) + by;
     if (SPEEDS[index] === undefined) return;
@@ -77,8 +84,9 @@ export class Bar {
     this.#clock.setSpeed(SPEEDS[index]);
   }
 
-  /** What the slider would make of these keys is a hair's breadth. */
+  /** What the slider would make of these keys is a hair's breadth. @param {KeyboardEvent} event */
   #sliderKey(event) {
+    /** @type {Record<string, number|undefined>} */
     const steps = {
       ArrowLeft: -STEP_S, ArrowDown: -STEP_S, ArrowRight: STEP_S, ArrowUp: STEP_S, PageDown: -LONG_STEP_S, PageUp: LONG_STEP_S,
     };
@@ -88,6 +96,7 @@ export class Bar {
     this.#clock.seek(this.#clock.t + (event.shiftKey ? 10 : 1) * step);
   }
 
+  /** @param {KeyboardEvent} event */
   #key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const target = event.target instanceof Element ? event.target : null;

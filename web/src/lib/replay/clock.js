@@ -9,6 +9,7 @@ export class Clock {
   #speed = 1;
   #begin = 0;
   #end = 0;
+  /** @type {((clock: Clock) => void)[]} */
   #listeners = [];
   #asked = false;
 
@@ -28,17 +29,20 @@ export class Clock {
     this.#listeners.push(hear);
   }
 
+  /** @param {number} begin @param {number} end */
   setSpan(begin, end) {
     [this.#begin, this.#end] = [begin, end];
     this.seek(this.#t);
   }
 
+  /** @param {number} t */
   seek(t) {
     this.#t = Math.min(this.#end, Math.max(this.#begin, t));
     if (this.isPlaying) this.#began = [this.now(), this.#t];
     this.#tell();
   }
 
+  /** @param {number} speed */
   setSpeed(speed) {
     this.#advance();
     this.#speed = speed;

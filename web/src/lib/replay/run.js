@@ -1,6 +1,43 @@
 /** A recorded flight: fetched whole, asked for any of its times. Nothing here touches the page. */
 import { request } from "../request.js";
 
+/**
+ * @import {Live} from "../messages.js"
+ * @typedef {import("../arena/arena.js").Pose} Pose
+ * @typedef {import("../flight/camera.js").Seen & {t: number}} SeenAt
+ * @typedef {import("../arena/map.js").NavigationMap & {t: number}} MapAt
+ * @typedef {{t: number, colour: string}} Crossing
+ */
+
+/**
+ * @typedef {object} Result what is used of result.json; what has its default may be missing
+ * @property {string} verdict
+ * @property {string} reason
+ * @property {number} [try_time_s]
+ * @property {number} [penalty_s]
+ * @property {number} [total_time_s]
+ * @property {number} [contacts]
+ * @property {string[]} [contact_frames]
+ * @property {number[]} [contact_times_s]
+ * @property {string[]} [frames_crossed]
+ * @property {number[]} [crossing_times_s]
+ */
+
+/**
+ * @typedef {object} Recording a run as in docs/monitor-channels.md, section 6; seconds since motors on
+ * @property {string} name
+ * @property {import("../arena/arena.js").World} world
+ * @property {import("../chart/statechart.js").Chart|null} chart
+ * @property {string[]} [states] that poses tell
+ * @property {Pose[]} poses
+ * @property {SeenAt[]} detections
+ * @property {MapAt[]} maps
+ * @property {Live.Transition[]} transitions oldest first
+ * @property {number[]} images their times
+ * @property {Crossing[]} crossings
+ * @property {Result|null} result null: not judged
+ */
+
 const OLD_IMAGE_S = 1; // boxes of an image older than this are not drawn
 const TRANSITIONS = 10;
 
@@ -9,7 +46,7 @@ export function addressOf(name) {
   return `/api/runs/${encodeURIComponent(name)}`;
 }
 
-/** How many of a sorted list's times are not after t. */
+/** How many of a sorted list's times are not after t. @param {number[]} times @param {number} t */
 function countUntil(times, t) {
   let [low, high] = [0, times.length];
   while (low < high) {
@@ -20,7 +57,10 @@ function countUntil(times, t) {
   return low;
 }
 
-/** The attitude between two, which are near each other, after a share of the shortest way. */
+/**
+ * The attitude between two, which are near each other, after a share of the shortest way.
+ * @param {number[]} from @param {number[]} to @param {number} share
+ */
 function turned(from, to, share) {
   const sign = from.reduce((sum, value, axis) => sum + value * to[axis], 0) < 0 ? -1 : 1;
   const q = from.map((value, axis) => value + share * (sign * to[axis] - value));
@@ -29,7 +69,7 @@ function turned(from, to, share) {
 }
 
 export class Run {
-  /** @param {object} recording as in docs/monitor-channels.md, section 5 */
+  /** @param {Recording} recording */
   constructor(recording) {
     this.name = recording.name;
     this.world = recording.world;
@@ -56,12 +96,16 @@ export class Run {
     return new Run(await request(addressOf(name)));
   }
 
-  /** How many poses there are up to a time. */
+  /** How many poses there are up to a time. @param {number} t */
   posesUntil(t) {
     return countUntil(this.poseTimes, t);
   }
 
-  /** Where the drone is at a time, between the poses around it; null if nothing is known. */
+  /**
+   * Where the drone is at a time, between the poses around it; null if nothing is known.
+   * @param {number} t
+   * @returns {Pose|null}
+   */
   poseAt(t) {
     const count = this.posesUntil(t);
     const before = this.poses[Math.max(0, count - 1)];
@@ -74,7 +118,11 @@ export class Run {
     return { ...before, t, p, q };
   }
 
-  /** The id of the mission's state at a time, and since when: [id or null, seconds in it]. */
+  /**
+   * The id of the mission's state at a time, and since when.
+   * @param {number} t
+   * @returns {[string|null, number]} id and seconds in it
+   */
   stateAt(t) {
     const pose = this.poses[Math.max(0, this.posesUntil(t) - 1)];
     const id = this.states[pose?.s] ?? null;
@@ -83,19 +131,23 @@ export class Run {
     return [id, Math.max(0, t - since)];
   }
 
-  /** The last transitions at a time, newest first, and how many there were: [list, count]. */
+  /**
+   * The last transitions at a time, newest first, and how many there were.
+   * @param {number} t
+   * @returns {[Live.Transition[], number]}
+   */
   transitionsAt(t) {
     const count = countUntil(this.transitionTimes, t);
     return [this.transitions.slice(Math.max(0, count - TRANSITIONS), count).reverse(), count];
   }
 
-  /** The number of the image at a time; null before the first. */
+  /** The number of the image at a time; null before the first. @param {number} t */
   imageAt(t) {
     const count = countUntil(this.images, t);
     return count > 0 ? count - 1 : null;
   }
 
-  /** What was detected last at a time; null if that is too old. */
+  /** What was detected last at a time; null if that is too old. @param {number} t */
   detectionsAt(t) {
     const count = countUntil(this.detectionTimes, t);
     const last = this.detections[count - 1];
@@ -106,12 +158,16 @@ export class Run {
     return t - seen <= OLD_IMAGE_S ? last : null;
   }
 
-  /** What the navigator's map was at a time; null if there was none. */
+  /** What the navigator's map was at a time; null if there was none. @param {number} t */
   mapAt(t) {
     return this.maps[countUntil(this.mapTimes, t) - 1] ?? null;
   }
 
-  /** The Game Monitor's figures at a time, as the live channel has them; null if nobody judged. */
+  /**
+   * The Game Monitor's figures at a time; null if nobody judged.
+   * @param {number} t
+   * @returns {Live.Figures|null}
+   */
   figuresAt(t) {
     const { result } = this;
     if (!result) return null;
@@ -144,16 +200,19 @@ export class Run {
     };
   }
 
-  /** The exact time of a crossing, as the result has it. */
+  /** The exact time of a crossing, as the result has it. @param {Crossing} crossing */
   #timeOf(crossing) {
     const index = this.result?.frames_crossed?.indexOf(crossing.colour) ?? -1;
     return this.result?.crossing_times_s?.[index] ?? crossing.t;
   }
 
+  /** @param {string} colour */
   #hasFrame(colour) {
-    return (this.world.scenario?.frames ?? []).some((frame) => frame.colour === colour);
+    return (this.world.scenario?.frames ?? []).some(
+      (/** @type {{colour: string}} */ frame) => frame.colour === colour);
   }
 
+  /** @param {Pose} pose */
   #isInside({ p: [x, y, z] }) {
     const arena = this.world.scenario?.arena;
     if (!arena) return true;
