@@ -17,7 +17,7 @@ import { reasonOf } from "../lib/request.js";
  * @typedef {object} Page
  * @property {boolean} judge whether there are controls
  * @property {(words: string) => void} say something under the title
- * @property {(work: () => Promise<unknown>) => Promise<boolean>} attempt what somebody asks; whether it was done
+ * @property {(work: () => Promise<unknown>) => Promise<boolean>} attempt what is asked; whether it was done
  */
 
 class Desk {

@@ -148,7 +148,8 @@ export class Queue {
   /** Teams that take part and are not in the queue. */
   get #absent() {
     const order = this.#order;
-    return /** @type {Board} */ (this.#board).teams.filter((team) => !team.withdrawn && !order.includes(team.id)).map((team) => team.id);
+    return /** @type {Board} */ (this.#board).teams
+      .filter((team) => !team.withdrawn && !order.includes(team.id)).map((team) => team.id);
   }
 
   /** Put a team at the end of the queue. @param {number} team its id */
@@ -160,7 +161,9 @@ export class Queue {
   async #set(teams, shuffle = false) {
     if (this.#busy) return; // a second click would speak of an order that is not there any more
     this.#busy = true;
-    await this.#page.attempt(() => send("queue", { seen: /** @type {Board} */ (this.#board).queue.number, teams, shuffle }));
+    await this.#page.attempt(() => send("queue", {
+      seen: /** @type {Board} */ (this.#board).queue.number, teams, shuffle,
+    }));
     this.#busy = false;
   }
 
@@ -188,7 +191,10 @@ export class Queue {
       make("span", { class: "who-is" }, make("span", { class: "place" }, `${place + 1}`),
         nameOf(each.team_name, { class: "name" })));
     if (!this.#page.judge) return row;
-    /** @type {(sign: string, words: string, key: string, to: number|null, disabled: boolean) => HTMLElement} */
+    /**
+     * @param {string} sign @param {string} words @param {string} key
+     * @param {number|null} to place @param {boolean} disabled
+     */
     const button = (sign, words, key, to, disabled) => {
       const element = make("button", {
         type: "button", disabled, title: words, "data-key": `${key}-${each.team}`, "aria-label": `${words}: ${each.team_name}`,

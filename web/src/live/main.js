@@ -30,7 +30,10 @@ const MOST_RECENT = 2000; // poses: more than the minute that is plotted
 const root = pageRoot("live");
 root.classList.add("m-live");
 
-/** A part of the page with a heading. @param {HTMLElement} place @param {string} name @param {string} title */
+/**
+ * A part of the page with a heading.
+ * @param {HTMLElement} place @param {string} name @param {string} title
+ */
 function panel(place, name, title) {
   const body = make("div", { class: "m-body" });
   const section = make("section", { class: `m-panel m-${name}-panel`, "aria-labelledby": `m-${name}` }, make("h2", { id: `m-${name}` }, title), body);
@@ -97,7 +100,8 @@ function showTeam(drone) {
   const shown = `${flown?.id} ${flown?.team_name}`;
   if (team.hidden || team.dataset.shown === shown) return;
   team.dataset.shown = shown;
-  team.replaceChildren(nameOf(/** @type {FlownTry} */ (flown).team_name, { class: "m-team-name" }), make("span", { class: "m-team-where" }, orDash(/** @type {FlownTry} */ (flown).scenario)));
+  team.replaceChildren(nameOf(/** @type {FlownTry} */ (flown).team_name, { class: "m-team-name" }),
+    make("span", { class: "m-team-where" }, orDash(/** @type {FlownTry} */ (flown).scenario)));
 }
 
 const flight = new Flight(arena, camera, {

@@ -40,7 +40,10 @@ export class Messages {
     this.#add(look, level, text, null, id === null || id === undefined || !this.#severalDrones ? "monitor" : `monitor, ${id}`);
   }
 
-  /** @param {string} look @param {string} severity @param {string} text @param {?number} time_s @param {string} who */
+  /**
+   * @param {string} look @param {string} severity @param {string} text
+   * @param {number|null} time_s @param {string} who "" for nobody
+   */
   #add(look, severity, text, time_s, who) {
     this.#list.querySelector(".m-none")?.remove();
     const time = typeof time_s === "number" ? make("span", { class: "m-when" }, `${number(time_s)} s`) : null;

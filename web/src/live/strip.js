@@ -69,7 +69,8 @@ export class DroneStrip {
     const quality = link.state === "live"
       ? [link.loss_percent === null ? "" : `${number(link.loss_percent, 1)} % lost`, link.rate_hz === null ? "" : `${number(link.rate_hz, 0)}/s`]
       : [`last heard ${number(link.age_s)} s ago`];
-    const look = link.state === "live" ? (/** @type {number} */ (link.loss_percent) > 5 ? "warn" : "good") : link.state === "stale" ? "warn" : "bad";
+    const look = link.state === "live" ? (/** @type {number} */ (link.loss_percent) > 5 ? "warn" : "good")
+      : link.state === "stale" ? "warn" : "bad";
     this.#put("link", [LINKS[link.state] ?? link.state, ...quality.filter(Boolean)].join(", "), look);
   }
 

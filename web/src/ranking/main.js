@@ -81,7 +81,8 @@ class Ranking {
   }
 
   async #load() {
-    const state = /** @type {RankingState} */ (await ask(`ranking${this.#wanted === "" ? "" : `?round=${this.#wanted}`}`));
+    /** @type {RankingState} */
+    const state = await ask(`ranking${this.#wanted === "" ? "" : `?round=${this.#wanted}`}`);
     this.#problem = state.problem;
     this.#say();
     this.#showRounds(state);

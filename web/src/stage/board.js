@@ -46,7 +46,7 @@ export class StageRanking {
   }
 }
 
-/** Who was called, who is next and who flew last. @param {Stage|null} stage as `/api/competition/stage` answers */
+/** Who was called, who is next and who flew last. @param {Stage|null} stage */
 function nextWords(stage) {
   const called = isWaiting(stage?.called ?? null) ? /** @type {Stage} */ (stage).called : null;
   const first = stage?.queue.teams[0] ?? null;

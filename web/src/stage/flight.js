@@ -25,7 +25,9 @@ export class StageHead {
   }
 
   /**
-   * @param {{team: string, scenario: string, figures: Live.Figures|null, isOver: boolean, rank: number|null}} told
+   * @param {object} told
+   * @param {string} told.team @param {string} told.scenario @param {Live.Figures|null} told.figures
+   * @param {boolean} told.isOver @param {number|null} told.rank
    */
   show({ team, scenario, figures, isOver, rank }) {
     if (this.#team.dataset.shown !== team) {
@@ -36,7 +38,8 @@ export class StageHead {
     }
     setText(this.#where, scenario);
     setText(this.#clock, number((isOver ? figures?.total_time_s : figures?.try_time_s) ?? null));
-    const penalty = /** @type {number} */ (figures?.penalty_s) > 0 ? `${isOver ? "with" : "and"} ${number(/** @type {Live.Figures} */ (figures).penalty_s)} s penalty` : "";
+    const penalty = /** @type {number} */ (figures?.penalty_s) > 0
+      ? `${isOver ? "with" : "and"} ${number(/** @type {Live.Figures} */ (figures).penalty_s)} s penalty` : "";
     const late = figures?.time_over && !isOver ? "time over" : "";
     setText(this.#penalty, late || penalty);
     const verdict = isOver ? figures?.verdict || "ended" : "";
@@ -83,7 +86,8 @@ export class Splits {
 
 /**
  * @param {string} name @param {string} colour "" for the landing @param {"crossed"|"next"|"open"} state
- * @param {number|null} time seconds; null: not yet, or not known @param {number|null} best seconds; null: there is none
+ * @param {number|null} time seconds; null: not yet, or not known
+ * @param {number|null} best seconds; null: there is none
  */
 function tile(name, colour, state, time, best) {
   const gap = time !== null && best !== null ? time - best : null;

@@ -128,7 +128,8 @@ class StagePage {
       this.#endedAt = null;
       this.#against = null;
     }
-    const isOver = !flying && Boolean(status?.figures) && /** @type {{figures: {try_time_s: number}}} */ (status).figures.try_time_s > 0;
+    const isOver = !flying && Boolean(status?.figures)
+      && /** @type {{figures: {try_time_s: number}}} */ (status).figures.try_time_s > 0;
     if (isOver && this.#endedAt === null) this.#endedAt = performance.now();
     this.#isFlying = flying;
   }
@@ -143,7 +144,10 @@ class StagePage {
     return stage?.complete && running.length === 0 ? "podium" : "waiting";
   }
 
-  /** The try to compare with: the best at the scenario, as it was before this one. @param {Flown|null} flown */
+  /**
+   * The try to compare with: the best at the scenario, as it was before this one.
+   * @param {Flown|null} flown
+   */
   #best(flown) {
     const { stage } = /** @type {{stage: Stage|null}} */ (this.#contest);
     if (!stage || !flown) return this.#against;

@@ -165,7 +165,11 @@ class TryPage {
     this.#head.replaceChildren(make("dl", {}, ...rows));
   }
 
-  /** @param {Team[]} teams @param {?number} team whose it is @param {number|null|undefined} before what was shown */
+  /**
+   * @param {Team[]} teams
+   * @param {number|null} team whose it is
+   * @param {number|null|undefined} before whose it was as shown; undefined: nothing was shown
+   */
   #showTeams(teams, team, before) {
     const text = JSON.stringify(teams);
     if (this.#team.dataset.shown === text && team === before) return;
