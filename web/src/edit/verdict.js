@@ -56,7 +56,11 @@ export function hitWords(contacts) {
   return word("hit", { things: list(contacts.map(({ name, time_s }) => word("hit_at", { thing: thingName(name), time: seconds(time_s) }))) });
 }
 
-/** The first contact with each thing. @param {Result} result @returns {Contact[]} */
+/**
+ * The first contact with each thing.
+ * @param {Pick<Result, "contact_frames"|"contact_times_s">} result
+ * @returns {Contact[]}
+ */
 export function contactsOf({ contact_frames = [], contact_times_s = [] }) {
   return contact_frames.map((name, index) => ({ name, time_s: contact_times_s[index] ?? 0 }))
     .filter(({ name }, index) => contact_frames.indexOf(name) === index);

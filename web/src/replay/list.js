@@ -83,7 +83,10 @@ export class RunList {
     );
   }
 
-  /** The way to see it beside the one that is shown. @param {RunInfo} run @param {number} place -1: not shown */
+  /**
+   * The way to see it beside the one that is shown.
+   * @param {RunInfo} run @param {number} place among those shown; -1: it is not
+   */
   #beside(run, place) {
     if (place >= 0) return `shown${this.#chosen.length > 1 ? ` as ${"AB"[place]}` : ""}`;
     if (this.#chosen.length === 0) return null;

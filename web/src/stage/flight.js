@@ -39,7 +39,8 @@ export class StageHead {
     setText(this.#where, scenario);
     setText(this.#clock, number((isOver ? figures?.total_time_s : figures?.try_time_s) ?? null));
     const penalty = /** @type {number} */ (figures?.penalty_s) > 0
-      ? `${isOver ? "with" : "and"} ${number(/** @type {Live.Figures} */ (figures).penalty_s)} s penalty` : "";
+      ? `${isOver ? "with" : "and"} ${number(/** @type {Live.Figures} */ (figures).penalty_s)} s penalty`
+      : "";
     const late = figures?.time_over && !isOver ? "time over" : "";
     setText(this.#penalty, late || penalty);
     const verdict = isOver ? figures?.verdict || "ended" : "";
