@@ -19,6 +19,7 @@ const fleet = new Fleet(tabs, (drone) => {
   statechart.setTransitions(drone.transitions);
   statechart.setState(drone.status?.mission?.state || null, drone.status?.mission?.seconds);
 });
+/** @param {number} id */
 const isChosen = (id) => fleet.chosen?.id === id;
 
 watchLive({

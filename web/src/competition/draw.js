@@ -4,6 +4,9 @@ import { send } from "../lib/contest/channel.js";
 import { moment, nameOf } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 
+/** @import {Board} from "./answers" */
+/** @import {Page} from "./main.js" */
+
 export class Draw {
   #page;
   #drawn = make("div", { class: "drawn" });
@@ -14,7 +17,7 @@ export class Draw {
   /** @type {string[]|null} */
   #known = null;
 
-  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} page */
+  /** @param {Page} page */
   constructor(page) {
     this.#page = page;
     this.element = make("section", { class: "panel", "aria-labelledby": "draw-title" },
@@ -54,6 +57,7 @@ export class Draw {
     });
   }
 
+  /** @param {string} name of a scenario @param {boolean} checked */
   #tick(name, checked) {
     const box = make("input", { type: "checkbox", value: name });
     box.checked = checked;
@@ -67,7 +71,7 @@ export class Draw {
     this.#page.attempt(() => send("draw", { pool: ticked, count: Number(this.#count.value) }));
   }
 
-  /** @param {object} board @param {string[]} scenarios that can be drawn */
+  /** @param {Board} board @param {string[]} scenarios that can be drawn */
   show(board, scenarios) {
     const draw = board.draws.find((each) => each.round === board.round);
     this.#flown = board.round > 0 && board.tries.some((each) => each.round === board.round);
@@ -94,10 +98,11 @@ export class Rule {
   #page;
   #words = make("p");
   #set = make("p", { class: "hint" });
+  /** @type {Record<string, {value: string|number}>} inputs, which take a number for its text */
   #fields = {};
   #shown = "";
 
-  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} page */
+  /** @param {Page} page */
   constructor(page) {
     this.#page = page;
     this.element = make("section", { class: "panel", "aria-labelledby": "rule-title" },
@@ -106,6 +111,7 @@ export class Rule {
   }
 
   #form() {
+    /** @param {string} id @param {string} label @param {string} least @param {string} step */
     const number = (id, label, least, step) => {
       const input = make("input", { id, type: "number", min: least, step, required: true, inputmode: "decimal" });
       this.#fields[id] = input;
@@ -132,7 +138,7 @@ export class Rule {
     return make("details", {}, make("summary", {}, "Change the rule"), form);
   }
 
-  /** @param {object} board */
+  /** @param {Board} board */
   show(board) {
     const rule = board.rule;
     setText(this.#words, `Sum of try time and penalty over ${rule.scenarios} scenarios. A try that is not completed `

@@ -10,12 +10,23 @@ import { make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 import { reasonOf } from "../lib/request.js";
 
+/** @import {Board, RunningTry, State, Try} from "./answers" */
+
+/**
+ * What the parts of the page have it do.
+ * @typedef {object} Page
+ * @property {boolean} judge whether there are controls
+ * @property {(words: string) => void} say something under the title
+ * @property {(work: () => Promise<unknown>) => Promise<boolean>} attempt what is asked; whether it was done
+ */
+
 class Desk {
   #line = make("p", { class: "line", role: "status", hidden: true });
   #tries = make("tbody");
   #none = make("p", { class: "hint" }, "No try has been flown. Each flight is one: ", make("code", {}, "framerunner fly test-case-1"));
-  /** @type {any} */
+  /** @type {Board|null} */
   #board = null;
+  /** @type {Map<number, HTMLElement>} */
   #clocks = new Map();
 
   /** @param {HTMLElement} element @param {boolean} judge */
@@ -40,13 +51,17 @@ class Desk {
     });
   }
 
-  /** Say something in the line under the title; "" takes it away. */
+  /** Say something in the line under the title; "" takes it away. @param {string} words */
   say(words) {
     setText(this.#line, words);
     this.#line.hidden = words === "";
   }
 
-  /** Do what somebody asks, and say why if it was refused. @returns {Promise<boolean>} whether it was done */
+  /**
+   * Do what somebody asks, and say why if it was refused.
+   * @param {() => Promise<unknown>} work
+   * @returns {Promise<boolean>} whether it was done
+   */
   async attempt(work) {
     try {
       await work();
@@ -69,7 +84,7 @@ class Desk {
   }
 
   async #load() {
-    const state = await ask("state");
+    const state = /** @type {State} */ (await ask("state"));
     const key = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.key : undefined;
     this.#board = state.board;
     this.say(state.problem);
@@ -84,6 +99,7 @@ class Desk {
     /** @type {HTMLElement|null} */ (document.querySelector(`[data-key="${CSS.escape(key)}"]`))?.focus();
   }
 
+  /** @param {Try[]} tries */
   #showTries(tries) {
     this.#none.hidden = tries.length > 0;
     /** @type {HTMLElement} */ (this.#tries.parentElement).hidden = tries.length === 0;
@@ -91,6 +107,7 @@ class Desk {
     this.#tries.replaceChildren(...tries.map((each) => this.#row(each)));
   }
 
+  /** @param {Try} each */
   #row(each) {
     const running = each.state === "running";
     const counts = make("td", { class: "number" },
@@ -112,6 +129,7 @@ class Desk {
       }, words)));
   }
 
+  /** @param {RunningTry[]} tries that are flown now */
   #run(tries) {
     if (this.#board === null) return;
     for (const each of tries) {

@@ -5,6 +5,9 @@ import { isWaiting, nowLines } from "../lib/contest/now.js";
 import { nameOf } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 
+/** @import {Board, Call, LastCall, Queued, RunningTry, Team} from "./answers" */
+/** @import {Page} from "./main.js" */
+
 /** "Now and next": who flies, who is called, and an organiser's form to call a team. */
 export class Calls {
   #page;
@@ -14,10 +17,10 @@ export class Calls {
   #scenario = make("select", { id: "next-scenario" });
   #call = make("button", { type: "submit", class: "main" }, "Call");
   #undo = make("button", { type: "button", id: "undo-call" });
-  /** @type {any} */
+  /** @type {Board|null} */
   #board = null;
 
-  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} page */
+  /** @param {Page} page */
   constructor(page) {
     this.#page = page;
     this.element = make("section", { class: "panel", "aria-labelledby": "next-title" },
@@ -38,8 +41,8 @@ export class Calls {
 
   /** The team that the form would call: the one chosen, or the first of the queue. */
   get #chosen() {
-    const id = Number(this.#team.value) || this.#board.queue.teams[0]?.team;
-    return this.#board.teams.find((team) => team.id === id) ?? null;
+    const id = Number(this.#team.value) || /** @type {Board} */ (this.#board).queue.teams[0]?.team;
+    return /** @type {Board} */ (this.#board).teams.find((team) => team.id === id) ?? null;
   }
 
   #callTeam() {
@@ -48,9 +51,9 @@ export class Calls {
       this.#page.say("the queue is empty and no team is chosen; choose one, or fill the queue with Add all teams");
       return;
     }
-    const called = this.#board.called;
+    const called = /** @type {Board} */ (this.#board).called;
     const question = `${called?.team_name} is called and has not flown. Call ${team.name} in its place?`;
-    if (isWaiting(called) && called.team !== team.id && !confirm(question)) return;
+    if (isWaiting(called) && /** @type {Call} */ (called).team !== team.id && !confirm(question)) return;
     const form = { team: team.id, scenario: this.#scenario.value };
     this.#page.attempt(async () => {
       await send("next", form);
@@ -59,7 +62,7 @@ export class Calls {
   }
 
   #takeBack() {
-    const call = this.#board.last_call;
+    const call = /** @type {LastCall} */ (/** @type {Board} */ (this.#board).last_call);
     const tries = call.tries.join(", ");
     const question = `${call.tries.length === 1 ? `Try ${tries} was` : `Tries ${tries} were`} flown on this call and `
       + `would be nobody's: it would not count for ${call.team_name}. Take the call back?`;
@@ -67,7 +70,7 @@ export class Calls {
     this.#page.attempt(() => send("next/undo", { call: call.id }));
   }
 
-  /** @param {object} board */
+  /** @param {Board} board */
   show(board) {
     this.#board = board;
     if (!this.#page.judge) return;
@@ -88,7 +91,7 @@ export class Calls {
     setText(this.#call, team === null ? "Call" : `Call ${team.name}`);
   }
 
-  /** @param {object[]} tries that are flown now */
+  /** @param {RunningTry[]} tries that are flown now */
   run(tries) {
     if (this.#board === null) return;
     const { called, queue } = this.#board;
@@ -102,7 +105,11 @@ export class Calls {
   }
 }
 
-/** Offer choices, and leave what is chosen as it is. */
+/**
+ * Offer choices, and leave what is chosen as it is.
+ * @param {HTMLSelectElement} select
+ * @param {string[][]} options value and words of each
+ */
 function offer(select, options) {
   const chosen = select.value;
   const text = JSON.stringify(options);
@@ -119,11 +126,11 @@ export class Queue {
   #count = make("span", { class: "count" });
   #all = make("button", { type: "button", id: "queue-all" }, "Add all teams");
   #shuffle = make("button", { type: "button", id: "queue-shuffle" }, "Shuffle");
-  /** @type {any} */
+  /** @type {Board|null} */
   #board = null;
   #busy = false;
 
-  /** @param {{judge: boolean, attempt: function(function(): Promise<void>): Promise<boolean>}} page */
+  /** @param {Pick<Page, "judge"|"attempt">} page */
   constructor(page) {
     this.#page = page;
     this.element = make("section", { class: "panel", "aria-labelledby": "queue-title" },
@@ -135,13 +142,14 @@ export class Queue {
   }
 
   get #order() {
-    return this.#board.queue.teams.map((each) => each.team);
+    return /** @type {Board} */ (this.#board).queue.teams.map((each) => each.team);
   }
 
   /** Teams that take part and are not in the queue. */
   get #absent() {
     const order = this.#order;
-    return this.#board.teams.filter((team) => !team.withdrawn && !order.includes(team.id)).map((team) => team.id);
+    return /** @type {Board} */ (this.#board).teams
+      .filter((team) => !team.withdrawn && !order.includes(team.id)).map((team) => team.id);
   }
 
   /** Put a team at the end of the queue. @param {number} team its id */
@@ -149,20 +157,24 @@ export class Queue {
     return this.#set([...this.#order, team]);
   }
 
+  /** @param {number[]} teams their ids, in order */
   async #set(teams, shuffle = false) {
     if (this.#busy) return; // a second click would speak of an order that is not there any more
     this.#busy = true;
-    await this.#page.attempt(() => send("queue", { seen: this.#board.queue.number, teams, shuffle }));
+    await this.#page.attempt(() => send("queue", {
+      seen: /** @type {Board} */ (this.#board).queue.number, teams, shuffle,
+    }));
     this.#busy = false;
   }
 
+  /** @param {number} team its id @param {number|null} place from 0; null: out of the queue */
   #move(team, place) {
     const order = this.#order.filter((each) => each !== team);
     if (place !== null) order.splice(place, 0, team);
     return this.#set(order);
   }
 
-  /** @param {object} board */
+  /** @param {Board} board */
   show(board) {
     this.#board = board;
     const teams = board.queue.teams;
@@ -173,11 +185,16 @@ export class Queue {
     else this.#list.replaceChildren(...teams.map((each, place) => this.#row(each, place, teams.length - 1)));
   }
 
+  /** @param {Queued} each @param {number} place from 0 @param {number} last place */
   #row(each, place, last) {
     const row = make("li", { "data-queued": String(each.team) },
       make("span", { class: "who-is" }, make("span", { class: "place" }, `${place + 1}`),
         nameOf(each.team_name, { class: "name" })));
     if (!this.#page.judge) return row;
+    /**
+     * @param {string} sign @param {string} words @param {string} key
+     * @param {number|null} to place @param {boolean} disabled
+     */
     const button = (sign, words, key, to, disabled) => {
       const element = make("button", {
         type: "button", disabled, title: words, "data-key": `${key}-${each.team}`, "aria-label": `${words}: ${each.team_name}`,

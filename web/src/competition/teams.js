@@ -5,6 +5,8 @@ import { isWaiting } from "../lib/contest/now.js";
 import { nameOf } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 
+/** @import {Board, Call, RunningTry, Team} from "./answers" */
+
 export class Teams {
   #page;
   #list = make("ul", { class: "teams" });
@@ -15,11 +17,11 @@ export class Teams {
   #members = make("input", { id: "team-members", maxlength: "300", autocomplete: "off", dir: "auto" });
   #save = make("button", { type: "submit", class: "main" }, "Enter");
   #cancel = make("button", { type: "button", hidden: true }, "Cancel");
-  /** @type {any} */
+  /** @type {Team|null} */
   #edited = null;
 
   /**
-   * @param {{judge: boolean, queue: import("./queue.js").Queue, attempt: function(function(): Promise<void>): Promise<boolean>}} page
+   * @param {Pick<import("./main.js").Page, "judge"|"attempt"> & {queue: import("./queue.js").Queue}} page
    */
   constructor(page) {
     this.#page = page;
@@ -44,6 +46,7 @@ export class Teams {
     if (await this.#page.attempt(() => send(path, form))) this.#edit(null);
   }
 
+  /** @param {Team|null} team null: a new one */
   #edit(team) {
     this.#edited = team;
     this.#name.value = team?.name ?? "";
@@ -54,11 +57,12 @@ export class Teams {
     this.#name.focus();
   }
 
-  /** @param {object} board @param {object[]} running tries */
+  /** @param {Board} board @param {RunningTry[]} running */
   show(board, running) {
     setText(this.#count, board.teams.length === 0 ? "" : String(board.teams.length));
     const flying = new Set(running.map((each) => each.team));
-    const waiting = isWaiting(board.called) ? board.called.team : null;
+    const waiting = isWaiting(board.called) ? /** @type {Call} */ (board.called).team : null;
+    /** @param {Team} team */
     const state = (team) => {
       const place = board.queue.teams.findIndex((each) => each.team === team.id) + 1;
       const inQueue = place > 0 ? `in the queue: ${place}` : "";
@@ -71,6 +75,7 @@ export class Teams {
     this.#list.replaceChildren(...board.teams.map((team) => this.#row(team, state(team))));
   }
 
+  /** @param {Team} team @param {string} state "" for none */
   #row(team, state) {
     const row = make("li", { "data-team": String(team.id), "data-withdrawn": String(team.withdrawn) },
       make("span", { class: "who-is" }, nameOf(team.name, { class: "name" }),
@@ -78,11 +83,13 @@ export class Teams {
       team.withdrawn ? make("span", { class: "tag" }, "withdrawn") : null,
       state === "" ? null : make("span", { class: "tag good" }, state));
     if (!this.#page.judge) return row;
+    /** @param {string} words @param {string} key @param {() => void} work */
     const button = (words, key, work) => {
       const element = make("button", { type: "button", "data-key": `${key}-${team.id}`, "aria-label": `${words}: ${team.name}` }, words);
       element.addEventListener("click", work);
       return element;
     };
+    /** @param {boolean} withdrawn */
     const withdraw = (withdrawn) => this.#page.attempt(() => send(`teams/${team.id}`, { withdrawn }));
     row.append(make("span", { class: "buttons" },
       team.withdrawn || state.startsWith("in the queue")

@@ -57,14 +57,18 @@ function whoTakesPart() {
 
 /** @type {import("../lib/course.js").Lesson[]} */
 let lessons = [];
-/** @type {{name: string, word: string, lessons: Object<string, {flights: number, passed_after_s: number|null, last_reason: string}>}[]} */
+/** @typedef {{flights: number, passed_after_s: number|null, last_reason: string}} Progress with a lesson */
+
+/** @type {{name: string, word: string, lessons: Record<string, Progress>}[]} */
 let learners = [];
 let shownClass = "";
 
+/** @param {string} text */
 function tell(text) {
   setText(problem, text);
 }
 
+/** @param {import("../lib/course.js").Lesson} lesson */
 async function open(lesson) {
   if (!learner()) {
     tell(word("need_name"));
@@ -100,6 +104,7 @@ function showClass() {
   if (told === shownClass) return; // a selected code word and the focus stay
   shownClass = told;
   const head = make("tr", {}, make("th", {}, word("pupil")), make("th", {}, word("word")), ...lessons.map(({ number: each, title }) => make("th", {}, `${each}. ${inLanguage(title)}`)));
+  /** @param {Progress|undefined} done */
   const cell = (done) => {
     if (!done) return make("td", {}, "");
     const { flights, passed_after_s, last_reason } = done;

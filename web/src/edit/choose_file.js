@@ -20,6 +20,7 @@ export async function chooseFile(root) {
   };
   const told = await request(`/api/edit/files?language=${language()}`).catch(refused);
   if (!told) return;
+  /** @param {string} name */
   const link = (name) => make("li", {}, make("a", { href: `/edit?file=${encodeURIComponent(name)}` }, name));
   list.replaceChildren(...told.files.map(link));
   if (told.files.length === 0) list.append(make("li", { class: "hint" }, word("no_files")));

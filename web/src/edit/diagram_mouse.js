@@ -74,6 +74,7 @@ function drag(root, start, action) {
   /** @type {PointerEvent|null} */
   let latest = null;
   let frame = 0;
+  /** @param {PointerEvent} event */
   const move = (event) => {
     isMoved ||= Math.hypot(event.clientX - start.clientX, event.clientY - start.clientY) > CLICK_PX;
     if (!isMoved) return;
@@ -83,6 +84,7 @@ function drag(root, start, action) {
       if (latest) action.move(latest);
     });
   };
+  /** @param {PointerEvent} event */
   const end = (event) => {
     root.removeEventListener("pointermove", move);
     root.removeEventListener("pointerup", end);

@@ -23,6 +23,7 @@ export function divider(area, { name, part, label, isRow, least, space }) {
     bar.setAttribute("aria-valuenow", String(pixels));
     return pixels;
   };
+  /** @param {number} wanted pixels */
   const keep = (wanted) => localStorage.setItem(kept, String(set(wanted)));
   bar.addEventListener("pointerdown", (event) => {
     event.preventDefault();

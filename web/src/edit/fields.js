@@ -58,6 +58,7 @@ export function tickBox(label, value, change) {
  * @param {string} list id of the list of suggestions
  */
 export function lineList(label, lines, change, list) {
+  /** @param {number} index @param {...string} others */
   const replaced = (index, ...others) => [...lines.slice(0, index), ...others, ...lines.slice(index + 1)];
   const rows = lines.map((line, index) => make("li", {},
     textField(`${label} ${index + 1}`, line, (value) => change(replaced(index, ...(value ? [value] : []))), { list }),

@@ -6,7 +6,8 @@ import { word } from "./words.js";
 
 /**
  * @typedef {import("./session.js").EditSession} EditSession
- * @typedef {import("../lib/messages.js").Documents.Node} StateNode
+ * @import {Documents} from "../lib/messages.js"
+ * @typedef {Documents.Node} StateNode
  * @typedef {import("./session.js").Edge} Edge
  * @typedef {import("../lib/diagram/diagram_view.js").Selection} Selection
  */
@@ -62,12 +63,14 @@ export class Inspector {
     /** @type {HTMLInputElement|null} */ (this.#root.querySelector("input"))?.select();
   }
 
+  /** @param {Documents.EditMessage["edit"]} edit */
   #edit(edit) {
     return this.#session.edit(edit);
   }
 
   #suggestions() {
     const { values, primitives } = this.#session.catalogue;
+    /** @param {string} value @param {string} text */
     const option = (value, text) => make("option", { value, label: text });
     return make("div", { hidden: true },
       make("datalist", { id: ACTIONS },
@@ -79,6 +82,7 @@ export class Inspector {
 
   #mission() {
     const { mission, variables, templates, diagram } = this.#session;
+    /** @type {(key: string) => (value: string) => Promise<boolean>} */
     const set = (key) => (value) => this.#edit({ kind: "set_mission", key, value });
     const top = diagram.nodes.filter(({ parent }) => parent === "").map(({ name }) => name);
     const uses = templates.map((name) => make("li", {}, make("span", {}, name),
@@ -109,7 +113,9 @@ export class Inspector {
     const inner = diagram.nodes.filter(({ parent }) => parent === state.id);
     const isTop = !path.startsWith("@") || path.includes(".");
     const start = state.parent === "" ? diagram.initial : diagram.nodes.find(({ id }) => id === state.parent)?.initial;
+    /** @param {boolean} value */
     const initial = (value) => value && this.#edit({ kind: "set_initial", state: path.includes(".") ? path.replace(/\.[^.]+$/, "") : "", name: state.name });
+    /** @param {"enter"|"during"|"exit"} section */
     const actions = (section) => {
       const above = section === "enter" ? this.#parametersFirst(state) : [];
       return lineList(word(section), state[section].slice(above.length),
@@ -191,6 +197,7 @@ export class Inspector {
     const events = /** @type {[string, string][]} */ (["tick", "done", "resume"].map((event) => [event, word(/** @type {any} */ (event))]));
     const siblings = this.#session.diagram.edges.filter(({ source, event }) => source === edge.source && event === "tick").length;
     const orders = /** @type {[string, string][]} */ (Array.from({ length: siblings }, (_, index) => [String(index), String(index + 1)]));
+    /** @param {string} event @param {string|number} index */
     const follow = (event, index) => this.#select({ kind: "transition", id: `${edge.source}/${event}/${index}` });
     return [
       title,

@@ -33,6 +33,7 @@ export class LessonPanel {
     this.#next = lessons.find(({ number }) => number === lesson.number + 1) ?? null;
     const { title, goal, steps, hints } = lesson;
     this.#listener.scenario(lesson.name, this.#next === null);
+    /** @param {import("../lib/course.js").Words[]} list */
     const items = (list) => list.map((each) => make("li", {}, inLanguage(each)));
     this.#root.append(
       make("div", { class: "e-lesson-head" },

@@ -16,6 +16,7 @@ export function watchFlights(name, listener) {
   let shown = "";
   /** @type {Object<string, number>} */
   let counts = {};
+  /** @param {string} state "": nobody flies it */
   const show = (state) => {
     if (state === shown) return;
     shown = state;

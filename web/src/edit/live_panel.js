@@ -10,6 +10,8 @@ const STEP_M = 0.03; // between two points of the track
 
 /** @typedef {{state: "starting"|"flying"|"ended"|"stopped", scenario: string, speed: number, text: string}} Live */
 
+/** @import {Answer, Request} from "./flights.js" */
+
 export class LivePanel {
   #listener;
   #scenario = FIRST_SCENARIO;
@@ -25,8 +27,8 @@ export class LivePanel {
 
   /**
    * @param {HTMLElement} root
-   * @param {{ask: (request: object) => Promise<any>, text: () => Promise<string>}} listener ask: something of the server;
-   *   text: of the mission
+   * @param {{ask: (request: Request) => Promise<Answer>, text: () => Promise<string>}} listener
+   *   ask: something of the server; text: of the mission
    */
   constructor(root, listener) {
     this.#listener = listener;
@@ -57,6 +59,7 @@ export class LivePanel {
     await this.#do({ kind: "start_live", text, scenario: this.#scenario, speed: Number(this.#speed) });
   }
 
+  /** @param {Request} request */
   async #do(request) {
     const answer = await this.#listener.ask(request);
     if (answer.kind !== "refused") return;

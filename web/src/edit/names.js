@@ -21,6 +21,7 @@ export function showNames(root, { values, primitives }) {
   if (root.dataset.shown === key) return;
   root.dataset.shown = key;
   const list = make("dl", {});
+  /** @param {string} search */
   const fill = (search) => {
     const rows = [
       ...primitives.map(({ name, text }) => [name, text]),

@@ -16,7 +16,7 @@ const MAX_LISTED = 100;
 const RECENT_S = 0.5; // a transition is lit for so long after it was taken
 
 /**
- * @typedef {{name: string, scenario: string, mission: string, verdict: string, started: string, session: boolean}} RunInfo
+ * @import {RunInfo} from "../replay/list.js"
  * @typedef {{time_s: number, from: string, to: string, when: string, values: [string, any][], ids: string[]}} Taken
  */
 
@@ -57,9 +57,10 @@ export class ReplayPanel {
   /** List the flights anew: those of this session, and those of the folder of runs. */
   async load() {
     try {
-      /** @type {RunInfo[]} */
-      const runs = (await request("/api/runs")).filter(({ verdict }) => verdict !== "unreadable").slice(0, MAX_LISTED);
+      const runs = /** @type {RunInfo[]} */ (await request("/api/runs"))
+        .filter(({ verdict }) => verdict !== "unreadable").slice(0, MAX_LISTED);
       const chosen = this.#run?.name ?? "";
+      /** @param {boolean} isOfSession @param {string} label */
       const group = (isOfSession, label) => {
         const own = runs.filter(({ session }) => session === isOfSession);
         const made = make("optgroup", { label }, ...own.map((run) => make("option", { value: run.name }, title(run))));

@@ -8,7 +8,13 @@ import { drawStrip } from "./state_strip.js";
 import { contactsOf, hitWords, shortVerdict, verdictWords } from "./verdict.js";
 import { waitingWords, word } from "./words.js";
 
-/** @typedef {import("./flights.js").Now} Now @typedef {import("./flights.js").Flight} Flight */
+/**
+ * @import {Answer, Flight, Now, Request} from "./flights.js"
+ * @import {Flights as Messages} from "../lib/messages.js"
+ * @typedef {Extract<Request, {run: string}>} ToRun what is asked of a run
+ * @typedef {ToRun extends infer Each ? Each extends any ? Omit<Each, "run"> : never : never} Order
+ * @typedef {Messages.Ended & {result: import("./verdict.js").Result|null}} Judged
+ */
 
 const SPEEDS = /** @type {[string, string][]} */ ([["0.2", "0.2 ×"], ["1", "1 ×"], ["5", "5 ×"], ["", word("fastest")]]);
 const BATCH = 20;
@@ -114,6 +120,7 @@ export class RunPanel {
     return [words, hitWords(contacts)].filter(Boolean).join(" ");
   }
 
+  /** @param {string} run its id; "": none */
   #setRun(run) {
     this.#run = run;
     this.#waits = "";
@@ -133,6 +140,7 @@ export class RunPanel {
     return mistake ? "" : text;
   }
 
+  /** @param {boolean} paused */
   async #start(paused) {
     if (this.#waits) return; // the line tells its place in the queue
     const text = await this.#text();
@@ -166,6 +174,7 @@ export class RunPanel {
     return this.#order({ kind: "stop" });
   }
 
+  /** @param {Order} request */
   async #order(request) {
     if (!this.#run) {
       setText(this.#line, word("not_flying"));
@@ -176,7 +185,7 @@ export class RunPanel {
   }
 
   #togglePause() {
-    return this.#order({ do: this.#root.classList.contains("e-paused") ? "go_on" : "pause" });
+    return this.#order({ kind: this.#root.classList.contains("e-paused") ? "go_on" : "pause" });
   }
 
   #toggleBreak() {
@@ -216,18 +225,23 @@ export class RunPanel {
     this.#progress.hidden = true;
   }
 
-  /** Ask for something that is no flight of this panel. @param {object} request @returns {Promise<any>} the answer */
+  /**
+   * Ask for something that is no flight of this panel.
+   * @param {Request} request
+   * @returns {Promise<Answer>}
+   */
   ask(request) {
     return this.#flights.ask(request);
   }
 
+  /** @param {Messages.ToPage} message */
   #hear(message) {
     if (message.kind === "live") this.#listener.live(message);
     else if (message.kind === "waiting") this.#wait(message);
     if (message.kind === "now" && message.run === this.#run) this.#showNow(message);
     else if (message.kind === "ended" && message.run === this.#run) {
       this.#setRun("");
-      this.#showEnd(message);
+      this.#showEnd(/** @type {Judged} */ (message));
       this.#listener.lit([], message.counts, []);
       this.#listener.lost(message.lost_in);
     } else if (message.kind === "flight" && message.batch === this.#batch) this.#showFlight(message);
@@ -244,7 +258,7 @@ export class RunPanel {
     setText(this.#line, waitingWords(waiting));
   }
 
-  /** @param {{text: string, result: import("./verdict.js").Result|null, spans: {state: string, from_s: number, to_s: number}[]}} ended */
+  /** @param {Judged} ended */
   #showEnd({ text, result, spans }) {
     this.#showStrip(spans);
     if (this.#isStopped) setText(this.#line, word("stopped"));
@@ -269,7 +283,7 @@ export class RunPanel {
     this.#view.add(now.full, now.trail, now.pose, now.contacts);
     const sign = { true: "✓", false: "✗", null: "?" };
     this.#guards.replaceChildren(...now.guards.map(({ to, when, holds }) => make("li", { "data-holds": String(holds) },
-      `${sign[String(holds)]} ${when || word("always")} → ${to}`)));
+      `${sign[/** @type {"true"|"false"|"null"} */ (String(holds))]} ${when || word("always")} → ${to}`)));
     this.#values.replaceChildren(...now.values.flatMap(({ name, value, unit }) => [
       make("dt", {}, name), make("dd", {}, typeof value === "number" ? `${number(value, 2)} ${unit}` : said(value))]));
     if (now.state) {

@@ -121,7 +121,7 @@ export class EditSession {
 
   /**
    * Send an edit of the diagram, after what was typed before it.
-   * @param {object} edit see offboard/authoring/edits.py
+   * @param {Documents.EditMessage["edit"]} edit see offboard/authoring/edits.py
    * @returns {Promise<boolean>} whether it was applied; the reason, if not, is told to the listener
    */
   async edit(edit) {
@@ -162,7 +162,9 @@ export class EditSession {
    * @param {string} to id
    */
   target(from, to) {
+    /** @param {string} id */
     const written = (id) => this.diagram.nodes.find((node) => node.id === id)?.source ?? "";
+    /** @param {string} path */
     const template = (path) => (path.startsWith("@") ? path.split(".")[0] : "");
     const path = written(to);
     return template(path) && template(path) === template(written(from)) ? path : to;
@@ -202,6 +204,7 @@ export class EditSession {
     }
     this.#number += 1;
     return new Promise((resolve) => {
+      /** @param {{refused?: string, code?: string}} reply */
       const answer = (reply) => {
         if (reply.refused) this.#listener.refused(reply.refused, reply.code ?? "");
         resolve(!reply.refused);
@@ -228,7 +231,9 @@ export class EditSession {
   #takeDocument(message) {
     const stays = message.kind === "document" && message.answered !== undefined && this.#synchronize(message);
     this.revision = message.revision;
-    for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) this[key] = message[key];
+    for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) {
+      /** @type {Record<string, any>} */ (this)[key] = /** @type {Record<string, any>} */ (message)[key];
+    }
     if (language() === "es") this.findings.forEach((finding, index) => { finding.message = message.spanish?.[index] ?? finding.message; });
     this.catalogue = message.catalogue ?? this.catalogue;
     // While the text cannot be read, the last diagram stays.

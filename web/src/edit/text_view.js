@@ -72,6 +72,7 @@ export class TextView {
    *   moved: (offset: number) => void}} listener
    */
   constructor(parent, listener) {
+    /** @param {() => void} take */
     const step = (take) => () => {
       take();
       return true;

@@ -38,13 +38,16 @@ const word = translator({
  *   outside_s?: number, try_time_s?: number, landed_on_base?: boolean, landing_error_m?: number|null, mission_state?: string, ended?: string}} Result
  *   as result.json; what has its default may be missing
  * @typedef {{name: string, time_s: number}} Contact time since the start
+ * @typedef {{goals?: Goal[], frames?: {colour: string}[]}} Layout what is needed of a scenario
  * @typedef {{hold_m: number[]|null, face: string|null, radius_m: number, distance_m: number[], seconds: number}} Goal
  */
 
 /** The name of something in the arena. @param {string} name as contacts have it */
 export const thingName = (name) => word(/** @type {any} */ (name)) ?? name;
 
+/** @param {string[]} parts */
 const list = (parts) => [parts.slice(0, -1).join(", "), parts.at(-1)].filter(Boolean).join(word("and"));
+/** @param {number} value */
 const seconds = (value) => number(value, 0);
 
 /** What the drone hit, and when; "" if nothing. @param {Contact[]} contacts */
@@ -53,7 +56,11 @@ export function hitWords(contacts) {
   return word("hit", { things: list(contacts.map(({ name, time_s }) => word("hit_at", { thing: thingName(name), time: seconds(time_s) }))) });
 }
 
-/** The first contact with each thing. @param {Result} result @returns {Contact[]} */
+/**
+ * The first contact with each thing.
+ * @param {Pick<Result, "contact_frames"|"contact_times_s">} result
+ * @returns {Contact[]}
+ */
 export function contactsOf({ contact_frames = [], contact_times_s = [] }) {
   return contact_frames.map((name, index) => ({ name, time_s: contact_times_s[index] ?? 0 }))
     .filter(({ name }, index) => contact_frames.indexOf(name) === index);
@@ -68,7 +75,7 @@ export function shortVerdict(verdict) {
 /**
  * A flight's verdict in one or two sentences, without what it hit.
  * @param {Result} result
- * @param {any} layout the scenario
+ * @param {Layout|null} layout the scenario
  * @param {number[][]} places where the drone was
  */
 export function verdictWords(result, layout, places) {
@@ -76,7 +83,7 @@ export function verdictWords(result, layout, places) {
   return [judged(result, layout, places), outside].filter(Boolean).join(" ");
 }
 
-/** @param {Result} result @param {any} layout @param {number[][]} places */
+/** @param {Result} result @param {Layout|null} layout @param {number[][]} places */
 function judged(result, layout, places) {
   const time = seconds(result.try_time_s ?? 0), state = result.mission_state ?? "";
   switch (result.verdict) {
@@ -89,14 +96,13 @@ function judged(result, layout, places) {
   }
 }
 
-/** @param {Result} result @param {any} layout @param {number[][]} places */
+/** @param {Result} result @param {Layout|null} layout @param {number[][]} places */
 function unfinished(result, layout, places) {
   const time = result.try_time_s ?? 0;
   if (result.ended && result.ended !== "finished") return word("ended_early", { reason: result.reason });
   if (time === 0) return word("no_motors");
   if (typeof result.landing_error_m !== "number") return word("not_landed");
   if (!result.landed_on_base) return word("beside", { distance: number(result.landing_error_m, 1) });
-  /** @type {Goal|undefined} */
   const goal = (layout?.goals ?? [])[result.goal_times_s?.length ?? 0];
   if (goal) return missed(goal, places);
   const crossed = result.frames_crossed ?? [];

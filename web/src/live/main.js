@@ -18,12 +18,22 @@ import { Statechart } from "../lib/chart/statechart.js";
 import { DroneStrip } from "./strip.js";
 import { pageRoot } from "../lib/page_data.js";
 
+/**
+ * @import {Known} from "../lib/flight/fleet.js"
+ * @import {FlownTry} from "../competition/answers"
+ * @import {Contest as Views, Live} from "../lib/messages.js"
+ * @typedef {Pick<Known, "id"|"status"|"chart"> & {pose?: Known["pose"]}} Looked
+ */
+
 const MOST_RECENT = 2000; // poses: more than the minute that is plotted
 
 const root = pageRoot("live");
 root.classList.add("m-live");
 
-/** A part of the page with a heading. */
+/**
+ * A part of the page with a heading.
+ * @param {HTMLElement} place @param {string} name @param {string} title
+ */
 function panel(place, name, title) {
   const body = make("div", { class: "m-body" });
   const section = make("section", { class: `m-panel m-${name}-panel`, "aria-labelledby": `m-${name}` }, make("h2", { id: `m-${name}` }, title), body);
@@ -54,19 +64,21 @@ const messages = new Messages(panel(side, "messages", "Messages"));
 let isConnected = false;
 /** @type {import("../lib/contest/contest.js").Contest} */
 let contest = { running: [], stage: null };
+/** @type {Map<string[], string[]>} */
 const orders = new Map();
 
-/** Kinds of a mission's states, in the order in which they stand in it. */
+/** Kinds of a mission's states, in the order in which they stand in it. @param {string[]} states */
 function orderOf(states) {
   if (!orders.has(states)) {
+    /** @type {string[]} */
     const order = [];
     for (const state of states) stateColour(state, order);
     orders.set(states, order);
   }
-  return orders.get(states);
+  return /** @type {string[]} */ (orders.get(states));
 }
 
-/** The state at once, numbers with the next beat. */
+/** The state at once, numbers with the next beat. @param {Looked} drone */
 function showStatus(drone) {
   const { status } = drone;
   const state = status?.mission?.state || null;
@@ -81,14 +93,15 @@ function showStatus(drone) {
   });
 }
 
-/** Whose try it is, if the contest knows. */
+/** Whose try it is, if the contest knows. @param {Looked} drone */
 function showTeam(drone) {
-  const flown = tryOf(contest, drone.id);
+  const flown = /** @type {Views.RunningView|FlownTry|null} */ (tryOf(contest, drone.id));
   team.hidden = !flown?.team_name;
   const shown = `${flown?.id} ${flown?.team_name}`;
   if (team.hidden || team.dataset.shown === shown) return;
   team.dataset.shown = shown;
-  team.replaceChildren(nameOf(flown.team_name, { class: "m-team-name" }), make("span", { class: "m-team-where" }, orDash(flown.scenario)));
+  team.replaceChildren(nameOf(/** @type {FlownTry} */ (flown).team_name, { class: "m-team-name" }),
+    make("span", { class: "m-team-where" }, orDash(/** @type {FlownTry} */ (flown).scenario)));
 }
 
 const flight = new Flight(arena, camera, {
@@ -104,11 +117,13 @@ const flight = new Flight(arena, camera, {
   },
 });
 
+/** @param {Known} drone */
 function plot(drone) {
   plots.clear();
   for (const pose of drone.recent) plots.add(pose.t, pose);
 }
 
+/** @param {Known} drone */
 function choose(drone) {
   arena.select(drone.id);
   arena.setMap(drone.map);
@@ -121,7 +136,9 @@ function choose(drone) {
 }
 
 const fleet = new Fleet(tabs, choose);
+/** @param {number} id */
 const isChosen = (id) => fleet.chosen?.id === id;
+/** @type {Live.World|null} */
 let world = null;
 
 watchLive({

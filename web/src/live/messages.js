@@ -1,5 +1,7 @@
 import { make, number } from "../lib/dom.js";
 
+/** @import {Live} from "../lib/messages.js" */
+
 const MOST = 60;
 const SEVERITIES = ["emergency", "alert", "critical", "error", "warning", "notice", "info", "debug"];
 
@@ -20,24 +22,28 @@ export class Messages {
     this.#list.replaceChildren(make("li", { class: "m-none" }, "none yet"));
   }
 
-  /** Whether to say which drone said it. */
+  /** Whether to say which drone said it. @param {boolean} several */
   setSeveral(several) {
     this.#severalDrones = several;
   }
 
-  /** @param {object} message of kind "text" */
+  /** @param {Live.Text} message */
   addText({ id, time_s, severity, text, from }) {
     const look = severity <= 3 ? "bad" : severity === 4 ? "warn" : "plain";
     const who = this.#severalDrones ? `${id}` : "";
     this.#add(look, SEVERITIES[severity] ?? `severity ${severity}`, text, time_s, from === "mission" ? `${who} mission`.trim() : who);
   }
 
-  /** @param {object} message of kind "notice" */
+  /** @param {Live.Notice} message */
   addNotice({ id, level, text }) {
-    const look = { error: "bad", warning: "warn" }[level] ?? "plain";
+    const look = /** @type {Record<string, string>} */ ({ error: "bad", warning: "warn" })[level] ?? "plain";
     this.#add(look, level, text, null, id === null || id === undefined || !this.#severalDrones ? "monitor" : `monitor, ${id}`);
   }
 
+  /**
+   * @param {string} look @param {string} severity @param {string} text
+   * @param {number|null} time_s @param {string} who "" for nobody
+   */
   #add(look, severity, text, time_s, who) {
     this.#list.querySelector(".m-none")?.remove();
     const time = typeof time_s === "number" ? make("span", { class: "m-when" }, `${number(time_s)} s`) : null;

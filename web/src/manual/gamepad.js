@@ -2,9 +2,15 @@
 
 import { neutral, withoutDeadZone } from "./values.js";
 
+/** @import {Sticks} from "./values.js" */
+/** @typedef {import("../lib/messages.js").ManualControl.Order["what"]} What */
+
 const DEAD_ZONE = 0.08;
 
-/** Buttons of the standard mapping: the lowest of the four on the right, the right one, the left one. */
+/**
+ * Buttons of the standard mapping: the lowest of the four on the right, the right one, the left one.
+ * @type {Record<number, What>}
+ */
 const BUTTONS = { 0: "take", 1: "give", 2: "hold" };
 
 /** The first gamepad that has two sticks. */
@@ -17,7 +23,7 @@ export class Gamepads {
 
   /**
    * Look at it once.
-   * @returns {{sticks: import("./values.js").Sticks, orders: string[]}} orders: of buttons pressed since last time
+   * @returns {{sticks: Sticks, orders: What[]}} orders: of buttons pressed since last time
    */
   read() {
     const pad = [...(navigator.getGamepads?.() ?? [])].find((each) => each?.connected && each.axes.length >= 4);
@@ -35,12 +41,14 @@ export class Gamepads {
     this.#pressed = null;
   }
 
+  /** @param {Gamepad} pad */
   #orders(pad) {
+    /** @type {What[]} */
     const orders = [];
     const before = this.#pressed;
     this.#pressed = {};
     for (const [number, what] of Object.entries(BUTTONS)) {
-      const down = Boolean(pad.buttons[number]?.pressed);
+      const down = Boolean(pad.buttons[/** @type {number} */ (/** @type {unknown} */ (number))]?.pressed);
       this.#pressed[number] = down;
       if (down && before !== null && !before[number]) orders.push(what);
     }

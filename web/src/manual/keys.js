@@ -2,10 +2,15 @@
 
 import { AXES, neutral } from "./values.js";
 
+/** @import {Sticks} from "./values.js" */
+
 const RISE_PER_S = 2.5;
 const FALL_PER_S = 8;
 
-/** By place on the keyboard, so that every layout has them under the same fingers. */
+/**
+ * By place on the keyboard, so that every layout has them under the same fingers.
+ * @type {Record<string, [keyof Sticks, number]>}
+ */
 const KEYS = {
   ArrowUp: ["forward", 1],
   ArrowDown: ["forward", -1],
@@ -19,6 +24,7 @@ const KEYS = {
 
 /** Keys held, and where the sticks are that they lead. */
 export class Keys {
+  /** @type {Set<string>} */
   #held = new Set();
   #sticks = neutral();
   /** @type {number|null} */
@@ -47,7 +53,7 @@ export class Keys {
 
   /**
    * @param {number} nowMs
-   * @returns {import("./values.js").Sticks}
+   * @returns {Sticks}
    */
   read(nowMs) {
     const passed_s = this.#lastMs === null ? 0 : Math.min(0.1, Math.max(0, (nowMs - this.#lastMs) / 1000));
@@ -59,7 +65,10 @@ export class Keys {
   }
 }
 
-/** Where a stick is after some time, on its way to where it is wanted. */
+/**
+ * Where a stick is after some time, on its way to where it is wanted.
+ * @param {number} now @param {number} wanted @param {number} passed_s
+ */
 function led(now, wanted, passed_s) {
   const returns = wanted === 0 || now * wanted < 0;
   const step = (returns ? FALL_PER_S : RISE_PER_S) * passed_s;

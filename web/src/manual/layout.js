@@ -24,6 +24,11 @@ const HELP = [
 ];
 
 /**
+ * @typedef {<E extends HTMLElement>(name: string, element: E) => E} Keep an element as a part of the page
+ * @typedef {(name: string, words: string) => HTMLButtonElement} MakeButton
+ */
+
+/**
  * Fill the page.
  * @param {HTMLElement} root
  * @returns {Object<string, any>} the parts, which are elements, by name
@@ -31,10 +36,12 @@ const HELP = [
 export function layOut(root) {
   /** @type {Object<string, any>} */
   const parts = {};
+  /** @type {Keep} */
   const keep = (name, element) => {
     parts[name] = element;
     return element;
   };
+  /** @type {MakeButton} */
   const button = (name, words) => keep(name, make("button", { type: "button" }, words));
   root.append(
     make(
@@ -70,6 +77,7 @@ export function layOut(root) {
   return parts;
 }
 
+/** @param {Keep} keep */
 function figures(keep) {
   const list = make("dl", { class: "p-figures" });
   for (const name of FIGURES) {
@@ -78,12 +86,14 @@ function figures(keep) {
   return list;
 }
 
+/** @param {MakeButton} button */
 function orders(button) {
   const row = make("div", { class: "p-orders", role: "group", "aria-label": "Orders" });
   for (const [what, words] of ORDERS) row.append(button(what, words));
   return row;
 }
 
+/** @param {Keep} keep */
 function sent(keep) {
   const table = make("div", { class: "p-bars" });
   for (const axis of AXES) {
@@ -97,6 +107,7 @@ function sent(keep) {
   return table;
 }
 
+/** @param {Keep} keep */
 function speed(keep) {
   const slider = make("input", { type: "range", min: "5", max: "100", step: "5", value: "15", id: "top-speed" });
   return make(

@@ -15,9 +15,16 @@ import { ManualViews } from "./views.js";
 import { figuresOf, whoFlies } from "./words.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 
+/**
+ * @import {Live, ManualControl} from "../lib/messages.js"
+ * @import {Sticks} from "./values.js"
+ * @typedef {ManualControl.Order["what"]} What
+ */
+
 const PERIOD_MS = 40;
 const LONGEST_LOG = 5;
 const FREE = { holder: "", yours: false, flying: false };
+/** @type {What[]} */
 const WORDS = ["take", "give", "arm", "disarm", "take_off", "land", "hold"];
 const SPEED_KEY = "framerunner.pilot.top-speed";
 
@@ -31,12 +38,13 @@ class ManualPage {
   #left;
   #right;
   #stop;
+  /** @type {Map<number|null, ManualControl.ControlMessage>} */
   #controls = new Map();
-  /** @type {import("../lib/messages.js").Live.DroneStatus[]} */
+  /** @type {Live.DroneStatus[]} */
   #drones = [];
   /** @type {number|null} */
   #id = null;
-  /** @type {import("../lib/messages.js").Live.DronePose|null} */
+  /** @type {Live.DronePose|null} */
   #pose = null;
   #connection = "away";
   #shownAt = 0;
@@ -95,6 +103,7 @@ class ManualPage {
     });
   }
 
+  /** @param {ManualControl.ControlMessage} control */
   #takeControl(control) {
     const before = this.#control.yours;
     this.#controls.set(control.id, control);
@@ -132,6 +141,7 @@ class ManualPage {
     });
   }
 
+  /** @param {Live.DroneStatus[]} drones */
   #takeStatus(drones) {
     this.#drones = drones;
     if (this.#id === null && drones.length) this.#choose(drones[0].id);
@@ -148,6 +158,7 @@ class ManualPage {
     this.#show();
   }
 
+  /** @param {number} id of a drone */
   #choose(id) {
     this.#id = id;
     this.#views.choose(id);
@@ -155,6 +166,7 @@ class ManualPage {
     this.#show();
   }
 
+  /** @param {What} what @param {boolean} [confirmed] */
   #order(what, confirmed = false) {
     if (this.#id === null) this.#say("there is no drone; start one: framerunner sim", "bad");
     else if (!this.#socket?.order(this.#id, what, confirmed)) this.#say(`${what.replace("_", " ")}: not connected`, "bad");
@@ -190,10 +202,11 @@ class ManualPage {
     if (this.#control.yours) this.#send(neutral(), "");
   }
 
+  /** @param {KeyboardEvent} event */
   #keyDown(event) {
     if (!this.#control.yours || this.#stop.asks || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.target === this.#parts.drone) return;
-    const speed = { "+": 5, "=": 5, "-": -5 }[event.key];
+    const speed = /** @type {Record<string, number>} */ ({ "+": 5, "=": 5, "-": -5 })[event.key];
     if (this.#keys.steers(event.code)) this.#keys.press(event.code);
     else if (speed) this.#changeSpeed(speed);
     else if (event.code === "Space" && !event.repeat) this.#order("hold");
@@ -203,11 +216,13 @@ class ManualPage {
     event.stopPropagation();
   }
 
+  /** @param {KeyboardEvent} event */
   #keyUp(event) {
     this.#keys.release(event.code);
     if (this.#control.yours && !this.#stop.asks && event.code === "Space") event.preventDefault(); // presses no button
   }
 
+  /** @param {number} by percent */
   #changeSpeed(by) {
     this.#parts.speed.value = String(Number(this.#parts.speed.value) + by);
     this.#showSpeed();
@@ -238,11 +253,13 @@ class ManualPage {
     return { forward: this.#right.up, right: this.#right.right, up: this.#left.up, yaw: this.#left.right };
   }
 
+  /** @param {Sticks} sticks @param {string} name of the input; "" for none */
   #send(sticks, name) {
     this.#socket?.sticks(sticks);
     this.#showSent(sticks, name);
   }
 
+  /** @param {Sticks} sticks @param {string} name of the input; "" for none */
   #showSent(sticks, name) {
     for (const axis of AXES) {
       setText(this.#parts[`value-${axis}`], sticks[axis].toFixed(2));
@@ -279,6 +296,7 @@ class ManualPage {
     this.#stop.button.disabled = !usable;
   }
 
+  /** @param {string} text @param {"good"|"bad"|""} look */
   #say(text, look) {
     const time = new Date().toLocaleTimeString([], { hour12: false });
     const line = make("li", { "data-look": look || null }, make("time", {}, time), " ", text);
@@ -287,6 +305,7 @@ class ManualPage {
   }
 }
 
+/** @param {string} value percent */
 function remember(value) {
   try {
     localStorage.setItem(SPEED_KEY, value);

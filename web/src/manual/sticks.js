@@ -7,6 +7,7 @@ const DEAD_ZONE = 0.06;
 
 /** One stick with two axes. Several are held at once, each by a finger of its own. */
 export class ScreenStick {
+  /** @type {number|null} */
   #pointer = null;
   #knob;
   #onChange;
@@ -48,6 +49,7 @@ export class ScreenStick {
     this.#place(0, 0);
   }
 
+  /** @param {PointerEvent} event */
   #down(event) {
     if (this.#pointer !== null || (event.pointerType === "mouse" && event.button !== 0)) return;
     event.preventDefault();
@@ -57,6 +59,7 @@ export class ScreenStick {
     this.#move(event);
   }
 
+  /** @param {PointerEvent} event */
   #move(event) {
     if (event.pointerId !== this.#pointer) return;
     const box = this.element.getBoundingClientRect();
@@ -66,6 +69,7 @@ export class ScreenStick {
     this.#place(Math.max(-1, Math.min(1, x)), Math.max(-1, Math.min(1, y)));
   }
 
+  /** @param {number} x to the right, -1 to 1 @param {number} y up, -1 to 1 */
   #place(x, y) {
     this.right = withoutDeadZone(x, DEAD_ZONE);
     this.up = withoutDeadZone(y, DEAD_ZONE);

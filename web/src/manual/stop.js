@@ -7,7 +7,9 @@ const HOLD_MS = 1000;
 export class StopButton {
   #timer = 0;
   #done = false;
+  /** @type {HTMLDialogElement|undefined} */
   #dialog;
+  /** @type {HTMLElement|undefined} */
   #question;
   #confirm;
 
@@ -32,8 +34,8 @@ export class StopButton {
         return;
       }
       asking();
-      this.#question.textContent = question();
-      this.#dialog.showModal();
+      /** @type {HTMLElement} */ (this.#question).textContent = question();
+      /** @type {HTMLDialogElement} */ (this.#dialog).showModal();
     });
     element.append(button, this.#makeDialog());
     this.button = button;
@@ -41,16 +43,16 @@ export class StopButton {
 
   /** Whether the dialog is open. */
   get asks() {
-    return this.#dialog.open;
+    return /** @type {HTMLDialogElement} */ (this.#dialog).open;
   }
 
   #makeDialog() {
     this.#question = make("h2", { id: "stop-question" });
     const cancel = make("button", { type: "button", autofocus: true }, "Cancel");
     const stop = make("button", { type: "button", class: "stop" }, "Stop the motors");
-    cancel.addEventListener("click", () => this.#dialog.close());
+    cancel.addEventListener("click", () => /** @type {HTMLDialogElement} */ (this.#dialog).close());
     stop.addEventListener("click", () => {
-      this.#dialog.close();
+      /** @type {HTMLDialogElement} */ (this.#dialog).close();
       this.#confirm();
     });
     this.#dialog = make(
@@ -63,6 +65,7 @@ export class StopButton {
     return this.#dialog;
   }
 
+  /** @param {PointerEvent} event @param {HTMLButtonElement} button */
   #down(event, button) {
     if (event.button !== 0) return;
     this.#done = false;
@@ -74,6 +77,7 @@ export class StopButton {
     }, HOLD_MS);
   }
 
+  /** @param {HTMLButtonElement} button */
   #up(button) {
     clearTimeout(this.#timer);
     button.classList.remove("pressing");

@@ -2,6 +2,8 @@
 
 import { CameraView } from "../lib/flight/camera.js";
 
+/** @import {Live} from "../lib/messages.js" */
+
 const ROOM = "(min-width: 60rem) and (min-height: 36rem)"; // as in manual.css
 
 export class ManualViews {
@@ -11,7 +13,7 @@ export class ManualViews {
   #arena = null;
   /** @type {number|null} */
   #id = null;
-  /** @type {import("../lib/messages.js").Live.World|null} */
+  /** @type {Live.World|null} */
   #world = null;
   /** @type {Object<number, string[]>} */
   #states = {};
@@ -35,28 +37,28 @@ export class ManualViews {
     this.#arena?.select(id);
   }
 
-  /** @param {object|undefined} status of that drone */
+  /** @param {Live.DroneStatus|undefined} status of that drone */
   setStatus(status) {
     this.#camera.setImage(status?.video ? `/video/${status.id}` : null, status ? "no video" : "no drone yet: start one with framerunner sim");
   }
 
-  /** @param {object} message "world" */
+  /** @param {Live.World} message */
   setWorld(message) {
     this.#world = message;
     this.#arena?.setWorld(message);
   }
 
-  /** @param {object} message "chart" */
+  /** @param {Live.Chart} message */
   setChart(message) {
     this.#states[message.id] = message.states ?? [];
   }
 
-  /** @param {object} message "detections" */
+  /** @param {Live.Detections} message */
   setDetections(message) {
     if (message.id === this.#id) this.#camera.setDetections(message);
   }
 
-  /** @param {object[]} drones of the message "pose" */
+  /** @param {Live.DronePose[]} drones of the message "pose" */
   setPoses(drones) {
     this.#arena?.setPoses(drones, this.#states);
   }

@@ -1,9 +1,11 @@
 /** Who flies, in words. */
 
+/** @import {Live} from "../lib/messages.js" */
+
 const BY_HAND = ["Manual", "Altitude", "Position", "Position Slow", "Acro", "Stabilized", "Rattitude"];
 
 /**
- * @param {object|undefined} status of the drone, as in the live channel
+ * @param {Live.DroneStatus|undefined} status of the drone
  * @param {{holder: string, yours: boolean, flying: boolean}} control
  * @returns {{look: "mine"|"theirs"|"auto"|"lost", head: string, words: string}}
  */
@@ -22,6 +24,7 @@ export function whoFlies(status, control) {
   return { look: "auto", head: "Automatic", words: `${doing(status)}${held}` };
 }
 
+/** @param {Live.DroneStatus} status */
 function doing(status) {
   const { mission } = status;
   if (status.armed && mission?.alive && mission.flying && !mission.paused) return `mission ${mission.state}`;
@@ -30,8 +33,13 @@ function doing(status) {
   return status.armed ? `${mode}${paused}` : `${mode}, motors off`;
 }
 
-/** Figures of the drone, as pairs of name and value. */
+/**
+ * Figures of the drone, as pairs of name and value.
+ * @param {Live.DroneStatus|undefined} status
+ * @param {Live.DronePose|null} pose
+ */
 export function figuresOf(status, pose) {
+  /** @param {number|null|undefined} value @param {number} decimals @param {string} unit */
   const number = (value, decimals, unit) =>
     typeof value === "number" && Number.isFinite(value) ? `${value.toFixed(decimals)} ${unit}` : "–";
   const speed = pose?.v ? Math.hypot(...pose.v) : null;

@@ -2,9 +2,11 @@
 
 import { make } from "../lib/dom.js";
 
+/** @import {Operator} from "../lib/messages.js" */
+
 const ORDER = ["FAIL", "accepted", "note", "pass"];
 
-/** @param {{title: string, rows: {cells: string[]}[]}[]} sections @returns {Node[]} */
+/** @param {Operator.CardSection[]} sections @returns {Node[]} */
 export function cardOf(sections) {
   const checks = sections.find(({ rows }) => rows[0]?.cells.length === 5);
   const others = sections.filter((section) => section !== checks);
@@ -12,6 +14,7 @@ export function cardOf(sections) {
   return [...parts, ...others.map(({ title, rows }) => details(title, tableOf(rows)))];
 }
 
+/** @param {Operator.Row[]} rows */
 function checksOf(rows) {
   const sorted = rows.toSorted((a, b) => ORDER.indexOf(a.cells[1]) - ORDER.indexOf(b.cells[1]));
   const bad = rows.filter(({ cells }) => cells[1] === "FAIL").length;
@@ -25,6 +28,7 @@ function checksOf(rows) {
   return details(title, list, bad > 0);
 }
 
+/** @param {Operator.Row[]} rows */
 function tableOf(rows) {
   return make("table", {}, make("tbody", {}, ...rows.map(({ cells }) => make("tr", {}, ...cells.map((cell, column) => make(
     column ? "td" : "th",
@@ -33,6 +37,7 @@ function tableOf(rows) {
   ))))));
 }
 
+/** @param {string} title @param {Node} content @param {boolean} open */
 function details(title, content, open = false) {
   return make("details", { open }, make("summary", {}, title), content);
 }

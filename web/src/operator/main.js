@@ -70,6 +70,7 @@ class OperatorPage {
     });
   }
 
+  /** @param {string} reason */
   #refuse(reason) {
     this.#refused = reason;
     this.#parts.login.hidden = false;
@@ -86,6 +87,7 @@ class OperatorPage {
     else if (message.kind === "end") this.#end(message);
   }
 
+  /** @param {Operator.FlightMessage} flight */
   #takeFlight(flight) {
     if (this.#flight?.flight !== flight.flight) {
       setText(this.#parts.answer, "");
@@ -99,6 +101,7 @@ class OperatorPage {
     this.#show();
   }
 
+  /** @param {Operator.BeatMessage} beat */
   #takeBeat(beat) {
     if (!this.#flight) return;
     if (beat.stops && !this.#beat?.stops) this.#stoppedAt = performance.now();
@@ -146,7 +149,7 @@ class OperatorPage {
     return this.#open && this.#beat !== null && performance.now() - this.#beatAt <= 1000;
   }
 
-  /** The keys of the terminal: G, Space, K. */
+  /** The keys of the terminal: G, Space, K. @param {KeyboardEvent} event @param {boolean} down */
   #key(event, down) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const { key } = event;
@@ -204,6 +207,7 @@ class OperatorPage {
   }
 }
 
+/** @param {HTMLElement} root */
 function layOut(root) {
   const parts = {
     link: make("p", { class: "o-link", role: "status" }),

@@ -1,6 +1,11 @@
 /** What the operator's page says. */
 
-/** Phases of a flight, as `offboard.safety.operator` names them. */
+/** @import {Operator} from "../lib/messages.js" */
+
+/**
+ * Phases of a flight, as `offboard.safety.operator` names them.
+ * @type {Record<string, string[]>}
+ */
 const PHASES = {
   checks: ["Checks", "the drone is checked; nothing is armed"],
   waiting: ["Ready", "hold Go to arm and take off"],
@@ -13,8 +18,8 @@ const PHASES = {
 };
 
 /**
- * @param {any} flight message of the flight; null without one
- * @param {any} beat the latest; null before the first
+ * @param {Operator.FlightMessage|null} flight null without one
+ * @param {Operator.BeatMessage|null} beat the latest; null before the first
  * @param {string} ended how the flight ended; empty if it goes on
  * @returns {{phase: string, head: string, words: string}}
  */

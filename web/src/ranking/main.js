@@ -8,6 +8,11 @@ import { nameOf, seconds } from "../lib/contest/words.js";
 import { make, setText, wantsStillness } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 
+/**
+ * @import {RankingState, Row, Cell, Rule, RunningTry, Call, Queue} from "../competition/answers"
+ * @typedef {Pick<HTMLElement, "getBoundingClientRect">} Placed
+ */
+
 const MOVE_MS = 700;
 const WIDE = "(min-width: 44rem)"; // as in the style sheet: the window shows all of it
 const LONGEST_GUESS_S = 1.5; // how long a clock goes on without news
@@ -25,14 +30,17 @@ class Ranking {
     make("a", { href: "/competition" }, "Competition"), ".");
   #rule = make("p", { class: "hint" });
   #pages;
+  /** @type {Map<number, HTMLElement>} of each team */
   #rows = new Map();
   #wanted = "";
   #linked = true;
   #problem = "";
   #heard_ms = 0;
-  /** @type {any[]} */
+  /** @type {[HTMLElement, number][]} */
   #clocks = [];
+  /** @type {Call|null} */
   called = null;
+  /** @type {Pick<Queue, "teams">} */
   queue = { teams: [] };
 
   /** @param {HTMLElement} element @param {boolean} join whether phones can open the monitor */
@@ -73,6 +81,7 @@ class Ranking {
   }
 
   async #load() {
+    /** @type {RankingState} */
     const state = await ask(`ranking${this.#wanted === "" ? "" : `?round=${this.#wanted}`}`);
     this.#problem = state.problem;
     this.#say();
@@ -91,6 +100,7 @@ class Ranking {
     this.#line.hidden = words === "";
   }
 
+  /** @param {RankingState} state */
   #showRounds(state) {
     const round = state.ranking.round;
     setText(this.#title, round === 0 ? "Ranking: before the draw" : `Ranking: round ${round}`);
@@ -105,6 +115,7 @@ class Ranking {
     this.#rounds.hidden = state.rounds.length < 2;
   }
 
+  /** @param {string[]} scenarios */
   #showHead(scenarios) {
     const titles = ["Rank", "Team", ...scenarios.map((name, index) => name || `Scenario ${index + 1}`), "Total"];
     const kinds = ["rank", "team", ...scenarios.map(() => "cell"), "total"];
@@ -115,7 +126,7 @@ class Ranking {
     this.titles = titles;
   }
 
-  /** Put the rows in order; those that were there move from where they were. */
+  /** Put the rows in order; those that were there move from where they were. @param {Row[]} rows */
   #showRows(rows) {
     const before = new Map([...this.#rows].filter(([, row]) => !row.hidden).map(([team, row]) => [team, row.getBoundingClientRect().top]));
     const present = new Set(rows.map((row) => row.team));
@@ -139,6 +150,7 @@ class Ranking {
     if (!wantsStillness()) this.#move(before);
   }
 
+  /** @param {Map<number, number>} before where each team's row was */
   #move(before) {
     for (const [team, row] of this.#rows) {
       if (row.hidden) continue;
@@ -151,6 +163,7 @@ class Ranking {
     }
   }
 
+  /** @param {HTMLElement} element @param {Row} row */
   #fillRow(element, row) {
     const text = JSON.stringify([row, this.titles]);
     if (element.dataset.shown === text) return;
@@ -163,6 +176,7 @@ class Ranking {
     );
   }
 
+  /** @param {Cell} cell @param {string} title */
   #cell(cell, title) {
     const flown = cell.state !== "not flown";
     const lacks = cell.missing === 0 ? "not completed" : `${cell.missing} missing`;
@@ -172,6 +186,7 @@ class Ranking {
       make("span", { class: "note" }, flown ? note : `counts ${seconds(cell.counted_s)}`));
   }
 
+  /** @param {Rule} rule */
   #showRule(rule) {
     setText(this.#rule, "Total: the sum over "
       + `${rule.scenarios} ${rule.scenarios === 1 ? "scenario" : "scenarios"} of try time and penalty, in seconds. `
@@ -179,6 +194,7 @@ class Ranking {
       + `a scenario not flown counts as if all were. Of several tries the ${rule.counting} counts.`);
   }
 
+  /** @param {RunningTry[]} tries that are flown now */
   #run(tries) {
     this.#heard_ms = performance.now();
     const { lines, clocks } = nowLines({ running: tries, called: this.called, queue: this.queue });

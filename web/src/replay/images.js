@@ -9,9 +9,11 @@ export class Images {
   #view;
   #address;
   #count;
-  #kept = new Map(); // number to Blob, oldest first
+  /** @type {Map<number, Blob>} */
+  #kept = new Map(); // oldest first
+  /** @type {Set<number>} */
   #loading = new Set();
-  /** @type {any} */
+  /** @type {number|null} */
   #wanted = null;
   /** @type {number|null} */
   #shown = null;
@@ -43,8 +45,9 @@ export class Images {
   /** Show the wanted image, or while it is under way the newest before it that is there. */
   #show() {
     let number = this.#wanted;
-    while (number !== null && number > this.#wanted - AHEAD && !this.#kept.has(number)) number -= 1;
-    const blob = this.#kept.get(number);
+    while (number !== null && number > /** @type {number} */ (this.#wanted) - AHEAD
+      && !this.#kept.has(number)) number -= 1;
+    const blob = this.#kept.get(/** @type {number} */ (number));
     if (!blob || number === this.#shown) return;
     this.#shown = number;
     this.#view.setImage(blob);
@@ -52,12 +55,13 @@ export class Images {
 
   #load() {
     for (let step = 0; step < AHEAD && this.#loading.size < AT_ONCE; step += 1) {
-      const number = this.#wanted + step;
+      const number = /** @type {number} */ (this.#wanted) + step;
       if (number >= this.#count || this.#kept.has(number) || this.#loading.has(number)) continue;
       this.#fetch(number);
     }
   }
 
+  /** @param {number} number */
   async #fetch(number) {
     this.#loading.add(number);
     try {
@@ -74,6 +78,7 @@ export class Images {
     this.#load();
   }
 
+  /** @param {number} number @param {Blob} blob */
   #keep(number, blob) {
     this.#kept.set(number, blob);
     for (const old of this.#kept.keys()) {

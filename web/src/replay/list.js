@@ -3,13 +3,27 @@ import { make, number, setText } from "../lib/dom.js";
 
 const SHOWN = 200;
 
-/** When a flight began, in the reader's own time. */
+/**
+ * @typedef {object} RunInfo as in /api/runs
+ * @property {string} name
+ * @property {string} scenario
+ * @property {string} mission "" if unknown
+ * @property {string} verdict "" if it was not judged
+ * @property {number|null} total_time_s
+ * @property {string} started ISO 8601; "" if unknown
+ * @property {boolean} session flown from a page of this program
+ */
+
+/** When a flight began, in the reader's own time. @param {string} started */
 function when(started) {
   const time = new Date(started);
   return started && !Number.isNaN(time.getTime()) ? time.toLocaleString([], { dateStyle: "medium", timeStyle: "short" }) : "";
 }
 
-/** The address of the page that shows one or two flights. */
+/**
+ * The address of the page that shows one or two flights.
+ * @param {string} a name @param {string|null} [b] name
+ */
 export function pageOf(a, b = null) {
   const query = new URLSearchParams(b === null ? { a } : { a, b });
   return `/replay?${query}`;
@@ -24,7 +38,7 @@ export class RunList {
 
   /**
    * @param {HTMLElement} element where it goes
-   * @param {object[]} runs as in /api/runs
+   * @param {RunInfo[]} runs
    * @param {string[]} chosen names of the one or two that are shown
    */
   constructor(element, runs, chosen) {
@@ -53,7 +67,9 @@ export class RunList {
     setText(this.#words, `${found.length} of ${this.#runs.length} flights${more}`);
   }
 
+  /** @param {RunInfo} run */
   #row(run) {
+    /** @param {string} name @param {...(Node|string|null)} content */
     const cell = (name, ...content) => make("td", { "data-name": name }, ...content);
     const place = this.#chosen.indexOf(run.name);
     const link = make("a", { href: pageOf(run.name), "aria-current": place >= 0 ? "true" : null }, run.name);
@@ -67,7 +83,10 @@ export class RunList {
     );
   }
 
-  /** The way to see it beside the one that is shown. */
+  /**
+   * The way to see it beside the one that is shown.
+   * @param {RunInfo} run @param {number} place among those shown; -1: it is not
+   */
   #beside(run, place) {
     if (place >= 0) return `shown${this.#chosen.length > 1 ? ` as ${"AB"[place]}` : ""}`;
     if (this.#chosen.length === 0) return null;

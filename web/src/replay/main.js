@@ -21,7 +21,7 @@ const foot = make("div", { class: "r-foot" });
 const choice = make("details", { class: "m-panel r-choice", open: chosen.length === 0 });
 root.append(line, sides, foot, choice);
 
-/** Say something about the page as a whole; "" takes it away. */
+/** Say something about the page as a whole; "" takes it away. @param {string} words */
 function say(words) {
   setText(line, words);
   line.hidden = words === "";
@@ -32,6 +32,7 @@ async function list() {
   const without = "This monitor was given no folder of flights. Start it with --runs FOLDER; framerunner fly leaves its flights in runs/.";
   if (!pageData().hasRuns) return choice.append(make("summary", {}, "Flights"), make("p", { class: "r-none" }, without));
   try {
+    /** @type {import("./list.js").RunInfo[]} */
     const runs = await request("/api/runs");
     choice.append(make("summary", {}, chosen.length ? "Choose another flight, or one to see beside" : "Choose a flight"));
     if (runs.length) new RunList(choice, runs, chosen);
@@ -41,12 +42,12 @@ async function list() {
   }
 }
 
-/** Keep the address a link to what is seen now. */
+/** Keep the address a link to what is seen now. @param {Clock} clock @param {string[]} names */
 function keepAddress(clock, names) {
   let last = "";
   let soon = 0;
   const write = () => {
-    const address = `${pageOf(...names)}&t=${clock.t.toFixed(1)}`;
+    const address = `${pageOf(.../** @type {[string, string?]} */ (names))}&t=${clock.t.toFixed(1)}`;
     if (address !== last) history.replaceState(null, "", address);
     last = address;
   };

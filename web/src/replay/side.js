@@ -38,6 +38,7 @@ export class Side {
     const grid = make("div", { class: "r-panels" });
     this.root = make("section", { class: "r-side", "aria-labelledby": id }, make("div", { class: "r-head" }, title, this.#result()), grid);
     element.append(this.root);
+    /** @param {string} name @param {string} words */
     const panel = (name, words) => {
       const body = make("div", { class: "m-body" });
       grid.append(make("section", { class: `m-panel r-${name}` }, make("h3", {}, words), body));
@@ -75,6 +76,7 @@ export class Side {
     setAttribute(this.root, "data-ended", now > run.end);
   }
 
+  /** @param {number} t seconds since motors on */
   #moveTo(t) {
     const { poses, states } = this.#run;
     const pose = this.#run.poseAt(t);

@@ -28,9 +28,13 @@ async function reloadIfRestarted() {
   if (document.dispatchEvent(new Event("monitor-restarted", { cancelable: true }))) location.reload();
 }
 
+/** @type {Record<string, string>} */
 const SPANISH = { "no drone": "sin dron", "flight over": "vuelo acabado", "live": "en vivo", "link lost": "enlace perdido", "reconnecting": "conectando de nuevo" };
 
-/** Shows the link; a change is told to screen readers, the same again is not. */
+/**
+ * Shows the link; a change is told to screen readers, the same again is not.
+ * @param {[string, string]} link state and words
+ */
 function show([state, words]) {
   const place = document.getElementById("link"); // a page for a projector has no header
   if (!place) return;

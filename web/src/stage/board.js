@@ -4,6 +4,8 @@ import { Pages } from "../lib/contest/pages.js";
 import { nameOf } from "../lib/contest/words.js";
 import { make, number } from "../lib/dom.js";
 
+/** @import {Queued, RankingOfRound, Stage} from "../competition/answers" */
+
 const LONG = 24; // letters of a name that is written smaller
 const PLACES = 3;
 
@@ -27,7 +29,7 @@ export class StageRanking {
     this.element = make("section", { class: "s-board" }, this.#next, make("div", { class: "s-standing" }, this.#list, note));
   }
 
-  /** @param {object|null} stage as `/api/competition/stage` answers */
+  /** @param {Stage|null} stage as `/api/competition/stage` answers */
   show(stage) {
     const told = JSON.stringify([stage?.called, stage?.queue, stage?.last, stage?.ranking]);
     if (told === this.#shown) return;
@@ -44,14 +46,14 @@ export class StageRanking {
   }
 }
 
-/** Who was called, who is next and who flew last. @param {any} stage as `/api/competition/stage` answers */
+/** Who was called, who is next and who flew last. @param {Stage|null} stage */
 function nextWords(stage) {
-  const called = isWaiting(stage?.called ?? null) ? stage.called : null;
+  const called = isWaiting(stage?.called ?? null) ? /** @type {Stage} */ (stage).called : null;
   const first = stage?.queue.teams[0] ?? null;
   const words = called || first
     ? [
       make("p", { class: "s-label" }, called ? "Called" : "Next"),
-      bigName((called ?? first).team_name, "s-called"),
+      bigName(/** @type {Queued} */ (called ?? first).team_name, "s-called"),
       make("p", { class: "s-where" }, called?.scenario ?? ""),
     ]
     : [bigName("No try is running", "s-called"), make("p", { class: "s-where" }, "Organisers call the next team on the page Competition.")];
@@ -74,7 +76,7 @@ export class Podium {
     this.element = make("section", { class: "s-podium", "aria-label": "podium" }, this.#steps);
   }
 
-  /** @param {object} ranking of the round */
+  /** @param {RankingOfRound} ranking of the round */
   show(ranking) {
     const told = JSON.stringify(ranking);
     if (told === this.#shown) return;

@@ -3,6 +3,11 @@ import { nameOf } from "../lib/contest/words.js";
 import { bigName } from "./board.js";
 import { make, number, setAttribute, setText } from "../lib/dom.js";
 
+/**
+ * @import {FlownTry} from "../competition/answers"
+ * @import {Live} from "../lib/messages.js"
+ */
+
 const GOOD = ["clean", "completed"];
 
 /** The line at the top: team, time, and at the end the verdict. */
@@ -19,7 +24,11 @@ export class StageHead {
     this.element = make("header", { class: "s-head" }, who, this.#verdict, time);
   }
 
-  /** @param {{team: string, scenario: string, figures: object|null, isOver: boolean, rank: number|null}} told */
+  /**
+   * @param {object} told
+   * @param {string} told.team @param {string} told.scenario @param {Live.Figures|null} told.figures
+   * @param {boolean} told.isOver @param {number|null} told.rank
+   */
   show({ team, scenario, figures, isOver, rank }) {
     if (this.#team.dataset.shown !== team) {
       const name = bigName(team, "s-team");
@@ -29,7 +38,9 @@ export class StageHead {
     }
     setText(this.#where, scenario);
     setText(this.#clock, number((isOver ? figures?.total_time_s : figures?.try_time_s) ?? null));
-    const penalty = figures?.penalty_s > 0 ? `${isOver ? "with" : "and"} ${number(figures.penalty_s)} s penalty` : "";
+    const penalty = /** @type {number} */ (figures?.penalty_s) > 0
+      ? `${isOver ? "with" : "and"} ${number(/** @type {Live.Figures} */ (figures).penalty_s)} s penalty`
+      : "";
     const late = figures?.time_over && !isOver ? "time over" : "";
     setText(this.#penalty, late || penalty);
     const verdict = isOver ? figures?.verdict || "ended" : "";
@@ -49,13 +60,14 @@ export class Splits {
   }
 
   /**
-   * @param {object|null} figures as in the live channel's status
+   * @param {Live.Figures|null} figures as in the live channel's status
    * @param {string[]} frames colours to cross, in order
-   * @param {object|null} best try, as `/api/competition/stage` has it
+   * @param {FlownTry|null} best try, as `/api/competition/stage` has it
    */
   show(figures, frames, best) {
-    const isDone = Boolean(figures?.over) && GOOD.includes(figures.verdict);
-    const times = (figures?.crossed ?? []).map((colour, index) => [colour, figures.crossing_times_s?.[index] ?? null]);
+    const isDone = Boolean(figures?.over) && GOOD.includes(/** @type {Live.Figures} */ (figures).verdict);
+    const times = (figures?.crossed ?? []).map((colour, index) =>
+      [colour, /** @type {Live.Figures} */ (figures).crossing_times_s?.[index] ?? null]);
     const own = Object.fromEntries(times);
     const told = JSON.stringify([own, frames, best, figures?.next_colour, figures?.over, isDone]);
     if (told === this.#shown) return;
@@ -65,7 +77,7 @@ export class Splits {
       return tile(colour, colour, state, own[colour] ?? null, best?.splits[colour] ?? null);
     });
     const isLanding = figures !== null && figures.next_colour === null && !figures.over;
-    const end = isDone ? figures.total_time_s : null;
+    const end = isDone ? /** @type {Live.Figures} */ (figures).total_time_s : null;
     tiles.push(tile("landed", "", isDone ? "crossed" : isLanding ? "next" : "open", end, best?.completed ? best.total_s : null));
     this.#list.replaceChildren(...tiles);
     const name = nameOf(best?.team_name || "without a team");
@@ -73,6 +85,11 @@ export class Splits {
   }
 }
 
+/**
+ * @param {string} name @param {string} colour "" for the landing @param {"crossed"|"next"|"open"} state
+ * @param {number|null} time seconds; null: not yet, or not known
+ * @param {number|null} best seconds; null: there is none
+ */
 function tile(name, colour, state, time, best) {
   const gap = time !== null && best !== null ? time - best : null;
   const look = gap === null ? null : gap <= 0 ? "ahead" : "behind";

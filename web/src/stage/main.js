@@ -13,6 +13,12 @@ import { Podium, StageRanking } from "./board.js";
 import { StageHead, Splits } from "./flight.js";
 import { pageRoot } from "../lib/page_data.js";
 
+/**
+ * @import {Contest as Views, Live} from "../lib/messages.js"
+ * @import {FlownTry, Stage} from "../competition/answers"
+ * @typedef {Views.RunningView|FlownTry} Flown
+ */
+
 const RESULT_MS = 30_000; // a result stays at least this long, unless the next flight begins
 const LOOK_MS = 1000;
 
@@ -26,7 +32,7 @@ class StagePage {
   #podium = new Podium();
   /** @type {import("../lib/contest/contest.js").Contest} */
   #contest = { running: [], stage: null };
-  /** @type {any} */
+  /** @type {FlownTry|null} */
   #against = null; // the best try when the present one began
   #isFlying = false;
   /** @type {number|null} */
@@ -57,6 +63,7 @@ class StagePage {
     setInterval(() => this.#show(), LOOK_MS);
   }
 
+  /** @param {Arena} arena @param {HTMLElement} line */
   #hear(arena, line) {
     let world = "";
     watchLive({
@@ -86,7 +93,7 @@ class StagePage {
     }, line);
   }
 
-  /** The try that is shown as the contest knows it; null if it does not. */
+  /** The try that is shown as the contest knows it; null if it does not. @returns {Flown|null} */
   get #try() {
     const { running, stage } = this.#contest;
     const id = this.#fleet.chosen?.id;
@@ -114,19 +121,20 @@ class StagePage {
     }
   }
 
-  /** Notice the beginning and the end of a flight. */
+  /** Notice the beginning and the end of a flight. @param {Live.DroneStatus|null} status */
   #follow(status) {
     const flying = isFlying(status);
     if (flying && !this.#isFlying) {
       this.#endedAt = null;
       this.#against = null;
     }
-    const isOver = !flying && Boolean(status?.figures) && status.figures.try_time_s > 0;
+    const isOver = !flying && Boolean(status?.figures)
+      && /** @type {{figures: {try_time_s: number}}} */ (status).figures.try_time_s > 0;
     if (isOver && this.#endedAt === null) this.#endedAt = performance.now();
     this.#isFlying = flying;
   }
 
-  /** @returns {"flying"|"ended"|"podium"|"waiting"} */
+  /** @param {Live.DroneStatus|null} status @returns {"flying"|"ended"|"podium"|"waiting"} */
   #phase(status) {
     const { running, stage } = this.#contest;
     if (isFlying(status)) return "flying";
@@ -136,9 +144,12 @@ class StagePage {
     return stage?.complete && running.length === 0 ? "podium" : "waiting";
   }
 
-  /** The try to compare with: the best at the scenario, as it was before this one. */
+  /**
+   * The try to compare with: the best at the scenario, as it was before this one.
+   * @param {Flown|null} flown
+   */
   #best(flown) {
-    const { stage } = this.#contest;
+    const { stage } = /** @type {{stage: Stage|null}} */ (this.#contest);
     if (!stage || !flown) return this.#against;
     const isOver = stage.last?.id === flown.id;
     const found = isOver ? stage.last_against : stage.best.find((each) => each.scenario === flown.scenario);
@@ -147,7 +158,10 @@ class StagePage {
   }
 }
 
-/** A team's rank in the present round, with its rows' total; null if it has none. */
+/**
+ * A team's rank in the present round, with its rows' total; null if it has none.
+ * @param {Stage|null} stage @param {string|undefined} team its name
+ */
 function rankOf(stage, team) {
   const row = team ? stage?.ranking?.rows.find((each) => each.name === team) : null;
   return row && row.flown > 0 ? row.rank : null;

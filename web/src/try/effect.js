@@ -2,6 +2,12 @@
 
 import { seconds, worth } from "../lib/contest/words.js";
 
+/**
+ * @import {Rule, TryDetail} from "../competition/answers"
+ * @import {Said} from "./form.js"
+ */
+
+/** @type {Record<string, string>} */
 const BARRIERS = {
   "open class": "It is in no ranking: its mission is of the class open, faster than the contest allows.",
   "no team": "It counts for nobody until a team is set.",
@@ -12,9 +18,8 @@ const BARRIERS = {
 
 /**
  * Say what a try counts, and which of a judge's values change nothing.
- * @param {object} detail of the try
- * @param {{missing: string[], completed: boolean, contradiction: boolean, counted_s: number, contacts: number,
- *   penalty_s: number, try_time_changed: boolean}} now as the form says
+ * @param {TryDetail} detail of the try
+ * @param {Said} now as the form says
  * @returns {string}
  */
 export function effect(detail, now) {
@@ -26,12 +31,18 @@ export function effect(detail, now) {
     .filter((sentence) => sentence !== "").join(" ");
 }
 
-/** Why a penalty of a try that is not completed changes nothing, as a note; "" if it counts. */
+/**
+ * Why a penalty of a try that is not completed changes nothing, as a note; "" if it counts.
+ * @param {{penalty_s: number, completed: boolean}} result
+ */
 export function penaltyNote(result) {
   return result.penalty_s > 0 && !result.completed ? " (changes nothing: not completed)" : "";
 }
 
-/** Time and penalty of a try that is not completed change nothing: say so where a judge gave them. */
+/**
+ * Time and penalty of a try that is not completed change nothing: say so where a judge gave them.
+ * @param {Rule} rule @param {Said} now
+ */
 function idle(rule, now) {
   if (now.completed) return "";
   const given = [now.penalty_s > 0 ? "penalty" : "", now.try_time_changed ? "try time" : ""].filter((each) => each !== "");
@@ -40,7 +51,10 @@ function idle(rule, now) {
     + `counts ${rule.limit_s} s, and ${rule.missing_frame_s} s for each frame missing.`;
 }
 
-/** Whether the ranking has this try, or another one of the team. */
+/**
+ * Whether the ranking has this try, or another one of the team.
+ * @param {TryDetail} detail @param {Said} now
+ */
 function standing(detail, now) {
   const { rival } = detail;
   const { barrier } = detail.try;
@@ -53,7 +67,10 @@ function standing(detail, now) {
   return `The ranking stays as it is: of the team's tries here try ${rival.try} counts, ${seconds(rival.counted_s)} s.`;
 }
 
-/** Whether one list of numbers comes before another: the first that differs decides. */
+/**
+ * Whether one list of numbers comes before another: the first that differs decides.
+ * @param {number[]} one @param {number[]} other
+ */
 function before(one, other) {
   const at = one.findIndex((value, index) => Math.round(value * 100) !== Math.round(other[index] * 100));
   return at >= 0 && one[at] < other[at];

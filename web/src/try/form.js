@@ -2,6 +2,19 @@
 
 import { make, setText } from "../lib/dom.js";
 
+/**
+ * @import {Rule, TryDetail} from "../competition/answers"
+ *
+ * @typedef {object} Said what a try would count, as the form says
+ * @property {string[]} missing frames
+ * @property {boolean} completed
+ * @property {boolean} contradiction completed is ticked while frames are missing
+ * @property {number} counted_s
+ * @property {number} contacts
+ * @property {number} penalty_s
+ * @property {boolean} try_time_changed
+ */
+
 /** A field that holds a number. */
 class NumberField {
   /**
@@ -19,6 +32,7 @@ class NumberField {
     this.hint = make("p", { class: "hint", id: `${id}-referee` });
     this.input.setAttribute("aria-describedby", this.hint.id);
     this.input.addEventListener("input", changed);
+    /** @param {number} by */
     const step = (by) => {
       const button = make("button", { type: "button", class: "step", "aria-label": `${by < 0 ? "less" : "more"}: ${label}` },
         by < 0 ? "−" : "+");
@@ -42,6 +56,7 @@ class NumberField {
     setText(this.hint, `referee: ${this.referee}${this.kind.unit}${this.kind.note ?? ""}`);
   }
 
+  /** @param {number} value */
   #text(value) {
     return value.toFixed(this.kind.decimals);
   }
@@ -67,6 +82,7 @@ class TickField {
   /** @param {string} title @param {function(): void} changed */
   constructor(title, changed) {
     this.onChange = changed;
+    /** @type {Map<string, HTMLInputElement>} */
     this.boxes = new Map();
     this.hint = make("p", { class: "hint" });
     this.ticks = make("div", { class: "ticks" });
@@ -128,10 +144,11 @@ export class Fields {
     this.all = [this.crossed, this.completed, this.contacts, this.penalty, this.time];
   }
 
-  /** @param {object} detail of a try */
+  /** @param {TryDetail} detail of a try */
   show(detail) {
     const { referee, result, frames } = detail.try;
     const said = detail.correction;
+    /** @param {boolean} completed */
     const ticks = (completed) => (completed ? ["completed"] : []);
     this.crossed.offer(frames.map((colour) => [colour, colour]));
     this.crossed.show(referee.crossed, result.crossed, said?.crossed ?? null, referee.crossed.join(", ") || "none");
@@ -162,7 +179,7 @@ export class Fields {
     };
   }
 
-  /** What the try would count, by a rule; as `effect` takes it. */
+  /** What the try would count, by a rule. @param {string[]} frames @param {Rule} rule @returns {Said} */
   counts(frames, rule) {
     const missing = frames.filter((colour) => !this.crossed.ticked.includes(colour));
     const completed = this.completed.ticked.length > 0;

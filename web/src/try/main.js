@@ -9,7 +9,10 @@ import { make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 import { reasonOf } from "../lib/request.js";
 
-const { judge, attempt } = pageData();
+/** @import {Judgement, Result, Team, Try, TryDetail} from "../competition/answers" */
+/** @typedef {(term: string, ...values: (Node|string)[]) => HTMLElement[]} MakeRow */
+
+const { judge, attempt } = /** @type {{judge: boolean, attempt: number}} */ (pageData());
 
 class TryPage {
   #line = make("p", { class: "line", role: "status", hidden: true });
@@ -20,7 +23,7 @@ class TryPage {
   #counts = make("p", { class: "counts", "aria-live": "polite" });
   #save = make("button", { type: "submit", class: "main" }, "Save");
   #history = make("ol", { class: "history" });
-  /** @type {any} */
+  /** @type {TryDetail|null} */
   #detail = null;
   #stale = false;
 
@@ -50,7 +53,9 @@ class TryPage {
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       const team = this.#team.value === "" ? null : Number(this.#team.value);
-      this.#attempt(() => send(`tries/${attempt}/team`, { seen: this.#detail.try.judgements, team }), this.#fields.changed);
+      this.#attempt(() => send(`tries/${attempt}/team`, {
+        seen: /** @type {TryDetail} */ (this.#detail).try.judgements, team,
+      }), this.#fields.changed);
     });
     return form;
   }
@@ -59,7 +64,9 @@ class TryPage {
     const back = make("button", { type: "button" }, "As the referee says");
     back.addEventListener("click", () => {
       if (confirm("Take all corrections of this try back? They stay in the history.")) {
-        this.#attempt(() => send(`tries/${attempt}/judgement`, { seen: this.#detail.try.judgements }), false);
+        this.#attempt(() => send(`tries/${attempt}/judgement`, {
+          seen: /** @type {TryDetail} */ (this.#detail).try.judgements,
+        }), false);
       }
     });
     this.#form.append(make("h2", {}, "Correct"), ...this.#fields.elements,
@@ -69,12 +76,18 @@ class TryPage {
       const wrong = /** @type {HTMLInputElement|null} */ (this.#form.querySelector("input:invalid, select:invalid, textarea:invalid"));
       if (wrong && !wrong.reportValidity()) return;
       this.#attempt(
-        () => send(`tries/${attempt}/judgement`, { seen: this.#detail.try.judgements, ...this.#fields.said }), false);
+        () => send(`tries/${attempt}/judgement`, {
+          seen: /** @type {TryDetail} */ (this.#detail).try.judgements, ...this.#fields.said,
+        }), false);
     });
     return this.#form;
   }
 
-  /** Do what the judge asks. @param {boolean} keep what is filled in but not saved */
+  /**
+   * Do what the judge asks.
+   * @param {() => Promise<unknown>} work
+   * @param {boolean} keep what is filled in but not saved
+   */
   async #attempt(work, keep) {
     this.#save.disabled = true;
     try {
@@ -89,6 +102,7 @@ class TryPage {
     }
   }
 
+  /** @param {string} words "" takes them away @param {"bad"|"good"} look */
   #say(words, look = "bad") {
     setText(this.#line, words);
     this.#line.dataset.look = look;
@@ -112,7 +126,8 @@ class TryPage {
    * @param {boolean} ownChange the change was ours: what is filled in is still good
    */
   async #load(force, ownChange = false) {
-    const [detail, teams] = await Promise.all([ask(`tries/${attempt}`), judge ? ask("teams") : []]);
+    const [detail, teams] = /** @type {[TryDetail, Team[]]} */ (
+      await Promise.all([ask(`tries/${attempt}`), judge ? ask("teams") : []]));
     const before = this.#detail;
     const judged = before !== null && before.try.judgements !== detail.try.judgements;
     const filled = judge && before !== null && this.#fields.changed;
@@ -133,9 +148,11 @@ class TryPage {
     this.#preview();
   }
 
+  /** @param {TryDetail} detail */
   #showHead(detail) {
     const each = detail.try;
     const result = each.result;
+    /** @type {MakeRow} */
     const row = (term, ...values) => [make("dt", {}, term), make("dd", {}, ...values)];
     const rows = [
       ...row("Team", each.team === null ? make("span", { class: "tag warn" }, "no team") : nameOf(each.team_name)),
@@ -148,6 +165,11 @@ class TryPage {
     this.#head.replaceChildren(make("dl", {}, ...rows));
   }
 
+  /**
+   * @param {Team[]} teams
+   * @param {number|null} team whose it is
+   * @param {number|null|undefined} before whose it was as shown; undefined: nothing was shown
+   */
   #showTeams(teams, team, before) {
     const text = JSON.stringify(teams);
     if (this.#team.dataset.shown === text && team === before) return;
@@ -163,6 +185,7 @@ class TryPage {
     this.#save.textContent = this.#fields.changed ? "Save" : "Confirm";
   }
 
+  /** @param {Judgement[]} entries */
   #showHistory(entries) {
     if (entries.length === 0) {
       this.#history.replaceChildren(make("li", { class: "hint" }, "Nothing: it stands as the referee says."));
@@ -175,7 +198,10 @@ class TryPage {
   }
 }
 
-/** What the form shows to judges, for those who only look. */
+/**
+ * What the form shows to judges, for those who only look.
+ * @param {Try} each @param {Result} result @param {MakeRow} row
+ */
 function values(each, result, row) {
   return [
     ...row("Frames", frameMarks(each.frames, result.crossed), ` ${result.crossed.join(", ") || "none"}`),
@@ -186,7 +212,7 @@ function values(each, result, row) {
   ];
 }
 
-/** What an entry of the history says. */
+/** What an entry of the history says. @param {Judgement} entry */
 function describe(entry) {
   if (entry.kind === "team") return ["team: ", entry.team_name === "" ? "nobody's" : nameOf(entry.team_name)];
   const parts = [];
