@@ -79,7 +79,7 @@ lint-web:
 
 .PHONY: web web-check page-types
 page-types: $(VENV)/installed-dev ## write the types of the pages' messages, web/src/lib/messages.d.ts, from their models
-	$(PYTHON) web/page_types.py
+	$(BIN)/python web/page_types.py
 
 web: $(NODE_MODULES) ## bundle the monitor's pages, web/, into framerunner/monitor/static/ (needs Node.js 20)
 	cd web && npm run --silent build

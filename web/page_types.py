@@ -12,8 +12,8 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from framerunner.editing import messages as flights
-from framerunner.editing.documents import messages as documents
+from framerunner.editing import editor_messages as flights
+from framerunner.editing.documents import document_messages as documents
 from framerunner.monitor import live_messages, manual_channel
 from framerunner.monitor.competition import views as contest
 from framerunner.wire import operator_messages

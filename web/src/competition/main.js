@@ -5,7 +5,7 @@ import { ask, oneAtATime, watch } from "../lib/contest/channel.js";
 import { Draw, Rule } from "./draw.js";
 import { Calls, Queue } from "./queue.js";
 import { Teams } from "./teams.js";
-import { frameMarks, moment, nameOf, notCounted, orDash, seconds, standing } from "../lib/contest/words.js";
+import { gateMarks, moment, nameOf, notCounted, orDash, seconds, standing } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 import { reasonOf } from "../lib/request.js";
@@ -120,7 +120,7 @@ class Desk {
       make("td", {}, `${each.id}`, make("span", { class: "when" }, moment(each.started))),
       make("td", { class: "team" }, team),
       make("td", {}, orDash(each.scenario), make("span", { class: "when" }, each.round === 0 ? "before the draw" : `round ${each.round}`), notCounted(each)),
-      make("td", {}, standing(each), " ", running ? null : frameMarks(each.frames, each.result.crossed),
+      make("td", {}, standing(each), " ", running ? null : gateMarks(each.frames, each.result.crossed),
         each.corrected_by === "" ? null : make("span", { class: "when" }, "corrected by ", nameOf(each.corrected_by))),
       counts,
       make("td", {}, make("a", {

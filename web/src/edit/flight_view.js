@@ -1,5 +1,5 @@
 /** A flight of the mission from above, with the goals of a lesson, and a legend. */
-import { allFrames } from "../lib/arena/obstacles.js";
+import { allGates } from "../lib/arena/obstacles.js";
 import { TopView } from "../lib/arena/top_view.js";
 import { make } from "../lib/dom.js";
 import { thingName } from "./verdict.js";
@@ -76,7 +76,7 @@ export class FlightView {
       ["➤", "t-of-drone", word("drone_legend")], ["―", "t-of-track", word("track_legend")], ["■", "t-of-base", word("base_legend")],
       goals.some((/** @type {any} */ { hold_m }) => hold_m) ? ["◌", "t-of-goal", word("goal_legend")] : null,
       goals.some((/** @type {any} */ { face }) => face) ? ["◯", "t-of-goal", word("ring_legend")] : null,
-      ...(this.#scenario ? allFrames(this.#scenario) : []).map(({ colour }) => ["▬", `t-of-${colour}`, thingName(colour)]),
+      ...(this.#scenario ? allGates(this.#scenario) : []).map(({ colour }) => ["▬", `t-of-${colour}`, thingName(colour)]),
       this.#contacts.length > 0 ? ["✕", "t-of-hit", word("hit_legend")] : null,
     ];
     const shown = JSON.stringify(rows);

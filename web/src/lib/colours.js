@@ -1,4 +1,4 @@
-/** Colours of states and frames: those of the pictures that a flight leaves, so that a trail looks the same everywhere. */
+/** Colours of states and gates: those of the pictures that a flight leaves, so that a trail looks the same everywhere. */
 
 /** Paul Tol's "muted" scheme, which colour-blind people can tell apart, and three more beside it. */
 export const STATE_COLOURS = [
@@ -7,7 +7,7 @@ export const STATE_COLOURS = [
 ];
 
 /** The pure colours of frames and decoys. @type {Record<string, string>} */
-export const FRAME_COLOURS = { red: "#ff0000", green: "#00ff00", blue: "#0000ff", cyan: "#00ffff", magenta: "#ff00ff" };
+export const GATE_COLOURS = { red: "#ff0000", green: "#00ff00", blue: "#0000ff", cyan: "#00ffff", magenta: "#ff00ff" };
 
 /**
  * The kind of a state: the last part of its id, "turning" of "red.turning".

@@ -51,17 +51,17 @@ export namespace Flights {
   type Changed = { kind: "changed"; run: string; tag: number; ids: Record<string, string> };
   type Contact = { name: string; time_s: number };
   type Done = { kind: "done"; tag: number };
-  type Ended = { kind: "ended"; run: string; text: string; lost_in: string; result: Record<string, any> | null; counts: Record<string, number>; spans: (StateTime)[] };
+  type Ended = { kind: "ended"; run: string; text: string; lost_in: string; result: Record<string, any> | null; counts: Record<string, number>; spans: (StateSpan)[] };
   type Flight = { kind: "flight"; batch: string; scenario: string; seed: number; verdict: string; completed: boolean; reason: string; cause: string; lost_in: string; rank: number; total_time_s: number | null; frames_crossed: (string)[]; counts: Record<string, number>; track: FlownTrack; layout: Record<string, any>; result: Record<string, any>; replay: string };
   type FlownTrack = { time_s: (number | null)[]; x: (number | null)[]; y: (number | null)[]; z: (number | null)[]; state: (number)[]; states: (string)[] };
-  type Guard = { id: string; to: string; when: string; holds: boolean | null };
+  type GuardNow = { id: string; to: string; when: string; holds: boolean | null };
   type Live = { kind: "live"; state: "starting" | "flying" | "ended" | "stopped"; scenario: string; speed: number; text: string };
-  type Now = { kind: "now"; run: string; full: boolean; time_s: number; began_s: number | null; state: string; active: (string)[]; seconds_in_state: number; paused: boolean; stopped_in: string; speed: number | null; guards: (Guard)[]; values: (Value)[]; taken: (Taken)[]; counts: Record<string, number>; spans: (StateTime)[]; contacts: (Contact)[]; pose: (number | null)[]; command: (number | null)[]; trail: ((number | null)[])[] };
+  type Now = { kind: "now"; run: string; full: boolean; time_s: number; began_s: number | null; state: string; active: (string)[]; seconds_in_state: number; paused: boolean; stopped_in: string; speed: number | null; guards: (GuardNow)[]; values: (ValueNow)[]; taken: (Taken)[]; counts: Record<string, number>; spans: (StateSpan)[]; contacts: (Contact)[]; pose: (number | null)[]; command: (number | null)[]; trail: ((number | null)[])[] };
   type Refused = { kind: "refused"; tag: number; text: string; lines: (string)[]; run: string };
   type Started = { kind: "started"; tag: number; run: string; layout: Record<string, any> };
-  type StateTime = { state: string; from_s: number; to_s: number };
+  type StateSpan = { state: string; from_s: number; to_s: number };
   type Taken = { ids: (string)[]; source: string; target: string; when: string; values: ([string, number | boolean | string | null])[]; time_s: number; seconds: number };
-  type Value = { name: string; value: number | boolean | string | null; unit: string };
+  type ValueNow = { name: string; value: number | boolean | string | null; unit: string };
   type Waiting = { kind: "waiting"; tag: number; run: string; place: number; seconds: number | null };
   type ToPage = Started | Now | Changed | Refused | Waiting | Done | Ended | BatchStarted | Flight | BatchEnded | Live;
 }

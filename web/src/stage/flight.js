@@ -49,7 +49,7 @@ export class StageHead {
   }
 }
 
-/** The frames and the landing: time of each, and how much before or behind the best. */
+/** The gates and the landing: time of each, and how much before or behind the best. */
 export class Splits {
   #list = make("ol", { class: "s-tiles" });
   #against = make("p", { class: "s-against" });

@@ -4,7 +4,7 @@ import "../lib/contest/contest.css";
 import { ask, oneAtATime, send, watch } from "../lib/contest/channel.js";
 import { effect, penaltyNote } from "./effect.js";
 import { Fields } from "./form.js";
-import { frameMarks, moment, nameOf, notCounted, orDash, seconds, standing } from "../lib/contest/words.js";
+import { gateMarks, moment, nameOf, notCounted, orDash, seconds, standing } from "../lib/contest/words.js";
 import { make, setText } from "../lib/dom.js";
 import { pageData, pageRoot } from "../lib/page_data.js";
 import { reasonOf } from "../lib/request.js";
@@ -204,7 +204,7 @@ class TryPage {
  */
 function values(each, result, row) {
   return [
-    ...row("Frames", frameMarks(each.frames, result.crossed), ` ${result.crossed.join(", ") || "none"}`),
+    ...row("Frames", gateMarks(each.frames, result.crossed), ` ${result.crossed.join(", ") || "none"}`),
     ...row("Completed", result.completed ? "yes" : "no"),
     ...row("Contacts", String(result.contacts)),
     ...row("Try time", `${seconds(result.try_time_s)} s`),

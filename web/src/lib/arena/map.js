@@ -1,5 +1,5 @@
-/** What a mission's navigator knows, drawn in the arena: frames as it estimates them, and the path that it plans. */
-import { FRAME_COLOURS } from "../colours.js";
+/** What a mission's navigator knows, drawn in the arena: gates as it estimates them, and the path that it plans. */
+import { GATE_COLOURS } from "../colours.js";
 
 /**
  * @typedef {object} MappedFrame as in the live channel's message "map"
@@ -19,9 +19,9 @@ import { FRAME_COLOURS } from "../colours.js";
 
 export const SIGMAS = 2; // how many standard deviations an ellipse reaches
 export const PATH_COLOUR = "#b3007d";
-const OTHER_COLOUR = "#7a7a7a"; // of a frame that is no part of the task
-const OUTER_M = [0.42, 0.22]; // width and height of a frame that the scenario does not have
-const AROUND = 1.35; // an outline is drawn so much larger, around the frame where the estimate is right
+const OTHER_COLOUR = "#7a7a7a"; // of a gate that is no part of the task
+const OUTER_M = [0.42, 0.22]; // width and height of a gate that the scenario does not have
+const AROUND = 1.35; // an outline is drawn so much larger, around the gate where the estimate is right
 export const NORMAL_M = 0.3; // how far the line along its normal goes, to each side
 const [LEAST_M, MOST_M] = [0.005, 4]; // half axes of an ellipsoid
 
@@ -37,23 +37,23 @@ export function mapIn(message) {
 
 /** The colour in which a frame is drawn. @param {string} colour */
 export function colourOf(colour) {
-  return Object.hasOwn(FRAME_COLOURS, colour) ? FRAME_COLOURS[colour] : OTHER_COLOUR;
+  return Object.hasOwn(GATE_COLOURS, colour) ? GATE_COLOURS[colour] : OTHER_COLOUR;
 }
 
 /**
- * Half the width and the height of a frame's outline, metres.
- * @param {MappedFrame} frame
+ * Half the width and the height of a gate's outline, metres.
+ * @param {MappedFrame} gate
  * @param {import("./obstacles.js").Scenario|null} scenario
  */
-export function halfSizeOf(frame, scenario) {
-  const known = scenario?.frames.find((each) => each.colour === frame.colour);
+export function halfSizeOf(gate, scenario) {
+  const known = scenario?.frames.find((each) => each.colour === gate.colour);
   const [width, height] = known ? [known.outer_width_m, known.outer_height_m] : OUTER_M;
   return [(AROUND * width) / 2, (height + (AROUND - 1) * width) / 2];
 }
 
 /**
- * Half axes of the ellipsoid of a frame's place along x, y, z, metres; null if not known.
- * @param {MappedFrame} frame
+ * Half axes of the ellipsoid of a gate's place along x, y, z, metres; null if not known.
+ * @param {MappedFrame} gate
  */
 export function halfAxesOf({ std }) {
   return std ? std.map((sigma) => Math.min(MOST_M, Math.max(LEAST_M, SIGMAS * sigma))) : null;

@@ -10,7 +10,7 @@ import { GAP, Ribbon } from "./ribbon.js";
  * @typedef {import("./obstacles.js").Scenario} Scenario
  */
 
-const DASHES = 3; // of each edge of a frame that is not certain
+const DASHES = 3; // of each edge of a gate that is not certain
 const MOST_POINTS = 4000;
 
 /** Draws one map at a time. */
@@ -43,7 +43,7 @@ export class MapModel {
       ball.material.dispose();
       ball.removeFromParent();
     }
-    for (const frame of map?.frames ?? []) this.#addFrame(frame, scenario);
+    for (const gate of map?.frames ?? []) this.#addGate(gate, scenario);
     for (const point of map?.path ?? []) this.#path.add(point, rgbOf(PATH_COLOUR));
   }
 
@@ -53,19 +53,19 @@ export class MapModel {
     this.#path.fit(2.5, picture);
   }
 
-  /** @param {MappedFrame} frame @param {Scenario|null} scenario */
-  #addFrame(frame, scenario) {
-    const [wide, high] = halfSizeOf(frame, scenario);
-    const [c, s] = [Math.cos(frame.yaw), Math.sin(frame.yaw)];
-    const [x, y, z] = frame.p;
+  /** @param {MappedFrame} gate @param {Scenario|null} scenario */
+  #addGate(gate, scenario) {
+    const [wide, high] = halfSizeOf(gate, scenario);
+    const [c, s] = [Math.cos(gate.yaw), Math.sin(gate.yaw)];
+    const [x, y, z] = gate.p;
     /** @param {number} ahead @param {number} left @param {number} up */
     const at = (ahead, left, up) => [x + c * ahead - s * left, y + s * ahead + c * left, z + up];
     const corners = [[-wide, -high], [wide, -high], [wide, high], [-wide, high]].map(([left, up]) => at(0, left, up));
-    const rgb = rgbOf(colourOf(frame.colour));
-    corners.forEach((corner, index) => this.#addLine(corner, corners[(index + 1) % 4], rgb, frame.certain ? 1 : DASHES));
+    const rgb = rgbOf(colourOf(gate.colour));
+    corners.forEach((corner, index) => this.#addLine(corner, corners[(index + 1) % 4], rgb, gate.certain ? 1 : DASHES));
     this.#addLine(at(-NORMAL_M, 0, 0), at(NORMAL_M, 0, 0), rgb, 1);
-    const axes = halfAxesOf(frame);
-    if (axes) this.#addBall(frame, axes);
+    const axes = halfAxesOf(gate);
+    if (axes) this.#addBall(gate, axes);
   }
 
   /**
@@ -80,11 +80,11 @@ export class MapModel {
     }
   }
 
-  /** @param {MappedFrame} frame @param {number[]} axes its half axes, metres */
-  #addBall(frame, axes) {
-    const paint = { color: colourOf(frame.colour), transparent: true, opacity: 0.3, depthWrite: false };
+  /** @param {MappedFrame} gate @param {number[]} axes its half axes, metres */
+  #addBall(gate, axes) {
+    const paint = { color: colourOf(gate.colour), transparent: true, opacity: 0.3, depthWrite: false };
     const ball = new THREE.Mesh(this.#ball, new THREE.MeshBasicMaterial(paint));
-    ball.position.fromArray(frame.p);
+    ball.position.fromArray(gate.p);
     ball.scale.fromArray(axes);
     this.#balls.push(ball);
     this.group.add(ball);

@@ -89,7 +89,7 @@ export function prismsOf(scenario, lift_m = 0) {
 }
 
 /** Frames and decoys. @param {Scenario} scenario */
-export function allFrames(scenario) {
+export function allGates(scenario) {
   return [...scenario.frames, ...(scenario.decoys ?? [])];
 }
 

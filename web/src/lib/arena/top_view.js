@@ -3,7 +3,7 @@ import "./top_view.css";
 import { svg } from "../diagram/shapes.js";
 import { number } from "../dom.js";
 import { colourOf, halfAxesOf, halfSizeOf, NORMAL_M, PATH_COLOUR } from "./map.js";
-import { allFrames, prismsOf } from "./obstacles.js";
+import { allGates, prismsOf } from "./obstacles.js";
 
 const MAP_PX = 190;
 const [LEFT_PX, TOP_PX, BOTTOM_PX, SCALE_PX] = [30, 8, 32, 58]; // the last: width of the scale of heights
@@ -103,20 +103,20 @@ export class TopView {
    */
   setMap(map, scenario) {
     const frames = (map?.frames ?? []).map(
-      (frame) => this.#mappedFrame(frame, /** @type {Scenario|null} */ (scenario)));
+      (gate) => this.#mappedFrame(gate, /** @type {Scenario|null} */ (scenario)));
     const path = map ? [svg("polyline", { points: this.#points(map.path), class: "t-path", stroke: PATH_COLOUR })] : [];
     this.#map.replaceChildren(...frames, ...path);
   }
 
-  /** @param {import("./map.js").MappedFrame} frame @param {Scenario|null} scenario */
-  #mappedFrame(frame, scenario) {
-    const [half] = halfSizeOf(frame, scenario), axes = halfAxesOf(frame), scale = this.#scale;
-    const colour = colourOf(frame.colour);
-    const outline = svg("g", { transform: `rotate(${(-frame.yaw * 180) / Math.PI})`, class: "t-mapped" },
-      svg("rect", { x: -0.1 * scale, y: -half * scale, width: 0.2 * scale, height: 2 * half * scale, ...(frame.certain ? {} : { "stroke-dasharray": "4 3" }) }),
+  /** @param {import("./map.js").MappedFrame} gate @param {Scenario|null} scenario */
+  #mappedFrame(gate, scenario) {
+    const [half] = halfSizeOf(gate, scenario), axes = halfAxesOf(gate), scale = this.#scale;
+    const colour = colourOf(gate.colour);
+    const outline = svg("g", { transform: `rotate(${(-gate.yaw * 180) / Math.PI})`, class: "t-mapped" },
+      svg("rect", { x: -0.1 * scale, y: -half * scale, width: 0.2 * scale, height: 2 * half * scale, ...(gate.certain ? {} : { "stroke-dasharray": "4 3" }) }),
       svg("path", { d: `M ${-NORMAL_M * scale} 0 H ${NORMAL_M * scale}` }));
     const around = axes ? [svg("ellipse", { rx: axes[0] * scale, ry: axes[1] * scale, fill: colour, "fill-opacity": 0.25 })] : [];
-    return svg("g", { transform: `translate(${this.#x(frame.p[0])} ${this.#y(frame.p[1])})`, stroke: colour, "data-mapped": frame.colour }, ...around, outline);
+    return svg("g", { transform: `translate(${this.#x(gate.p[0])} ${this.#y(gate.p[1])})`, stroke: colour, "data-mapped": gate.colour }, ...around, outline);
   }
 
   /** @param {number} id @returns {Drawn} */
@@ -212,7 +212,7 @@ export class TopView {
         this.#x(centre[0] + u * Math.cos(yaw) - v * Math.sin(yaw)), this.#y(centre[1] + u * Math.sin(yaw) + v * Math.cos(yaw))]);
       parts.push(svg("polygon", { points: corners.map((corner) => corner.join(",")).join(" "), class: "t-solid" }));
     }
-    const frames = allFrames(scenario);
+    const frames = allGates(scenario);
     parts.push(...(scenario.goals ?? []).flatMap((goal, index, { length }) => this.#goal(goal, length > 1 ? String(index + 1) : "", frames)));
     for (const { colour, x_m, y_m, z_m, yaw_rad, outer_width_m, outer_height_m } of frames) {
       const [dx, dy] = [-Math.sin(yaw_rad) * outer_width_m / 2, Math.cos(yaw_rad) * outer_width_m / 2];
@@ -226,7 +226,7 @@ export class TopView {
   }
 
   /**
-   * A point to reach, or from where to look at a frame.
+   * A point to reach, or from where to look at a gate.
    * @param {import("./obstacles.js").Goal} goal
    * @param {string} label
    * @param {import("./obstacles.js").Frame[]} frames
@@ -240,11 +240,11 @@ export class TopView {
         svg("path", { d: `M ${this.#scaleX + 3} ${this.#z(hold_m[2])} h 9`, class: "t-goal" }),
       ];
     }
-    const frame = frames.find(({ colour }) => colour === face);
-    if (!frame) return [];
+    const gate = frames.find(({ colour }) => colour === face);
+    if (!gate) return [];
     const [least, most] = distance_m;
     return [svg("circle", {
-      cx: this.#x(frame.x_m), cy: this.#y(frame.y_m), r: (least + most) / 2 * this.#scale, "stroke-width": (most - least) * this.#scale, class: "t-goal-ring",
+      cx: this.#x(gate.x_m), cy: this.#y(gate.y_m), r: (least + most) / 2 * this.#scale, "stroke-width": (most - least) * this.#scale, class: "t-goal-ring",
     })];
   }
 }

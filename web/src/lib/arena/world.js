@@ -1,7 +1,7 @@
-/** What stands still in the arena, made once for each scenario: floor, base, frames, obstacles, shadows, the outline. */
+/** What stands still in the arena, made once for each scenario: floor, base, gates, obstacles, shadows, the outline. */
 import * as THREE from "three";
-import { channels, FRAME_COLOURS } from "../colours.js";
-import { allFrames, PRISM, prismsOf } from "./obstacles.js";
+import { channels, GATE_COLOURS } from "../colours.js";
+import { allGates, PRISM, prismsOf } from "./obstacles.js";
 import { Ribbon } from "./ribbon.js";
 
 /**
@@ -20,7 +20,7 @@ const BASE = [172, 170, 168];
 const BASE_MARK = [238, 238, 238];
 const MAT_M = 2;
 const DARKEST = 0.3; // no face is painted darker than this share of its colour
-const PURE_SHADE = 0.35; // a frame keeps its colour, with just enough shade to have edges
+const PURE_SHADE = 0.35; // a gate keeps its colour, with just enough shade to have edges
 const SHADOW = 0.4; // how much of the light is missing there
 const GROUND_M = 120;
 const SEEN_THROUGH = 0.45; // opacity of poles and walls, except in the onboard view: nothing may be lost behind them
@@ -38,7 +38,7 @@ export function buildWorld(scenario, lift_m) {
   floor.rectangle(-half_x, half_x, -half_y, half_y, TATAMI);
   paintMats(floor, arena);
   const solids = new Painter(light);
-  const boxes = [baseBox(base), ...allFrames(scenario).flatMap((frame) => frameBars(frame, lift_m))];
+  const boxes = [baseBox(base), ...allGates(scenario).flatMap((gate) => gateBars(gate, lift_m))];
   for (const box of boxes) {
     solids.box(box);
     shadows.shadow(box);
@@ -65,7 +65,7 @@ export function buildWorld(scenario, lift_m) {
   glassy.userData.isHelp = true;
   group.add(massive, glassy);
   group.add(outline(half_x, half_y, arena.height_m + lift_m));
-  for (const frame of allFrames(scenario)) group.add(frameLines(frame, lift_m));
+  for (const gate of allGates(scenario)) group.add(gateLines(gate, lift_m));
   return group;
 }
 
@@ -121,40 +121,40 @@ function baseBox({ x_m, y_m, edge_m, top_m }) {
 
 /**
  * The four bars: top and bottom over the whole width, left and right between them.
- * @param {Frame} frame
+ * @param {Frame} gate
  * @param {number} lift_m
  */
-function frameBars(frame, lift_m) {
-  const bar = frame.bar_m / 2;
-  const [wide, high] = [frame.outer_width_m / 2, frame.outer_height_m / 2];
-  const colour = channels(FRAME_COLOURS[frame.colour]);
-  const [c, s] = [Math.cos(frame.yaw_rad), Math.sin(frame.yaw_rad)];
+function gateBars(gate, lift_m) {
+  const bar = gate.bar_m / 2;
+  const [wide, high] = [gate.outer_width_m / 2, gate.outer_height_m / 2];
+  const colour = channels(GATE_COLOURS[gate.colour]);
+  const [c, s] = [Math.cos(gate.yaw_rad), Math.sin(gate.yaw_rad)];
   const parts = [
     [0, high - bar, wide, bar], [0, bar - high, wide, bar],
     [wide - bar, 0, bar, high - 2 * bar], [bar - wide, 0, bar, high - 2 * bar],
   ];
   return parts.map(([y, z, half_y, half_z]) => ({
-    centre: [frame.x_m - s * y, frame.y_m + c * y, frame.z_m + lift_m + z],
-    half: [bar, half_y, half_z], yaw: frame.yaw_rad, colour, isPure: true,
+    centre: [gate.x_m - s * y, gate.y_m + c * y, gate.z_m + lift_m + z],
+    half: [bar, half_y, half_z], yaw: gate.yaw_rad, colour, isPure: true,
   }));
 }
 
 /**
- * A frame's outline, which stays wide enough to be seen from far away, and a thread to the floor below it.
- * @param {Frame} frame
+ * A gate's outline, which stays wide enough to be seen from far away, and a thread to the floor below it.
+ * @param {Frame} gate
  * @param {number} lift_m
  */
-function frameLines(frame, lift_m) {
-  const [c, s] = [Math.cos(frame.yaw_rad), Math.sin(frame.yaw_rad)];
-  const z = frame.z_m + lift_m;
+function gateLines(gate, lift_m) {
+  const [c, s] = [Math.cos(gate.yaw_rad), Math.sin(gate.yaw_rad)];
+  const z = gate.z_m + lift_m;
   /** @param {number} y @param {number} up @returns {[number, number, number]} */
-  const at = (y, up) => [frame.x_m - s * y, frame.y_m + c * y, z + up];
-  const [wide, high] = [(frame.outer_width_m - frame.bar_m) / 2, (frame.outer_height_m - frame.bar_m) / 2];
+  const at = (y, up) => [gate.x_m - s * y, gate.y_m + c * y, z + up];
+  const [wide, high] = [(gate.outer_width_m - gate.bar_m) / 2, (gate.outer_height_m - gate.bar_m) / 2];
   const ring = new Ribbon(5, { rim: 0 });
-  const rgb = channels(FRAME_COLOURS[frame.colour]).map((channel) => channel / 255);
+  const rgb = channels(GATE_COLOURS[gate.colour]).map((channel) => channel / 255);
   for (const [y, up] of [[-wide, -high], [wide, -high], [wide, high], [-wide, high], [-wide, -high]]) ring.add(at(y, up), rgb);
   ring.mesh.userData.ribbon = ring;
-  const thread = [new THREE.Vector3(frame.x_m, frame.y_m, 0.01), new THREE.Vector3(...at(0, -high))];
+  const thread = [new THREE.Vector3(gate.x_m, gate.y_m, 0.01), new THREE.Vector3(...at(0, -high))];
   const faint = new THREE.LineBasicMaterial({ color: "#4a4a46", transparent: true, opacity: 0.55 });
   const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints(thread), faint);
   const group = new THREE.Group();

@@ -1,6 +1,6 @@
 /** Who flies now, who is called, and who comes next: three things that the contest's pages never mix up. */
 
-import { frameMarks, nameOf, notCounted } from "./words.js";
+import { gateMarks, nameOf, notCounted } from "./words.js";
 import { make } from "../dom.js";
 
 /** @import {Call, Queue, Queued, RunningTry} from "./answers" */
@@ -23,7 +23,7 @@ export function nowLines({ running, called, queue }) {
       each.team === null
         ? make("span", { class: "name" }, `drone ${each.drone_id}, no team`)
         : nameOf(each.team_name, { class: "name" }),
-      make("span", { class: "where" }, each.scenario), notCounted(each), frameMarks(each.frames, each.crossed),
+      make("span", { class: "where" }, each.scenario), notCounted(each), gateMarks(each.frames, each.crossed),
       make("span", {}, clock, " s"));
   });
   if (isWaiting(called)) {

@@ -43,11 +43,11 @@ export function nameOf(text, attributes = {}) {
 }
 
 /**
- * The frames of a try as marks: filled when crossed; each says its name.
+ * The gates of a try as marks: filled when crossed; each says its name.
  * @param {string[]} frames
  * @param {string[]} crossed
  */
-export function frameMarks(frames, crossed) {
+export function gateMarks(frames, crossed) {
   const marks = make("span", { class: "marks" });
   for (const colour of frames) {
     const done = crossed.includes(colour);

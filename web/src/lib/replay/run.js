@@ -209,7 +209,7 @@ export class Run {
   /** @param {string} colour */
   #hasFrame(colour) {
     return (this.world.scenario?.frames ?? []).some(
-      (/** @type {{colour: string}} */ frame) => frame.colour === colour);
+      (/** @type {{colour: string}} */ gate) => gate.colour === colour);
   }
 
   /** @param {Pose} pose */
