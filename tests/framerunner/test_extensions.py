@@ -176,7 +176,7 @@ def test_the_monitor_and_its_editor_take_a_pilots_name(second_package):
 
     web = FastAPI(lifespan=lifespan)
     web.include_router(editing.router(lambda _: Visitor("Ada", Role.ORGANISER, "ada")))
-    start = {"do": "start_batch", "tag": 1, "text": MISSION, "scenarios": ["test-case-1"]}
+    start = {"kind": "start_batch", "tag": 1, "text": MISSION, "scenarios": ["test-case-1"]}
     with TestClient(web) as client, client.websocket_connect("/ws/editing") as socket:
         socket.send_text(json.dumps(start))
         while (told := json.loads(socket.receive_text()))["kind"] != "flight":
