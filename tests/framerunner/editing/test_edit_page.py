@@ -178,6 +178,24 @@ async def test_closing_with_unsaved_work_asks(windows):
     assert asked == ["beforeunload"]
 
 
+async def test_a_file_that_another_program_changed_is_overwritten_only_after_a_question(windows):
+    user = await windows.open()
+    answers = ["dismiss", "accept"]
+
+    async def answer(dialog):
+        await getattr(dialog, answers.pop(0))()
+
+    user.page.on("dialog", answer)
+    await user.type_at(2, " # mine")
+    others = HOVER + "# of another program\n"
+    windows.path.write_text(others)
+    await user.page.keyboard.press("ControlOrMeta+s")
+    await eventually(lambda: asyncio.sleep(0, answers == ["accept"]), 10.0)
+    assert windows.path.read_text() == others
+    await user.saves()
+    assert "# mine" in windows.path.read_text()
+
+
 async def test_two_windows_know_of_each_other_and_show_the_same(windows):
     one, two = await windows.open(), await windows.open()
     for user in (one, two):

@@ -85,6 +85,17 @@ async def test_a_flight_is_replayed_on_the_chart_and_the_map(user):
     assert not await wide_parts(replay)
 
 
+async def test_a_flight_pauses_and_goes_on_at_the_button(user):
+    fly = await user.show_tab("fly")
+    await user.press("Fly", fly)
+    await expect(fly.locator(".e-run-line")).to_contain_text(CLIMB, timeout=30_000)
+    await user.press("Pause", fly)
+    await expect(fly.locator(".e-paused")).to_have_count(1)
+    await user.press("Go on", fly)
+    await expect(fly.locator(".e-paused")).to_have_count(0)
+    await user.press("Stop", fly)
+
+
 async def test_the_table_of_many_flights_is_not_wider_than_its_panel(user, program):
     await user.open(program.page("at_once.yaml"))
     fly = await user.show_tab("fly")

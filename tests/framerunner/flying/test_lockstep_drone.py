@@ -232,7 +232,9 @@ def test_refuses_a_delay_that_does_not_fit_between_ticks(simulation, delay_us):
 def test_images_are_spaced_by_their_times_and_only_those_used_are_painted(simulation, monkeypatch):
     painted = []
     render = SimulatedCamera.render
-    monkeypatch.setattr(SimulatedCamera, "render", lambda *args, **named: painted.append(1) or render(*args, **named))
+    monkeypatch.setattr(
+        SimulatedCamera, "render", lambda *args, **named: painted.append(1) or render(*args, **named)
+    )
     perception = LockstepPerception(simulation.scenario)
 
     def after(seconds):
