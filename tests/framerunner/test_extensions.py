@@ -1,17 +1,12 @@
 """A second package, in a folder of its own, adds to this one by entry points; so do bad ones."""
 
-import asyncio
-import contextlib
 import json
 import sys
-from concurrent.futures import CancelledError
 from importlib import resources
 from pathlib import Path
 
 import pytest
-from fastapi import FastAPI
 from joblib.externals.loky import get_reusable_executor
-from starlette.testclient import TestClient
 
 import framerunner
 from framerunner.cli import run
@@ -20,10 +15,10 @@ from framerunner.editing.web import EditingRouter
 from framerunner.errors import UserError
 from framerunner.evaluation.plan import plan_flights
 from framerunner.files.extensions import KINDS, ExtensionError
-from framerunner.monitor.access import Role, Visitor
 from framerunner.vehicle.airframe import load_airframe
 from offboard.mission import MISSIONS
 from sitl.sensors.suite import load_suite
+from tests.framerunner.editing.page_socket import flights_socket
 
 MISSION = """
 name: gentle_hover
@@ -167,20 +162,8 @@ def test_the_monitor_and_its_editor_take_a_pilots_name(second_package):
     given = equipment("udpin://127.0.0.1:14550", None, Path("runs"), pilot="gentle")
     assert given.runs.recording(flight.name)["chart"]["name"] == "gentle_hover"
     editing = next(each for each in given.extensions if isinstance(each, EditingRouter))
-
-    @contextlib.asynccontextmanager
-    async def lifespan(_):
-        running = asyncio.create_task(editing.run())
-        yield
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
-
-    web = FastAPI(lifespan=lifespan)
-    web.include_router(editing.router(lambda _: Visitor("Ada", Role.ORGANISER, "ada")))
     start = {"kind": "start_batch", "tag": 1, "text": MISSION, "scenarios": ["test-case-1"]}
-    # The test client cancels what the server still does when a page has left.
-    left = contextlib.suppress(CancelledError)
-    with TestClient(web) as client, left, client.websocket_connect("/ws/editing") as socket:
+    with flights_socket(editing) as socket:
         socket.send_text(json.dumps(start))
         while (told := json.loads(socket.receive_text()))["kind"] != "flight":
             assert told["kind"] != "refused", told

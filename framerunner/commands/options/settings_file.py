@@ -29,7 +29,7 @@ def read_settings(path: Path, arguments: ArgumentCollection) -> None:
     }
     types: dict[str, Any] = {name: (_type_of(argument.hint), None) for name, argument in known.items()}
     model = create_model("Options", __config__=ConfigDict(extra="forbid"), **types)
-    files = FileKind("settings file", model, SettingError, folder="", example="max-speed: 0.5")
+    files = FileKind("settings", model, SettingError, folder="", example="max-speed: 0.5")
     content = files.parse(files.read(path), str(path))
     for name in content.model_fields_set:
         if not known[name].tokens:

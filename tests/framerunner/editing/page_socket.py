@@ -1,9 +1,10 @@
-"""A page's end of a document's WebSocket, and a server with the documents' router, without a browser."""
+"""A page's end of the editor's WebSockets, and servers with their routers, without a browser."""
 
 from __future__ import annotations
 
+import asyncio
 from concurrent.futures import CancelledError
-from contextlib import contextmanager, suppress
+from contextlib import asynccontextmanager, contextmanager, suppress
 from types import SimpleNamespace
 
 from fastapi import FastAPI
@@ -44,6 +45,25 @@ class Socket:
     def type(self, start, inserted, *, revision, removed=0):
         change = {"start": start, "removed": removed, "inserted": inserted}
         return self.ask("type", revision=revision, changes=[change])
+
+
+@contextmanager
+def flights_socket(router, role=Role.ORGANISER):
+    """A page's end of the WebSocket of flights, and a server with its router."""
+
+    @asynccontextmanager
+    async def lifespan(_):
+        running = asyncio.create_task(router.run())
+        yield
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+    web = FastAPI(lifespan=lifespan)
+    web.include_router(router.router(lambda _: Visitor("Ada", role, "ada")))
+    # The test client cancels what the server still does when a page has left.
+    left = suppress(CancelledError)
+    with TestClient(web) as client, left, client.websocket_connect("/ws/editing") as socket:
+        yield socket
 
 
 @contextmanager

@@ -8,7 +8,6 @@ import json
 import os
 import signal
 import time
-from concurrent.futures import CancelledError
 from pathlib import Path
 
 import pytest
@@ -23,9 +22,10 @@ from framerunner.editing.web import EditingRouter
 from framerunner.editing.workers import WorkerPool
 from framerunner.evaluation.runner import fly_task
 from framerunner.flying.plan import FlightPlan
-from framerunner.monitor.access import Role, Visitor
+from framerunner.monitor.access import Role
 from offboard.mission import MISSIONS, load_mission
 from scenarios.loader import load_scenario
+from tests.framerunner.editing.page_socket import flights_socket
 
 PAPER = (MISSIONS / "frame_challenge.yaml").read_text(encoding="utf-8")
 RED_ONLY = (
@@ -115,18 +115,7 @@ def no_spare_workers(monkeypatch):
 def page(*, role=Role.ORGANISER, **settings):
     """A page that is connected to a server."""
     router = EditingRouter(EditingSettings(**{"jobs": 2, **settings}))
-
-    @contextlib.asynccontextmanager
-    async def lifespan(_):
-        running = asyncio.create_task(router.run())
-        yield
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
-
-    web = FastAPI(lifespan=lifespan)
-    web.include_router(router.router(lambda _: Visitor("Ada", role, "ada")))
-    end = contextlib.suppress(CancelledError)  # of the endpoint, when the test is over
-    with TestClient(web) as client, end, client.websocket_connect("/ws/editing") as socket:
+    with flights_socket(router, role) as socket:
         yield Page(socket)
 
 
