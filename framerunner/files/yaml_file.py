@@ -157,7 +157,7 @@ class FileKind(Generic[Model]):
             raise error(f"{failure.place}: {failure}") from None
         example = self.example or f"name: my-{kind}"
         if root is None or plain(root) is None:
-            raise error(f"{source}:1: empty; a {kind} needs at least `{example}`")
+            raise error(f"{source}:1: empty; it needs at least `{example}`")
         if not isinstance(root, MapNode):
             what = _show(plain(root))
             raise error(f"{source}:{root.place.line}: must hold fields like `{example}`, not {what}")

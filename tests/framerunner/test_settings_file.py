@@ -55,7 +55,7 @@ def test_a_file_gives_options_and_the_command_line_goes_before_it():
         ("lifeline: true", "flight.yaml:1: lifeline is not a known field"),
         ("speed: 1\nspeed: 2", "flight.yaml:2:1: speed is given twice"),
         ("a: &b 1", "anchor &b is not allowed"),
-        ("", "flight.yaml:1: empty; a settings file needs at least `max-speed: 0.5`"),
+        ("", "flight.yaml:1: empty; it needs at least `max-speed: 0.5`"),
         ("speed: 500", "--speed 500: must be from 0.01 to 100"),
         (
             "lockstep: true\nmonitor: true",

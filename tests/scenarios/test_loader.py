@@ -130,7 +130,7 @@ GATE = "name: a\nframes:\n  - {colour: red, x_m: 1, y_m: 1, z_m: 1}\n"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "f.yaml:1: empty; a scenario needs at least `name: my-scenario`"),
+        ("", "f.yaml:1: empty; it needs at least `name: my-scenario`"),
         ("- a", 'f.yaml:1: must hold fields like `name: my-scenario`, not ["a"]'),
         ("{}", "f.yaml:1: name is missing; add it"),
         ("name: a\nframs: []", "f.yaml:2: frams is not a known field; did you mean frames?"),

@@ -40,7 +40,7 @@ def test_a_level_loads_by_path(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "f.yaml:1: empty; a level needs at least `name: my-level`"),
+        ("", "f.yaml:1: empty; it needs at least `name: my-level`"),
         ("- a", 'f.yaml:1: must hold fields like `name: my-level`, not ["a"]'),
         ("name: a", "f.yaml:1: layout is missing; add it"),
         ("name: a: b", "f.yaml:1:8: not valid YAML: mapping values are not allowed here"),
