@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from scenarios.result import spreadsheet_cell
+from framerunner.files.spreadsheet import csv_text
 
 Counting = Literal["best", "last"]
 
@@ -321,21 +318,3 @@ def _why_not(each: TryView, chosen: int | None, counting: Counting) -> str:
     if each.barrier or chosen is None:
         return each.barrier
     return f"try {chosen} is {'better' if counting == 'best' else 'later'}"
-
-
-def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table for a spreadsheet, whose texts it takes for no formulas."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")
-    writer.writerow([_safe(column) for column in columns])
-    writer.writerows([_safe(value) for value in row] for row in rows)
-    return text.getvalue()
-
-
-def _safe(value: object) -> str:
-    """A value as text that no spreadsheet takes for a formula."""
-    if isinstance(value, str):
-        return spreadsheet_cell(value)
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return "" if value is None else str(value)
