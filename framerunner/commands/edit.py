@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from cyclopts import Parameter
 
-from framerunner.commands import NamedPilot, check_range, say
+from framerunner.commands import NamedPilot, say
 from framerunner.commands.monitor import PagesPort
 from framerunner.errors import SettingError
 
@@ -49,7 +49,6 @@ def edit(
         port: TCP port of the pages.
         browser: open the page in the browser
     """
-    check_range("--port", port, 0, 65535)
     from framerunner.commands.monitor import equipment, prepare_server
     from framerunner.editing.documents.session import EditorSession
     from framerunner.monitor.run import serve
