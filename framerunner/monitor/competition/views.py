@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -13,9 +13,20 @@ Counting = Literal["best", "last"]
 
 
 class CompetitionView(BaseModel):
-    """Base of all views; they are made from rows and other objects, too."""
+    """Base of all views."""
 
-    model_config = ConfigDict(frozen=True, from_attributes=True)
+    model_config = ConfigDict(frozen=True)
+
+    @classmethod
+    def of(cls, *sources: object, **more: object) -> Self:
+        """A view of rows and other objects: each field as given, else of the first that has it."""
+        fields = {
+            name: getattr(each, name)
+            for each in reversed(sources)
+            for name in cls.model_fields
+            if name not in more and hasattr(each, name)
+        }
+        return cls.model_validate(fields | more)
 
 
 class TeamView(CompetitionView):
