@@ -131,7 +131,8 @@ class MissionEngine:
             if self._navigator is not None:
                 if state is None:
                     raise PilotError("its map of frames needs the drone's state; give it to each tick")
-                self._navigator.observe(state, images, sent)
+                state = self._navigator.observe(state, images, sent)
+                pilot.imu = Imu(state.x, state.y, state.z, state.yaw)
             self._count_unseen(time_us)
             if self._present is None:
                 self._start(time_us)
