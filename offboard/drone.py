@@ -213,8 +213,12 @@ class Drone(Protocol):
     async def refuse(self) -> None:
         """Let the vehicle that an operator gave back hold, and wait until it is given back again."""
 
-    def command(self, command: VelocityFluCommand) -> LimitedCommand:
+    def command(self, command: VelocityFluCommand, at: DroneState | None = None) -> LimitedCommand:
         """Set the velocity to fly from now on. Never blocks.
+
+        Args:
+            command: wanted.
+            at: where the app has estimated the drone to be, for its box; None: where it is reported.
 
         Returns:
             The velocity that is sent, by the adapter's `VelocityLimits`; zero if none is flown now.

@@ -254,11 +254,11 @@ class LockstepDrone:
 
     refuse = hold  # no operator takes this drone, so none gives it back
 
-    def command(self, command: VelocityFluCommand) -> LimitedCommand:
+    def command(self, command: VelocityFluCommand, at: DroneState | None = None) -> LimitedCommand:
         """Set the velocity to fly from now on. Without motors on it is ignored."""
         if not self._commanding:
             return LimitedCommand(STILL)
-        limited = self._limits.limit(command, self._latest)
+        limited = self._limits.limit(command, at or self._latest)
         self._send(limited.command)
         return limited
 

@@ -66,7 +66,9 @@ class InertialTrack:
         turn = self._attitudes[-1]
         for sample in samples:
             turn = self._add(sample, turn)
-        self._attitudes[-1] = attitude
+        if samples:
+            after_s = (self._times_us[-1] - time_us) * 1e-6
+            self._attitudes[-1] = rotated_by_rate(attitude, samples[-1].angular_rate_flu_rad_s, after_s)
         old = bisect_left(self._times_us, self._times_us[-1] - KEPT_US)
         del self._times_us[:old], self._sums[:old], self._attitudes[:old]
         return True

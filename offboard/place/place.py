@@ -14,7 +14,6 @@ from math import pi, radians, remainder, sqrt
 
 import numpy as np
 
-from framerunner.geometry.rotations import rotation
 from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import DroneState, ReportedAccuracy
 from offboard.navigation.camera_model import CameraModel
@@ -22,7 +21,7 @@ from offboard.navigation.gates.gate_map import GateMap
 from offboard.navigation.gates.gate_measurement import GateView, view_of
 from offboard.navigation.pose_history import DronePose, PoseCorrection, turned_by
 from offboard.navigation.view import GateEstimate
-from offboard.place.inertial_track import InertialMotion, InertialTrack
+from offboard.place.inertial_track import InertialTrack
 from offboard.place.landmarks import GateLandmarks
 from offboard.place.measurements import Eye, SeenPoint, height, points, position, stands, velocity
 from offboard.place.place_filter import TURN, VELOCITY, PlaceFilter
@@ -48,7 +47,8 @@ LEAST_VELOCITY_STD_M_S = 0.03
 LEAST_HEIGHT_STD_M = 0.01
 
 RESET_TURN_RAD = radians(3.0)
-BLIND_M_S = 0.3  # of the velocity, after a gap in the IMU's samples
+BLIND_M = 0.1  # of the reported way in a gap of the IMU's samples, per root of a second
+BLIND_M_S = 0.3  # of the velocity after it
 
 POINTS_GATE = 7.5  # times the number of coordinates: the base has edges that shadows hide
 IMAGE_STD_M = 0.001
@@ -95,8 +95,8 @@ class PlaceEstimator:
         if place is not None:
             if last is not None and _resets(last) != _resets(state):
                 place.p[TURN, TURN] += RESET_TURN_RAD**2
-            if not continued:
-                self._bridge(place, state)
+            if not continued and last is not None:
+                self._bridge(place, last, state)
             for each in (*state.missed, state):
                 at_us = each.time_us - round(each.position_age_s * 1e6)
                 if not self._reports or at_us > self._reports[-1][0]:
@@ -113,15 +113,11 @@ class PlaceEstimator:
             self._first_std_m = accuracy.position_std_m
         return accuracy.position_std_m < min(SURE_M, max(ALWAYS_SURE_M, SURE_FACTOR * self._first_std_m))
 
-    def _bridge(self, place: PlaceFilter, state: DroneState) -> None:
-        """Go on after a gap in the IMU's samples, with the reported velocity."""
+    def _bridge(self, place: PlaceFilter, last: DroneState, state: DroneState) -> None:
+        """Go on after a gap in the IMU's samples: by how far the vehicle reports to have moved."""
         gap_s = max(0.0, (state.time_us - place.time_us) * 1e-6)
-        level = rotation((1.0, 0.0, 0.0, 0.0))
-        step = InertialMotion(gap_s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), level)
-        place.predict(step)
-        each = np.arange(3)
-        place.p[each, each] += (BLIND_M_S * gap_s) ** 2
-        place.p[each + 4, each + 4] += BLIND_M_S**2 + gap_s**2
+        x, y = turned(state.x - last.x, state.y - last.y, place.turn_rad)
+        place.displace(state.time_us, (x, y, state.z - last.z), BLIND_M * sqrt(gap_s), BLIND_M_S)
         place.update(velocity(state.velocity_arena_m_s, BLIND_M_S, BLIND_M_S))
         self._reports.clear()
 

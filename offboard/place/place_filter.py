@@ -153,6 +153,21 @@ class PlaceFilter:
         p[TURN, TURN] += (TURN_SETTLING_RAD if settling else TURN_RAD) ** 2 * step_s
         self.time_us += round(step_s * 1e6)
 
+    def displace(self, time_us: int, by_m: Vec3, std_m: float, velocity_std_m_s: float) -> None:
+        """Be elsewhere at a later time, with a velocity that is not known.
+
+        Args:
+            time_us: from now on.
+            by_m: the way there, arena axes.
+            std_m: of each coordinate of that way.
+            velocity_std_m_s: of each coordinate of the velocity, in addition.
+        """
+        self.time_us = time_us
+        self.x[POSITION] += by_m
+        each = np.arange(3)
+        self.p[each, each] += std_m**2
+        self.p[each + 4, each + 4] += velocity_std_m_s**2
+
     def distance2(self, model: Model) -> float | None:
         """Square of a measurement's Mahalanobis distance; None if it cannot be made."""
         at = model(self.x)
