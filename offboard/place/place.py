@@ -12,8 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import pi, radians, remainder, sqrt
 
-import numpy as np
-
 from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import DroneState, ReportedAccuracy
 from offboard.navigation.camera_model import CameraModel
@@ -24,7 +22,7 @@ from offboard.navigation.view import GateEstimate
 from offboard.place.inertial_track import InertialTrack
 from offboard.place.landmarks import GateLandmarks
 from offboard.place.measurements import Eye, SeenPoint, height, points, position, stands, velocity
-from offboard.place.place_filter import TURN, VELOCITY, PlaceFilter
+from offboard.place.place_filter import POSITION, TURN, VELOCITY, PlaceFilter
 from vision.types import GateSighting
 
 # A place that is known no better than this, or this many times worse than at the start, is not known.
@@ -44,7 +42,7 @@ STANDS_STD = (0.003, 0.003, 0.01)  # metres, radians, metres a second
 ERROR_S = 2.0
 LEAST_POSITION_STD_M = 0.005
 LEAST_VELOCITY_STD_M_S = 0.03
-LEAST_HEIGHT_STD_M = 0.01
+LEAST_HEIGHT_STD_M = 0.05
 
 RESET_TURN_RAD = radians(3.0)
 BLIND_M = 0.1  # of the reported way in a gap of the IMU's samples, per root of a second
@@ -144,8 +142,7 @@ class PlaceEstimator:
         motion = self._track.between(place.time_us, time_us)
         if motion is None:
             return False
-        left_us = self._left_us
-        place.predict(motion, settling=left_us is None or time_us - left_us < SETTLING_US)
+        place.predict(motion, settling=self._is_settling(time_us))
         place.time_us = time_us
         return True
 
@@ -166,13 +163,17 @@ class PlaceEstimator:
             for std in (accuracy.velocity_std_m_s, accuracy.climb_std_m_s)
         )
         place.update(velocity(report.velocity_arena_m_s, level, climb))
-        place.update(height(report.z, slow * max(accuracy.height_std_m, LEAST_HEIGHT_STD_M)))
+        place.update(height(report.z, max(accuracy.height_std_m, LEAST_HEIGHT_STD_M)))
         if self._knows_position(accuracy):
             at_m = (report.x, report.y, report.z)
             place.update(position(at_m, slow * max(accuracy.position_std_m, LEAST_POSITION_STD_M)))
 
-    def _motion_at(self, time_us: int) -> tuple[Vec3, Vec3] | None:
-        """Position and velocity at a time; None while the vehicle's reports are used."""
+    def _is_settling(self, time_us: int) -> bool:
+        """Whether the vehicle may correct its heading now."""
+        return self._left_us is None or time_us - self._left_us < SETTLING_US
+
+    def _motion_at(self, time_us: int) -> tuple[Vec3, Vec3, float] | None:
+        """Position, velocity and turn at a time; None while the vehicle's reports are used."""
         place = self._filter
         if place is None:
             return None
@@ -180,24 +181,22 @@ class PlaceEstimator:
         if motion is None:
             x, y, z = place.x[VELOCITY].tolist()
             step_s = (time_us - place.time_us) * 1e-6
-            px, py, pz = place.x[:3].tolist()
-            return (px + step_s * x, py + step_s * y, pz + step_s * z), (x, y, z)
-        return place.moved(motion)
+            px, py, pz = place.x[POSITION].tolist()
+            return (px + step_s * x, py + step_s * y, pz + step_s * z), (x, y, z), place.turn_rad
+        return *place.moved(motion), place.turned_rad(motion, settling=self._is_settling(time_us))
 
     def correction(self, time_us: int) -> PoseCorrection | None:
         """Of a pose at a time; None while the vehicle's reports are used."""
-        place, motion = self._filter, self._motion_at(time_us)
-        if place is None or motion is None:
-            return None
-        return PoseCorrection(motion[0], place.turn_rad, IMAGE_STD_M)
+        motion = self._motion_at(time_us)
+        return None if motion is None else PoseCorrection(motion[0], motion[2], IMAGE_STD_M)
 
     def state(self, reported: DroneState) -> DroneState:
         """The drone's state now."""
         place, motion = self._filter, self._motion_at(reported.time_us)
         if place is None or motion is None:
             return reported
-        (x, y, z), velocity_m_s = motion
-        turn_rad, camera = place.turn_rad, reported.camera_attitude_arena
+        (x, y, z), velocity_m_s, turn_rad = motion
+        camera = reported.camera_attitude_arena
         return replace(
             reported,
             x=x,
@@ -208,7 +207,7 @@ class PlaceEstimator:
             position_age_s=0.0,
             attitude_arena=turned_by(turn_rad, reported.attitude_arena),
             camera_attitude_arena=None if camera is None else turned_by(turn_rad, camera),
-            position_std_m=float(np.sqrt(place.p.diagonal()[:3].max())),
+            position_std_m=sqrt(place.p.diagonal()[:3].max()),
         )
 
     @property
@@ -222,9 +221,9 @@ class PlaceEstimator:
             return (0.0, 0.0, 0.0)
         motion = self._motion_at(state.time_us - round(state.position_age_s * 1e6))
         assert motion is not None, "there is a filter"
-        (x, y, z), velocity_m_s = state.velocity_arena_m_s, motion[1]
+        (x, y, z), (_, velocity_m_s, turn_rad) = state.velocity_arena_m_s, motion
         ahead, left = turned(x, y, -state.yaw)
-        true_ahead, true_left = turned(velocity_m_s[0], velocity_m_s[1], -state.yaw - place.turn_rad)
+        true_ahead, true_left = turned(velocity_m_s[0], velocity_m_s[1], -state.yaw - turn_rad)
         return (ahead - true_ahead, left - true_left, z - velocity_m_s[2])
 
     def see(

@@ -29,8 +29,9 @@ GATE = 4  # numbers of a gate
 # reported roll and pitch are wrong by tenths of a degree.
 ACCEL_M_S2 = 0.027
 BIAS_M_S2 = 0.01
-TURN_RAD = radians(0.25)
-TURN_SETTLING_RAD = radians(1.2)  # likewise while the vehicle corrects its heading after leaving the ground
+TURN_RAD = radians(0.25)  # of the reported heading
+TURN_SETTLING_RAD = radians(1.2)  # likewise while the vehicle corrects it after leaving the ground
+GYRO_RAD = radians(0.2)  # of a heading by gyroscope alone: its bias, its scale
 
 START_POSITION_M = 0.003
 START_VELOCITY_M_S = 0.02
@@ -96,6 +97,11 @@ class PlaceFilter:
         """What must be added to the reported heading."""
         return float(self.x[TURN])
 
+    def turned_rad(self, motion: InertialMotion, *, settling: bool) -> float:
+        """The turn after a motion: that of the reported heading and of the gyroscope, by their noise."""
+        reported, gyro = (TURN_SETTLING_RAD if settling else TURN_RAD) ** 2, GYRO_RAD**2
+        return self.turn_rad + motion.turn_rad * reported / (reported + gyro)
+
     def moved(self, motion: InertialMotion) -> tuple[Vec3, Vec3]:
         """Position and velocity after a motion; the state stays."""
         position, velocity, _ = self._after(motion)
@@ -150,7 +156,9 @@ class PlaceFilter:
         p[each, each + 4] += q * step_s**2 / 2.0
         p[each + 4, each] += q * step_s**2 / 2.0
         p[each + 7, each + 7] += BIAS_M_S2**2 * step_s
-        p[TURN, TURN] += (TURN_SETTLING_RAD if settling else TURN_RAD) ** 2 * step_s
+        reported, gyro = (TURN_SETTLING_RAD if settling else TURN_RAD) ** 2, GYRO_RAD**2
+        p[TURN, TURN] += step_s * reported * gyro / (reported + gyro)
+        self.x[TURN] = self.turned_rad(motion, settling=settling)
         self.time_us += round(step_s * 1e6)
 
     def displace(self, time_us: int, by_m: Vec3, std_m: float, velocity_std_m_s: float) -> None:
