@@ -130,7 +130,7 @@ class Navigator:
 
     def explore(self) -> VelocityFluCommand:
         """Fly to the view that shows most of what has not been seen."""
-        return self._true(self._explore())
+        return self._compensated(self._explore())
 
     def _explore(self) -> VelocityFluCommand:
         state, now_s = self._begin("explore")
@@ -150,7 +150,7 @@ class Navigator:
         if self._goal is None or self._goal.position_m != goal_m:
             self._goal = Point(goal_m)
             self._flight.change()
-        return self._true(self._fly(self._goal))
+        return self._compensated(self._fly(self._goal))
 
     def step_back(self, colour: str) -> VelocityFluCommand:
         """Fly back from a gate, to one of its sides, facing it."""
@@ -163,11 +163,11 @@ class Navigator:
                 side = 1 if self._steps_back % 2 else -1
                 self._goal = self._places.aside(gate, here_m, side, self._world.obstacles())
             self._steps_back += 1
-        return self._true(self._fly(self._goal))
+        return self._compensated(self._fly(self._goal))
 
     def cross(self, colour: str) -> VelocityFluCommand:
         """Fly through a gate as the map has it now, and on towards what comes next."""
-        return self._true(self._cross(colour))
+        return self._compensated(self._cross(colour))
 
     def _cross(self, colour: str) -> VelocityFluCommand:
         state, now_s = self._begin(f"cross {colour}")
@@ -207,7 +207,7 @@ class Navigator:
             crossing.aim(path.crossings[0])
         return command
 
-    def _true(self, command: VelocityFluCommand) -> VelocityFluCommand:
+    def _compensated(self, command: VelocityFluCommand) -> VelocityFluCommand:
         """What to command to a vehicle that is wrong about its velocity, so that it flies a command."""
         added = self._world.velocity_error_flu_m_s
         if not any(added):

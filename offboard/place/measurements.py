@@ -1,19 +1,17 @@
-"""What the filter of the place measures: reported velocity and height, corners of gates, points known before.
+"""What the filter of the place measures: reported velocity and height, and corners of gates.
 
 Each function gives the measurement's model: residual, Jacobian and noise at a state (`PlaceFilter`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, sin
 
 import numpy as np
 
-from framerunner.geometry.rotations import to_body
 from framerunner.geometry.vectors import Quaternion, Vec3
-from offboard.navigation.camera_model import NEAREST_M, CameraModel
+from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.gates.gate_measurement import GateView, predicted
 from offboard.navigation.pose_history import turned_by
 from offboard.place.place_filter import POSITION, TURN, VELOCITY, Floats, Measurement, Model
@@ -126,60 +124,5 @@ def corners(view: GateView, eye: Eye, first: int, yaw_var_rad2: float) -> Model:
             + PLACE_STD_M**2 * (moved @ moved.T)
         )
         return Measurement(view.corners_px - corners_px, jacobian, noise)
-
-    return at
-
-
-@dataclass(frozen=True, slots=True)
-class SeenPoint:
-    """A point of the arena whose place is known, as an image shows it.
-
-    Attributes:
-        position_m: in the arena.
-        right_px: of the optical axis.
-        down_px: likewise.
-        covariance_px2: of right and down: variances, and the covariance between.
-    """
-
-    position_m: Vec3
-    right_px: float
-    down_px: float
-    covariance_px2: tuple[float, float, float]
-
-
-def points(seen: Sequence[SeenPoint], eye: Eye, attitude_std_rad: float) -> Model:
-    """Known points in an image, such as corners of the base.
-
-    The attitude's error is common to all of them.
-    """
-
-    def at(state: Floats) -> Measurement | None:
-        place_m, attitude = eye.place(state)
-        camera = eye.model.pose(place_m, attitude)
-        focal_px, m = eye.model.focal_px, camera.rotation
-        residual = np.zeros(2 * len(seen))
-        jacobian = np.zeros((2 * len(seen), len(state)))
-        turned = np.zeros((2 * len(seen), 3))
-        noise = np.zeros((2 * len(seen), 2 * len(seen)))
-        for number, point in enumerate(seen):
-            away = [a - b for a, b in zip(point.position_m, camera.position_m, strict=True)]
-            ahead, left, up = to_body(m, *away)
-            if ahead < NEAREST_M:
-                return None
-            right, down = -focal_px * left / ahead, -focal_px * up / ahead
-            rows = slice(2 * number, 2 * number + 2)
-            residual[rows] = (point.right_px - right, point.down_px - down)
-            by_body = np.array(((-right, -focal_px, 0.0), (-down, 0.0, -focal_px))) / ahead
-            by_point = by_body @ np.array(m).reshape(3, 3).T
-            jacobian[rows, POSITION] = -by_point
-            x, y, _ = (a - b for a, b in zip(point.position_m, state[POSITION].tolist(), strict=True))
-            jacobian[rows, TURN] = by_point @ (y, -x, 0.0)
-            turned[rows] = (
-                (down, -right * down / focal_px, focal_px + right * right / focal_px),
-                (-right, -focal_px - down * down / focal_px, right * down / focal_px),
-            )
-            a, b, shared = point.covariance_px2
-            noise[rows, rows] = ((a, shared), (shared, b))
-        return Measurement(residual, jacobian, noise + attitude_std_rad**2 * (turned @ turned.T))
 
     return at

@@ -21,7 +21,7 @@ from offboard.navigation.pose_history import DronePose, PoseCorrection, turned_b
 from offboard.navigation.view import GateEstimate
 from offboard.place.inertial_track import InertialTrack
 from offboard.place.landmarks import GateLandmarks
-from offboard.place.measurements import Eye, SeenPoint, height, points, position, stands, velocity
+from offboard.place.measurements import Eye, height, position, stands, velocity
 from offboard.place.place_filter import POSITION, TURN, VELOCITY, PlaceFilter
 from vision.types import GateSighting
 
@@ -49,12 +49,11 @@ RESET_TURN_RAD = radians(3.0)
 BLIND_M = 0.1  # of the reported way in a gap of the IMU's samples, per root of a second
 BLIND_M_S = 0.3  # of the velocity after it
 
-POINTS_GATE = 7.5  # times the number of coordinates: the base has edges that shadows hide
 IMAGE_STD_M = 0.001
 
 
 class PlaceEstimator:
-    """Estimates the drone's place from its states, and from the gates and points that images show.
+    """Estimates the drone's place from its states, and from the gates that images show.
 
     Args:
         camera: of the drone.
@@ -79,9 +78,13 @@ class PlaceEstimator:
 
     def add(self, state: DroneState) -> None:
         """Take in a state as the vehicle reports it; call it once a tick, before images are used."""
+        track, last, place = self._track, self._last, self._filter
+        if place is not None and last is not None and track.is_interrupted(state.imu, state.time_us):
+            self.advance(last.time_us)
+            self._bridge(place, last, state)
+            self._last = state
         if not state.imu:
             return
-        track, last = self._track, self._last
         if self._start is None:
             self._start = state
         continued = track.add(state.imu, state.time_us, state.attitude_arena)
@@ -94,8 +97,6 @@ class PlaceEstimator:
         if place is not None:
             if last is not None and _resets(last) != _resets(state):
                 place.p[TURN, TURN] += RESET_TURN_RAD**2
-            if not continued and last is not None:
-                self._bridge(place, last, state)
             for each in (*state.missed, state):
                 at_us = each.time_us - round(each.position_age_s * 1e6)
                 if not self._reports or at_us > self._reports[-1][0]:
@@ -113,7 +114,7 @@ class PlaceEstimator:
         return accuracy.position_std_m < min(SURE_M, max(ALWAYS_SURE_M, SURE_FACTOR * self._first_std_m))
 
     def _bridge(self, place: PlaceFilter, last: DroneState, state: DroneState) -> None:
-        """Go on after a gap in the IMU's samples: by how far the vehicle reports to have moved."""
+        """Go on while the IMU's samples are missing: by how far the vehicle reports to have moved."""
         gap_s = max(0.0, (state.time_us - place.time_us) * 1e-6)
         x, y = turned(state.x - last.x, state.y - last.y, place.turn_rad)
         place.displace(state.time_us, (x, y, state.z - last.z), BLIND_M * sqrt(gap_s), BLIND_M_S)
@@ -252,24 +253,6 @@ class PlaceEstimator:
             if view is not None:
                 by_colour.setdefault(sighting.colour, []).append((view, self._eye(pose, at)))
         self._landmarks.see(place, by_colour, gates)
-
-    def see_points(self, seen: Sequence[SeenPoint], pose: DronePose, at: PoseCorrection) -> bool:
-        """Use known points in an image, to whose time the filter was brought; whether they fit.
-
-        Args:
-            seen: in the image.
-            pose: corrected, of the drone.
-            at: the correction of the pose.
-        """
-        place = self._filter
-        if place is None or not seen:
-            return False
-        model = points(seen, self._eye(pose, at), pose.attitude_std_rad)
-        distance2 = place.distance2(model)
-        if distance2 is None or distance2 > POINTS_GATE * 2 * len(seen):
-            return False
-        place.update(model)
-        return True
 
     def _eye(self, pose: DronePose, at: PoseCorrection) -> Eye:
         """The carrier of a corrected pose, without the correction."""
