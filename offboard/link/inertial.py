@@ -59,9 +59,12 @@ class InertialFeed:
                 await plugin.set_rate_odometry(ACCURACY_HZ)
 
     def take(self, until_us: int) -> tuple[ImuInterval, ...]:
-        """The samples until a vehicle time since the last call, oldest first."""
+        """The samples before a vehicle time since the last call, oldest first.
+
+        One of that time may arrive before or after the message that made the tick.
+        """
         samples, taken = self._samples, []
-        while samples and samples[0].time_us <= until_us:
+        while samples and samples[0].time_us < until_us:
             taken.append(samples.popleft())
         return tuple(taken) if 0.0 < self._usual_us <= LONGEST_US else ()
 
