@@ -142,6 +142,9 @@ SPANISH: Mapping[str, str] = {
     "detector.unknown": "detector desconocido '{name}'; {advice}",
     "detector.known": "los paquetes instalados añaden: {names}",
     "detector.none": "ningún paquete instalado añade uno; quita 'detector' y decide 'vision'",
+    "what.gate": "el 'gate' de una misión",
+    "gate.size": "{key} de 'gate' es '{text}'; escribe metros, de {low:g} a {high:g}",
+    "gate.opening": "bar_m {bar:g} de 'gate' no deja abertura; hazlo más fino o agranda el marco",
     "vision.needed": (
         "'{name}' necesita el mapa de marcos; añade la línea 'vision: frames' al principio de {file}"
     ),

@@ -64,10 +64,10 @@ class CrossingAttempt:
         if crossing != self._aim:
             self._aim, self._along_m = crossing, -inf
 
-    def move(self, position_m: Vec3, opening_m: tuple[float, float], now_s: float) -> None:
-        """Note where the drone is now; `opening_m` are the opening's width and height."""
+    def move(self, position_m: Vec3, now_s: float) -> None:
+        """Note where the drone is now."""
         if self._aim is not None:
-            self._move(self._aim, position_m, opening_m, now_s)
+            self._move(self._aim, position_m, now_s)
         near = -SETTLED_M < self._along_m < 0.0
         if now_s - self.began_s > MAX_CROSSING_S + (MORE_NEAR_S if near else 0.0):
             self._refuse(f"not through it within {MAX_CROSSING_S:g} s")
@@ -76,11 +76,12 @@ class CrossingAttempt:
         elif now_s - self._there_since_s > MAX_STUCK_S:
             self._refuse(f"stuck for {MAX_STUCK_S:g} s")
 
-    def _move(self, aim: Crossing, position_m: Vec3, opening_m: tuple[float, float], now_s: float) -> None:
+    def _move(self, aim: Crossing, position_m: Vec3, now_s: float) -> None:
         (x, y, z), heading = aim.gate.centre_m, aim.heading_rad
         dx, dy, dz = position_m[0] - x, position_m[1] - y, position_m[2] - z
         along_m, left_m = turned(dx, dy, -heading)
         if along_m >= 0.0 > self._along_m > -inf and not self.passed:
+            opening_m = aim.gate.shape.opening_m
             self.passed = abs(left_m) < opening_m[0] / 2 and abs(dz) < opening_m[1] / 2
             self._refuse(f"passed its plane {hypot(left_m, dz):.2f} m from its centre")
             self._passed_s = now_s

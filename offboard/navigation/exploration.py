@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from framerunner.geometry.axes import Pose
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import FlightStyle
@@ -68,15 +69,23 @@ class Explorer:
         camera: the drone's camera.
         arena: where the gates are.
         pace: of the flight to viewpoints.
+        shapes: of the gates; None: all have that of the frame challenge.
 
     Attributes:
         coverage: what has been seen so far.
     """
 
-    def __init__(self, camera: CameraModel, arena: Arena, pace: Pace | None = None) -> None:
+    def __init__(
+        self,
+        camera: CameraModel,
+        arena: Arena,
+        pace: Pace | None = None,
+        shapes: GateShapes | None = None,
+    ) -> None:
         self._pace = pace or Pace()
-        self.coverage = Coverage(camera, arena)
-        self._visibility = GateVisibility(camera)
+        shapes = shapes or GateShapes()
+        self.coverage = Coverage(camera, arena, shapes)
+        self._visibility = GateVisibility(camera, shapes)
         self._blocks = self.coverage.grid.blocks()
         self._table = view_table(camera, arena)
         self._likelihood = Likelihood(self._blocks)

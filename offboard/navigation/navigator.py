@@ -36,8 +36,6 @@ class Navigator:
     """The world model, the path, and the action that is flown. All positions are in arena axes."""
 
     def __init__(self, surroundings: Surroundings, limits: CommandLimits = CONTEST) -> None:
-        width_m, height_m = surroundings.gate_m
-        self._opening_m = (width_m - 2 * surroundings.bar_m, height_m - 2 * surroundings.bar_m)
         self._style = style_of(limits)
         self._world = WorldModel(surroundings, self._style)
         self._flight = PathFlight(surroundings.arena, self._style, limits)
@@ -159,7 +157,7 @@ class Navigator:
         crossing = self._crossing
         if crossing is None or crossing.colour != colour or crossing.refusal:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)
-        crossing.move(position_now(state), self._opening_m, now_s)
+        crossing.move(position_now(state), now_s)
         estimate = self._world.gate(colour)
         goes_on = crossing.is_committed or (estimate is not None and crossing.is_settled(estimate))
         if goes_on and crossing.is_on(self._flight.path):

@@ -212,6 +212,7 @@ class GateTrack:
 
     Attributes:
         colour: of the gate.
+        shape: its sizes.
         belief: twice the images that showed it, minus those that should have; negative: there is none.
         missed: images in a row that should have shown it.
         time_us: vehicle time of the last prediction.
@@ -220,7 +221,7 @@ class GateTrack:
     """
 
     def __init__(self, found: list[Solution], view: GateView) -> None:
-        self.colour = view.colour
+        self.colour, self.shape = view.colour, view.shape
         self.belief, self.missed, self.views = SEEN_BELIEF, 0, 1
         self.time_us = self.seen_us = view.time_us
         self._hypotheses = [GateFilter(solution) for solution in found]
@@ -354,6 +355,7 @@ class GateTrack:
             certain=exact and not ambiguous and self.views >= CERTAIN_VIEWS,
             views=self.views,
             seen_us=self.seen_us,
+            shape=self.shape,
         )
 
     def _saw(self, view: GateView) -> None:

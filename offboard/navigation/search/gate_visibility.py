@@ -14,10 +14,10 @@ from typing import Final, Self
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.goals import GATE_HEIGHT_M, GATE_WIDTH_M
-from scenarios.models import Arena
+from scenarios.models import COLOURS, Arena
 
 Floats = npt.NDArray[np.float32]
 Bools = npt.NDArray[np.bool_]
@@ -88,16 +88,23 @@ def block_means(cells: Floats) -> Floats:
 
 
 class GateVisibility:
-    """How well a camera would recognise a gate, by the gate's place in the camera's axes."""
+    """How well a camera would recognise a gate, by the gate's place in the camera's axes.
 
-    def __init__(self, camera: CameraModel) -> None:
+    Args:
+        camera: of the drone.
+        shapes: of the gates; all are in view where the widest and the highest would be.
+    """
+
+    def __init__(self, camera: CameraModel, shapes: GateShapes) -> None:
+        widths_m, heights_m = zip(*(shapes.of(colour).half_m for colour in COLOURS), strict=True)
+        self._half_width_m, self._half_height_m = max(widths_m), max(heights_m)
         self._right = np.float32(camera.half_width_px / camera.focal_px)
         self._up = np.float32(camera.half_height_px / camera.focal_px)
 
     def in_view(self, ahead: Floats, left: Floats, up: Floats, margin_m: float) -> Bools:
         """Whether a gate is wholly in the image, with a margin to its edges; metres in the camera's axes."""
-        side = np.abs(left) + np.float32(GATE_WIDTH_M / 2 + margin_m)
-        height = np.abs(up) + np.float32(GATE_HEIGHT_M / 2 + margin_m)
+        side = np.abs(left) + np.float32(self._half_width_m + margin_m)
+        height = np.abs(up) + np.float32(self._half_height_m + margin_m)
         seen: Bools = (side <= ahead * self._right) & (height <= ahead * self._up)
         return seen
 
