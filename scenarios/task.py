@@ -25,7 +25,7 @@ class Task(Part):
     base: Base
     start: StartPose
     colours: tuple[Colour, ...] = Field(description="of the frames to cross, in order")
-    shapes: dict[str, GateShape] = Field(description="of the frames of each colour, decoys' too")
+    shapes: dict[str, GateShape] = Field({}, description="of the frames of each colour, decoys' too")
     camera: Camera
     try_limit_s: float
     airframe: str

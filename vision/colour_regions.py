@@ -18,6 +18,7 @@ from vision.types import Image
 Plane = npt.NDArray[np.uint8]
 
 PRIMARIES = ("red", "green", "blue")
+SECONDARIES = ("cyan", "magenta")
 OBSTACLE = "violet"
 
 MIN_EXCESS = 25

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from framerunner.camera_calibration.mounting_report import MountingSearch, search_mounting
 from framerunner.geometry.axes import flip_quaternion, flip_vector
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3
 from framerunner.preflight.link import open_link
 from framerunner.wire.dialect import Message, mavlink
@@ -54,6 +55,7 @@ class Watched(Record):
         reports: the drone's states, axes north, west, up.
         images: what was seen.
         stamped: whether the images have times of their own.
+        shapes: of the gates, if a simulator tells them.
         ended: the drone is watched no longer; a thread uses the link until then.
     """
 
@@ -65,8 +67,13 @@ class Watched(Record):
         self.images: list[Detections] = []
         self.stamped = False
         smooth = task is not None and task.camera.effects is not None
+        self.shapes = None if task is None else GateShapes(task.shapes)
         self._detect = new_detector(
-            "frames", calibration=calibration, rendered=task is not None, smooth=smooth
+            "frames",
+            calibration=calibration,
+            rendered=task is not None,
+            smooth=smooth,
+            shapes=self.shapes,
         )
         self._lag_s: float | None = None
 
@@ -209,7 +216,13 @@ async def _until_known(
             await asyncio.sleep(0.1)
         images, reports = list(watched.images), list(watched.reports)
         search = await asyncio.to_thread(
-            search_mounting, images, reports, calibration, position_flu_m, stamped=watched.stamped
+            search_mounting,
+            images,
+            reports,
+            calibration,
+            position_flu_m,
+            stamped=watched.stamped,
+            shapes=watched.shapes,
         )
         over_s = time.monotonic() - began_s
         if (not search.missing and over_s >= _MIN_S) or over_s >= limit_s:

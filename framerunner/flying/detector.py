@@ -23,12 +23,13 @@ def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
     if others is not None:
         return others_detector(others, plan.calibration or true_calibration(plan.scenario.camera))
     if plan.mission is None or plan.mission.vision == "boxes":
-        return new_detector("boxes")  # with the paper's focal length
+        return new_detector("boxes", shapes=plan.gate_shapes)  # with the paper's focal length
     return new_detector(
         plan.mission.vision,
         calibration=plan.calibration or true_calibration(plan.scenario.camera),
         rendered=rendered,
         smooth=plan.scenario.camera.effects is not None,
+        shapes=plan.gate_shapes,
     )
 
 

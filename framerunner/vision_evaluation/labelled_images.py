@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import atan2, cos, degrees, pi, radians, sin
 
 import cv2
@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.flying.detector import true_calibration
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.rotations import mounting_flu, quaternion_from_euler, rotation, rotation_rows
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Quaternion, Vec3
@@ -73,6 +74,7 @@ class LabelledImage:
     calibration: Calibration
     gates: tuple[GateLabel, ...]
     smooth: bool = False  # painted with camera effects
+    shapes: GateShapes = field(default_factory=GateShapes)  # that a drone is told
 
     @property
     def focal_px(self) -> float:
@@ -98,7 +100,14 @@ def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbanc
         image = _disturbed(painted, disturbance, noise)
         labels = scene.labels(position, attitude)
         yield LabelledImage(
-            image, scene.scenario.name, position, attitude, scene.calibration, labels, scene.smooth
+            image,
+            scene.scenario.name,
+            position,
+            attitude,
+            scene.calibration,
+            labels,
+            scene.smooth,
+            scene.shapes,
         )
 
 
@@ -107,6 +116,7 @@ class _LabelledScene:
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         self.scenario = scenario
+        self.shapes = GateShapes(scenario.gate_shapes)
         self.camera = SimulatedCamera(scenario, seed)
         self.calibration = true_calibration(scenario.camera)
         self.smooth = scenario.camera.effects is not None

@@ -10,6 +10,7 @@ from math import acos, asin, degrees, hypot, inf, isfinite, sqrt
 
 import numpy as np
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3
 from framerunner.vision_evaluation.labelled_images import GateLabel, LabelledImage
 from vision.calibration.model import Calibration
@@ -125,10 +126,11 @@ def detect_all(
     scores = Scores()
     first: list[LabelledImage] = []
     detectors: dict[str, Detector] = {}
-    calibration: Calibration | None = None
+    camera: tuple[Calibration, GateShapes] | None = None
     for one in labelled:
-        if calibration != one.calibration:
-            calibration = one.calibration
+        calibration = one.calibration
+        if camera != (calibration, one.shapes):
+            camera = (calibration, one.shapes)
             detectors = {k: detector_of(one, k, rendered=rendered) for k in KINDS}
             if others is not None:
                 detectors[detector_name(others)] = others_detector(others, calibration)
@@ -143,7 +145,13 @@ def detect_all(
 
 def detector_of(labelled: LabelledImage, kind: Vision, *, rendered: bool) -> Detector:
     """The detector for the camera of an image."""
-    return new_detector(kind, calibration=labelled.calibration, rendered=rendered, smooth=labelled.smooth)
+    return new_detector(
+        kind,
+        calibration=labelled.calibration,
+        rendered=rendered,
+        smooth=labelled.smooth,
+        shapes=labelled.shapes,
+    )
 
 
 def rows_by(
