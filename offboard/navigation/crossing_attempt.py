@@ -8,6 +8,7 @@ from math import cos, dist, hypot, inf, pi, remainder, sin
 from framerunner.geometry.vectors import Vec3, turned
 from offboard.navigation.goals import Point
 from offboard.navigation.path import Crossing, Path
+from offboard.navigation.planner.clearance import deeper_m, room_share
 from offboard.navigation.view import GateEstimate
 
 COMMIT_M = 0.3  # before the opening; from there the path is not planned again
@@ -86,7 +87,8 @@ class CrossingAttempt:
             self._refuse(f"passed its plane {hypot(left_m, dz):.2f} m from its centre")
             self._passed_s = now_s
         self._along_m, self._across_m = along_m, hypot(left_m, dz)
-        self.cleared = self.passed and (along_m > CLEAR_M or now_s - self._passed_s > MAX_CLEARING_S)
+        clear_m = CLEAR_M + deeper_m(aim.gate.shape)
+        self.cleared = self.passed and (along_m > clear_m or now_s - self._passed_s > MAX_CLEARING_S)
 
     def _refuse(self, why: str) -> None:
         """Note why the attempt cannot go on; nothing can be refused behind the opening."""
@@ -112,7 +114,11 @@ class CrossingAttempt:
     @property
     def is_committed(self) -> bool:
         """The drone is straight before the opening, too near to plan again, or beyond it."""
-        return self.passed or (-COMMIT_M < self._along_m < 0.0 and self._across_m < COMMIT_ACROSS_M)
+        if self._aim is None:
+            return False
+        shape = self._aim.gate.shape
+        near = -COMMIT_M - deeper_m(shape) < self._along_m < 0.0
+        return self.passed or (near and self._across_m < COMMIT_ACROSS_M * room_share(shape))
 
     def is_settled(self, estimate: GateEstimate) -> bool:
         """The drone is near, and the path leads through the opening as it is known now."""
@@ -120,7 +126,8 @@ class CrossingAttempt:
             return False
         gate = self._aim.gate
         turned_rad = abs(remainder(gate.yaw_rad - estimate.yaw_rad, pi))
-        return dist(gate.centre_m, estimate.position_m) < SETTLED_MOVE_M and turned_rad < SETTLED_TURN_RAD
+        moved_m = SETTLED_MOVE_M * room_share(gate.shape)
+        return dist(gate.centre_m, estimate.position_m) < moved_m and turned_rad < SETTLED_TURN_RAD
 
     @property
     def looks(self) -> bool:

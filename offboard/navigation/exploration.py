@@ -87,7 +87,7 @@ class Explorer:
         self.coverage = Coverage(camera, arena, shapes)
         self._visibility = GateVisibility(camera, shapes)
         self._blocks = self.coverage.grid.blocks()
-        self._table = view_table(camera, arena)
+        self._table = view_table(camera, arena, self._visibility.reach)
         self._likelihood = Likelihood(self._blocks)
         self._visits = np.zeros((len(self._table.places_m), len(YAWS)))
         self._last: Pose | None = None
@@ -218,7 +218,8 @@ class Explorer:
                 shown &= clear[sample > _SAMPLES / 2]
             in_view = np.flatnonzero(shown)
             way, block = np.divmod(in_view, x_m.size)
-            qualities = view_qualities(dx.ravel()[in_view], dy.ravel()[in_view], dz.ravel()[in_view])
+            dx, dy, dz = (each.ravel()[in_view] for each in (dx, dy, dz))
+            qualities = view_qualities(dx, dy, dz, self._visibility.reach)
             before = np.take(best_view, in_view, axis=1)
             after = np.maximum(before, qualities)
             best_view[:, in_view] = after

@@ -42,7 +42,7 @@ class WorldModel:
         self._map = GateMap(camera, surroundings.arena, surroundings.shapes)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
         self.seen_space = SeenSpace(camera, surroundings.arena)
-        self.viewed_space = ViewedSpace(camera, surroundings.base)
+        self.viewed_space = ViewedSpace(camera, surroundings.base, surroundings.shapes)
         self._glimpses = Glimpses(camera, surroundings.shapes)
         self._explorer = Explorer(camera, surroundings.arena, Pace.of(style), surroundings.shapes)
         self._start_m: Vec3 | None = None

@@ -10,7 +10,7 @@ from math import cos, hypot, sin
 
 import numpy as np
 
-from framerunner.geometry.gate_shape import GateShapes
+from framerunner.geometry.gate_shape import PAPER_GATE, GateShapes
 from offboard.navigation.camera_model import CameraModel, CameraPose
 from offboard.navigation.gates.gate_measurement import GateView, Prior, solutions, view_of
 from offboard.navigation.gates.gate_track import CHI_SQUARED, Fit, GateTrack, load_filters
@@ -21,6 +21,7 @@ from offboard.navigation.view import GateEstimate
 from scenarios.models import Arena
 from vision.types import Detections, ObstacleEdge
 
+# All sizes are those of the challenge's gate.
 # A gate that is nearer, less oblique and farther inside the image than this is found in all but few images.
 SURELY_FOUND_M = 5.0
 SURELY_FOUND_COSINE = 0.5
@@ -189,7 +190,10 @@ class GateMap:
         x, y, _, yaw = track.state.tolist()
         distance_m = _distance_m(track, camera)
         facing = abs((at[0] - x) * cos(yaw) + (at[1] - y) * sin(yaw))
-        if distance_m > SURELY_FOUND_M or facing < SURELY_FOUND_COSINE * distance_m:
+        if (
+            distance_m > SURELY_FOUND_M * self._camera.reach(track.shape)
+            or facing < SURELY_FOUND_COSINE * distance_m
+        ):
             return False
         outline = self._outline(track, camera)
         if outline is None or not all(
@@ -271,6 +275,9 @@ def _are_one(a: GateTrack, b: GateTrack) -> bool:
         return False
     x, y, z, _ = (a.state - b.state).tolist()
     away_m = hypot(x, y, z)
-    if away_m >= DUPLICATE_CERTAIN_M:
+    larger = max(a.shape.outer_width_m / PAPER_GATE.outer_width_m, 1.0)
+    if away_m >= DUPLICATE_CERTAIN_M * larger:
         return False
-    return away_m < DUPLICATE_M or any(one.estimate().certain and not one.is_doubted for one in (a, b))
+    return away_m < DUPLICATE_M * larger or any(
+        one.estimate().certain and not one.is_doubted for one in (a, b)
+    )

@@ -20,6 +20,7 @@ from offboard.navigation.gates.gate_measurement import (
     predicted,
     solutions,
 )
+from offboard.navigation.planner.clearance import room_share
 from offboard.navigation.view import GateEstimate
 from scenarios.models import Arena
 
@@ -181,7 +182,7 @@ SAME_YAW_RAD = 0.06  # hypotheses nearer than this, or than half their standard 
 SAME_M = 0.1
 
 # Certain: 95 % of the errors to the side and in height within 1.5 cm, of the yaw within 2 degrees. Along the
-# normal, where a drone flies through anyway, twice as much is allowed.
+# normal, where a drone flies through anyway, twice as much is allowed; in a narrower opening less.
 CERTAIN_M = 0.015 / 1.96
 CERTAIN_RAD = 0.035 / 1.96
 CERTAIN_VIEWS = 3
@@ -344,7 +345,8 @@ class GateTrack:
         nx, ny = cos(yaw), sin(yaw)
         shared = 2.0 * nx * ny * float(self.covariance[0, 1])
         along, aside = nx * nx * vx + ny * ny * vy + shared, ny * ny * vx + nx * nx * vy - shared
-        exact = max(along / 4.0, aside, vz) <= CERTAIN_M**2 and v_yaw <= CERTAIN_RAD**2
+        certain_m = CERTAIN_M * room_share(self.shape)
+        exact = max(along / 4.0, aside, vz) <= certain_m**2 and v_yaw <= CERTAIN_RAD**2
         return GateEstimate(
             colour=self.colour,
             position_m=(x, y, z),

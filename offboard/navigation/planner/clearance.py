@@ -7,7 +7,7 @@ from math import cos, hypot, sin
 import numpy as np
 import numpy.typing as npt
 
-from framerunner.geometry.gate_shape import GateShape
+from framerunner.geometry.gate_shape import PAPER_GATE, GateShape
 from framerunner.geometry.vectors import Vec3
 from offboard.navigation.goals import FlightStyle, Obstacles, PathGate
 from offboard.navigation.planner.legs import Array
@@ -18,6 +18,7 @@ DRONE_HALF_LENGTH_M = 0.125
 DRONE_HALF_HEIGHT_M = 0.0225
 TILTED_M = 0.05  # how much farther down and up its box reaches while it tilts in a turn
 SAME_GATE_M = 0.4  # two gates whose centres are nearer are the same
+LEAST_ROOM_SHARE = 0.4  # for which tolerances are made smaller in openings
 MIDDLE_M = 0.01  # a drone that is nearer to an opening's middle plane may leave it on either side
 
 _SPARE_M = 0.03  # how much farther than needed a detour passes
@@ -196,6 +197,22 @@ class Clearance:
             centre = np.array([column[0], column[1], point_m[2]])
             moves = [centre + sign * radius_m * across - point_m for sign in (1.0, -1.0)]
         return [(point_m + move, level) for move in moves]
+
+
+def room_share(shape: GateShape) -> float:
+    """How much room the drone has in an opening, as a share of that in the challenge's; at most 1."""
+    return min(max(_room_m(shape) / _room_m(PAPER_GATE), LEAST_ROOM_SHARE), 1.0)
+
+
+def _room_m(shape: GateShape) -> float:
+    """From the drone's box in the middle of an opening to the bars."""
+    width_m, height_m = shape.opening_m
+    return min(width_m / 2 - DRONE_HALF_LENGTH_M, height_m / 2 - DRONE_HALF_HEIGHT_M)
+
+
+def deeper_m(shape: GateShape) -> float:
+    """By how much farther from its middle a gate's bars reach, along its normal, than the challenge's."""
+    return max((shape.depth_m - PAPER_GATE.depth_m) / 2, 0.0)
 
 
 def gate_reach_m(shape: GateShape, style: FlightStyle) -> float:

@@ -81,7 +81,7 @@ class Coverage:
             clear = self._clear(pose, obstacle_edges, dx_m, dy_m, dz_m)
             in_view, dx_m, dy_m, dz_m = in_view[clear], dx_m[clear], dy_m[clear], dz_m[clear]
         self._seen *= np.float32(_FADE)
-        qualities = view_qualities(dx_m, dy_m, dz_m)
+        qualities = view_qualities(dx_m, dy_m, dz_m, self._visibility.reach)
         self._seen[:, in_view] = np.maximum(np.take(self._seen, in_view, axis=1), qualities)
 
     def blocks(self) -> Floats:

@@ -44,6 +44,14 @@ def test_each_reason_is_said():
     assert stuck.refusal == "stuck for 6 s"
 
 
+def test_the_drone_must_be_nearer_to_the_axis_of_a_narrow_opening_before_it_commits():
+    for shape, committed in ((PAPER_GATE, True), (GateShape(0.31, 0.2, 0.01, 0.01), False)):
+        crossing = attempt()
+        crossing.aim(Crossing(PathGate((2.0, 0.0, 1.0), 0.0, shape), 0.0, 1.0))
+        crossing.move((1.75, 0.04, 1.0), 1.0)
+        assert crossing.is_committed is committed
+
+
 def test_a_miss_is_refused_and_a_passage_is_not():
     missed, wide = "passed its plane 0.30 m from its centre", GateShape(outer_width_m=0.8)
     for left_m, shape, refusal in ((0.3, PAPER_GATE, missed), (0.05, PAPER_GATE, ""), (0.3, wide, "")):
