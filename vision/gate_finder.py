@@ -32,12 +32,6 @@ _Plane = npt.NDArray[np.uint8]
 _Contour = npt.NDArray[np.int32]
 _Box = tuple[int, int, int, int]
 
-PAINTED_SPREAD_PX = 0.5
-"""How much larger than true the simulator paints on each side: a border is on the nearest pixels."""
-
-SMOOTH_SPREAD_PX = 0.25
-"""The same with camera effects, which are painted at twice the resolution."""
-
 _OBSTACLE_STEP = 8
 _MIN_RUN_PX = 3
 _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are upright
@@ -52,24 +46,15 @@ class GateFinder:
 
     Args:
         focal_px: focal length of the camera; its optical axis is in the middle of the image.
-        spread_px: how much larger than true a region looks on each side: `PAINTED_SPREAD_PX` for images of
-            the simulator, 0 for those of a real camera.
         lens: of a camera that is not ideal; it has the same focal length. What is found is then in pixels of
             an ideal camera.
         shapes: of the gates of each colour; None: all have that of the frame challenge.
     """
 
-    def __init__(
-        self,
-        focal_px: float,
-        spread_px: float = 0.0,
-        lens: Lens | None = None,
-        shapes: GateShapes | None = None,
-    ) -> None:
+    def __init__(self, focal_px: float, lens: Lens | None = None, shapes: GateShapes | None = None) -> None:
         self._focal_px = focal_px
         known = shapes or GateShapes()
         self._models = {colour: GateModel(known.of(colour), focal_px) for colour in PRIMARIES + SECONDARIES}
-        self._spread_px = spread_px
         self._lens = lens
 
     def find(self, image: Image, time_us: int | None = None) -> Detections:
@@ -168,7 +153,7 @@ class GateFinder:
         """The likeliest gate of several first estimates."""
         best: FittedGate | None = None
         for sides in candidates:
-            fitted = fit_gate(patch, sides, model, self._spread_px)
+            fitted = fit_gate(patch, sides, model)
             if fitted is not None and (
                 best is None or (fitted.whole, -fitted.cost) > (best.whole, -best.cost)
             ):

@@ -14,14 +14,12 @@ from typing import TYPE_CHECKING
 
 from framerunner.camera_calibration.mounting_report import MountingSearch, search_mounting
 from framerunner.geometry.axes import flip_quaternion, flip_vector
-from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3
 from framerunner.preflight.link import open_link
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.session.client import VehicleClient
 from framerunner.wire.session.record import Record
 from framerunner.wire.session.session import pose_rates
-from framerunner.wire.simulator_api import SimulatorApi
 from offboard.drone import DroneError
 from offboard.link.telemetry import least_lag
 from vision.calibration.sightings import MotionReport
@@ -30,7 +28,6 @@ from vision.sources import open_source
 from vision.types import CameraFrame, Detections
 
 if TYPE_CHECKING:
-    from scenarios.task import Task
     from vision.calibration.model import Calibration
 
 _FIND_S = 10.0
@@ -55,26 +52,17 @@ class Watched(Record):
         reports: the drone's states, axes north, west, up.
         images: what was seen.
         stamped: whether the images have times of their own.
-        shapes: of the gates, if a simulator tells them.
         ended: the drone is watched no longer; a thread uses the link until then.
     """
 
-    def __init__(self, calibration: Calibration, task: Task | None) -> None:
+    def __init__(self, calibration: Calibration) -> None:
         super().__init__(heartbeat="companion")
         self.rates = pose_rates(_WANTED_HZ, _ENOUGH, _MEASURED_S, time.monotonic(), _MAX_REQUESTS)
         self.ended = False
         self.reports: list[MotionReport] = []
         self.images: list[Detections] = []
         self.stamped = False
-        smooth = task is not None and task.camera.effects is not None
-        self.shapes = None if task is None else GateShapes(task.shapes)
-        self._detect = new_detector(
-            "frames",
-            calibration=calibration,
-            rendered=task is not None,
-            smooth=smooth,
-            shapes=self.shapes,
-        )
+        self._detect = new_detector("frames", calibration=calibration)
         self._lag_s: float | None = None
 
     def take(self, message: Message, now_s: float) -> bool:
@@ -107,24 +95,6 @@ class Watched(Record):
             self.images.append(self._detect(frame.image, time_us))
 
 
-async def _rendered_task(camera_url: str) -> Task | None:
-    """The task whose images a URL serves, if it is that of a simulator or a virtual camera."""
-    import aiohttp
-    from pydantic import ValidationError
-
-    from scenarios.task import Task
-
-    api = SimulatorApi.of_video(camera_url)
-    if api is None or api.video_url != camera_url:
-        return None
-    limit = aiohttp.ClientTimeout(total=2.0)
-    try:
-        async with aiohttp.ClientSession() as session, session.get(api.scenario_url, timeout=limit) as answer:
-            return Task.model_validate_json(await answer.read()) if answer.status == 200 else None
-    except (aiohttp.ClientError, TimeoutError, ValidationError):
-        return None
-
-
 async def measure_live(
     drone_url: str,
     camera_url: str,
@@ -153,7 +123,7 @@ async def measure_live(
         LinkError: the link cannot be opened or has failed.
         DroneError: no vehicle is heard, or it has restarted.
     """
-    watched = Watched(calibration, await _rendered_task(camera_url))
+    watched = Watched(calibration)
     with closing(open_link(drone_url)) as link:
         client = VehicleClient(link, watched, time.monotonic)
         reader = asyncio.create_task(asyncio.to_thread(client.run, inf, "", lambda: watched.ended))
@@ -216,13 +186,7 @@ async def _until_known(
             await asyncio.sleep(0.1)
         images, reports = list(watched.images), list(watched.reports)
         search = await asyncio.to_thread(
-            search_mounting,
-            images,
-            reports,
-            calibration,
-            position_flu_m,
-            stamped=watched.stamped,
-            shapes=watched.shapes,
+            search_mounting, images, reports, calibration, position_flu_m, stamped=watched.stamped
         )
         over_s = time.monotonic() - began_s
         if (not search.missing and over_s >= _MIN_S) or over_s >= limit_s:

@@ -220,9 +220,8 @@ def measure_recorded(
         simulated = result is not None and result.judged_by == "truth"
         scenario = RunFiles(folder).load_scenario()
         known = _calibration(calibration, scenario if simulated else None)
-        smooth = scenario is not None and scenario.camera.effects is not None
         shapes = None if scenario is None else GateShapes(scenario.gate_shapes)
-        detect = new_detector("frames", calibration=known, rendered=simulated, smooth=smooth, shapes=shapes)
+        detect = new_detector("frames", calibration=known, shapes=shapes)
         images: list[Detections] = []
         reports: list[MotionReport] = []
         with Console(stderr=True).status("looking for frames in the recorded images"):

@@ -73,7 +73,6 @@ class LabelledImage:
     attitude_arena: Quaternion
     calibration: Calibration
     gates: tuple[GateLabel, ...]
-    smooth: bool = False  # painted with camera effects
     shapes: GateShapes = field(default_factory=GateShapes)  # that a drone is told
 
     @property
@@ -100,14 +99,7 @@ def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbanc
         image = _disturbed(painted, disturbance, noise)
         labels = scene.labels(position, attitude)
         yield LabelledImage(
-            image,
-            scene.scenario.name,
-            position,
-            attitude,
-            scene.calibration,
-            labels,
-            scene.smooth,
-            scene.shapes,
+            image, scene.scenario.name, position, attitude, scene.calibration, labels, scene.shapes
         )
 
 
@@ -119,7 +111,6 @@ class _LabelledScene:
         self.shapes = GateShapes(scenario.gate_shapes)
         self.camera = SimulatedCamera(scenario, seed)
         self.calibration = true_calibration(scenario.camera)
-        self.smooth = scenario.camera.effects is not None
         self._lens = None if self.calibration.is_ideal else Lens(self.calibration)
         others = [scenario.base.solid, *scenario.prisms]
         self._solids = [*(gate.hull for gate in scenario.all_gates), *others]
@@ -137,7 +128,7 @@ class _LabelledScene:
 
     def draw_motion(self, stream: np.random.Generator) -> ExposureMotion:
         """When the image is taken, and how the drone moves then: as in a contest flight."""
-        if not self.smooth:
+        if self.scenario.camera.effects is None:
             return STILL
         time_us = int(stream.uniform(0.0, _LAST_S) * 1e6)
         vx, vy, vz = (float(value) for value in stream.uniform(-_MAX_SPEED_M_S, _MAX_SPEED_M_S, 3))

@@ -116,7 +116,7 @@ class ErrorRow:
 
 
 def detect_all(
-    labelled: Iterable[LabelledImage], *, rendered: bool, others: str | DetectorMaker | None = None
+    labelled: Iterable[LabelledImage], others: str | DetectorMaker | None = None
 ) -> tuple[Scores, list[LabelledImage]]:
     """Run our detectors over images, and one of others if it is given; also give back the first images.
 
@@ -131,7 +131,7 @@ def detect_all(
         calibration = one.calibration
         if camera != (calibration, one.shapes):
             camera = (calibration, one.shapes)
-            detectors = {k: detector_of(one, k, rendered=rendered) for k in KINDS}
+            detectors = {k: new_detector(k, calibration=calibration, shapes=one.shapes) for k in KINDS}
             if others is not None:
                 detectors[detector_name(others)] = others_detector(others, calibration)
             for detector in detectors.values():
@@ -141,17 +141,6 @@ def detect_all(
             first.append(one)
     scores.leave_out_unused()
     return scores, first
-
-
-def detector_of(labelled: LabelledImage, kind: Vision, *, rendered: bool) -> Detector:
-    """The detector for the camera of an image."""
-    return new_detector(
-        kind,
-        calibration=labelled.calibration,
-        rendered=rendered,
-        smooth=labelled.smooth,
-        shapes=labelled.shapes,
-    )
 
 
 def rows_by(
