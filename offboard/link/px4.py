@@ -9,13 +9,11 @@ vehicle sets them repeatedly, and an app that stops doing so leaves no stream ru
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import threading
-from collections.abc import Awaitable
+from collections import deque
 from math import degrees
 from typing import Any
 
-from mavsdk.asyncio import MavsdkError
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.plugins.offboard import VelocityBodyYawspeed
 
@@ -136,24 +134,26 @@ class SteppedPx4Dialect(SteppedDialect):
 
     kind = PX4
     response_prior = ResponsePrior.LATE
-    _interval_requested = False  # since the last tick
 
-    def request_streams(self) -> Awaitable[None]:
-        """Request positions, the IMU's samples and their errors as often as the app uses them.
+    def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
+        super().__init__(direct, system_id)
+        self._to_request: deque[tuple[int, float]] = deque()
+        self._requested = asyncio.Event()
 
-        After each request PX4's thread that receives messages waits until time has gone on.
+    async def request_streams(self) -> None:
+        """Request what the app uses as often as it does, one of them a tick.
+
+        After each request PX4's thread that receives messages waits until time has gone on. What is refused
+        is missing later, in words.
         """
-        return self._request_streams()
-
-    async def _request_streams(self) -> None:
-        for message_id, rate_hz in STREAMS_HZ.items():
-            self._interval_requested = True
-            with contextlib.suppress(MavsdkError):
-                await self._request(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz)
+        self._to_request.extend(STREAMS_HZ.items())
+        await self._requested.wait()
 
     async def _until_taken(self) -> None:
-        if self._interval_requested:
-            self._interval_requested = False
+        if self._to_request:
+            message_id, rate_hz = self._to_request.popleft()
+            self._messages.send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz)
             await asyncio.sleep(_TAKEN_S)
         else:
+            self._requested.set()
             await super()._until_taken()
