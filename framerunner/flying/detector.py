@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from framerunner.flying.plan import FlightPlan
 from scenarios.imaging.effects import CameraEffects
-from scenarios.models import Camera
+from scenarios.models import Base, Camera
+from vision.base.model import BaseShape
 from vision.calibration.model import Calibration
 from vision.detectors import Detector, DetectorMaker, new_detector, others_detector
 
@@ -35,6 +36,11 @@ def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
 def others_of(plan: FlightPlan) -> str | DetectorMaker | None:
     """The detector of others with which a plan's mission sees; None: it is one of ours."""
     return plan.detector or (None if plan.mission is None else plan.mission.detector or None)
+
+
+def base_shape(base: Base) -> BaseShape:
+    """The size of a scenario's base, as it is looked for in images."""
+    return BaseShape(base.edge_m, base.top_m, base.mark_share * base.edge_m)
 
 
 def true_calibration(camera: Camera) -> Calibration:
