@@ -5,7 +5,10 @@ from __future__ import annotations
 from framerunner.flying.plan import FlightPlan
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Base, Camera
+from vision.base.detector import DetectorWithBase
+from vision.base.finder import BaseFinder
 from vision.base.model import BaseShape
+from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.detectors import Detector, DetectorMaker, new_detector, others_detector
 
@@ -21,16 +24,23 @@ def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
         DetectorError, ExtensionError: a detector of others cannot be made.
     """
     others = others_of(plan)
+    calibration = plan.calibration or true_calibration(plan.scenario.camera)
     if others is not None:
-        return others_detector(others, plan.calibration or true_calibration(plan.scenario.camera))
+        return _with_base(others_detector(others, calibration), plan, calibration)
     if plan.mission is None or plan.mission.vision == "boxes":
         return new_detector("boxes")  # with the paper's focal length
-    return new_detector(
-        plan.mission.vision,
-        calibration=plan.calibration or true_calibration(plan.scenario.camera),
-        rendered=rendered,
-        smooth=plan.scenario.camera.effects is not None,
-    )
+    smooth = plan.scenario.camera.effects is not None
+    detector = new_detector(plan.mission.vision, calibration=calibration, rendered=rendered, smooth=smooth)
+    return _with_base(detector, plan, calibration)
+
+
+def _with_base(detector: Detector, plan: FlightPlan, calibration: Calibration) -> Detector:
+    """A detector that looks for the base, too; a drone that starts from the floor has none."""
+    if plan.mission is None or plan.mission.vision == "boxes" or plan.lift_m:
+        return detector
+    lens = None if calibration.is_ideal else Lens(calibration)
+    finder = BaseFinder(base_shape(plan.scenario.base), calibration.fx_px, lens)
+    return DetectorWithBase(detector, finder)
 
 
 def others_of(plan: FlightPlan) -> str | DetectorMaker | None:

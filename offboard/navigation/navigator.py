@@ -20,7 +20,7 @@ from offboard.navigation.search.looking_places import LookingPlaces
 from offboard.navigation.view import NavigationView, Surroundings
 from offboard.navigation.world_model import WorldModel
 from scenarios.models import COLOURS
-from vision.types import Detections
+from vision.types import BaseExpectation, Detections
 
 GAP_S = 0.6  # an action that was not called for so long begins again
 EXPLORE_S = 0.5  # between two choices of where to look next
@@ -75,6 +75,10 @@ class Navigator:
         if self._start_m is None:
             self._start_m = position_now(state)
         return state
+
+    def expected_base(self, time_us: int) -> BaseExpectation | None:
+        """See `WorldModel.expected_base`."""
+        return self._world.expected_base(time_us)
 
     def is_known(self, colour: str) -> bool:
         """The gate is on the map."""

@@ -5,13 +5,11 @@ Each function gives the measurement's model: residual, Jacobian and noise at a s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, sin
 
 import numpy as np
 
-from framerunner.geometry.rotations import to_body
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import NEAREST_M, CameraModel
 from offboard.navigation.gates.gate_measurement import GateView, predicted
@@ -130,56 +128,48 @@ def corners(view: GateView, eye: Eye, first: int, yaw_var_rad2: float) -> Model:
     return at
 
 
-@dataclass(frozen=True, slots=True)
-class SeenPoint:
-    """A point of the arena whose place is known, as an image shows it.
-
-    Attributes:
-        position_m: in the arena.
-        right_px: of the optical axis.
-        down_px: likewise.
-        covariance_px2: of right and down: variances, and the covariance between.
-    """
-
-    position_m: Vec3
-    right_px: float
-    down_px: float
-    covariance_px2: tuple[float, float, float]
-
-
-def points(seen: Sequence[SeenPoint], eye: Eye, attitude_std_rad: float) -> Model:
+def points(
+    points_m: Floats, pixels: Floats, covariance_px2: Floats, eye: Eye, attitude_std_rad: float
+) -> Model:
     """Known points in an image, such as corners of the base.
 
     The attitude's error is common to all of them.
+
+    Args:
+        points_m: in the arena, shape (n, 3).
+        pixels: right of and below the optical axis, shape (n, 2).
+        covariance_px2: of all coordinates, shape (2 n, 2 n).
+        eye: that sees them.
+        attitude_std_rad: standard deviation of its attitude.
     """
 
     def at(state: Floats) -> Measurement | None:
         place_m, attitude = eye.place(state)
         camera = eye.model.pose(place_m, attitude)
-        focal_px, m = eye.model.focal_px, camera.rotation
-        residual = np.zeros(2 * len(seen))
-        jacobian = np.zeros((2 * len(seen), len(state)))
-        turned = np.zeros((2 * len(seen), 3))
-        noise = np.zeros((2 * len(seen), 2 * len(seen)))
-        for number, point in enumerate(seen):
-            away = [a - b for a, b in zip(point.position_m, camera.position_m, strict=True)]
-            ahead, left, up = to_body(m, *away)
-            if ahead < NEAREST_M:
-                return None
-            right, down = -focal_px * left / ahead, -focal_px * up / ahead
-            rows = slice(2 * number, 2 * number + 2)
-            residual[rows] = (point.right_px - right, point.down_px - down)
-            by_body = np.array(((-right, -focal_px, 0.0), (-down, 0.0, -focal_px))) / ahead
-            by_point = by_body @ np.array(m).reshape(3, 3).T
-            jacobian[rows, POSITION] = -by_point
-            x, y, _ = (a - b for a, b in zip(point.position_m, state[POSITION].tolist(), strict=True))
-            jacobian[rows, TURN] = by_point @ (y, -x, 0.0)
-            turned[rows] = (
-                (down, -right * down / focal_px, focal_px + right * right / focal_px),
-                (-right, -focal_px - down * down / focal_px, right * down / focal_px),
-            )
-            a, b, shared = point.covariance_px2
-            noise[rows, rows] = ((a, shared), (shared, b))
-        return Measurement(residual, jacobian, noise + attitude_std_rad**2 * (turned @ turned.T))
+        focal_px = eye.model.focal_px
+        turn = np.array(camera.rotation).reshape(3, 3)
+        in_camera = (points_m - camera.position_m) @ turn
+        ahead = in_camera[:, 0]
+        if float(ahead.min()) < NEAREST_M:
+            return None
+        seen = -focal_px * in_camera[:, 1:] / ahead[:, None]
+        right, down = seen.T
+        by_body = np.zeros((len(seen), 2, 3))
+        by_body[:, 0, 0], by_body[:, 0, 1] = -right, -focal_px
+        by_body[:, 1, 0], by_body[:, 1, 2] = -down, -focal_px
+        by_point = (by_body / ahead[:, None, None]) @ turn.T
+        x, y, _ = (points_m - state[POSITION]).T
+        jacobian = np.zeros((len(seen), 2, len(state)))
+        jacobian[:, :, POSITION] = -by_point
+        jacobian[:, :, TURN] = by_point[:, :, 0] * y[:, None] - by_point[:, :, 1] * x[:, None]
+        turned = np.stack(
+            [
+                np.stack([down, -right * down / focal_px, focal_px + right * right / focal_px], axis=1),
+                np.stack([-right, -focal_px - down * down / focal_px, right * down / focal_px], axis=1),
+            ],
+            axis=1,
+        ).reshape(-1, 3)
+        noise = covariance_px2 + attitude_std_rad**2 * (turned @ turned.T)
+        return Measurement((pixels - seen).ravel(), jacobian.reshape(-1, len(state)), noise)
 
     return at
