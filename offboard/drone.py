@@ -113,27 +113,24 @@ class VelocityFluCommand:
         return not isnan(self.forward_m_s + self.left_m_s + self.up_m_s + self.yaw_rate_rad_s)
 
 
-LimitName = Literal["class", "box", "cap"]
-
-
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """What a limit has changed in a command.
+    """What a limit, not that of the mission's class, has changed in a command.
 
     Attributes:
-        limit: that of the mission's class, the box, or a cap on a drone that may be real.
+        limit: the box, or a cap on a drone that may be real.
         quantity: such as "level speed".
         words: what was changed and why, for people.
     """
 
-    limit: LimitName
+    limit: Literal["box", "cap"]
     quantity: str
     words: str
 
 
 @dataclass(frozen=True, slots=True)
 class LimitedCommand:
-    """A command within all limits, and what they have changed in it, in their order."""
+    """A command within all limits, and what box and caps have changed in it, in their order."""
 
     command: VelocityFluCommand
     clips: tuple[Clip, ...] = ()
@@ -146,7 +143,7 @@ class LimitedCommand:
     @property
     def remark(self) -> str:
         """What the box and the caps have changed, for people; empty if nothing."""
-        return "; ".join(dict.fromkeys(clip.words for clip in self.clips if clip.limit != "class"))
+        return "; ".join(dict.fromkeys(clip.words for clip in self.clips))
 
 
 class Drone(Protocol):

@@ -14,7 +14,7 @@ from offboard.navigation.gates.gate_measurement import GateView, predicted
 from offboard.navigation.gates.gate_track import CHI_SQUARED, half_turn, is_certain, is_moved
 from offboard.navigation.view import GateEstimate
 from offboard.place.measurements import Eye, corners
-from offboard.place.place_filter import PlaceFilter
+from offboard.place.place_filter import Floats, PlaceFilter
 
 # A gate joins the filter when the map is sure which of its yaws is right, and its corners are where they
 # should be.
@@ -29,6 +29,7 @@ GATE_FACTOR = (
 CONTRADICTIONS = 6  # in a row; then the gate is dropped
 ELSEWHERE_M = 0.5  # from where the map has the gate
 ELSEWHERE_RAD = 0.3
+STAYS_CERTAIN = 3.0  # times the usual deviations: a drone does not see a gate just before it
 NOVEL_US = 1_000_000
 
 _Seen: TypeAlias = tuple[GateView, Eye]
@@ -41,6 +42,7 @@ class GateLandmarks:
         self._used: dict[str, GateView] = {}
         self._contradicted: dict[str, int] = {}
         self._elsewhere: dict[str, int] = {}
+        self._certain: set[str] = set()
 
     def see(self, place: PlaceFilter, seen: Mapping[str, Sequence[_Seen]], gates: GateMap) -> None:
         """Use the gates in an image, after the map has used them.
@@ -133,5 +135,15 @@ class GateLandmarks:
             yaw_rad=half_turn(yaw),
             position_std_m=(sqrt(vx), sqrt(vy), sqrt(vz)),
             yaw_std_rad=sqrt(v_yaw),
-            certain=not estimate.ambiguous and is_certain(yaw, covariance, estimate.views),
+            certain=self._is_certain(estimate, yaw, covariance),
         )
+
+    def _is_certain(self, estimate: GateEstimate, yaw_rad: float, covariance: Floats) -> bool:
+        """Whether a gate is certain: one that was stays so for a while when the drone does not see it."""
+        colour = estimate.colour
+        factor = STAYS_CERTAIN if colour in self._certain else 1.0
+        if not estimate.ambiguous and is_certain(yaw_rad, covariance, estimate.views, factor):
+            self._certain.add(colour)
+            return True
+        self._certain.discard(colour)
+        return False

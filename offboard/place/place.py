@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from math import pi, radians, remainder, sqrt
+from math import hypot, pi, radians, remainder, sqrt
 
 import numpy as np
 
@@ -37,6 +37,7 @@ LATE_US = 300_000  # of images; the filter stays so far behind the present when 
 SETTLING_US = 3_000_000  # after take-off, in which a vehicle corrects its heading
 
 STOOD_US = 300_000  # before the vehicle says that it has left the ground
+STANDS_M_S = 0.1  # reported by a vehicle that has left the ground and does not say so yet
 STANDS_STD = (0.003, 0.003, 0.01)  # metres, radians, metres a second
 
 # The vehicle's errors are slow: those of reports in so long are one error. The noise of each report is larger
@@ -159,7 +160,8 @@ class PlaceEstimator:
         assert start is not None, "the filter begins with a state"
         step_s = min(max((time_us - self._fused_us) * 1e-6, 0.01), 0.2)
         self._fused_us = time_us
-        if self._left_us is None or time_us < self._left_us - STOOD_US:
+        stood = self._left_us is None or time_us < self._left_us - STOOD_US
+        if stood and hypot(*report.velocity_arena_m_s) < STANDS_M_S:
             turn_rad = remainder(start.yaw - report.yaw, 2 * pi)
             place.update(stands((start.x, start.y, start.z), turn_rad, *STANDS_STD))
             return
@@ -213,7 +215,7 @@ class PlaceEstimator:
             position_age_s=0.0,
             attitude_arena=turned_by(turn_rad, reported.attitude_arena),
             camera_attitude_arena=None if camera is None else turned_by(turn_rad, camera),
-            position_std_m=sqrt(place.p.diagonal()[:3].max()),
+            position_std_m=place.position_std_m(reported.time_us),
         )
 
     @property

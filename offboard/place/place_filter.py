@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, radians, sin
+from math import cos, radians, sin, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -96,6 +96,11 @@ class PlaceFilter:
     def turn_rad(self) -> float:
         """What must be added to the reported heading."""
         return float(self.x[TURN])
+
+    def position_std_m(self, time_us: int) -> float:
+        """Standard deviation of the position at a time, of the coordinate known worst."""
+        variances, later_s = self.p.diagonal(), (time_us - self.time_us) * 1e-6
+        return sqrt((variances[POSITION] + later_s**2 * variances[VELOCITY]).max())
 
     def turned_rad(self, motion: InertialMotion, *, settling: bool) -> float:
         """The turn after a motion: that of the reported heading and of the gyroscope, by their noise."""

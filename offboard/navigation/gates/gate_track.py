@@ -370,19 +370,21 @@ class GateTrack:
         self._hypotheses = kept
 
 
-def is_certain(yaw_rad: float, covariance: Floats, views: int) -> bool:
+def is_certain(yaw_rad: float, covariance: Floats, views: int, factor: float = 1.0) -> bool:
     """Whether a gate is known well enough to fly through.
 
     Args:
         yaw_rad: of its normal.
         covariance: of x, y, z and yaw, shape (4, 4).
         views: how many were used.
+        factor: by which standard deviations may be larger than usual.
     """
     vx, vy, vz, v_yaw = covariance.diagonal().tolist()
     nx, ny = cos(yaw_rad), sin(yaw_rad)
     shared = 2.0 * nx * ny * float(covariance[0, 1])
     along, aside = nx * nx * vx + ny * ny * vy + shared, ny * ny * vx + nx * nx * vy - shared
-    exact = max(along / 4.0, aside, vz) <= CERTAIN_M**2 and v_yaw <= CERTAIN_RAD**2
+    square = factor * factor
+    exact = max(along / 4.0, aside, vz) <= square * CERTAIN_M**2 and v_yaw <= square * CERTAIN_RAD**2
     return exact and views >= CERTAIN_VIEWS
 
 
