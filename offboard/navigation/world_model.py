@@ -133,13 +133,21 @@ class WorldModel:
         at_us = pose.time_us + round(1e6 * self._camera.read_after_s(base.row_px(sighting)))
         pose = self._history.at(at_us, self._place.correction(at_us)) or pose
         if self._place.see_points(base.points_m(sighting), sighting, pose, correction):
-            base.seen_us = image.time_us
+            base.seen_us.append(pose.time_us)
 
     def expected_base(self, time_us: int) -> BaseExpectation | None:
         """Where the base is to be looked for in an image; None if it need not be, or is out of view."""
         std = self._place.std
         pose = None if std is None else self._history.at(time_us, self._place.correction(time_us))
         return None if std is None or pose is None else self._base.expected(pose, std)
+
+    def base_known(self, since_us: int) -> tuple[int, float] | None:
+        """How often the base was seen since a time, and how well the place is known in plan, metres.
+
+        None: the vehicle knows its place, so the base need not be looked at.
+        """
+        std = self._place.std
+        return None if std is None else (self._base.sightings(since_us), float(std[:2].max()))
 
     def _poses_of_rows(self, image: Detections, pose: DronePose) -> list[DronePose] | None:
         """With a rolling shutter, the drone's pose when each gate's middle row was read out."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from math import hypot
 
 import numpy as np
@@ -19,6 +20,7 @@ LEAST_STD_M, LEAST_STD_RAD = 0.06, 0.015
 FACTOR = 1.5  # by which the place may be known less well than the filter states
 LEAST_CORNERS = 3  # that should be in the image
 MARGIN_PX = 20.0
+SEEN_KEPT = 8
 
 
 class BaseLandmark:
@@ -29,11 +31,11 @@ class BaseLandmark:
         base: as the task has it.
 
     Attributes:
-        seen_us: vehicle time of the last image that showed it; None: none did.
+        seen_us: vehicle times of the last images that showed it where the drone's place has it.
     """
 
     def __init__(self, camera: CameraModel, base: Base) -> None:
-        self.seen_us: int | None = None
+        self.seen_us: deque[int] = deque(maxlen=SEEN_KEPT)
         self._camera, self._base = camera, base
         self._looked_us: int | None = None
         half_m = base.edge_m / 2
@@ -67,6 +69,10 @@ class BaseLandmark:
         heading_std_rad = max(FACTOR * float(std[3]), LEAST_STD_RAD)
         eye_m = (x - base.x_m, y - base.y_m, z)
         return BaseExpectation(eye_m, pose.attitude_arena, (std_x, std_y, std_z), heading_std_rad)
+
+    def sightings(self, since_us: int) -> int:
+        """How many images have shown it since a vehicle time, of the last ones."""
+        return sum(time_us >= since_us for time_us in self.seen_us)
 
     def row_px(self, sighting: BaseSighting) -> float:
         """The middle row of what the image shows of it, below the optical axis."""
