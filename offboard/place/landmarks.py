@@ -15,6 +15,7 @@ from offboard.navigation.gates.gate_track import CHI_SQUARED, half_turn, is_cert
 from offboard.navigation.view import GateEstimate
 from offboard.place.measurements import Eye, corners
 from offboard.place.place_filter import Floats, PlaceFilter
+from scenarios.models import COLOURS
 
 # A gate joins the filter when the map is sure which of its yaws is right, and its corners are where they
 # should be.
@@ -55,7 +56,7 @@ class GateLandmarks:
         for colour, of_colour in seen.items():
             if colour in place.gates:
                 self._see_known(place, colour, of_colour)
-            else:
+            elif colour in COLOURS:  # what has another one may be a poster or a window, of any size
                 self._begin(place, colour, of_colour, gates)
         for colour in tuple(place.gates):
             self._compare(place, colour, gates.best(colour))

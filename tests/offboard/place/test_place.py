@@ -243,3 +243,16 @@ def test_the_same_flight_gives_the_same_estimate():
     first, _ = fly(Vehicle(7), 6.0)
     second, _ = fly(Vehicle(7), 6.0)
     assert first == second
+
+
+def test_what_has_another_colour_than_the_task_s_gates_does_not_move_the_drone():
+    """Such as a poster, whose size is not a gate's, or a thing that moves: here 15 cm a second."""
+
+    def gates(time_s):
+        thing = gate_at(2.5, 0.5 + 0.15 * max(0.0, time_s - 5.0), 1.2, 0.2)
+        return (thing.model_copy(update={"colour": "cyan"}),)
+
+    states, _ = fly(Vehicle(6), gates=gates)
+    alone, _ = fly(Vehicle(6), gates=lambda _: ())
+    assert np.abs(errors(states)[-1]).max() < 0.3
+    assert states[-1].position_std_m > 0.9 * alone[-1].position_std_m
