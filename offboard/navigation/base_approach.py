@@ -7,7 +7,7 @@ from math import atan2, cos, dist, hypot, pi, sin
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState
 from offboard.navigation.goals import Point
-from scenarios.models import Arena, Base
+from scenarios.models import Arena, Base, is_over_base
 
 BEFORE_M = 1.4  # from the base's centre: from there the drone looks at it
 ABOVE_M = 0.45  # its top: all of the top is in view
@@ -19,6 +19,44 @@ SURE_M = 0.03  # a place known so well are enough to land
 NEAR_M = 1.8  # from here on that is so in flight, too
 PLACES = 4  # from which it is looked for; then the drone lands where it believes the base to be
 ASIDE_RAD = pi / 4  # between two of them
+
+
+class WayHome:
+    """Where to fly to first, on the way to a point that may be on the base."""
+
+    def __init__(self, base: Base, arena: Arena) -> None:
+        self._base, self._arena = base, arena
+        self._approach: BaseApproach | None = None
+
+    def begin(self) -> None:
+        """Forget the way that was flown."""
+        self._approach = None
+
+    @property
+    def looks(self) -> bool:
+        """The drone is on its way to a place from which it looks at the base, or is there."""
+        return self._approach is not None and not self._approach.lands
+
+    def goal(
+        self, goal_m: Vec3, state: DroneState, known: tuple[int, float] | None, *, no_path: bool
+    ) -> Point:
+        """Where to fly to now; a drone that knows its place flies to the point itself.
+
+        Args:
+            goal_m: the point.
+            state: of the drone, as estimated.
+            known: how often the base was seen in the last `SIGHTINGS_S`, and the standard deviation of the
+                place in plan, metres; None for a drone that knows its place.
+            no_path: there is none to where it was to fly.
+        """
+        if known is None or not is_over_base(self._base, goal_m[0], goal_m[1]):
+            return Point(goal_m)
+        here_m = (state.x, state.y, state.z)
+        if self._approach is None:
+            self._approach = BaseApproach(self._base, self._arena, goal_m, here_m)
+        elif no_path:
+            self._approach.refuse(here_m)
+        return self._approach.goal(state, *known)
 
 
 class BaseApproach:

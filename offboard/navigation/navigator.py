@@ -13,14 +13,14 @@ from math import dist, hypot
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityFluCommand
 from offboard.limits import CONTEST, CommandLimits
-from offboard.navigation.base_approach import SIGHTINGS_S, BaseApproach
+from offboard.navigation.base_approach import SIGHTINGS_S, WayHome
 from offboard.navigation.crossing_attempt import CrossingAttempt
 from offboard.navigation.goals import Goal, Point, style_of
 from offboard.navigation.path_flight import STILL, PathFlight, position_now
 from offboard.navigation.search.looking_places import LookingPlaces
 from offboard.navigation.view import NavigationView, Surroundings
 from offboard.navigation.world_model import WorldModel
-from scenarios.models import COLOURS, is_over_base
+from scenarios.models import COLOURS
 from vision.types import BaseExpectation, Detections
 
 GAP_S = 0.6  # an action that was not called for so long begins again
@@ -49,8 +49,7 @@ class Navigator:
         self._action = ""
         self._acted_s = -GAP_S
         self._goal: Point | None = None
-        self._approach: BaseApproach | None = None
-        self._surroundings = surroundings
+        self._way_home = WayHome(surroundings.base, surroundings.arena)
         self._chosen_s = 0.0
         self._crossing: CrossingAttempt | None = None
         self._steps_back = 0
@@ -120,7 +119,7 @@ class Navigator:
     def arrived(self) -> bool:
         """`fly_to` or `step_back` has reached its goal, and the drone is (nearly) at rest."""
         goal, state = self._goal, self._state
-        if goal is None or state is None or (self._approach is not None and not self._approach.lands):
+        if goal is None or state is None or self._way_home.looks:
             return False
         near = dist(position_now(state), goal.position_m) < self._style.arrived_m
         return near and hypot(*state.velocity_arena_m_s) < self._style.arrived_m_s
@@ -154,25 +153,14 @@ class Navigator:
     def fly_to(self, goal_m: Vec3) -> VelocityFluCommand:
         """Fly to a point on a smooth path; to one on the base, when that was looked at if need be."""
         state, _ = self._begin("fly to goal")
-        goal = self._landing_goal(goal_m, state) or Point(goal_m)
+        flight = self._flight
+        known = self._world.base_known(state.time_us - round(SIGHTINGS_S * 1e6))
+        no_path = flight.path is None and flight.search is None and bool(flight.refusal)
+        goal = self._way_home.goal(goal_m, state, known, no_path=no_path)
         if self._goal != goal:
             self._goal = goal
-            self._flight.change()
+            flight.change()
         return self._true(self._fly(goal))
-
-    def _landing_goal(self, goal_m: Vec3, state: DroneState) -> Point | None:
-        """Where to fly to first, for a landing on the base; None for a drone that knows its place."""
-        surroundings, approach = self._surroundings, self._approach
-        known = self._world.base_known(state.time_us - round(SIGHTINGS_S * 1e6))
-        if known is None or not is_over_base(surroundings.base, goal_m[0], goal_m[1]):
-            return None
-        if approach is None:
-            here_m = position_now(state)
-            approach = BaseApproach(surroundings.base, surroundings.arena, goal_m, here_m)
-            self._approach = approach
-        elif self._flight.path is None and self._flight.search is None and self._flight.refusal:
-            approach.refuse(position_now(state))
-        return approach.goal(state, *known)
 
     def step_back(self, colour: str) -> VelocityFluCommand:
         """Fly back from a gate, to one of its sides, facing it."""
@@ -247,7 +235,8 @@ class Navigator:
         if gap:
             self._flight.stop()
         if gap or action != self._action:
-            self._action, self._goal, self._approach = action, None, None
+            self._action, self._goal = action, None
+            self._way_home.begin()
             self._flight.change()
         self._acted_s = now_s
         return state, now_s
