@@ -136,9 +136,6 @@ class Navigator:
 
     def explore(self) -> VelocityFluCommand:
         """Fly to the view that shows most of what has not been seen."""
-        return self._true(self._explore())
-
-    def _explore(self) -> VelocityFluCommand:
         state, now_s = self._begin("explore")
         if self._goal is None or now_s - self._chosen_s >= EXPLORE_S:
             flight = self._flight
@@ -148,7 +145,7 @@ class Navigator:
             flight.spent += VIEWPOINT_WORK
             viewpoint = self._world.next_viewpoint(position_now(state), state.yaw)
             self._goal, self._chosen_s = Point(viewpoint.position_m, viewpoint.yaw_rad), now_s
-        return self._fly(self._goal)
+        return self._true(self._fly(self._goal))
 
     def fly_to(self, goal_m: Vec3) -> VelocityFluCommand:
         """Fly to a point on a smooth path; to one on the base, when that was looked at if need be."""

@@ -10,13 +10,14 @@ from offboard.drone import ImuInterval
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.gates.gate_measurement import GateView
 from offboard.place.inertial_track import GRAVITY_M_S2, InertialTrack
-from offboard.place.measurements import Eye, corners, height, position, stands, velocity
+from offboard.place.measurements import Eye, corners, height, points, position, stands, velocity
 from offboard.place.place_filter import OWN, TURN, PlaceFilter
 from scenarios.models import Camera
 
 CAMERA = CameraModel.of(Camera())
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 EYE = Eye(CAMERA, quaternion_from_euler(0.1, -0.05, 0.4), (0.02, -0.01, 0.03))
+BASE_M = np.array(((2.1, 0.4, 0.5), (2.1, 0.9, 0.5), (1.8, 0.2, 0.0)))
 STATE = np.array((0.1, -0.3, 1.2, 0.05, 0.5, -0.2, 0.1, 0.02, -0.01, 0.03, 2.1, 0.9, 1.4, 0.7))
 
 
@@ -112,6 +113,7 @@ def view(seen=(True, True, True, True)):
         stands((0.2, 0.1, 1.0), 0.1, 0.01, 0.01, 0.01),
         corners(view(), EYE, OWN, 0.0),
         corners(view((True, False, False, True)), EYE, OWN, 0.0),
+        points(BASE_M, np.array(((5.0, 60.0), (-40.0, 55.0), (20.0, 70.0))), np.eye(6), EYE, 0.003),
     ],
 )
 def test_the_derivatives_of_a_measurement_are_those_of_its_residual(model):
