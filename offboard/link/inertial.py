@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from math import isfinite, sqrt
+from math import sqrt
 from typing import Any
 
 from mavsdk.asyncio import MavsdkError
 
 from framerunner.geometry.axes import flip_vector
+from framerunner.geometry.vectors import Vec3
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from framerunner.wire.vehicle_telemetry import MessageOrder
 from offboard.drone import ImuInterval, ReportedAccuracy
@@ -23,6 +24,7 @@ RATE_HZ = 250.0  # requested; PX4 has 200 samples a second by itself
 ACCURACY_HZ = 10.0
 LONGEST_US = 12_000  # between two samples that are means without gaps; now and then one is lost
 SAMPLES_KEPT = 1000  # until they are taken
+MOST_M_S2, MOST_RAD_S = 1000.0, 100.0  # beyond what IMUs of drones can measure
 _X, _Y, _Z, _YAW = 0, 6, 11, 20  # of ODOMETRY's pose_covariance and velocity_covariance
 
 
@@ -46,15 +48,23 @@ class InertialFeed:
         subscribe(direct, "ODOMETRY", self._on_odometry)
 
     async def request(self, plugin: Any) -> None:  # noqa: ANN401
-        """Request both, by MAVSDK's asyncio `telemetry`; a vehicle that refuses is flown as it reports."""
-        for request, rate_hz in ((plugin.set_rate_imu, RATE_HZ), (plugin.set_rate_odometry, ACCURACY_HZ)):
+        """Request both, by MAVSDK's asyncio `telemetry`; a vehicle that refuses is flown as it reports.
+
+        A vehicle that sends ODOMETRY already keeps its rate.
+        """
+        with contextlib.suppress(MavsdkError):
+            await plugin.set_rate_imu(RATE_HZ)
+        if self.accuracy is None:
             with contextlib.suppress(MavsdkError):
-                await request(rate_hz)
+                await plugin.set_rate_odometry(ACCURACY_HZ)
 
     def take(self, until_us: int) -> tuple[ImuInterval, ...]:
-        """The samples until a vehicle time since the last call, oldest first."""
+        """The samples before a vehicle time since the last call, oldest first.
+
+        One of that time may arrive before or after the message that made the tick.
+        """
         samples, taken = self._samples, []
-        while samples and samples[0].time_us <= until_us:
+        while samples and samples[0].time_us < until_us:
             taken.append(samples.popleft())
         return tuple(taken) if 0.0 < self._usual_us <= LONGEST_US else ()
 
@@ -64,7 +74,7 @@ class InertialFeed:
         last_us, self._last_us = self._last_us, message.time_usec
         force = (message.xacc, message.yacc, message.zacc)
         rate = (message.xgyro, message.ygyro, message.zgyro)
-        if last_us is None or not isfinite(sum(force) + sum(rate)):
+        if last_us is None or not (_is_within(force, MOST_M_S2) and _is_within(rate, MOST_RAD_S)):
             return
         period_us = message.time_usec - last_us
         usual_us = self._usual_us or period_us
@@ -83,3 +93,8 @@ class InertialFeed:
             return
         x, y, z, vx, vy, vz, heading = map(sqrt, variances)
         self.accuracy = ReportedAccuracy(max(x, y), z, max(vx, vy), vz, heading, message.reset_counter)
+
+
+def _is_within(values: Vec3, most: float) -> bool:
+    """Whether all are numbers of at most this size."""
+    return all(abs(value) <= most for value in values)

@@ -136,6 +136,9 @@ class Navigator:
 
     def explore(self) -> VelocityFluCommand:
         """Fly to the view that shows most of what has not been seen."""
+        return self._compensated(self._explore())
+
+    def _explore(self) -> VelocityFluCommand:
         state, now_s = self._begin("explore")
         if self._goal is None or now_s - self._chosen_s >= EXPLORE_S:
             flight = self._flight
@@ -145,7 +148,7 @@ class Navigator:
             flight.spent += VIEWPOINT_WORK
             viewpoint = self._world.next_viewpoint(position_now(state), state.yaw)
             self._goal, self._chosen_s = Point(viewpoint.position_m, viewpoint.yaw_rad), now_s
-        return self._true(self._fly(self._goal))
+        return self._fly(self._goal)
 
     def fly_to(self, goal_m: Vec3) -> VelocityFluCommand:
         """Fly to a point on a smooth path; to one on the base, when that was looked at if need be."""
@@ -157,7 +160,7 @@ class Navigator:
         if self._goal != goal:
             self._goal = goal
             flight.change()
-        return self._true(self._fly(goal))
+        return self._compensated(self._fly(goal))
 
     def step_back(self, colour: str) -> VelocityFluCommand:
         """Fly back from a gate, to one of its sides, facing it."""
@@ -170,11 +173,11 @@ class Navigator:
                 side = 1 if self._steps_back % 2 else -1
                 self._goal = self._places.aside(gate, here_m, side, self._world.obstacles())
             self._steps_back += 1
-        return self._true(self._fly(self._goal))
+        return self._compensated(self._fly(self._goal))
 
     def cross(self, colour: str) -> VelocityFluCommand:
         """Fly through a gate as the map has it now, and on towards what comes next."""
-        return self._true(self._cross(colour))
+        return self._compensated(self._cross(colour))
 
     def _cross(self, colour: str) -> VelocityFluCommand:
         state, now_s = self._begin(f"cross {colour}")
@@ -214,7 +217,7 @@ class Navigator:
             crossing.aim(path.crossings[0])
         return command
 
-    def _true(self, command: VelocityFluCommand) -> VelocityFluCommand:
+    def _compensated(self, command: VelocityFluCommand) -> VelocityFluCommand:
         """What to command to a vehicle that is wrong about its velocity, so that it flies a command."""
         added = self._world.velocity_error_flu_m_s
         if not any(added):

@@ -60,10 +60,7 @@ class InertialTrack:
         Returns:
             Whether they continue those before.
         """
-        continued = bool(self._times_us)
-        if continued and samples and samples[0].time_us - self._times_us[-1] > LONGEST_GAP_US:
-            continued = False
-        if not continued:
+        if not self._times_us or self.is_interrupted(samples, time_us):
             self._times_us, self._sums, self._attitudes = (
                 [time_us],
                 [((0.0,) * 3, (0.0,) * 3, 0.0)],
@@ -83,6 +80,11 @@ class InertialTrack:
         old = bisect_left(self._times_us, self._times_us[-1] - KEPT_US)
         del self._times_us[:old], self._sums[:old], self._attitudes[:old]
         return True
+
+    def is_interrupted(self, samples: tuple[ImuInterval, ...], time_us: int) -> bool:
+        """Whether so many samples are missing before these, or before a time if there are none."""
+        next_us = samples[0].time_us if samples else time_us
+        return bool(self._times_us) and next_us - self._times_us[-1] > LONGEST_GAP_US
 
     def _add(self, sample: ImuInterval, attitude: Quaternion) -> Quaternion:
         """Add a sample that stands for the time since the last; the attitude at its end."""

@@ -59,7 +59,7 @@ IMAGE_STD_M = 0.001
 
 
 class PlaceEstimator:
-    """Estimates the drone's place from its states, and from the gates and points that images show.
+    """Estimates the drone's place from its states, and from the gates that images show.
 
     Args:
         camera: of the drone.
@@ -85,9 +85,13 @@ class PlaceEstimator:
 
     def add(self, state: DroneState) -> None:
         """Take in a state as the vehicle reports it; call it once a tick, before images are used."""
+        track, last, place = self._track, self._last, self._filter
+        if place is not None and last is not None and track.is_interrupted(state.imu, state.time_us):
+            self.advance(last.time_us)
+            self._bridge(place, last, state)
+            self._last = state
         if not state.imu:
             return
-        track, last = self._track, self._last
         if self._start is None:
             self._start = state
         continued = track.add(state.imu, state.time_us, state.attitude_arena)
@@ -100,8 +104,6 @@ class PlaceEstimator:
         if place is not None:
             if last is not None and _resets(last) != _resets(state):
                 place.p[TURN, TURN] += RESET_TURN_RAD**2
-            if not continued and last is not None:
-                self._bridge(place, last, state)
             for each in (*state.missed, state):
                 at_us = each.time_us - round(each.position_age_s * 1e6)
                 if not self._reports or at_us > self._reports[-1][0]:
@@ -119,7 +121,7 @@ class PlaceEstimator:
         return accuracy.position_std_m < min(SURE_M, max(ALWAYS_SURE_M, SURE_FACTOR * self._first_std_m))
 
     def _bridge(self, place: PlaceFilter, last: DroneState, state: DroneState) -> None:
-        """Go on after a gap in the IMU's samples: by how far the vehicle reports to have moved."""
+        """Go on while the IMU's samples are missing: by how far the vehicle reports to have moved."""
         gap_s = max(0.0, (state.time_us - place.time_us) * 1e-6)
         x, y = turned(state.x - last.x, state.y - last.y, place.turn_rad)
         place.displace(state.time_us, (x, y, state.z - last.z), BLIND_M * sqrt(gap_s), BLIND_M_S)

@@ -54,7 +54,22 @@ def test_messages_of_others_and_numbers_that_are_none_are_ignored():
     vehicle.samples([4_000, 8_000])
     vehicle.samples([12_000], component=191)
     vehicle.samples([16_000], xacc=None)
+    vehicle.samples([20_000], xacc=1e30)
     assert [sample.time_us for sample in vehicle.feed.take(50_000)] == [8_000]
+
+
+@pytest.mark.parametrize("sends", [False, True])
+async def test_a_vehicle_that_sends_odometry_keeps_its_rate(sends):
+    vehicle, requested = Vehicle(), []
+
+    async def note(rate_hz):
+        requested.append(rate_hz)
+
+    if sends:
+        covariance = {"pose_covariance": [0.01] * 21, "velocity_covariance": [0.01] * 21}
+        vehicle.send("ODOMETRY", time_usec=1000, frame_id=1, reset_counter=0, **covariance)
+    await vehicle.feed.request(SimpleNamespace(set_rate_imu=note, set_rate_odometry=note))
+    assert requested == ([250.0] if sends else [250.0, 10.0])
 
 
 @pytest.mark.parametrize("unknown", [False, True])

@@ -239,6 +239,18 @@ def test_samples_that_are_lost_for_a_while_make_the_place_less_sure_and_do_not_b
     assert np.abs(errors(states)[-40:]).max() < 3.0 * stated[-40:].max()
 
 
+def test_a_vehicle_whose_samples_end_in_flight_is_followed_by_its_reports():
+    states, world = fly(
+        Vehicle(5), change=lambda state: replace(state, imu=()) if state.time_us > 6_000_000 else state
+    )
+    drifting = Vehicle(5)
+    reported = [drifting.state(time_us) for time_us in range(TICK_US, 16_000_000, TICK_US)]
+    moved = errors(states)[-1] - errors(reported)[-1]
+    assert np.abs(moved).max() < 0.4  # as far from the reports as when the samples ended
+    assert states[-1].position_std_m > 0.2
+    assert hypot(*world.velocity_error_flu_m_s) < 0.1
+
+
 def test_the_same_flight_gives_the_same_estimate():
     first, _ = fly(Vehicle(7), 6.0)
     second, _ = fly(Vehicle(7), 6.0)
