@@ -11,7 +11,7 @@ from math import cos, sin
 import numpy as np
 
 from framerunner.geometry.vectors import Quaternion, Vec3
-from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.camera_model import NEAREST_M, CameraModel
 from offboard.navigation.gates.gate_measurement import GateView, predicted
 from offboard.navigation.pose_history import turned_by
 from offboard.place.place_filter import POSITION, TURN, VELOCITY, Floats, Measurement, Model

@@ -5,6 +5,7 @@ from math import cos, sin
 import numpy as np
 import pytest
 
+from framerunner.geometry.gate_shape import PAPER_GATE
 from framerunner.geometry.rotations import quaternion_from_euler, rotated_by_rate, rotation, to_body
 from offboard.drone import ImuInterval
 from offboard.navigation.camera_model import CameraModel
@@ -93,6 +94,7 @@ def view(seen=(True, True, True, True)):
     count = 2 * sum(seen)
     return GateView(
         colour="red",
+        shape=PAPER_GATE,
         whole=all(seen),
         time_us=0,
         camera=CAMERA.pose((0.0, 0.0, 1.0), LEVEL),
