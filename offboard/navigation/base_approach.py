@@ -13,7 +13,8 @@ BEFORE_M = 1.4  # from the base's centre: from there the drone looks at it
 ABOVE_M = 0.45  # its top: all of the top is in view
 SIDE_M = 0.5  # from the arena's sides, at least
 REACHED_M, REACHED_M_S = 0.25, 0.3
-LOOK_S = 2.5  # if the base is not seen in so long, it is looked for from another side
+SEARCH_S = 1.2  # if the base is not seen in so long, it is looked for farther around
+LOOK_S = 2.5  # likewise, from another side
 SIGHTINGS, SIGHTINGS_S = 4, 1.2  # so many in so long, and
 SURE_M = 0.03  # a place known so well are enough to land
 NEAR_M = 1.8  # from here on that is so in flight, too
@@ -36,6 +37,11 @@ class WayHome:
     def looks(self) -> bool:
         """The drone is on its way to a place from which it looks at the base, or is there."""
         return self._approach is not None and not self._approach.lands
+
+    @property
+    def searches(self) -> bool:
+        """See `BaseApproach`."""
+        return self._approach is not None and self._approach.searches
 
     def goal(
         self, goal_m: Vec3, state: DroneState, known: tuple[int, float] | None, *, no_path: bool
@@ -70,10 +76,11 @@ class BaseApproach:
 
     Attributes:
         lands: it is on its last way, to the goal.
+        searches: the base is not seen where it should be, so it may be farther away.
     """
 
     def __init__(self, base: Base, arena: Arena, goal_m: Vec3, here_m: Vec3) -> None:
-        self.lands = False
+        self.lands = self.searches = False
         self._base, self._arena, self._goal_m = base, arena, goal_m
         self._side_rad = atan2(here_m[1] - base.y_m, here_m[0] - base.x_m)
         self._tried = 0
@@ -99,13 +106,15 @@ class BaseApproach:
                     self._reached_us = state.time_us
             elif state.time_us - self._reached_us > LOOK_S * 1e6:
                 self.refuse(here_m)
+            elif state.time_us - self._reached_us > SEARCH_S * 1e6 and not (sightings or self.searches):
+                self.searches, self._reached_us = True, state.time_us
         return self._place
 
     def refuse(self, here_m: Vec3) -> None:
         """Look from another side, or land: the base is not seen from this one, or no path leads there."""
         if self.lands:
             return
-        self._reached_us = None
+        self._reached_us, self.searches = None, False
         if self._tried >= PLACES:
             self._land(here_m)
         else:

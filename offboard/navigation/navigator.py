@@ -156,7 +156,10 @@ class Navigator:
         flight = self._flight
         known = self._world.base_known(state.time_us - round(SIGHTINGS_S * 1e6))
         no_path = flight.path is None and flight.search is None and bool(flight.refusal)
+        searched = self._way_home.searches
         goal = self._way_home.goal(goal_m, state, known, no_path=no_path)
+        if self._way_home.searches and not searched:
+            self._world.doubt_place()
         if self._goal != goal:
             self._goal = goal
             flight.change()

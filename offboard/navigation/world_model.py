@@ -149,6 +149,10 @@ class WorldModel:
         std = self._place.std
         return None if std is None else (self._base.sightings(since_us), float(std[:2].max()))
 
+    def doubt_place(self) -> None:
+        """See `PlaceEstimator.doubt`."""
+        self._place.doubt()
+
     def _poses_of_rows(self, image: Detections, pose: DronePose) -> list[DronePose] | None:
         """With a rolling shutter, the drone's pose when each gate's middle row was read out."""
         if self._camera.readout_s == 0.0:

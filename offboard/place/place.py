@@ -55,7 +55,8 @@ BLIND_M_S = 0.3  # of the velocity after it
 POINTS_GATE = 30.0  # squared distance that fits; corners of a rigid cube have six degrees of freedom
 POINTS_STD_FACTOR = 2.0  # of corners: the errors of images from nearly the same place are not independent
 POINTS_MISFITS = 4  # in a row: known points tell that the estimate is wrong, and that is less well known then
-MISFIT_STD = (0.2, 0.2, 0.05, radians(4.0))  # metres, radians
+MISFIT_M, MISFIT_RAD = (0.2, 0.2, 0.05), radians(4.0)
+UNSEEN_M, UNSEEN_RAD = (0.5, 0.5, 0.05), radians(4.0)
 IMAGE_STD_M = 0.001
 
 
@@ -283,18 +284,19 @@ class PlaceEstimator:
             return False
         covariance = POINTS_STD_FACTOR**2 * sighting.covariance_px2
         model = points(points_m, sighting.pixels, covariance, self._eye(pose, at), pose.attitude_std_rad)
-        distance2 = place.distance2(model)
-        if distance2 is None:
-            return False
-        if distance2 > POINTS_GATE:
-            self._misfits += 1
-            if self._misfits >= POINTS_MISFITS:
-                self._misfits = 0
-                place.p[range(4), range(4)] += np.square(MISFIT_STD)
-            return False
-        self._misfits = 0
-        place.update(model)
-        return True
+        if place.update(model, POINTS_GATE):
+            self._misfits = 0
+            return True
+        self._misfits += 1
+        if self._misfits >= POINTS_MISFITS:
+            self._misfits = 0
+            place.doubt(MISFIT_M, MISFIT_RAD)
+        return False
+
+    def doubt(self) -> None:
+        """What should be in view for long is not seen: the place is not known as well as it seems."""
+        if self._filter is not None:
+            self._filter.doubt(UNSEEN_M, UNSEEN_RAD)
 
     @property
     def std(self) -> Floats | None:
