@@ -6,7 +6,7 @@ from math import atan2, cos, hypot, pi, remainder, sin
 import pytest
 
 from offboard.drone import DroneState
-from offboard.navigation.base_approach import BEFORE_M, LOOK_S, PLACES, SIGHTINGS, WayHome
+from offboard.navigation.base_approach import BEFORE_M, LOOK_S, PLACES, SEARCH_S, SIGHTINGS, WayHome
 from scenarios.models import Arena, Base
 
 BASE = Base(x_m=1.0, y_m=-2.0)
@@ -88,3 +88,14 @@ def test_a_new_way_looks_again() -> None:
     way.begin()
     way.goal(GOAL_M, near, NOT_SEEN, no_path=False)
     assert way.looks
+
+
+def test_one_that_is_not_seen_is_first_looked_for_farther_around() -> None:
+    way = WayHome(BASE, Arena())
+    place = way.goal(GOAL_M, state_at(-3.0, 0.0, 1.0), NOT_SEEN, no_path=False)
+    for time_s, searches in ((10.0, False), (10.1 + SEARCH_S, True), (10.0 + LOOK_S + SEARCH_S, True)):
+        assert way.goal(GOAL_M, state_at(*place.position_m, time_s), NOT_SEEN, no_path=False) == place
+        assert way.searches == searches
+    elsewhere = state_at(*place.position_m, 10.2 + LOOK_S + SEARCH_S)
+    assert way.goal(GOAL_M, elsewhere, NOT_SEEN, no_path=False) != place
+    assert not way.searches

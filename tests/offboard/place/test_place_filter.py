@@ -163,3 +163,41 @@ def test_a_gate_is_known_as_well_from_the_drone_as_it_was_seen_however_far_that_
     assert place.gate("red") is None
     assert place.gate("blue").tolist() == [-3.0, 1.0, 1.2, 1.3]
     assert place.gate_from_drone("blue") == pytest.approx(seen, abs=1e-9)
+
+
+CORNERS_M = np.array(
+    [(2.4 + x, 0.1 + y, z) for x in (-0.25, 0.25) for y in (-0.25, 0.25) for z in (0.0, 0.5)]
+)
+
+
+def corners_from(true_m):
+    """The corners of a base in an image that is taken at a place."""
+    eye = Eye(CAMERA, LEVEL, (0.0, 0.0, 0.0))
+    camera = CAMERA.pose(true_m, LEVEL)
+    pixels = np.array([CAMERA.project(camera, tuple(corner)) for corner in CORNERS_M])
+    return lambda spoilt_px: points(
+        CORNERS_M, pixels + spoilt_px, 0.25 * np.eye(2 * len(pixels)), eye, attitude_std_rad=0.003
+    )
+
+
+def test_a_place_that_is_far_off_is_found_by_known_corners_once_it_is_doubted():
+    true_m = (0.9, 0.3, 0.9)
+    measured = corners_from(true_m)
+    place = PlaceFilter(0, (0.2, -0.4, 0.93), (0.0, 0.0, 0.0), position_std_m=0.05)
+    assert not place.update(measured(0.0), 30.0)
+    assert place.x[:3] == pytest.approx((0.2, -0.4, 0.93))
+    place.doubt((0.5, 0.5, 0.05), 0.07)
+    other = np.random.default_rng(1).normal(0.0, 12.0, (len(CORNERS_M), 2))
+    assert not place.update(measured(other), 30.0)
+    assert place.update(measured(0.0), 30.0)
+    assert place.x[:3] == pytest.approx(true_m, abs=0.02)
+
+
+def test_a_doubted_place_is_known_as_well_as_before_relative_to_the_gates():
+    place = PlaceFilter(0, (0.2, -0.4, 0.9), (0.0, 0.0, 0.0))
+    place.add_gate("red", np.array((2.0, 0.5, 1.2, 0.3)), 1e-4 * np.eye(4))
+    before, gate_m = place.gate_from_drone("red"), place.p[OWN, OWN]
+    place.doubt((0.5, 0.5, 0.05), 0.07)
+    assert place.gate_from_drone("red") == pytest.approx(before, abs=1e-9)
+    assert place.p[0, 0] > 0.25
+    assert place.p[OWN, OWN] > gate_m + 0.25
