@@ -9,11 +9,13 @@ vehicle sets them repeatedly, and an app that stops doing so leaves no stream ru
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import threading
 from collections.abc import Awaitable
 from math import degrees
 from typing import Any
 
+from mavsdk.asyncio import MavsdkError
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.plugins.offboard import VelocityBodyYawspeed
 
@@ -21,12 +23,17 @@ from framerunner.wire import px4_modes
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.px4_modes import Px4Mode
 from offboard.drone import ResponsePrior, VelocityFluCommand
+from offboard.link import inertial
 from offboard.link.dialect import AutopilotKind, Dialect, ModeNames
 from offboard.link.direct import synchronous
 from offboard.link.stepped import SteppedDialect
 
 _TAKEN_S = 0.3  # wall time in which PX4 takes a request that it cannot return a PING after
-_POSITIONS_HZ = 50.0
+STREAMS_HZ = {
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0,
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: inertial.RATE_HZ,
+    mavlink.MAVLINK_MSG_ID_ODOMETRY: inertial.ACCURACY_HZ,
+}
 
 
 def _parameters(mode: Px4Mode) -> tuple[float, ...]:
@@ -132,14 +139,17 @@ class SteppedPx4Dialect(SteppedDialect):
     _interval_requested = False  # since the last tick
 
     def request_streams(self) -> Awaitable[None]:
-        """Request positions as often as the app uses them.
+        """Request positions, the IMU's samples and their errors as often as the app uses them.
 
-        PX4's thread that receives messages waits then, until time has gone on.
+        After each request PX4's thread that receives messages waits until time has gone on.
         """
-        self._interval_requested = True
-        interval_us = 1e6 / _POSITIONS_HZ
-        number = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
-        return self._request(number, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, interval_us)
+        return self._request_streams()
+
+    async def _request_streams(self) -> None:
+        for message_id, rate_hz in STREAMS_HZ.items():
+            self._interval_requested = True
+            with contextlib.suppress(MavsdkError):
+                await self._request(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz)
 
     async def _until_taken(self) -> None:
         if self._interval_requested:
