@@ -22,7 +22,7 @@ from offboard.navigation.search.looking_places import LookingPlaces
 from offboard.navigation.view import NavigationView, Surroundings
 from offboard.navigation.world_model import WorldModel
 from scenarios.models import COLOURS
-from vision.types import BaseExpectation, Detections
+from vision.types import Detections
 
 GAP_S = 0.6  # an action that was not called for so long begins again
 EXPLORE_S = 0.5  # between two choices of where to look next
@@ -36,12 +36,17 @@ SEARCH_AFTER_M = 2.0  # from behind a gate to the drone, when it is chosen where
 
 
 class Navigator:
-    """The world model, the path, and the action that is flown. All positions are in arena axes."""
+    """The world model, the path, and the action that is flown. All positions are in arena axes.
+
+    Attributes:
+        expected_base: see `WorldModel.expected_base`.
+    """
 
     def __init__(self, surroundings: Surroundings, limits: CommandLimits = CONTEST) -> None:
         self._style = style_of(limits)
         self._camera = CameraModel.of(surroundings.camera)
         self._world = WorldModel(surroundings, self._style)
+        self.expected_base = self._world.expected_base
         self._flight = PathFlight(surroundings.arena, self._style, limits)
         self._places = LookingPlaces(surroundings.arena, self._style)
         self._start_m: Vec3 | None = None
@@ -77,10 +82,6 @@ class Navigator:
         if self._start_m is None:
             self._start_m = position_now(state)
         return state
-
-    def expected_base(self, time_us: int) -> BaseExpectation | None:
-        """See `WorldModel.expected_base`."""
-        return self._world.expected_base(time_us)
 
     def is_known(self, colour: str) -> bool:
         """The gate is on the map."""
