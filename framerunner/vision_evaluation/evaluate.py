@@ -16,6 +16,7 @@ from rich.table import Table
 
 from framerunner.errors import SettingError
 from framerunner.terminal import table_console
+from framerunner.vision_evaluation.base_scores import BaseScores, rate_base
 from framerunner.vision_evaluation.labelled_images import Disturbance, LabelledImage, labelled_images
 from framerunner.vision_evaluation.scores import (
     RATED_ANGLE_DEG,
@@ -65,8 +66,10 @@ def evaluate_vision(settings: VisionSettings) -> None:
     _make_folder(settings.out)
     scores, examples = detect_all(_shown(settings), settings.detector)
     print_scores(scores, settings.title)
+    base = rate_base(settings.level, settings.images, settings.seed, settings.disturbance)
+    print_base_scores(base)
     report = settings.out / REPORT
-    report.write_text(json.dumps(finite(_as_json(settings, scores), 5), indent=1), encoding="utf-8")
+    report.write_text(json.dumps(finite(_as_json(settings, scores, base), 5), indent=1), encoding="utf-8")
     from framerunner.vision_evaluation.picture import save_picture
 
     save_picture(scores, examples, settings.title, settings.out / PICTURE)
@@ -126,7 +129,7 @@ def _make_folder(path: Path) -> None:
         raise SettingError(f"{path}: cannot be a folder ({error.strerror}); choose another") from error
 
 
-def _as_json(settings: VisionSettings, scores: Scores) -> dict[str, object]:
+def _as_json(settings: VisionSettings, scores: Scores, base: BaseScores) -> dict[str, object]:
     return {
         "level": settings.level.name,
         "images": scores.images,
@@ -135,6 +138,8 @@ def _as_json(settings: VisionSettings, scores: Scores) -> dict[str, object]:
         "detectors": [asdict(row) for row in scores.in_sum()],
         "by_distance_m": [asdict(row) for row in scores.by_distance()],
         "by_angle_deg": [asdict(row) for row in scores.by_angle()],
+        "base_by_distance_m": [asdict(row) for row in base.rows()],
+        "base_false_alarms": {"of": base.others, "count": base.false_alarms},
         "false_alarms": scores.false_alarms,
         "median_ms": {kind: sorted(times)[len(times) // 2] for kind, times in scores.times_ms.items()},
     }
@@ -155,6 +160,33 @@ def print_scores(scores: Scores, title: str) -> None:
         times_ms = np.percentile(scores.times_ms[kind], (50, 95))
         console.print(
             f"{kind}: {scores.false_alarms[kind]} false alarms, "
+            f"{times_ms[0]:.2f} ms an image (95 %: {times_ms[1]:.2f} ms)",
+            markup=False,
+        )
+
+
+def print_base_scores(scores: BaseScores) -> None:
+    """Print how well the base was found to standard output."""
+    console = table_console(130)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("base, by distance", no_wrap=True)
+    for column in ("images", "found", "corners", "95 %", "corners / std"):
+        table.add_column(column, justify="right")
+    for row in scores.rows():
+        if row.images:
+            table.add_row(
+                f"{row.low_m:g} to {row.high_m:g} m",
+                str(row.images),
+                _cell(row.found, 100.0, ".1f", " %"),
+                _cell(row.error_median_px, 1.0, ".2f", " px"),
+                _cell(row.error_p95_px, 1.0, ".2f", " px"),
+                _cell(row.deviation_rms, 1.0, ".2f", ""),
+            )
+    console.print(table)
+    if scores.times_ms:
+        times_ms = np.percentile(scores.times_ms, (50, 95))
+        console.print(
+            f"base: {scores.false_alarms} false alarms in {scores.others} images without it, "
             f"{times_ms[0]:.2f} ms an image (95 %: {times_ms[1]:.2f} ms)",
             markup=False,
         )

@@ -96,7 +96,7 @@ def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbanc
         position, attitude = scene.draw_pose(poses)
         motion = scene.draw_motion(motions)
         painted = scene.camera.render(position, attitude, motion=motion)
-        image = _disturbed(painted, disturbance, noise)
+        image = disturbed(painted, disturbance, noise)
         labels = scene.labels(position, attitude)
         yield LabelledImage(
             image, scene.scenario.name, position, attitude, scene.calibration, labels, scene.shapes
@@ -247,7 +247,8 @@ def _vector(values: Floats) -> Vec3:
     return (x, y, z)
 
 
-def _disturbed(image: Image, disturbance: Disturbance, stream: np.random.Generator) -> Image:
+def disturbed(image: Image, disturbance: Disturbance, stream: np.random.Generator) -> Image:
+    """An image made harder."""
     if disturbance.blur_px > 0.0:
         image = np.asarray(cv2.GaussianBlur(image, (0, 0), disturbance.blur_px), np.uint8)
     if disturbance.light != 1.0 or disturbance.noise > 0.0:

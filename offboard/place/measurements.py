@@ -11,7 +11,7 @@ from math import cos, sin
 import numpy as np
 
 from framerunner.geometry.vectors import Quaternion, Vec3
-from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.camera_model import NEAREST_M, CameraModel
 from offboard.navigation.gates.gate_measurement import GateView, predicted
 from offboard.navigation.pose_history import turned_by
 from offboard.place.place_filter import POSITION, TURN, VELOCITY, Floats, Measurement, Model
@@ -124,5 +124,52 @@ def corners(view: GateView, eye: Eye, first: int, yaw_var_rad2: float) -> Model:
             + PLACE_STD_M**2 * (moved @ moved.T)
         )
         return Measurement(view.corners_px - corners_px, jacobian, noise)
+
+    return at
+
+
+def points(
+    points_m: Floats, pixels: Floats, covariance_px2: Floats, eye: Eye, attitude_std_rad: float
+) -> Model:
+    """Known points in an image, such as corners of the base.
+
+    The attitude's error is common to all of them.
+
+    Args:
+        points_m: in the arena, shape (n, 3).
+        pixels: right of and below the optical axis, shape (n, 2).
+        covariance_px2: of all coordinates, shape (2 n, 2 n).
+        eye: that sees them.
+        attitude_std_rad: standard deviation of its attitude.
+    """
+
+    def at(state: Floats) -> Measurement | None:
+        place_m, attitude = eye.place(state)
+        camera = eye.model.pose(place_m, attitude)
+        focal_px = eye.model.focal_px
+        turn = np.array(camera.rotation).reshape(3, 3)
+        in_camera = (points_m - camera.position_m) @ turn
+        ahead = in_camera[:, 0]
+        if float(ahead.min()) < NEAREST_M:
+            return None
+        seen = -focal_px * in_camera[:, 1:] / ahead[:, None]
+        right, down = seen.T
+        by_body = np.zeros((len(seen), 2, 3))
+        by_body[:, 0, 0], by_body[:, 0, 1] = -right, -focal_px
+        by_body[:, 1, 0], by_body[:, 1, 2] = -down, -focal_px
+        by_point = (by_body / ahead[:, None, None]) @ turn.T
+        x, y, _ = (points_m - state[POSITION]).T
+        jacobian = np.zeros((len(seen), 2, len(state)))
+        jacobian[:, :, POSITION] = -by_point
+        jacobian[:, :, TURN] = by_point[:, :, 0] * y[:, None] - by_point[:, :, 1] * x[:, None]
+        turned = np.stack(
+            [
+                np.stack([down, -right * down / focal_px, focal_px + right * right / focal_px], axis=1),
+                np.stack([-right, -focal_px - down * down / focal_px, right * down / focal_px], axis=1),
+            ],
+            axis=1,
+        ).reshape(-1, 3)
+        noise = covariance_px2 + attitude_std_rad**2 * (turned @ turned.T)
+        return Measurement((pixels - seen).ravel(), jacobian.reshape(-1, len(state)), noise)
 
     return at

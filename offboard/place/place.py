@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot, pi, radians, remainder, sqrt
 
+import numpy as np
+
 from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import DroneState, ReportedAccuracy
@@ -22,9 +24,9 @@ from offboard.navigation.pose_history import DronePose, PoseCorrection, turned_b
 from offboard.navigation.view import GateEstimate
 from offboard.place.inertial_track import InertialTrack
 from offboard.place.landmarks import GateLandmarks
-from offboard.place.measurements import Eye, height, position, stands, velocity
-from offboard.place.place_filter import POSITION, TURN, VELOCITY, PlaceFilter
-from vision.types import GateSighting
+from offboard.place.measurements import Eye, height, points, position, stands, velocity
+from offboard.place.place_filter import POSITION, TURN, VELOCITY, Floats, PlaceFilter
+from vision.types import BaseSighting, GateSighting
 
 # A place that is known no better than this, or this many times worse than at the start, is not known.
 SURE_M = 0.1
@@ -50,6 +52,11 @@ RESET_TURN_RAD = radians(3.0)
 BLIND_M = 0.1  # of the reported way in a gap of the IMU's samples, per root of a second
 BLIND_M_S = 0.3  # of the velocity after it
 
+POINTS_GATE = 30.0  # squared distance that fits; corners of a rigid cube have six degrees of freedom
+POINTS_STD_FACTOR = 2.0  # of corners: the errors of images from nearly the same place are not independent
+POINTS_MISFITS = 4  # in a row: known points tell that the estimate is wrong, and that is less well known then
+MISFIT_M, MISFIT_RAD = (0.2, 0.2, 0.05), radians(4.0)
+UNSEEN_M, UNSEEN_RAD = (0.5, 0.5, 0.05), radians(4.0)
 IMAGE_STD_M = 0.001
 
 
@@ -71,6 +78,7 @@ class PlaceEstimator:
         self._left_us: int | None = None  # when the drone left the ground
         self._landmarks = GateLandmarks()
         self._fused_us = 0
+        self._misfits = 0  # of known points, in a row
 
     @property
     def estimates(self) -> bool:
@@ -259,6 +267,41 @@ class PlaceEstimator:
             if view is not None:
                 by_colour.setdefault(sighting.colour, []).append((view, self._eye(pose, at)))
         self._landmarks.see(place, by_colour, gates)
+
+    def see_points(
+        self, points_m: Floats, sighting: BaseSighting, pose: DronePose, at: PoseCorrection
+    ) -> bool:
+        """Use known points in an image, to whose time the filter was brought; whether they fit.
+
+        Args:
+            points_m: in the arena, shape (n, 3).
+            sighting: of them.
+            pose: corrected, of the drone when they were read out.
+            at: the correction of the pose.
+        """
+        place = self._filter
+        if place is None:
+            return False
+        covariance = POINTS_STD_FACTOR**2 * sighting.covariance_px2
+        model = points(points_m, sighting.pixels, covariance, self._eye(pose, at), pose.attitude_std_rad)
+        if place.update(model, POINTS_GATE):
+            self._misfits = 0
+            return True
+        self._misfits += 1
+        if self._misfits >= POINTS_MISFITS:
+            self._misfits = 0
+            place.doubt(MISFIT_M, MISFIT_RAD)
+        return False
+
+    def doubt(self) -> None:
+        """What should be in view for long is not seen: the place is not known as well as it seems."""
+        if self._filter is not None:
+            self._filter.doubt(UNSEEN_M, UNSEEN_RAD)
+
+    @property
+    def std(self) -> Floats | None:
+        """Standard deviations of x, y, z (metres) and the heading (radians); None if nothing is estimated."""
+        return None if self._filter is None else np.sqrt(self._filter.p.diagonal()[:4])
 
     def _eye(self, pose: DronePose, at: PoseCorrection) -> Eye:
         """The carrier of a corrected pose, without the correction."""

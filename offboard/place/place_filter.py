@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, radians, sin, sqrt
+from math import cos, inf, radians, sin, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -37,7 +37,7 @@ START_POSITION_M = 0.003
 START_VELOCITY_M_S = 0.02
 START_TURN_RAD = radians(1.0)
 START_BIAS_M_S2 = 0.05
-ITERATIONS = 3
+ITERATIONS = 5
 MOVED = 0.005  # metres or radians: where the state moves less, linearising anew changes nothing
 
 
@@ -181,6 +181,21 @@ class PlaceFilter:
         self.p[each, each] += std_m**2
         self.p[each + 4, each + 4] += velocity_std_m_s**2
 
+    def doubt(self, std_m: Vec3, heading_std_rad: float) -> None:
+        """Know less well where drone and gates are in the arena; relative to one another they stay known.
+
+        Args:
+            std_m: of x, y and z, in addition.
+            heading_std_rad: of the heading, in addition.
+        """
+        common = np.zeros((len(self.x), 4))
+        common[:4] = np.eye(4)
+        for at in self.gates.values():
+            x, y, _ = self.x[at : at + 3] - self.x[POSITION]
+            common[at : at + GATE] = np.eye(GATE)
+            common[at : at + 2, TURN] = (-y, x)
+        self.p += common * np.square((*std_m, heading_std_rad)) @ common.T
+
     def distance2(self, model: Model) -> float | None:
         """Square of a measurement's Mahalanobis distance; None if it cannot be made."""
         at = model(self.x)
@@ -189,8 +204,18 @@ class PlaceFilter:
         spread = at.jacobian @ self.p @ at.jacobian.T + at.noise
         return float(at.residual @ np.linalg.solve(spread, at.residual))
 
-    def update(self, model: Model) -> None:
-        """Use a measurement, linearised where it leads to (Bell & Cathey, IEEE TAC 38(2), 1993)."""
+    def update(self, model: Model, most2: float = inf) -> bool:
+        """Use a measurement, linearised where it leads to (Bell & Cathey, IEEE TAC 38(2), 1993).
+
+        Args:
+            model: of the measurement.
+            most2: it is used if the squares of the Mahalanobis distances of what is measured and of the state
+                from where it leads to are no more together. For a linear model this is `distance2`; it also
+                holds where little was known, and the model is far from linear.
+
+        Returns:
+            Whether it was used.
+        """
         before = at = self.x
         for _ in range(ITERATIONS):
             measurement = model(at)
@@ -198,14 +223,25 @@ class PlaceFilter:
                 break
             h, noise = measurement.jacobian, measurement.noise
             across = self.p @ h.T
+            innovation = measurement.residual - h @ (before - at)
             gain = np.linalg.solve(h @ across + noise, across.T).T
-            led = before + gain @ (measurement.residual - h @ (before - at))
+            led = before + gain @ innovation
             moved, at = float(np.abs(led - at).max()), led
             if moved < MOVED:
                 break
-        if at is not before:
-            kept = np.eye(len(before)) - gain @ h
-            self.x, self.p = at, kept @ self.p @ kept.T + gain @ noise @ gain.T
+        if at is before:
+            return False
+        if most2 < inf:
+            reached, of_state = model(at), np.linalg.solve(h @ across + noise, innovation)
+            if reached is None:
+                return False
+            distance2 = float(of_state @ h @ across @ of_state)
+            distance2 += float(reached.residual @ np.linalg.solve(reached.noise, reached.residual))
+            if distance2 > most2:
+                return False
+        kept = np.eye(len(before)) - gain @ h
+        self.x, self.p = at, kept @ self.p @ kept.T + gain @ noise @ gain.T
+        return True
 
     def add_gate(self, colour: str, state: Floats, covariance: Floats) -> None:
         """Begin to estimate a gate: x, y, z and yaw as seen from the drone where it is estimated to be.
