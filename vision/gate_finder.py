@@ -107,11 +107,15 @@ class GateFinder:
         found: list[tuple[_Box, GateSighting]] = []
         for group in _groups(mask, others):
             sighting = self._sighting(mask, others, np.concatenate(group))
+            if (sighting is None or not sighting[1].whole) and len(group) > 1:
+                # What is joined may be two things: a gate, and mixed colours at an obstacle's edge.
+                each = [self._sighting(mask, others, fragment) for fragment in group]
+                alone = [one for one in each if one is not None and (sighting is None or one[1].whole)]
+                if alone:
+                    found += alone
+                    continue
             if sighting is not None:
                 found.append(sighting)
-            elif len(group) > 1:
-                alone = (self._sighting(mask, others, fragment) for fragment in group)
-                found += [one for one in alone if one is not None]
         if not found:
             return [], NOT_SEEN
         height, width = mask.mask.shape

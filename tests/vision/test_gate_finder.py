@@ -224,7 +224,9 @@ def test_a_gate_before_a_poster_of_its_colour_is_found(up_m):
 
 
 def test_a_bar_that_is_expected_wider_than_the_image_is_looked_for_in_the_image_only():
-    patch = ImagePatch(np.zeros((40, 60), np.uint8), (30.0, 20.0), (160.0, 120.0))
+    patch = ImagePatch(
+        np.zeros((40, 60), np.uint8), np.zeros((40, 60), np.int16), (30.0, 20.0), (160.0, 120.0)
+    )
     a, b, c, d = (-10.0, -5.0), (10.0, -5.0), (10.0, 5.0), (-10.0, 5.0)
     edges = find_edges(patch, ((a, b), (b, c), (c, d), (d, a)), [(1e9, 1e9)] * 4)
     assert not edges.outer_ok.any()
