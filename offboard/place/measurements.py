@@ -6,7 +6,7 @@ Each function gives the measurement's model: residual, Jacobian and noise at a s
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, sin
+from math import cos, inf, sin
 
 import numpy as np
 
@@ -14,36 +14,51 @@ from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import NEAREST_M, CameraModel
 from offboard.navigation.gates.gate_measurement import GateView, predicted
 from offboard.navigation.pose_history import turned_by
-from offboard.place.place_filter import POSITION, TURN, VELOCITY, Floats, Measurement, Model
+from offboard.place.place_filter import OWN, POSITION, TURN, Floats, Measurement, Model
 
 PLACE_STD_M = 0.0005  # of the camera on the drone
 
 
-def velocity(reported_m_s: Vec3, level_std_m_s: float, climb_std_m_s: float) -> Model:
-    """A reported velocity, in the axes of the reported heading."""
-    x, y, z = reported_m_s
+def report(
+    velocity_m_s: Vec3,
+    level_std_m_s: float,
+    climb_std_m_s: float,
+    *,
+    position_m: Vec3 = (0.0, 0.0, 0.0),
+    height_std_m: float = inf,
+    position_std_m: float = inf,
+) -> Model:
+    """What a vehicle reports of its motion.
+
+    Args:
+        velocity_m_s: in the axes of the reported heading.
+        level_std_m_s: of its level components.
+        climb_std_m_s: of the vertical one.
+        position_m: above the arena's floor, and in plan.
+        height_std_m: infinite: the height is not used.
+        position_std_m: of each coordinate in plan; infinite: they are not used.
+    """
+    vx, vy, vz = velocity_m_s
+    stds = [level_std_m_s, level_std_m_s, climb_std_m_s]
+    used = []  # coordinates of the position
+    for axis, std_m in ((2, height_std_m), (0, position_std_m), (1, position_std_m)):
+        if std_m < inf:
+            used.append(axis)
+            stds.append(std_m)
+    measured = [position_m[axis] for axis in used]
+    noise = np.diag(np.square(stds))
+    shown = np.zeros((len(stds), OWN))
+    shown[np.arange(3), np.arange(4, 7)] = 1.0
+    shown[np.arange(3, len(stds)), used] = 1.0
 
     def at(state: Floats) -> Measurement:
         c, s = cos(state[TURN]), sin(state[TURN])
-        ax, ay = c * x - s * y, s * x + c * y
-        jacobian = np.zeros((3, len(state)))
-        jacobian[:, VELOCITY] = np.eye(3)
-        jacobian[:2, TURN] = (ay, -ax)
-        residual = np.array((ax, ay, z)) - state[VELOCITY]
-        return Measurement(
-            residual, jacobian, np.diag(np.square((level_std_m_s, level_std_m_s, climb_std_m_s)))
-        )
-
-    return at
-
-
-def height(reported_m: float, std_m: float) -> Model:
-    """A reported height above the arena's floor."""
-
-    def at(state: Floats) -> Measurement:
-        jacobian = np.zeros((1, len(state)))
-        jacobian[0, 2] = 1.0
-        return Measurement(np.array((reported_m - state[2],)), jacobian, np.array(((std_m**2,),)))
+        ax, ay = c * vx - s * vy, s * vx + c * vy
+        jacobian = np.zeros((len(stds), len(state)))
+        jacobian[:, :OWN] = shown
+        jacobian[0, TURN], jacobian[1, TURN] = ay, -ax
+        residual = np.array((ax, ay, vz, *measured)) - shown @ state[:OWN]
+        return Measurement(residual, jacobian, noise)
 
     return at
 
@@ -56,16 +71,6 @@ def stands(position_m: Vec3, turn_rad: float, std_m: float, turn_std_rad: float,
     def at(state: Floats) -> Measurement:
         jacobian = np.eye(len(known), len(state))
         return Measurement(known - state[: len(known)], jacobian, noise)
-
-    return at
-
-
-def position(reported_m: Vec3, std_m: float) -> Model:
-    """A reported place in plan."""
-
-    def at(state: Floats) -> Measurement:
-        residual = np.array(reported_m[:2]) - state[:2]
-        return Measurement(residual, np.eye(2, len(state)), std_m**2 * np.eye(2))
 
     return at
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from math import hypot, pi, radians, remainder, sqrt
+from math import hypot, inf, pi, radians, remainder, sqrt
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from offboard.navigation.pose_history import DronePose, PoseCorrection, turned_b
 from offboard.navigation.view import GateEstimate
 from offboard.place.inertial_track import InertialTrack
 from offboard.place.landmarks import GateLandmarks
-from offboard.place.measurements import Eye, height, points, position, stands, velocity
+from offboard.place.measurements import Eye, points, report, stands
 from offboard.place.place_filter import POSITION, TURN, VELOCITY, Floats, PlaceFilter
 from vision.types import BaseSighting, GateSighting
 
@@ -71,7 +71,7 @@ class PlaceEstimator:
         self._camera, self._shapes = camera, shapes
         self._track = InertialTrack()
         self._filter: PlaceFilter | None = None
-        self._reports: deque[tuple[int, DroneState]] = deque()
+        self._reports: deque[tuple[int, DroneState, ReportedAccuracy]] = deque()
         self._last: DroneState | None = None
         self._start: DroneState | None = None
         self._first_std_m: float | None = None
@@ -108,13 +108,14 @@ class PlaceEstimator:
         if self._filter is None and continued and not self._is_sure(state):
             self._filter = PlaceFilter(position_us, (state.x, state.y, state.z), state.velocity_arena_m_s)
         place = self._filter
-        if place is not None:
+        accuracy = state.accuracy
+        if place is not None and accuracy is not None:
             if last is not None and _resets(last) != _resets(state):
                 place.p[TURN, TURN] += RESET_TURN_RAD**2
             for each in (*state.missed, state):
                 at_us = each.time_us - round(each.position_age_s * 1e6)
                 if not self._reports or at_us > self._reports[-1][0]:
-                    self._reports.append((at_us, each))
+                    self._reports.append((at_us, each, accuracy))
         self._last = state
 
     def _is_sure(self, state: DroneState) -> bool:
@@ -132,7 +133,7 @@ class PlaceEstimator:
         gap_s = max(0.0, (state.time_us - place.time_us) * 1e-6)
         x, y = turned(state.x - last.x, state.y - last.y, place.turn_rad)
         place.displace(state.time_us, (x, y, state.z - last.z), BLIND_M * sqrt(gap_s), BLIND_M_S)
-        place.update(velocity(state.velocity_arena_m_s, BLIND_M_S, BLIND_M_S))
+        place.update(report(state.velocity_arena_m_s, BLIND_M_S, BLIND_M_S))
         self._reports.clear()
 
     def advance(self, time_us: int | None = None) -> bool:
@@ -147,9 +148,9 @@ class PlaceEstimator:
         at_us = last.time_us - LATE_US if time_us is None else time_us
         reports = self._reports
         while reports and reports[0][0] <= at_us:
-            report_us, report = reports.popleft()
+            report_us, state, accuracy = reports.popleft()
             if report_us >= place.time_us and self._predict(place, report_us):
-                self._use(place, report, report_us)
+                self._use(place, state, accuracy, report_us)
         return self._predict(place, at_us)
 
     def _predict(self, place: PlaceFilter, time_us: int) -> bool:
@@ -162,16 +163,15 @@ class PlaceEstimator:
         place.time_us = time_us
         return True
 
-    def _use(self, place: PlaceFilter, report: DroneState, time_us: int) -> None:
+    def _use(self, place: PlaceFilter, state: DroneState, accuracy: ReportedAccuracy, time_us: int) -> None:
         """Fuse what a state reports of a time."""
-        accuracy, start = report.accuracy, self._start
-        assert accuracy is not None, "without it there is no filter"
+        start = self._start
         assert start is not None, "the filter begins with a state"
         step_s = min(max((time_us - self._fused_us) * 1e-6, 0.01), 0.2)
         self._fused_us = time_us
         stood = self._left_us is None or time_us < self._left_us - STOOD_US
-        if stood and hypot(*report.velocity_arena_m_s) < STANDS_M_S:
-            turn_rad = remainder(start.yaw - report.yaw, 2 * pi)
+        if stood and hypot(*state.velocity_arena_m_s) < STANDS_M_S:
+            turn_rad = remainder(start.yaw - state.yaw, 2 * pi)
             place.update(stands((start.x, start.y, start.z), turn_rad, *STANDS_STD))
             return
         slow = sqrt(2.0 * ERROR_S / step_s)
@@ -179,11 +179,17 @@ class PlaceEstimator:
             slow * max(std, LEAST_VELOCITY_STD_M_S)
             for std in (accuracy.velocity_std_m_s, accuracy.climb_std_m_s)
         )
-        place.update(velocity(report.velocity_arena_m_s, level, climb))
-        place.update(height(report.z, max(accuracy.height_std_m, LEAST_HEIGHT_STD_M)))
-        if self._knows_position(accuracy):
-            at_m = (report.x, report.y, report.z)
-            place.update(position(at_m, slow * max(accuracy.position_std_m, LEAST_POSITION_STD_M)))
+        knows = self._knows_position(accuracy)
+        place.update(
+            report(
+                state.velocity_arena_m_s,
+                level,
+                climb,
+                position_m=(state.x, state.y, state.z),
+                height_std_m=max(accuracy.height_std_m, LEAST_HEIGHT_STD_M),
+                position_std_m=slow * max(accuracy.position_std_m, LEAST_POSITION_STD_M) if knows else inf,
+            )
+        )
 
     def _is_settling(self, time_us: int) -> bool:
         """Whether the vehicle may correct its heading now."""

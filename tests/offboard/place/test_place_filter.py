@@ -11,7 +11,7 @@ from offboard.drone import ImuInterval
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.gates.gate_measurement import GateView
 from offboard.place.inertial_track import GRAVITY_M_S2, InertialTrack
-from offboard.place.measurements import Eye, corners, height, points, position, stands, velocity
+from offboard.place.measurements import Eye, corners, points, report, stands
 from offboard.place.place_filter import OWN, TURN, PlaceFilter
 from scenarios.models import Camera
 
@@ -109,9 +109,11 @@ def view(seen=(True, True, True, True)):
 @pytest.mark.parametrize(
     "model",
     [
-        velocity((0.6, -0.1, 0.2), 0.1, 0.05),
-        height(1.3, 0.05),
-        position((0.2, 0.1, 1.0), 0.01),
+        report((0.6, -0.1, 0.2), 0.1, 0.05),
+        report((0.6, -0.1, 0.2), 0.1, 0.05, position_m=(0.2, 0.1, 1.3), height_std_m=0.05),
+        report(
+            (0.6, -0.1, 0.2), 0.1, 0.05, position_m=(0.2, 0.1, 1.3), height_std_m=0.05, position_std_m=0.01
+        ),
         stands((0.2, 0.1, 1.0), 0.1, 0.01, 0.01, 0.01),
         corners(view(), EYE, OWN, 0.0),
         corners(view((True, False, False, True)), EYE, OWN, 0.0),
