@@ -319,8 +319,16 @@ class PlaceEstimator:
         )
 
     def known(self, estimate: GateEstimate) -> GateEstimate:
-        """A gate of the map, the best of its colour, as the filter has it: exact relative to the drone."""
-        return estimate if self._filter is None else self._landmarks.known(self._filter, estimate)
+        """A gate of the map, the best of its colour, as the filter has it: exact relative to the drone.
+
+        One that the filter could have and has not is not certain: the map knows nothing of how the drone drifts.
+        """
+        place, last = self._filter, self._last
+        if place is None or last is None:
+            return estimate
+        if estimate.colour not in place.gates:
+            return replace(estimate, certain=False) if last.imu else estimate
+        return self._landmarks.known(place, estimate)
 
 
 def _resets(state: DroneState) -> int:
