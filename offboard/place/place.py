@@ -321,7 +321,7 @@ class PlaceEstimator:
     def known(self, estimate: GateEstimate) -> GateEstimate:
         """A gate of the map, the best of its colour, as the filter has it: exact relative to the drone.
 
-        One that the filter could have and has not is not certain: the map knows nothing of how the drone drifts.
+        One that the filter could have and has not is not certain: the map does not know how the drone drifts.
         """
         place, last = self._filter, self._last
         if place is None or last is None:
