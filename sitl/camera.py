@@ -29,6 +29,7 @@ from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.models import Scenario, TrueState
 from sitl.camera_projection import Pinhole
+from sitl.optics.backdrop import Backdrop
 from sitl.optics.painter import MARGIN_PX, Image, Painter
 from sitl.optics.sensor import SCALE, LensMap, SensorChain
 
@@ -69,6 +70,7 @@ class SimulatedCamera:
             pinhole = Pinhole(width, height, settings.focal_px, settings.near_m, settings.far_m)
         else:
             self._lens = lens = LensMap(settings)
+            self._blur_px = effects.blur_px
             self._sensor = SensorChain(settings, seed)
             # Of the read-out while as many rows are read as the canvas has.
             self._readout_s = effects.readout_s * lens.height_px / (SCALE * settings.height_px)
@@ -90,6 +92,7 @@ class SimulatedCamera:
         motion: ExposureMotion = STILL,
         *,
         gimbal_arena: Quaternion | None = None,
+        backdrop: Backdrop | None = None,
     ) -> Image:
         """What the camera sees.
 
@@ -102,6 +105,7 @@ class SimulatedCamera:
             motion: of the drone, for blur and rolling shutter; its time is that of light and noise.
             gimbal_arena: attitude of a camera on a gimbal, forward-left-up to arena; its centre is the
                 camera's place on the drone. None: the camera is fixed to the drone.
+            backdrop: seen behind gates, base and obstacles, instead of floor, hall and sky.
 
         Returns:
             A new image, BGR, shape (height, width, 3), uint8; its rows need not follow each other in memory.
@@ -118,12 +122,19 @@ class SimulatedCamera:
         if self._effects is None:
             attitude = _unit(attitude_arena)
             eye, rotation = self._seen_from(position_arena_m, attitude)
-            return self._painter.paint(eye, rotation, drones, time_us=motion.time_us)[_INSIDE]
-        light = self._exposed(position_arena_m, attitude_arena, drones, motion)
+            return self._painter.paint(eye, rotation, drones, time_us=motion.time_us, backdrop=backdrop)[
+                _INSIDE
+            ]
+        light = self._exposed(position_arena_m, attitude_arena, drones, motion, backdrop)
         return self._sensor.develop(light, motion.time_us)
 
     def _exposed(
-        self, position: Vec3, attitude: Quaternion, drones: Sequence[Solid], motion: ExposureMotion
+        self,
+        position: Vec3,
+        attitude: Quaternion,
+        drones: Sequence[Solid],
+        motion: ExposureMotion,
+        backdrop: Backdrop | None,
     ) -> Image:
         """The mean of what is seen behind the lens during the exposure."""
         drift = None
@@ -139,7 +150,13 @@ class SimulatedCamera:
             after_s = self._exposure_s * ((index + 0.5) / count - 0.5)
             eye, rotation = self._pose_at(position, attitude, motion, after_s)
             self._painter.paint(
-                eye, rotation, drones, time_us=motion.time_us, drift=drift, canvas=self._canvas
+                eye,
+                rotation,
+                drones,
+                time_us=motion.time_us,
+                drift=drift,
+                canvas=self._canvas,
+                backdrop=backdrop,
             )
             seen = self._lens.image(self._canvas)
             if mean is None:
@@ -147,6 +164,8 @@ class SimulatedCamera:
             else:
                 cv2.addWeighted(mean, index / (index + 1), seen, 1 / (index + 1), 0.0, dst=mean)
         assert mean is not None  # there is at least one exposure
+        if self._blur_px > 0.0:
+            mean = np.asarray(cv2.GaussianBlur(mean, (0, 0), self._blur_px), np.uint8)
         return mean
 
     @property
