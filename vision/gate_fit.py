@@ -84,6 +84,20 @@ def fit_gate(patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float)
     return _fit_any(patch, sides, focal_px, spread_px)
 
 
+def gate_of_axes(axes_corners: Sequence[Point], std_px: float, focal_px: float) -> FittedGate | None:
+    """A gate that is seen whole, by where the axes of its bars meet; None if no gate looks so.
+
+    Args:
+        axes_corners: upper left, upper right, lower right and lower left, pixels from the optical axis.
+        std_px: standard deviation of each of their coordinates.
+        focal_px: focal length.
+    """
+    meetings: _Meetings = [Meeting(x, y, std_px, std_px) for x, y in axes_corners]
+    poses = find_poses(axes_corners, focal_px, _max_error_px(meetings))
+    corners = _outer_corners(meetings, poses[0], focal_px, True) if poses else None
+    return None if corners is None else _fitted(corners, True, poses, meetings)
+
+
 def _least_length(sides: Sides) -> float:
     """Length of the shortest side, pixels; 0 if one is not seen."""
     return min(
