@@ -4,8 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
+from vision.bar_edges import find_edges
 from vision.fill_shares import find_filled
 from vision.gate_finder import GateFinder
+from vision.patch import ImagePatch
 from vision.thin_gates import find_rings
 
 OUTLINE = np.array([[140.0, 100.0], [162.0, 103.0], [161.0, 114.5], [139.0, 111.0]])  # the bars' axes
@@ -51,3 +53,11 @@ def test_the_finder_gives_its_pose():
     assert [(sighting.colour, sighting.whole) for sighting in sightings] == [("green", True)]
     # 22.2 pixels between the axes of the upright bars, 0.40 m apart: about 2.9 m.
     assert 2.4 < np.hypot(*sightings[0].poses[0].position_flu_m[:2]) < 3.3
+
+
+def test_a_bar_wider_than_the_image_is_looked_for_in_the_image_only():
+    labels = np.zeros((40, 60), np.uint8)
+    patch = ImagePatch(labels, (30.0, 20.0), (160.0, 120.0))
+    a, b, c, d = (-10.0, -5.0), (10.0, -5.0), (10.0, 5.0), (-10.0, 5.0)
+    edges = find_edges(patch, ((a, b), (b, c), (c, d), (d, a)), [(1e9, 1e9)] * 4)
+    assert not edges.outer_ok.any()
