@@ -1,7 +1,7 @@
 """The axes of a gate's bars in an image, as straight lines fitted to the bars' edges.
 
 The bars are square rods. Seen from anywhere, the middle of a rod's image is nearly the image of its axis, and
-a blur, a threshold or pixels painted too large widen both its edges alike. So each side of a gate is
+a blur or an image's brightness curve moves both its edges alike. So each side of a gate is
 measured as the middle of its bar; the four axes are a rectangle in the gate's middle plane. Where only the
 outer edge is seen (the opening is too small in the image, or hidden), half the bar's width is added to it.
 """
@@ -69,8 +69,8 @@ def fit_lines(edges: BarEdges, focal_px: float, offsets: Floats | None = None) -
     Args:
         edges: of the bars.
         focal_px: focal length.
-        offsets: what `frame_model.bar_offsets` says of these edges, at the first and last place of each side
-            and with the spread of the pixels, if a pose is known; else the edges are taken to be symmetric.
+        offsets: what `gate_model.bar_offsets` says of these edges, at the first and last place of each
+            side, if a pose is known; else the edges are taken to be symmetric.
     """
     both = edges.outer_ok & edges.inner_ok
     axis, half_px = _axis(edges, both, offsets)

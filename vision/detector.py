@@ -6,6 +6,9 @@ Navigation Systems", Electronics 2021, 10, 7, and their published implementation
 Choices where the sources leave room:
 
 - The colour test for red, |g - b| < 20 and r - g > 50, is used for green and blue with r -> g -> b -> r.
+- A camera mixes what shares a pixel, and the paper's test is for pixels that do not. So one at a gate's edge
+  counts if it is filled by half, and those of lines thinner than a pixel do if they differ from what is
+  around them as the gate's colour does (`colour_regions.py`).
 - Distance and angle are given for a gate *wholly* in view, as the paper says: its box touches no border of
   the image. The published code looks at the top and bottom rows only, so that a gate cut off at a side
   seems narrower than it is and its angle is far too large.
@@ -18,7 +21,7 @@ from math import acos, degrees, hypot
 
 import cv2
 
-from vision.colour_regions import Plane, split_planes
+from vision.colour_regions import Plane, find_primaries, half_filled, split_planes
 from vision.types import NOT_SEEN, Detection, Detections, Image
 
 GATE_HEIGHT_M = 0.23
@@ -45,12 +48,13 @@ def detect(image: Image, time_us: int | None = None, *, focal_px: float | None =
     Raises:
         ValueError: the image is not of that shape and type.
     """
-    blue, green, red = split_planes(image)
+    planes = blue, green, red = split_planes(image)
+    lines = {found.colour: found.mask for found in find_primaries(planes)}
     focal = image.shape[1] / 2 if focal_px is None else focal_px
     return Detections(
-        red=_find(red, green, blue, focal),
-        green=_find(green, blue, red, focal),
-        blue=_find(blue, red, green, focal),
+        red=_find(red, green, blue, lines.get("red"), focal),
+        green=_find(green, blue, red, lines.get("green"), focal),
+        blue=_find(blue, red, green, lines.get("blue"), focal),
         time_us=time_us,
     )
 
@@ -82,15 +86,19 @@ def measure(
     return Detection(n, s, e, w, distance_m, degrees(acos(apparent_width / full_width)))
 
 
-def _find(shown: Plane, following: Plane, other: Plane, focal_px: float) -> Detection:
+def _find(shown: Plane, following: Plane, other: Plane, line: Plane | None, focal_px: float) -> Detection:
     """Detect one colour, given the planes of its channel, the next channel and the remaining one."""
     # Saturating subtraction keeps every difference in uint8; a pixel stays non-zero where a test passes.
-    _, mask = cv2.threshold(cv2.subtract(shown, following), MIN_EXCESS, 255, cv2.THRESH_BINARY)
-    if cv2.countNonZero(mask) == 0:
-        return NOT_SEEN
-    gap = cv2.absdiff(following, other)
-    _, grey = cv2.threshold(gap, MAX_GREY_GAP - 1, 255, cv2.THRESH_BINARY_INV, dst=gap)
-    column, row, columns, rows = cv2.boundingRect(cv2.bitwise_and(mask, grey, dst=mask))
+    excess = cv2.subtract(shown, following)
+    _, mask = cv2.threshold(excess, MIN_EXCESS, 255, cv2.THRESH_BINARY)
+    if cv2.countNonZero(mask):
+        gap = cv2.absdiff(following, other)
+        _, grey = cv2.threshold(gap, MAX_GREY_GAP - 1, 255, cv2.THRESH_BINARY_INV, dst=gap)
+        cv2.bitwise_and(mask, grey, dst=mask)
+        cv2.bitwise_and(mask, half_filled(excess), dst=mask)
+    if line is not None:
+        cv2.bitwise_or(mask, line, dst=mask)
+    column, row, columns, rows = cv2.boundingRect(mask)
     if rows == 0:
         return NOT_SEEN
     height, width = shown.shape

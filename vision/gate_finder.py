@@ -34,12 +34,6 @@ _Contour = npt.NDArray[np.int32]
 _Box = tuple[int, int, int, int]
 _Found = tuple[_Box, GateSighting]
 
-PAINTED_SPREAD_PX = 0.5
-"""How much larger than true the simulator paints on each side: a border is on the nearest pixels."""
-
-SMOOTH_SPREAD_PX = 0.25
-"""The same with camera effects, which are painted at twice the resolution."""
-
 _OBSTACLE_STEP = 8
 _MIN_RUN_PX = 3
 _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are upright
@@ -57,15 +51,12 @@ class GateFinder:
 
     Args:
         focal_px: focal length of the camera; its optical axis is in the middle of the image.
-        spread_px: how much larger than true a region looks on each side: `PAINTED_SPREAD_PX` for images of
-            the simulator, 0 for those of a real camera.
         lens: of a camera that is not ideal; it has the same focal length. What is found is then in pixels of
             an ideal camera.
     """
 
-    def __init__(self, focal_px: float, spread_px: float = 0.0, lens: Lens | None = None) -> None:
+    def __init__(self, focal_px: float, lens: Lens | None = None) -> None:
         self._focal_px = focal_px
-        self._spread_px = spread_px
         self._lens = lens
 
     def find(self, image: Image, time_us: int | None = None) -> Detections:
@@ -183,7 +174,7 @@ class GateFinder:
         """The likeliest gate of several first estimates."""
         best: FittedGate | None = None
         for sides in candidates:
-            fitted = fit_gate(patch, sides, self._focal_px, self._spread_px)
+            fitted = fit_gate(patch, sides, self._focal_px)
             if fitted is not None and (
                 best is None or (fitted.whole, -fitted.cost) > (best.whole, -best.cost)
             ):

@@ -67,21 +67,20 @@ class FittedGate(NamedTuple):
     cost: float
 
 
-def fit_gate(patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float) -> FittedGate | None:
+def fit_gate(patch: ImagePatch, sides: Sides, focal_px: float) -> FittedGate | None:
     """Fit a gate to a region; None if the region is no gate and no sure part of one.
 
     Args:
         patch: the region.
         sides: first estimates of its outer edges, pixels from the optical axis, from pixel centre to centre.
         focal_px: focal length.
-        spread_px: how much larger than its true outline a region is painted on each side.
     """
     if patch.has_foreign and _least_length(sides) >= _CLEAR_PX:
         # It may be behind what is beside it, or in front of that: then four whole bars are seen.
-        fitted = _fit_any(patch.in_front(), sides, focal_px, spread_px)
+        fitted = _fit_any(patch.in_front(), sides, focal_px)
         if fitted is not None and fitted.whole:
             return fitted
-    return _fit_any(patch, sides, focal_px, spread_px)
+    return _fit_any(patch, sides, focal_px)
 
 
 def gate_of_axes(axes_corners: Sequence[Point], std_px: float, focal_px: float) -> FittedGate | None:
@@ -105,11 +104,11 @@ def _least_length(sides: Sides) -> float:
     )
 
 
-def _fit_any(patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float) -> FittedGate | None:
-    lines, meetings, poses = _fit(patch, sides, focal_px, spread_px)
+def _fit_any(patch: ImagePatch, sides: Sides, focal_px: float) -> FittedGate | None:
+    lines, meetings, poses = _fit(patch, sides, focal_px)
     known = [(met.x, met.y) for met in meetings if met is not None]
     if len(known) == 4:
-        if poses and not _has_bars(lines, known, poses[0], focal_px, spread_px):
+        if poses and not _has_bars(lines, known, poses[0], focal_px):
             return None
         support = patch.support(known, known[1:] + known[:1])
         if max(support.empty) <= _MAX_EMPTY:
@@ -121,18 +120,16 @@ def _fit_any(patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float)
         a, b, c, d = (
             side if empty <= _MAX_EMPTY else None for side, empty in zip(sides, support.empty, strict=True)
         )
-        lines, meetings, poses = _fit(patch, (a, b, c, d), focal_px, spread_px)
+        lines, meetings, poses = _fit(patch, (a, b, c, d), focal_px)
     corners = _outer_corners(meetings, poses[0], focal_px, False) if poses else None
     if corners is None:
         if not patch.may_be_cut:
             return None  # nothing explains why no more is seen of it
-        corners = _corners_without_pose(patch, lines, spread_px)
+        corners = _corners_without_pose(patch, lines)
     return _fitted(corners, False, poses, meetings) if any(corners) else None
 
 
-def _has_bars(
-    lines: BarLines, axes_corners: Sequence[Point], pose: ModelPose, focal_px: float, spread_px: float
-) -> bool:
+def _has_bars(lines: BarLines, axes_corners: Sequence[Point], pose: ModelPose, focal_px: float) -> bool:
     """Whether there is an opening where it is large enough to be seen, and the bars are as wide as a gate's.
 
     Posters and drawn rectangles are not. The limits let through all gates of some thousand images, rendered
@@ -153,7 +150,7 @@ def _has_bars(
     offsets = bar_offsets(pose, tuple(line.steep for line in known), inward, spans, focal_px)
     if offsets is None:
         return True
-    half_px = 0.5 * (offsets[:, 1] - offsets[:, 0]).mean(axis=1)[clear] + spread_px
+    half_px = 0.5 * (offsets[:, 1] - offsets[:, 0]).mean(axis=1)[clear]
     wider_px = float(np.mean([known[k].half_px for k in clear]) - half_px.mean())
     expected_px = float(half_px.mean())
     most_px, least_px = (limit + share * expected_px for limit, share in (_TOO_WIDE, _TOO_THIN))
@@ -169,11 +166,9 @@ def _fitted(corners: Corners, whole: bool, poses: list[ModelPose], meetings: _Me
     return FittedGate(corners, whole, tuple(map(as_seen, poses)), min(costs, default=inf))
 
 
-def _fit(
-    patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float
-) -> tuple[BarLines, _Meetings, list[ModelPose]]:
+def _fit(patch: ImagePatch, sides: Sides, focal_px: float) -> tuple[BarLines, _Meetings, list[ModelPose]]:
     """The axes of the sides, where they meet (sides k - 1 and k) and the poses that follow."""
-    edges = find_edges(patch, sides, expected_widths(sides, spread_px))
+    edges = find_edges(patch, sides, expected_widths(sides))
     lines, meetings, poses = _lines_and_poses(patch, edges, None, (), focal_px)
     if all(line is not None and line.open > _CLEAR_OPEN and line.half_px < _THIN_PX for line in lines):
         # So far away that the middle of a bar's image is its axis.
@@ -184,8 +179,6 @@ def _fit(
         offsets = bar_offsets(poses[0], edges.steep, edges.inward, edges.spans, focal_px)
         if offsets is None:
             break
-        offsets[:, 0] -= spread_px
-        offsets[:, 1] += spread_px
         wider = _wider(edges, offsets)
         lines, meetings, poses = _lines_and_poses(patch, edges, offsets, poses, focal_px)
         if wider is None or not poses:
@@ -313,7 +306,7 @@ def _facing(pose: ModelPose) -> float:
     return abs(float(pose.rotation[:, 2] @ pose.shift_m)) / hypot(*pose.shift_m.tolist())
 
 
-def _corners_without_pose(patch: ImagePatch, lines: BarLines, spread_px: float) -> Corners:
+def _corners_without_pose(patch: ImagePatch, lines: BarLines) -> Corners:
     """Corners of the outline if too little of a gate is seen for a pose: where two bars are seen to meet.
 
     They are half a bar outside the axes. A bar's depth is seen beside its width, how much of it depends on
@@ -331,7 +324,7 @@ def _corners_without_pose(patch: ImagePatch, lines: BarLines, spread_px: float) 
         middles = [_point(bar) for bar in bars]
         if min(patch.support([(met.x, met.y)] * 2, middles).own) < _WHOLE:
             continue
-        outer = meeting(_moved_outward(before, spread_px), _moved_outward(after, spread_px))
+        outer = meeting(_moved_outward(before), _moved_outward(after))
         found[k] = None if outer is None else _corner(outer, 0.0, 0.0, False)
     return _corners(found)
 
@@ -341,11 +334,10 @@ def _point(line: BarLine) -> tuple[float, float]:
     return (line.at, line.along) if line.steep else (line.along, line.at)
 
 
-def _moved_outward(line: BarLine, spread_px: float) -> BarLine:
+def _moved_outward(line: BarLine) -> BarLine:
     """From the axis of a bar to its outer edge in the gate's middle plane."""
-    half_px = max(line.half_px - spread_px, 0.0)
-    at = line.at - line.inward * _WIDTH_SHARE * half_px
-    return line._replace(at=at, var_at=line.var_at + (_WIDTH_SHARE_STD * half_px) ** 2)
+    at = line.at - line.inward * _WIDTH_SHARE * line.half_px
+    return line._replace(at=at, var_at=line.var_at + (_WIDTH_SHARE_STD * line.half_px) ** 2)
 
 
 def _corner(met: Meeting, right_px: float, down_px: float, whole: bool) -> GateCorner | None:

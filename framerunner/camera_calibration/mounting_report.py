@@ -217,8 +217,7 @@ def measure_recorded(
         simulated = result is not None and result.judged_by == "truth"
         scenario = RunFiles(folder).load_scenario()
         known = _calibration(calibration, scenario if simulated else None)
-        smooth = scenario is not None and scenario.camera.effects is not None
-        detect = new_detector("frames", calibration=known, rendered=simulated, smooth=smooth)
+        detect = new_detector("frames", calibration=known)
         images: list[Detections] = []
         reports: list[MotionReport] = []
         with Console(stderr=True).status("looking for frames in the recorded images"):

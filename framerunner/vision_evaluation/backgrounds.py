@@ -64,9 +64,8 @@ class Backgrounds:
         part = photograph[top : top + rows, left : left + columns]
         if stream.random() < 0.5:
             part = part[:, ::-1]
-        canvas = 1 if camera.effects is None else SCALE  # pixels of the canvas to one of the image
-        factor = _AROUND * canvas
+        factor = _AROUND * SCALE
         size = (round(factor * camera.width_px), round(factor * camera.height_px))
         shrinks = columns > size[0]
         resized = cv2.resize(part, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
-        return Backdrop(np.asarray(resized, np.uint8), canvas * camera.focal_px, rotation)
+        return Backdrop(np.asarray(resized, np.uint8), SCALE * camera.focal_px, rotation)

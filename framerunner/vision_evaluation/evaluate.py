@@ -63,7 +63,7 @@ def evaluate_vision(settings: VisionSettings) -> None:
         DetectorError, ExtensionError: the detector of others cannot be used.
     """
     _make_folder(settings.out)
-    scores, examples = detect_all(_shown(settings), rendered=True, others=settings.detector)
+    scores, examples = detect_all(_shown(settings), settings.detector)
     print_scores(scores, settings.title)
     report = settings.out / REPORT
     report.write_text(json.dumps(finite(_as_json(settings, scores), 5), indent=1), encoding="utf-8")

@@ -78,7 +78,6 @@ class LabelledImage:
     attitude_arena: Quaternion
     calibration: Calibration
     gates: tuple[GateLabel, ...]
-    smooth: bool = False  # painted with camera effects
 
     @property
     def focal_px(self) -> float:
@@ -116,9 +115,7 @@ def labelled_images(
             backdrop = backgrounds.draw(scene.scenario.camera, rows, streams.backgrounds)
         image = scene.image(position, attitude, motion, chain, backdrop)
         labels = scene.labels(position, attitude)
-        yield LabelledImage(
-            image, scene.scenario.name, position, attitude, scene.calibration, labels, scene.smooth
-        )
+        yield LabelledImage(image, scene.scenario.name, position, attitude, scene.calibration, labels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +139,6 @@ class _LabelledScene:
         self.scenario = scenario
         self.camera = SimulatedCamera(scenario, seed)
         self.calibration = true_calibration(scenario.camera)
-        self.smooth = scenario.camera.effects is not None
         self._lens = None if self.calibration.is_ideal else Lens(self.calibration)
         others = [scenario.base.solid, *scenario.prisms]
         self._solids = [*(gate.hull for gate in scenario.all_gates), *others]
@@ -160,7 +156,7 @@ class _LabelledScene:
 
     def draw_motion(self, stream: np.random.Generator, *, moves: bool) -> ExposureMotion:
         """When the image is taken, and how the drone moves then: as in a contest flight."""
-        if not (self.smooth or moves):
+        if self.scenario.camera.effects is None and not moves:
             return STILL
         time_us = int(stream.uniform(0.0, _LAST_S) * 1e6)
         vx, vy, vz = (float(value) for value in stream.uniform(-_MAX_SPEED_M_S, _MAX_SPEED_M_S, 3))

@@ -125,7 +125,7 @@ class ErrorRow:
 
 
 def detect_all(
-    labelled: Iterable[LabelledImage], *, rendered: bool, others: str | DetectorMaker | None = None
+    labelled: Iterable[LabelledImage], others: str | DetectorMaker | None = None
 ) -> tuple[Scores, list[Example]]:
     """Run our detectors over images, and one of others if it is given; also give back some images.
 
@@ -139,7 +139,7 @@ def detect_all(
     for one in labelled:
         if calibration != one.calibration:
             calibration = one.calibration
-            detectors = {k: detector_of(one, k, rendered=rendered) for k in KINDS}
+            detectors = {k: new_detector(k, calibration=calibration) for k in KINDS}
             if others is not None:
                 detectors[detector_name(others)] = others_detector(others, calibration)
             for detector in detectors.values():
@@ -162,11 +162,6 @@ def _example(labelled: LabelledImage, detections: Detections) -> Example:
         and _sighting_of(label, detections.frames) is None
     ]
     return Example(labelled, detections, tuple(missed), tuple(_false_alarms(labelled, detections)))
-
-
-def detector_of(labelled: LabelledImage, kind: Vision, *, rendered: bool) -> Detector:
-    """The detector for the camera of an image."""
-    return new_detector(kind, calibration=labelled.calibration, rendered=rendered, smooth=labelled.smooth)
 
 
 def rows_by(

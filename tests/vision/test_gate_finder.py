@@ -19,7 +19,7 @@ from vision.types import Detections, GateSighting
 GATE = Gate(colour="green", x_m=0, y_m=0, z_m=1.5, yaw_rad=0.4)
 SCENARIO = Scenario(name="one", frames=(GATE,), base=Base(x_m=4.5, y_m=4.5))
 CAMERA = SimulatedCamera(SCENARIO)
-FIND = new_detector("frames", focal_px=CAMERA.focal_px, rendered=True)
+FIND = new_detector("frames", focal_px=CAMERA.focal_px)
 
 
 def look(
@@ -155,10 +155,10 @@ def test_a_calibrated_camera_gives_corners_and_poses_of_an_ideal_one(distance_m,
         (0.0, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0)
     )
     calibration = Calibration.ideal(320, 240, camera.focal_px, BARREL.coefficients)
-    find = new_detector("frames", calibration=calibration, rendered=True, smooth=True)
+    find = new_detector("frames", calibration=calibration)
     (sighting,) = find(image, None).frames
     assert sighting.poses[0].position_flu_m == pytest.approx((x, y, 0.0), abs=0.015 * distance_m)
-    ideal = new_detector("frames", focal_px=camera.focal_px, rendered=True, smooth=True)
+    ideal = new_detector("frames", focal_px=camera.focal_px)
     blind = ideal(image, None).frames
     if distance_m < 1.0:  # without the calibration it is no gate, or elsewhere
         assert (

@@ -57,7 +57,7 @@ def test_the_finder_gives_its_pose():
 
 def test_a_bar_wider_than_the_image_is_looked_for_in_the_image_only():
     labels = np.zeros((40, 60), np.uint8)
-    patch = ImagePatch(labels, (30.0, 20.0), (160.0, 120.0))
+    patch = ImagePatch(labels, np.zeros((40, 60), np.int16), (30.0, 20.0), (160.0, 120.0))
     a, b, c, d = (-10.0, -5.0), (10.0, -5.0), (10.0, 5.0), (-10.0, 5.0)
     edges = find_edges(patch, ((a, b), (b, c), (c, d), (d, a)), [(1e9, 1e9)] * 4)
     assert not edges.outer_ok.any()

@@ -14,10 +14,10 @@ from framerunner.geometry.rotations import quaternion_from_euler, rotation, rota
 from framerunner.vision_evaluation.backgrounds import Backgrounds
 from framerunner.vision_evaluation.camera_chain import PRESETS, CameraChain
 from framerunner.vision_evaluation.labelled_images import labelled_images
-from framerunner.vision_evaluation.scores import detector_of
 from scenarios.models import Camera
 from scenarios.random_scenarios import load_level
 from sitl.camera_projection import Pinhole
+from vision.detectors import new_detector
 
 
 def test_the_report_compares_both_detectors(tmp_path, capsys):
@@ -59,7 +59,7 @@ def test_gates_of_crowded_scenes_are_found_where_they_are(chain):
     find = None
     found = whole = 0
     for labelled in labelled_images(load_level("crowded"), 60, 40, chain):
-        find = find or detector_of(labelled, "frames", rendered=True)
+        find = find or new_detector("frames", calibration=labelled.calibration)
         sightings = find(labelled.image, None).frames
         for label in labelled.gates:
             if label.whole and label.distance_m < 4 and label.angle_deg < 70:
@@ -103,7 +103,9 @@ def test_a_photograph_is_behind_the_gates():
     compared = 0
     for before, behind in zip(plain, with_photograph("plain", 12, 3), strict=True):
         assert before.gates == behind.gates
-        same = (before.image == behind.image).all(axis=2)
+        same = (
+            np.abs(before.image.astype(int) - behind.image).max(axis=2) < 60
+        )  # edges mix with what is behind
         assert same.mean() < 0.5  # of sky and floor nothing is left
         for label in before.gates:
             if label.whole and label.distance_m < 3.0:
