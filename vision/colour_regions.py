@@ -17,6 +17,7 @@ import numpy.typing as npt
 from vision.types import Image
 
 Plane = npt.NDArray[np.uint8]
+Signed = npt.NDArray[np.int16]
 
 PRIMARIES = ("red", "green", "blue")
 OBSTACLE = "violet"
@@ -51,6 +52,8 @@ _LEAST_EXCESS = np.uint8(12)
 _FEWEST_SURE = 2  # pixels; of thin lines far away only a few are sure
 _BESIDE = np.ones((3, 3), np.uint8)
 _THIN = np.ones((5, 5), np.uint8)  # what is narrower than this is a line
+_AROUND = np.ones((9, 9), np.uint8)  # as far as a pixel has a part in what stands out
+_LIGHTER = 1.2
 _REACH_PX = 8  # from sure pixels, to others of lines of the same colour
 _REACH = np.ones((2 * _REACH_PX + 1, 2 * _REACH_PX + 1), np.uint8)
 
@@ -67,7 +70,7 @@ class ColourMask:
     shown: tuple[Plane, ...]  # the channels of the image that are bright in it
     pale: tuple[Plane, ...]  # and those that are dark
 
-    def excess(self, box: tuple[int, int, int, int]) -> npt.NDArray[np.int16]:
+    def excess(self, box: tuple[int, int, int, int]) -> Signed:
         """How far the bright channels exceed the dark ones in a box; less than 0 beside other colours.
 
         It is linear in the light, so a pixel that is filled by half is half-way between what is beside it.
@@ -163,8 +166,7 @@ def _grown(sure: ColourMask, others: Sequence[Plane]) -> ColourMask | None:
 
     A camera mixes thin bars and edges with what is behind them. However bright that is, a pixel that the bar
     fills by half has half the excess of those beside it; so beside pixels that are sure, that is the test.
-    Lines thinner than a pixel, in some of whose pixels nothing is sure, are what stands out in their
-    neighbourhood by excess and hue (white top-hat transform).
+    Some pixels of lines thinner than a pixel are filled by less, and have hardly a hue of their own.
     """
     column, row, columns, rows = sure.box
     left, top = max(column - _REACH_PX, 0), max(row - _REACH_PX, 0)
@@ -178,19 +180,34 @@ def _grown(sure: ColourMask, others: Sequence[Plane]) -> ColourMask | None:
     cv2.bitwise_and(filled, cv2.dilate(known, _BESIDE), dst=filled)
     cv2.bitwise_or(filled, known, dst=filled)
     cv2.bitwise_and(filled, _same_hue(gap, excess), dst=filled)
-
-    line = cv2.convertScaleAbs(cv2.morphologyEx(difference, cv2.MORPH_TOPHAT, _THIN))
-    least = cv2.convertScaleAbs(cv2.dilate(line, _BESIDE), alpha=THIN_FILLED)
-    thin = cv2.compare(line, np.maximum(least, np.uint8(MIN_EXCESS)), cv2.CMP_GT)
-    cv2.bitwise_and(thin, _same_hue(cv2.morphologyEx(gap, cv2.MORPH_TOPHAT, _THIN), line), dst=thin)
+    thin = _thin_lines(difference, gap)
     cv2.bitwise_and(thin, cv2.dilate(known, _REACH), dst=thin)
     for other in others:  # beside another colour everything stands out
-        cv2.subtract(thin, cv2.dilate(_crop(other, part), _THIN), dst=thin)
-    cv2.bitwise_or(filled, thin, dst=filled)
+        cv2.subtract(thin, cv2.dilate(_crop(other, part), _AROUND), dst=thin)
+    cv2.bitwise_or(filled, thin, dst=thin)
+    with_others = cv2.compare(cv2.boxFilter(thin & 1, -1, (3, 3), normalize=False), 1.0, cv2.CMP_GT)
+    cv2.bitwise_or(filled, cv2.bitwise_and(thin, with_others), dst=filled)
     known[...] = filled
     if cv2.countNonZero(filled) < MIN_PIXELS:
         return None
     return _kept(sure, (*part[:2], filled.shape[1], filled.shape[0]), filled)
+
+
+def _thin_lines(excess: Signed, gap: Plane) -> Plane:
+    """Where thin lines stand out in their neighbourhood by excess and hue (white top-hat transform).
+
+    Args:
+        excess: of the colour over the others, less than 0 where these are brighter.
+        gap: between the channels that should be equal.
+    """
+    line = cv2.morphologyEx(excess, cv2.MORPH_TOPHAT, _THIN)
+    # In a shadow an excess below 0 is smaller by as much as all is darker; a line is to fill a fifth or more.
+    lighter = cv2.compare(cv2.addWeighted(excess, _LIGHTER, line, 1.0, 0.0), 0.0, cv2.CMP_GT)
+    line = cv2.convertScaleAbs(line)
+    least = cv2.convertScaleAbs(cv2.dilate(line, _BESIDE), alpha=THIN_FILLED)
+    found = cv2.compare(line, np.maximum(least, np.uint8(MIN_EXCESS)), cv2.CMP_GT)
+    same = _same_hue(cv2.morphologyEx(gap, cv2.MORPH_TOPHAT, _THIN), line)
+    return np.asarray(cv2.bitwise_and(cv2.bitwise_and(found, same), lighter), np.uint8)
 
 
 def half_filled(excess: Plane) -> Plane:
