@@ -52,9 +52,7 @@ def test_the_data_set_has_what_is_in_each_image(tmp_path):
     assert (tmp_path / "labels.json").read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    "chain", [CameraChain(), CameraChain(noise=3, blur_px=(0.6, 0.6), light=(0.7, 0.7), jpeg=98)]
-)
+@pytest.mark.parametrize("chain", [CameraChain(), CameraChain(noise=3, blur_px=(0.6, 0.6), light=(0.7, 0.7))])
 def test_gates_of_crowded_scenes_are_found_where_they_are(chain):
     find = None
     found = whole = 0
