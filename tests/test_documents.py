@@ -22,6 +22,7 @@ import yaml
 import framerunner
 from framerunner.camera_calibration.calibration_file import load_calibration
 from framerunner.cli import build_app, run
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.vehicle.airframe import load_airframe
 from offboard.mission import load_mission, new_mission
 from offboard.navigation.camera_model import CameraModel
@@ -38,7 +39,7 @@ from vision.types import Detections
 
 PROGRAMS = {page: found for page in PAGES if (found := blocks(page, "python"))}
 FILES = {page: found for page in PAGES if (found := blocks(page, "yaml"))}
-IN_REAL_TIME = {("api.md", 1), ("api.md", 2), ("simulator.md", 0)}
+IN_REAL_TIME = {("api.md", 1), ("ci.md", 0), ("simulator.md", 0)}
 
 
 def names_of_the_map():
@@ -49,7 +50,7 @@ def names_of_the_map():
         time_us=0, position_age_s=0.0, x=-3.0, y=-3.0, z=1.0, velocity_arena_m_s=(0.0, 0.0, 0.0)
     )
     state.attitude_arena, state.camera_attitude_arena = level, None
-    classes = (CameraModel, Explorer, GateMap, ObstacleMap, PoseHistory)
+    classes = (CameraModel, Explorer, GateMap, GateShapes, ObstacleMap, PoseHistory)
     return {
         **{each.__name__: each for each in classes},
         "scenario": scenario,
@@ -59,7 +60,7 @@ def names_of_the_map():
         "attitude": level,
         "yaw_rad": 0.0,
         "positions": [],
-        "glimpses": Glimpses(CameraModel.of(scenario.camera)),
+        "glimpses": Glimpses(CameraModel.of(scenario.camera), GateShapes()),
         "obstacle_map": ObstacleMap(CameraModel.of(scenario.camera), scenario.arena),
     }
 
@@ -198,16 +199,22 @@ def read_with_omissions(text, folder):
     assert list(yaml.safe_load(text)) == ["templates"]
 
 
+def read_workflow(text, folder):
+    (job,) = yaml.safe_load(text)["jobs"].values()
+    assert [step["run"] for step in job["steps"] if "run" in step][-1] == "pytest"
+
+
 KINDS = {
     "camera.md": [read_scenario, read_scenario, read_level, read_calibration, read_part_of_calibration],
+    "ci.md": [read_workflow],
     "devices.md": [read_scenario],
     "faults.md": [read_scenario],
     "flight-files.md": [read_options],
-    "missions.md": [read_mission, read_with_omissions, read_transitions],
+    "missions.md": [read_mission, read_mission, read_with_omissions, read_transitions],
     "real-drone.md": [read_whole_scenario],
     "scenarios.md": [
         read_whole_scenario,
-        *[read_scenario] * 3,
+        *[read_scenario] * 4,
         read_airframe,
         read_scenario,
         read_scenario,
@@ -259,6 +266,21 @@ def test_messages_in_troubleshooting_are_those_of_the_program():
     unknown = [each for each in shown if each.removesuffix("…").strip() not in texts]
     assert len(shown) > 20
     assert [each for each in unknown if not each.startswith(composed)] == []
+
+
+def test_no_node_of_a_diagram_has_a_name_that_mermaid_reserves():
+    """It draws an error instead of such a diagram."""
+    reserved = re.compile(r"(?<![\w\"-])(class|end|graph|style|subgraph|click|default)(?=\[|\(| *--|$)")
+    drawn = [(page, text) for page in PAGES for text in blocks(page, "mermaid")]
+    found = [
+        (page, line.strip())
+        for page, text in drawn
+        if text.startswith("flowchart")
+        for line in text.splitlines()
+        if reserved.search(line) and line.strip() not in ("end",)
+    ]
+    assert len(drawn) > 8
+    assert found == []
 
 
 @pytest.mark.parametrize("page", sorted((DOCS / "tutorials").glob("*.md")), ids=lambda path: path.name)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from framerunner.geometry.gate_shape import GateShape
 from offboard.navigation.gates.gate_measurement import (
     Floats,
     GateView,
@@ -20,6 +21,7 @@ from offboard.navigation.gates.gate_measurement import (
     predicted,
     solutions,
 )
+from offboard.navigation.planner.clearance import room_share
 from offboard.navigation.view import GateEstimate
 from scenarios.models import Arena
 
@@ -181,7 +183,7 @@ SAME_YAW_RAD = 0.06  # hypotheses nearer than this, or than half their standard 
 SAME_M = 0.1
 
 # Certain: 95 % of the errors to the side and in height within 1.5 cm, of the yaw within 2 degrees. Along the
-# normal, where a drone flies through anyway, twice as much is allowed.
+# normal, where a drone flies through anyway, twice as much is allowed; in a narrower opening less.
 CERTAIN_M = 0.015 / 1.96
 CERTAIN_RAD = 0.035 / 1.96
 CERTAIN_VIEWS = 3
@@ -212,6 +214,7 @@ class GateTrack:
 
     Attributes:
         colour: of the gate.
+        shape: its sizes.
         belief: twice the images that showed it, minus those that should have; negative: there is none.
         missed: images in a row that should have shown it.
         time_us: vehicle time of the last prediction.
@@ -220,7 +223,7 @@ class GateTrack:
     """
 
     def __init__(self, found: list[Solution], view: GateView) -> None:
-        self.colour = view.colour
+        self.colour, self.shape = view.colour, view.shape
         self.belief, self.missed, self.views = SEEN_BELIEF, 0, 1
         self.time_us = self.seen_us = view.time_us
         self._hypotheses = [GateFilter(solution) for solution in found]
@@ -268,7 +271,7 @@ class GateTrack:
         """Use a view that fits; one from nearly the same place as the last adds nothing but belief."""
         self._saw(view)
         self._misfits.clear()
-        if not _is_moved(view, self._used) and view.time_us - self._used.time_us < NOVEL_US:
+        if not is_moved(view, self._used) and view.time_us - self._used.time_us < NOVEL_US:
             return
         self._used = view
         self.views += 1
@@ -286,7 +289,7 @@ class GateTrack:
         be from several places and agree, more of them for a gate that is well known.
         """
         misfits = self._misfits
-        if predicted(self.state, view) is None or (misfits and not _is_moved(view, misfits[-1])):
+        if predicted(self.state, view) is None or (misfits and not is_moved(view, misfits[-1])):
             return
         misfits.append(view)
         if len(misfits) < MISFITS + self.belief // MISFITS_PER_BELIEF:
@@ -340,10 +343,6 @@ class GateTrack:
         vx, vy, vz, v_yaw = self.covariance.diagonal().tolist()
         weights = [hypothesis.log_weight for hypothesis in self._hypotheses]
         ambiguous = any(weight > weights[0] - AMBIGUOUS for weight in weights[1:])
-        nx, ny = cos(yaw), sin(yaw)
-        shared = 2.0 * nx * ny * float(self.covariance[0, 1])
-        along, aside = nx * nx * vx + ny * ny * vy + shared, ny * ny * vx + nx * nx * vy - shared
-        exact = max(along / 4.0, aside, vz) <= CERTAIN_M**2 and v_yaw <= CERTAIN_RAD**2
         return GateEstimate(
             colour=self.colour,
             position_m=(x, y, z),
@@ -351,9 +350,10 @@ class GateTrack:
             position_std_m=(sqrt(vx), sqrt(vy), sqrt(vz)),
             yaw_std_rad=sqrt(v_yaw),
             ambiguous=ambiguous,
-            certain=exact and not ambiguous and self.views >= CERTAIN_VIEWS,
+            certain=not ambiguous and is_certain(yaw, self.covariance, self.shape, self.views),
             views=self.views,
             seen_us=self.seen_us,
+            shape=self.shape,
         )
 
     def _saw(self, view: GateView) -> None:
@@ -374,6 +374,26 @@ class GateTrack:
         self._hypotheses = kept
 
 
+def is_certain(yaw_rad: float, covariance: Floats, shape: GateShape, views: int, factor: float = 1.0) -> bool:
+    """Whether a gate is known well enough to fly through.
+
+    Args:
+        yaw_rad: of its normal.
+        covariance: of x, y, z and yaw, shape (4, 4).
+        shape: the smaller its opening, the better it must be known.
+        views: how many were used.
+        factor: by which standard deviations may be larger than usual.
+    """
+    vx, vy, vz, v_yaw = covariance.diagonal().tolist()
+    nx, ny = cos(yaw_rad), sin(yaw_rad)
+    shared = 2.0 * nx * ny * float(covariance[0, 1])
+    along, aside = nx * nx * vx + ny * ny * vy + shared, ny * ny * vx + nx * nx * vy - shared
+    square = factor * factor
+    certain_m = CERTAIN_M * room_share(shape)
+    exact = max(along / 4.0, aside, vz) <= square * certain_m**2 and v_yaw <= square * CERTAIN_RAD**2
+    return exact and views >= CERTAIN_VIEWS
+
+
 def _same(a: GateFilter, b: GateFilter) -> bool:
     away = (a.state - b.state).tolist()
     vx, vy, vz, v_yaw = (a.covariance + b.covariance).diagonal().tolist()
@@ -382,7 +402,7 @@ def _same(a: GateFilter, b: GateFilter) -> bool:
     )
 
 
-def _is_moved(view: GateView, last: GateView) -> bool:
+def is_moved(view: GateView, last: GateView) -> bool:
     """Whether a view's errors differ from those of an earlier one: edges fall on other parts of pixels."""
     if view.seen != last.seen:
         return True
