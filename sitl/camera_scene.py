@@ -211,7 +211,7 @@ def _side(half: Vec3, axis: int, sign: int) -> list[Vec3]:
 def _overlapping_bars(gate: UprightGate) -> list[Solid]:
     """The four bars of a gate, all of full length, so that their shadows leave no gap between them."""
     top, bottom, *sides = gate_solids(gate)
-    half_m = (gate.bar_m / 2, gate.bar_m / 2, gate.outer_height_m / 2)
+    half_m = (gate.shape.depth_m / 2, gate.bar_m / 2, gate.outer_height_m / 2)
     return [top, bottom, *(replace(side, half_extents_m=half_m) for side in sides)]
 
 

@@ -8,8 +8,9 @@ from math import ceil, floor, hypot, sqrt
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import GateShape
 from vision.calibration.lens import Lens
-from vision.gate_model import BAR_M, GATE_HEIGHT_M, GATE_WIDTH_M, Floats, Point, Segment, Sides
+from vision.gate_model import Floats, Point, Segment, Sides
 from vision.patch import BACKGROUND, OWN, ImagePatch, Labels
 
 Flags = npt.NDArray[np.bool_]
@@ -192,25 +193,27 @@ class _Plan:
 _NOWHERE = _Plan(False, (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def expected_widths(sides: Sides) -> Widths:
+def expected_widths(sides: Sides, shape: GateShape) -> Widths:
     """What half the widths of the bars should be, by the size of the outline.
 
     The upright sides tell the scale at their distance. A square bar that is turned looks wider.
 
     Args:
         sides: first estimates of the outer edges.
+        shape: of the gate.
     """
+    width_m, height_m = shape.outer_width_m, shape.outer_height_m
     top, right, bottom, left = (None if side is None else _length(side) for side in sides)
     height_right, height_left = right or left, left or right
     if height_right is None or height_left is None:  # as if seen from the front
         width = max(top or 0.0, bottom or 0.0)
-        height_right = height_left = width * GATE_HEIGHT_M / GATE_WIDTH_M
+        height_right = height_left = width * height_m / width_m
     cosine = 0.7
     if top is not None and bottom is not None:
-        seen = (top + bottom) / (height_right + height_left) * GATE_HEIGHT_M / GATE_WIDTH_M
+        seen = (top + bottom) / (height_right + height_left) * height_m / width_m
         cosine = min(1.0, seen)
     turned = cosine + sqrt(1.0 - cosine * cosine)
-    share = BAR_M / GATE_HEIGHT_M / 2.0
+    share = shape.bar_m / height_m / 2.0
     at_right, at_left = share * max(height_right, 2.0), share * max(height_left, 2.0)
     level = 1.15  # seen from somewhat above or below
     return [

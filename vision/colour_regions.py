@@ -20,6 +20,7 @@ Plane = npt.NDArray[np.uint8]
 Signed = npt.NDArray[np.int16]
 
 PRIMARIES = ("red", "green", "blue")
+SECONDARIES = ("cyan", "magenta")
 OBSTACLE = "violet"
 
 MIN_EXCESS = 25

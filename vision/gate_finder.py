@@ -10,12 +10,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import GateShapes
 from vision.calibration.lens import Lens, straight_box
-from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
+from vision.colour_regions import OBSTACLE, PRIMARIES, SECONDARIES, ColourMask, find_colours
 from vision.detector import measure
 from vision.fill_shares import find_filled
 from vision.gate_fit import FittedGate, fit_gate, gate_of_axes
-from vision.gate_model import BAR_M, Point, Sides
+from vision.gate_model import GateModel, Point, Sides
 from vision.outer_sides import named_sides, outer_sides, sides_by_opening
 from vision.patch import ImagePatch, cut_patch
 from vision.thin_gates import Ring, find_rings
@@ -47,16 +48,19 @@ _OPENING_PX = 12  # a region smaller than this is not looked at for an opening
 
 
 class GateFinder:
-    """Finds gates of known size by colour and shape.
+    """Finds gates of known sizes by colour and shape.
 
     Args:
         focal_px: focal length of the camera; its optical axis is in the middle of the image.
         lens: of a camera that is not ideal; it has the same focal length. What is found is then in pixels of
             an ideal camera.
+        shapes: of the gates of each colour; None: all have that of the frame challenge.
     """
 
-    def __init__(self, focal_px: float, lens: Lens | None = None) -> None:
+    def __init__(self, focal_px: float, lens: Lens | None = None, shapes: GateShapes | None = None) -> None:
         self._focal_px = focal_px
+        known = shapes or GateShapes()
+        self._models = {colour: GateModel(known.of(colour), focal_px) for colour in PRIMARIES + SECONDARIES}
         self._lens = lens
 
     def find(self, image: Image, time_us: int | None = None) -> Detections:
@@ -94,7 +98,7 @@ class GateFinder:
             if thin is not None:
                 found.setdefault(ring.colour, []).append(thin)
         height, width = image.shape[:2]
-        numbers = {c: self._numbers(found[c], width, height) for c in PRIMARIES if found.get(c)}
+        numbers = {c: self._numbers(c, found[c], width, height) for c in PRIMARIES if found.get(c)}
         return Detections(
             red=numbers.get("red", NOT_SEEN),
             green=numbers.get("green", NOT_SEEN),
@@ -128,23 +132,27 @@ class GateFinder:
             places = self._lens.ideal(places)
         corners: list[Point] = [(x, y) for x, y in places.tolist()]
         segments = list(zip(corners, corners[1:] + corners[:1], strict=True))
+        model = self._models[ring.colour]
         best: FittedGate | None = None
         for sides in named_sides(segments):
             axes = [side[0] for side in sides if side is not None]
-            fitted = gate_of_axes(axes, ring.std_px, self._focal_px)
+            fitted = gate_of_axes(axes, ring.std_px, model)
             if fitted is not None and (best is None or fitted.cost < best.cost):
                 best = fitted
-        if best is None or self._focal_px * BAR_M > _THIN_BAR_PX * hypot(*best.poses[0].position_flu_m):
+        if best is None:
+            return None
+        distance_m = hypot(*best.poses[0].position_flu_m)
+        if self._focal_px * model.shape.bar_m > _THIN_BAR_PX * distance_m:
             return None
         box = _bounding_box(np.rint(ring.corners).astype(np.int32))
         return box, GateSighting(ring.colour, best.corners, best.whole, best.poses)
 
-    def _numbers(self, found: Sequence[_Found], width: int, height: int) -> Detection:
+    def _numbers(self, colour: str, found: Sequence[_Found], width: int, height: int) -> Detection:
         """The paper's numbers of the largest of some gates."""
         box, largest = max(found, key=lambda one: one[0][2] * one[0][3])
         numbers = measure(
             box[1] + 1, box[1] + box[3], box[0] + 1, box[0] + box[2],
-            width_px=width, height_px=height, focal_px=self._focal_px,
+            width_px=width, height_px=height, focal_px=self._focal_px, shape=self._models[colour].shape,
         )  # fmt: skip
         if self._lens is not None:
             numbers = straight_box(numbers, self._lens)
@@ -161,20 +169,23 @@ class GateFinder:
         candidates = outer_sides(points, width, height, self._lens)
         if not candidates:
             return None
-        patch = cut_patch(mask, others, box, self._lens)
-        best = self._best_fit(patch, candidates)
+        patch, model = cut_patch(mask, others, box, self._lens), self._models[mask.colour]
+        best = self._best_fit(patch, candidates, model)
         if best is None and min(box[2:]) >= _OPENING_PX:
             # Something of its colour behind it may spoil its outline, but not that of its opening.
-            best = self._best_fit(patch, sides_by_opening(mask.mask, box, self._lens))
+            openings = sides_by_opening(mask.mask, box, model.shape, self._lens)
+            best = self._best_fit(patch, openings, model)
         return (
             None if best is None else (box, GateSighting(mask.colour, best.corners, best.whole, best.poses))
         )
 
-    def _best_fit(self, patch: ImagePatch, candidates: Sequence[Sides]) -> FittedGate | None:
+    def _best_fit(
+        self, patch: ImagePatch, candidates: Sequence[Sides], model: GateModel
+    ) -> FittedGate | None:
         """The likeliest gate of several first estimates."""
         best: FittedGate | None = None
         for sides in candidates:
-            fitted = fit_gate(patch, sides, self._focal_px)
+            fitted = fit_gate(patch, sides, model)
             if fitted is not None and (
                 best is None or (fitted.whole, -fitted.cost) > (best.whole, -best.cost)
             ):

@@ -22,9 +22,9 @@ def plan_detector(plan: FlightPlan) -> Detector:
     if others is not None:
         return others_detector(others, plan.calibration or true_calibration(plan.scenario.camera))
     if plan.mission is None or plan.mission.vision == "boxes":
-        return new_detector("boxes")  # with the paper's focal length
+        return new_detector("boxes", shapes=plan.gate_shapes)  # with the paper's focal length
     calibration = plan.calibration or true_calibration(plan.scenario.camera)
-    return new_detector(plan.mission.vision, calibration=calibration)
+    return new_detector(plan.mission.vision, calibration=calibration, shapes=plan.gate_shapes)
 
 
 def others_of(plan: FlightPlan) -> str | DetectorMaker | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import atan2, cos, degrees, pi, radians, sin
 
 import cv2
@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.flying.detector import true_calibration
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.rotations import (
     RotationRows,
     mounting_flu,
@@ -78,6 +79,7 @@ class LabelledImage:
     attitude_arena: Quaternion
     calibration: Calibration
     gates: tuple[GateLabel, ...]
+    shapes: GateShapes = field(default_factory=GateShapes)  # that a drone is told
 
     @property
     def focal_px(self) -> float:
@@ -115,7 +117,9 @@ def labelled_images(
             backdrop = backgrounds.draw(scene.scenario.camera, rows, streams.backgrounds)
         image = scene.image(position, attitude, motion, chain, backdrop)
         labels = scene.labels(position, attitude)
-        yield LabelledImage(image, scene.scenario.name, position, attitude, scene.calibration, labels)
+        yield LabelledImage(
+            image, scene.scenario.name, position, attitude, scene.calibration, labels, scene.shapes
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +141,7 @@ class _LabelledScene:
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         self.scenario = scenario
+        self.shapes = GateShapes(scenario.gate_shapes)
         self.camera = SimulatedCamera(scenario, seed)
         self.calibration = true_calibration(scenario.camera)
         self._lens = None if self.calibration.is_ideal else Lens(self.calibration)

@@ -10,6 +10,7 @@ from math import acos, asin, degrees, hypot, inf, isfinite, sqrt
 
 import numpy as np
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3
 from framerunner.vision_evaluation.labelled_images import GateLabel, LabelledImage
 from vision.calibration.model import Calibration
@@ -135,11 +136,12 @@ def detect_all(
     scores = Scores()
     examples: list[Example] = []
     detectors: dict[str, Detector] = {}
-    calibration: Calibration | None = None
+    camera: tuple[Calibration, GateShapes] | None = None
     for one in labelled:
-        if calibration != one.calibration:
-            calibration = one.calibration
-            detectors = {k: new_detector(k, calibration=calibration) for k in KINDS}
+        calibration = one.calibration
+        if camera != (calibration, one.shapes):
+            camera = (calibration, one.shapes)
+            detectors = {k: new_detector(k, calibration=calibration, shapes=one.shapes) for k in KINDS}
             if others is not None:
                 detectors[detector_name(others)] = others_detector(others, calibration)
             for detector in detectors.values():

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot, pi, radians, remainder, sqrt
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import DroneState, ReportedAccuracy
 from offboard.navigation.camera_model import CameraModel
@@ -59,8 +60,8 @@ class PlaceEstimator:
         camera: of the drone.
     """
 
-    def __init__(self, camera: CameraModel) -> None:
-        self._camera = camera
+    def __init__(self, camera: CameraModel, shapes: GateShapes) -> None:
+        self._camera, self._shapes = camera, shapes
         self._track = InertialTrack()
         self._filter: PlaceFilter | None = None
         self._reports: deque[tuple[int, DroneState]] = deque()
@@ -249,7 +250,7 @@ class PlaceEstimator:
             return
         by_colour: dict[str, list[tuple[GateView, Eye]]] = {}
         for sighting, pose in zip(sightings, poses, strict=True):
-            view = view_of(sighting, self._camera, pose)
+            view = view_of(sighting, self._shapes.of(sighting.colour), self._camera, pose)
             if view is not None:
                 by_colour.setdefault(sighting.colour, []).append((view, self._eye(pose, at)))
         self._landmarks.see(place, by_colour, gates)

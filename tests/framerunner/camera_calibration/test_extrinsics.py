@@ -85,7 +85,7 @@ def test_a_recorded_flight_gives_the_mounting(tmp_path: Path, capsys: pytest.Cap
 def search(*, missing: tuple[str, ...] = (), pitch_rad: float = 0.1, rms_px: float = 0.4) -> MountingSearch:
     """A mounting that was found, its images 0.093 s late."""
     nothing = np.empty(0)
-    seen = Sightings(nothing.astype(str), nothing, nothing, nothing, nothing, nothing)
+    seen = Sightings(nothing.astype(str), nothing, nothing, nothing, nothing, nothing, nothing)
     found = Values((0.03, pitch_rad, -0.05), (0.08, 0.0, 0.0), 0.093)
     std = Values((0.001, 0.001, 0.002), (0.002, 0.003, 0.02), 0.001)
     fit = MountingFit(found, std, seen, nothing.astype(int), nothing.reshape(0, 3), rms_px)
