@@ -21,6 +21,7 @@ _MM = 3  # decimals
 _ROUNDING = 1e-6
 _NONE = Range(low=0.0, high=0.0)
 _Size = Annotated[Range, within(0.05, 5.0)]
+_Opening = Annotated[float, Field(ge=0.05, le=5.0)]
 _Pixels = Annotated[int, Field(ge=16, le=4096)]
 _OneImageSize = tuple[_Pixels, _Pixels]
 
@@ -38,7 +39,7 @@ class RandomShapes(Part):
     depth_share: Annotated[Range, within(0.1, 5.0)] = Field(
         description="thickness of the bars along the normal, as a share of their width"
     )
-    least_opening_m: tuple[float, float] = Field(
+    least_opening_m: tuple[_Opening, _Opening] = Field(
         description="clear width and height that the drone needs, between the bars"
     )
     clear_m: float = Field(ge=0, le=2, description="below each frame; one that would hang lower is raised")

@@ -115,7 +115,8 @@ def find_colours(image: Image) -> list[ColourMask]:
         _secondary("cyan", blue, green, red, spare),
         _secondary("magenta", blue, red, green, spare),
     ]
-    found = [*_all_grown(sure), _violet(blue, green, red, spare)]
+    violet = _violet(blue, green, red, spare)
+    found = [*_all_grown(sure, violet), violet]
     return [mask for mask in found if mask is not None]
 
 
@@ -134,11 +135,13 @@ def _primaries(planes: Sequence[Plane], spare: list[Plane]) -> list[ColourMask |
     ]
 
 
-def _all_grown(sure: Sequence[ColourMask | None]) -> list[ColourMask | None]:
-    """The masks of colours, from the pixels that are sure to have them."""
+def _all_grown(
+    sure: Sequence[ColourMask | None], violet: ColourMask | None = None
+) -> list[ColourMask | None]:
+    """The masks of colours, from the pixels that are sure to have them, and those of obstacles."""
     seen = [mask for mask in sure if mask is not None]
     beside = [[other.mask.copy() for other in seen if other is not mask] for mask in seen]
-    return [_grown(mask, others) for mask, others in zip(seen, beside, strict=True)]
+    return [_grown(mask, others, violet) for mask, others in zip(seen, beside, strict=True)]
 
 
 def _primary(colour: str, shown: Plane, one: Plane, other: Plane, spare: list[Plane]) -> ColourMask | None:
@@ -162,8 +165,8 @@ def _excess(shown: Plane, pale: Plane, result: Plane) -> Plane:
     return result
 
 
-def _grown(sure: ColourMask, others: Sequence[Plane]) -> ColourMask | None:
-    """The mask of one colour, from the pixels that are sure to have it, and those of the other colours.
+def _grown(sure: ColourMask, others: Sequence[Plane], violet: ColourMask | None) -> ColourMask | None:
+    """The mask of one colour, from the pixels that are sure to have it, and those of other colours.
 
     A camera mixes thin bars and edges with what is behind them. However bright that is, a pixel that the bar
     fills by half has half the excess of those beside it; so beside pixels that are sure, that is the test.
@@ -185,6 +188,8 @@ def _grown(sure: ColourMask, others: Sequence[Plane]) -> ColourMask | None:
     cv2.bitwise_and(thin, cv2.dilate(known, _REACH), dst=thin)
     for other in others:  # beside another colour everything stands out
         cv2.subtract(thin, cv2.dilate(_crop(other, part), _AROUND), dst=thin)
+    if violet is not None:  # a pole is a thin line itself, somewhat blue and red
+        cv2.subtract(thin, cv2.dilate(_crop(violet.mask, part), _BESIDE), dst=thin)
     cv2.bitwise_or(filled, thin, dst=thin)
     with_others = cv2.compare(cv2.boxFilter(thin & 1, -1, (3, 3), normalize=False), 1.0, cv2.CMP_GT)
     cv2.bitwise_or(filled, cv2.bitwise_and(thin, with_others), dst=filled)

@@ -46,7 +46,7 @@ _BRIGHT_PERCENT, _BRIGHT = 90, 0.75  # a gate is less bright than the brightest 
 _LEAST_BRIGHT = 60.0
 _LEAST_SQUARE = 900.0  # of the difference between a colour and what is around
 _GRID = 4
-_MIN_PIXELS = 8
+_MIN_PIXELS = 20
 _MARGIN_PX = 4
 _GAP_ROWS = 4  # between the planes of two colours
 

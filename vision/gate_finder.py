@@ -116,11 +116,15 @@ class GateFinder:
             groups = [group for group in groups if max(_bounding_box(np.concatenate(group))[2:]) >= _LARGE_PX]
         for group in groups:
             sighting = self._sighting(mask, others, np.concatenate(group))
+            if (sighting is None or not sighting[1].whole) and 1 < len(group) <= _CLUTTER:
+                # What is joined may be two things: a gate, and mixed colours at an obstacle's edge.
+                each = [self._sighting(mask, others, fragment) for fragment in group]
+                alone = [one for one in each if one is not None and (sighting is None or one[1].whole)]
+                if alone:
+                    found += alone
+                    continue
             if sighting is not None:
                 found.append(sighting)
-            elif 1 < len(group) <= _CLUTTER:
-                alone = (self._sighting(mask, others, fragment) for fragment in group)
-                found += [one for one in alone if one is not None]
         return found
 
     def _thin_sighting(self, ring: Ring, image: Image) -> _Found | None:

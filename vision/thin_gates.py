@@ -91,14 +91,15 @@ def _quad(hole: Points) -> tuple[float, Floats] | None:
     if wide < _MIN_COLUMNS or high < _MIN_ROWS:
         return None
     hull = cv2.convexHull(hole, clockwise=False)
-    if len(hull) < 4:
+    filled = cv2.contourArea(hole) + 2.0
+    if len(hull) < 4 or filled < _LEAST_QUAD * cv2.contourArea(hull):  # the quadrilateral is around the hull
         return None
     quad = cv2.approxPolyN(hull.astype(np.float32), 4).reshape(-1, 2).astype(np.float64)
     if len(quad) < 4:
         return None
     (x0, y0), (x1, y1), (x2, y2), (x3, y3) = quad.tolist()
     area = 0.5 * ((x2 - x0) * (y3 - y1) - (x3 - x1) * (y2 - y0))
-    if abs(area) < _LEAST_AREA or cv2.contourArea(hole) < _LEAST_QUAD * abs(area) - 2.0:
+    if abs(area) < _LEAST_AREA or filled < _LEAST_QUAD * abs(area):
         return None
     return abs(area), quad if area > 0.0 else quad[::-1]
 

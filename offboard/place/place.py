@@ -78,7 +78,14 @@ class PlaceEstimator:
         return self._filter is not None
 
     def add(self, state: DroneState) -> None:
-        """Take in a state as the vehicle reports it; call it once a tick, before images are used."""
+        """Take in a state as the vehicle reports it; call it once a tick, before images are used.
+
+        All begins when the vehicle is armed: how much of its telemetry has come before is a matter of chance.
+        """
+        if self._start is None:
+            self._start = state
+        if self._last is None and not state.armed:
+            return
         track, last, place = self._track, self._last, self._filter
         if place is not None and last is not None and track.is_interrupted(state.imu, state.time_us):
             self.advance(last.time_us)
@@ -86,8 +93,6 @@ class PlaceEstimator:
             self._last = state
         if not state.imu:
             return
-        if self._start is None:
-            self._start = state
         continued = track.add(state.imu, state.time_us, state.attitude_arena)
         position_us = state.time_us - round(state.position_age_s * 1e6)
         if not state.landed and self._left_us is None:
