@@ -18,6 +18,7 @@ from vision.fill_shares import find_filled
 from vision.gate_fit import FittedGate, fit_gate, gate_of_axes
 from vision.gate_model import GateModel, Point, Sides
 from vision.outer_sides import named_sides, outer_sides, sides_by_opening
+from vision.learned.proposals import GateProposals
 from vision.patch import ImagePatch, cut_patch
 from vision.thin_gates import Ring, find_rings
 from vision.types import (
@@ -44,6 +45,7 @@ _SHEET_PX, _SHEET_SHARE, _BARS_SHARE = 5.0, 0.9, 0.6
 _CLUTTER = 4  # regions of a colour; among more of them, small ones are not taken for gates by it alone
 _LARGE_PX = 40
 _THIN_BAR_PX = 2.5  # wider bars have pixels of their own colour, which tell how wide they are
+_LEAST_CHANCE, _LEAST_LIKELY = 0.2, 0.1  # of a network: of what it proposes, and of what is found without it
 _OPENING_PX = 12  # a region smaller than this is not looked at for an opening
 
 
@@ -57,7 +59,15 @@ class GateFinder:
         shapes: of the gates of each colour; None: all have that of the frame challenge.
     """
 
-    def __init__(self, focal_px: float, lens: Lens | None = None, shapes: GateShapes | None = None) -> None:
+    def __init__(
+        self,
+        focal_px: float,
+        lens: Lens | None = None,
+        shapes: GateShapes | None = None,
+        *,
+        learned: bool = False,
+    ) -> None:
+        self._learned = learned
         self._focal_px = focal_px
         known = shapes or GateShapes()
         self._models = {colour: GateModel(known.of(colour), focal_px) for colour in PRIMARIES + SECONDARIES}
@@ -93,11 +103,17 @@ class GateFinder:
                 found[mask.colour] = self._find_colour(mask, others)
         known = [box for each in found.values() for box, _ in each]
         filled = find_filled(image, known)
-        for ring in () if filled is None else find_rings(filled):
+        proposals = GateProposals(image, _LEAST_CHANCE) if self._learned else None
+        for ring in (
+            () if filled is None else find_rings(filled, None if proposals is None else proposals.corners)
+        ):
             thin = self._thin_sighting(ring, image)
             if thin is not None:
                 found.setdefault(ring.colour, []).append(thin)
         height, width = image.shape[:2]
+        if proposals is not None:
+            for colour, sightings in found.items():
+                found[colour] = [one for one in sightings if _is_likely(one, proposals, width, height)]
         numbers = {c: self._numbers(c, found[c], width, height) for c in PRIMARIES if found.get(c)}
         return Detections(
             red=numbers.get("red", NOT_SEEN),
@@ -195,6 +211,16 @@ class GateFinder:
             ):
                 best = fitted
         return best
+
+
+def _is_likely(found: _Found, proposals: GateProposals, width: int, height: int) -> bool:
+    """Whether the network does not deny a gate; of what is seen in part it is not asked."""
+    _, sighting = found
+    if not sighting.whole or not sighting.poses:
+        return True
+    corners = [(corner.right_px, corner.down_px) for corner in sighting.corners if corner is not None]
+    right, down = np.mean(corners, axis=0).tolist()
+    return proposals.chance_near(right + (width - 1) / 2, down + (height - 1) / 2) > _LEAST_LIKELY
 
 
 def _is_filled(mask: ColourMask, points: _Contour, box: _Box) -> bool:

@@ -30,6 +30,8 @@ _PLACES = (0.08 + 0.84 * (np.arange(10.0) + 0.5) / 10.0)[:, None]  # along a sid
 _REACHES = (3, 2, 2)  # pixels on both sides of an estimate in which a ridge is looked for
 _LEAST_SHARE, _LEAST_EXCESS = 0.2, 2.0  # in the middle along a ring
 _LEAST_CLEAR = 0.4
+_LEAST_CLEAR_PROPOSED = 0.15  # of rings that a network proposes
+_AXES = 0.94  # of an outline's size, between the axes of its bars
 _LEAST_STD_PX, _STD_SHARE = 0.15, 0.7  # of corners, by the ridges' distances from straight lines
 
 
@@ -50,17 +52,25 @@ class Ring:
     std_px: float
 
 
-def find_rings(filled: FilledPixels) -> list[Ring]:
-    """Find candidates, the clearest first; each is somewhere else."""
+def find_rings(filled: FilledPixels, proposed: Floats | None = None) -> list[Ring]:
+    """Find candidates, the clearest first; each is somewhere else.
+
+    Args:
+        filled: the pixels.
+        proposed: outlines of what probably is a gate, columns and rows of the image, shape (n, 4, 2).
+    """
     quads = _quads(filled)
+    holes = len(quads)
+    if proposed is not None:
+        quads += _proposed_quads(filled, proposed)
     if not quads:
         return []
     corners, deviations = _fitted(filled.share, np.array(quads))
     clear = np.where(_is_of_colour(filled, corners), _clearness(filled.share, corners), -1.0)
     rings: list[Ring] = []
     for k in np.argsort(-clear, kind="stable").tolist():
-        if clear[k] < _LEAST_CLEAR:
-            break
+        if clear[k] < (_LEAST_CLEAR if k < holes else _LEAST_CLEAR_PROPOSED):
+            continue
         plane = int(corners[k, :, 1].mean()) // filled.pitch
         offset = (filled.origin[0], filled.origin[1] - plane * filled.pitch)
         std_px = hypot(_LEAST_STD_PX, _STD_SHARE * deviations[k])
@@ -68,6 +78,19 @@ def find_rings(filled: FilledPixels) -> list[Ring]:
         if not any(_overlap(ring, other) for other in rings):
             rings.append(ring)
     return rings
+
+
+def _proposed_quads(filled: FilledPixels, proposed: Floats) -> list[Floats]:
+    """Between the axes of the bars of proposed gates, in the plane of each colour."""
+    rows, columns = filled.share.shape
+    rows //= len(filled.colours)
+    middles = proposed.mean(axis=1, keepdims=True)
+    quads = []
+    for quad in middles + _AXES * (proposed - middles) - np.array(filled.origin):
+        column, row = quad.mean(axis=0)
+        if 0 <= column < columns and 0 <= row < rows:
+            quads += [quad + (0, plane * filled.pitch) for plane in range(len(filled.colours))]
+    return quads
 
 
 def _quads(filled: FilledPixels) -> list[Floats]:

@@ -20,7 +20,8 @@ def plan_detector(plan: FlightPlan) -> Detector:
     """
     others = others_of(plan)
     if others is not None:
-        return others_detector(others, plan.calibration or true_calibration(plan.scenario.camera))
+        calibration = plan.calibration or true_calibration(plan.scenario.camera)
+        return others_detector(others, calibration, plan.gate_shapes)
     if plan.mission is None or plan.mission.vision == "boxes":
         return new_detector("boxes", shapes=plan.gate_shapes)  # with the paper's focal length
     calibration = plan.calibration or true_calibration(plan.scenario.camera)

@@ -22,7 +22,15 @@ PARTS = (((128, 160), 32), ((240, 320), 8))
 LEAST_RATE, BEST_RATE = 1e-5, 4e-3
 
 
-def train(data: Path, out: Path, *, seconds: float, seed: int, most_steps: int | None = None) -> GateNetwork:
+def train(
+    data: Path,
+    out: Path,
+    *,
+    seconds: float,
+    seed: int,
+    start: Path | None = None,
+    most_steps: int | None = None,
+) -> GateNetwork:
     """Train for a time, or some steps, and write the network.
 
     Args:
@@ -30,6 +38,7 @@ def train(data: Path, out: Path, *, seconds: float, seed: int, most_steps: int |
         out: folder for the network and the log.
         seconds: how long; the rate of learning rises over the first twentieth of it, and falls to its end.
         seed: of the first weights and of all that is drawn.
+        start: weights of an earlier training (`gates.pt`) to go on from.
         most_steps: end after so many.
     """
     torch.manual_seed(seed)
@@ -37,7 +46,10 @@ def train(data: Path, out: Path, *, seconds: float, seed: int, most_steps: int |
     stream = np.random.default_rng(seed)
     images = np.load(data / "images.npy", mmap_mode="r")
     gates = np.load(data / "gates.npy")
-    network = GateNetwork().to(memory_format=torch.channels_last)
+    network = GateNetwork()
+    if start is not None:
+        network.load_state_dict(torch.load(start))
+    network = network.to(memory_format=torch.channels_last)
     optimiser = torch.optim.AdamW(network.parameters(), lr=BEST_RATE, weight_decay=1e-3)
     begun = saved = time.monotonic()
     step = seen = 0
@@ -61,7 +73,7 @@ def train(data: Path, out: Path, *, seconds: float, seed: int, most_steps: int |
             torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
             optimiser.step()
             step, seen = step + 1, seen + count
-            sums += (float(found), float(placed), 1.0)
+            sums += (found.item(), placed.item(), 1.0)
             if step % 100 == 0:
                 log.write(
                     f"{time.monotonic() - begun:.0f},{step},{seen},{sums[0] / sums[2]:.4f},{sums[1] / sums[2]:.5f}\n"
@@ -92,8 +104,9 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--seconds", type=float, default=1500.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--start", type=Path)
     options = parser.parse_args()
-    train(options.data, options.out, seconds=options.seconds, seed=options.seed)
+    train(options.data, options.out, seconds=options.seconds, seed=options.seed, start=options.start)
 
 
 if __name__ == "__main__":
