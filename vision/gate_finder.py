@@ -17,8 +17,8 @@ from vision.detector import measure
 from vision.fill_shares import find_filled
 from vision.gate_fit import FittedGate, fit_gate, gate_of_axes
 from vision.gate_model import GateModel, Point, Sides
-from vision.outer_sides import named_sides, outer_sides, sides_by_opening
 from vision.learned.proposals import GateProposals
+from vision.outer_sides import named_sides, outer_sides, sides_by_opening
 from vision.patch import ImagePatch, cut_patch
 from vision.thin_gates import Ring, find_rings
 from vision.types import (
@@ -104,9 +104,8 @@ class GateFinder:
         known = [box for each in found.values() for box, _ in each]
         filled = find_filled(image, known)
         proposals = GateProposals(image, _LEAST_CHANCE) if self._learned else None
-        for ring in (
-            () if filled is None else find_rings(filled, None if proposals is None else proposals.corners)
-        ):
+        proposed = None if proposals is None else proposals.outside(known)
+        for ring in () if filled is None else find_rings(filled, proposed):
             thin = self._thin_sighting(ring, image)
             if thin is not None:
                 found.setdefault(ring.colour, []).append(thin)

@@ -89,7 +89,7 @@ def _proposed_quads(filled: FilledPixels, proposed: Floats) -> list[Floats]:
     for quad in middles + _AXES * (proposed - middles) - np.array(filled.origin):
         column, row = quad.mean(axis=0)
         if 0 <= column < columns and 0 <= row < rows:
-            quads += [quad + (0, plane * filled.pitch) for plane in range(len(filled.colours))]
+            quads += [quad + np.array([0, plane * filled.pitch]) for plane in range(len(filled.colours))]
     return quads
 
 

@@ -1,4 +1,4 @@
-"""Pictures behind the gates: photographs, the same in other colours, and drawn textures with shapes that are no gates."""
+"""Pictures behind the gates: photographs, recoloured ones, and textures with shapes that are no gates."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _in_other_colours(photograph: Image, stream: np.random.Generator) -> Image:
 
 
 def _drawn(stream: np.random.Generator) -> Image:
-    """Dead leaves (shapes upon shapes, as statistics of natural images ask for), noise of 1/f, or a gradient."""
+    """Dead leaves (shapes upon shapes, statistically like photographs), noise of 1/f, or a gradient."""
     kind = int(stream.integers(3))
     if kind == 0:
         picture = _leaves(stream)
@@ -76,7 +76,7 @@ def _cloud(stream: np.random.Generator) -> Image:
 
 
 def _with_shapes(picture: Image, stream: np.random.Generator, count: int) -> Image:
-    """Shapes of pure colours that are no gates: sheets, bars, rings that are open or round, crossed windows."""
+    """Shapes that are no gates, of pure colours: sheets, bars, open, round and three-cornered rings."""
     picture = np.ascontiguousarray(picture)
     height, width = picture.shape[:2]
     for _ in range(count):

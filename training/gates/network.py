@@ -13,9 +13,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-CELL_PX = 4
-OFFSET_PX = 16.0
-"""Unit of the corners' offsets."""
 WIDTHS = (8, 16, 24, 32, 48, 64)
 """Channels at 1/2, 1/4, ... 1/64 of the image's size; the last ones see all of an image."""
 
@@ -32,8 +29,8 @@ def _separable(inputs: int, outputs: int, stride: int = 1) -> nn.Sequential:
 class GateNetwork(nn.Module):
     """From images, BGR 0..1, shape (n, 3, rows, columns), to maps, shape (n, 9, rows / 4, columns / 4).
 
-    The first map is the logit of "a gate's centre is here"; the others are the offsets right and down of its upper left,
-    upper right, lower right and lower left corner from the middle of the cell, in units of `OFFSET_PX`.
+    The first map is the logit of "a gate's centre is here"; the others are the offsets right and down of its
+    upper left, upper right, lower right and lower left corner from the middle of the cell, in `OFFSET_PX`.
     """
 
     def __init__(self, widths: tuple[int, ...] = WIDTHS) -> None:
@@ -53,6 +50,7 @@ class GateNetwork(nn.Module):
             self.head[-1].bias[0] = -5.0
 
     def forward(self, images: Tensor) -> Tensor:
+        """The maps of images."""
         levels = [self.first(self.stem(images))]
         for down in self.down:
             levels.append(down(levels[-1]))

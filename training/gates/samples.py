@@ -1,4 +1,4 @@
-"""Random parts of images of a data set, changed as cameras change them, and what the network is to say of them."""
+"""Random parts of images of a data set, changed as cameras do, and what the network is to say of them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 CELL_PX, OFFSET_PX = 4, 16.0
+"""Pixels of a cell of the maps, and the unit of the corners' offsets."""
 _MIRRORED = [1, 0, 3, 2]  # corners after left and right are exchanged
 
 Image = npt.NDArray[np.uint8]

@@ -52,18 +52,18 @@ PARTS = (
 
 
 def corners_in(labelled: LabelledImage, gate: GateLabel) -> npt.NDArray[np.float32] | None:
-    """The corners of a gate's outline in the image, columns and rows, shape (4, 2); None if behind the camera."""
+    """The corners of a gate's outline, columns and rows, shape (4, 2); None if behind the camera."""
     if not gate.corners_px:
         return None
     places = np.array(gate.corners_px)
     if not labelled.calibration.is_ideal:
         places = Lens(labelled.calibration).all_seen(places)
     height, width = labelled.image.shape[:2]
-    return (places + [(width - 1) / 2, (height - 1) / 2]).astype(np.float32)
+    return (places + np.array([(width - 1) / 2, (height - 1) / 2])).astype(np.float32)
 
 
 def rows_of(labelled: LabelledImage) -> npt.NDArray[np.float32]:
-    """The gates of an image, shape (MAX_GATES, 9): 1 for one to be found, -1 for one that may be; four corners.
+    """The gates of an image, shape (MAX_GATES, 9): 1 for one to be found, -1 for one that may be; corners.
 
     One may be found that is partly hidden, very far, or nearly edge-on. Rows of none begin with 0.
     """

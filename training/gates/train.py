@@ -76,7 +76,8 @@ def train(
             sums += (found.item(), placed.item(), 1.0)
             if step % 100 == 0:
                 log.write(
-                    f"{time.monotonic() - begun:.0f},{step},{seen},{sums[0] / sums[2]:.4f},{sums[1] / sums[2]:.5f}\n"
+                    f"{time.monotonic() - begun:.0f},{step},{seen},"
+                    f"{sums[0] / sums[2]:.4f},{sums[1] / sums[2]:.5f}\n"
                 )
                 log.flush()
                 sums[:] = 0.0

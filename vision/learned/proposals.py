@@ -1,10 +1,12 @@
 """Where a network sees gates in an image: first estimates of their corners.
 
-The network is trained by `training/gates` ([card](card.md)) and run by OpenCV. It does not know colours or sizes of gates.
+The network is trained by `training/gates` (`card.md`) and run by OpenCV. It does not know colours or sizes of
+gates.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -27,8 +29,8 @@ class GateProposals:
 
     Attributes:
         chances: of a gate's centre in each cell of `cell_px`, shape (rows, columns).
-        corners: upper left, upper right, lower right and lower left of the outlines of proposed gates, columns
-            and rows of the image, shape (n, 4, 2), the likelier one first.
+        corners: upper left, upper right, lower right and lower left of the outlines of proposed gates,
+            columns and rows of the image, shape (n, 4, 2), the likelier one first.
         cell_px: columns and rows of a cell.
     """
 
@@ -46,7 +48,17 @@ class GateProposals:
         rows, columns = rows[order], columns[order]
         middles = np.stack([columns, rows], axis=-1) * _CELL_PX + 0.5 * (_CELL_PX - 1)
         offsets = _OFFSET_PX * maps[1:, rows, columns].T.reshape(-1, 4, 2)
-        self.corners = (middles[:, None] + offsets + 0.5) * scale - 0.5
+        self.corners: npt.NDArray[np.float64] = (middles[:, None] + offsets + 0.5) * scale - 0.5
+
+    def outside(self, boxes: Sequence[tuple[int, int, int, int]]) -> npt.NDArray[np.float64]:
+        """The corners of those whose middle is in no box (column, row, columns, rows), shape (n, 4, 2)."""
+        middles = self.corners.mean(axis=1)
+        free = np.ones(len(middles), bool)
+        for column, row, columns, rows in boxes:
+            inside = (middles >= (column, row)) & (middles < (column + columns, row + rows))
+            free &= ~inside.all(axis=1)
+        kept: npt.NDArray[np.float64] = self.corners[free]
+        return kept
 
     def chance_near(self, column: float, row: float) -> float:
         """The largest chance in the cell of a pixel and those beside it; 1 outside the image."""
