@@ -13,7 +13,7 @@ import numpy as np
 from framerunner.flying.detector import base_shape, true_calibration
 from framerunner.geometry.rotations import multiply, quaternion_from_euler, quaternion_from_yaw
 from framerunner.geometry.vectors import Quaternion, Vec3
-from framerunner.vision_evaluation.labelled_images import Disturbance, disturbed
+from framerunner.vision_evaluation.camera_chain import CLIP_IMAGES, CameraChain
 from offboard.navigation.camera_model import CameraModel
 from scenarios.models import Scenario
 from scenarios.random_scenarios import Level, random_scenario
@@ -82,7 +82,7 @@ class BaseScores:
         )
 
 
-def rate_base(level: Level, images: int, seed: int, disturbance: Disturbance) -> BaseScores:
+def rate_base(level: Level, images: int, seed: int, chain: CameraChain) -> BaseScores:
     """Look for the base in images of a level, half of which are turned away from it.
 
     The drone's place is expected within some errors, as it is known on the way home.
@@ -93,10 +93,10 @@ def rate_base(level: Level, images: int, seed: int, disturbance: Disturbance) ->
     for number in range(images // 2):
         if view is None or number % IMAGES_OF_A_SCENE == 0:
             drawn = seed + number // IMAGES_OF_A_SCENE
-            view = _BaseView(random_scenario(level, drawn), drawn)
+            view = _BaseView(chain.applied_to(random_scenario(level, drawn), stream), drawn)
         position_m, attitude = view.draw_pose(stream)
         expected = view.expectation(position_m, attitude, stream)
-        image = disturbed(view.camera.render(position_m, attitude), disturbance, stream)
+        image = chain.compressed([view.camera.render(position_m, attitude)] * CLIP_IMAGES)
         begun_s = time.thread_time()
         sighting = view.finder.find(image, expected)
         scores.times_ms.append(1e3 * (time.thread_time() - begun_s))
@@ -106,7 +106,7 @@ def rate_base(level: Level, images: int, seed: int, disturbance: Disturbance) ->
             scores.samples.append((away_m, sighting is not None, errors, deviations))
         turned_away = multiply(quaternion_from_yaw(pi), attitude)
         if view.corners_in_view(position_m, turned_away) == 0:
-            image = disturbed(view.camera.render(position_m, turned_away), disturbance, stream)
+            image = chain.compressed([view.camera.render(position_m, turned_away)] * CLIP_IMAGES)
             scores.others += 1
             scores.false_alarms += view.finder.find(image, expected) is not None
     return scores

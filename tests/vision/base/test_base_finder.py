@@ -11,7 +11,7 @@ from framerunner.flying.detector import base_shape, true_calibration
 from framerunner.geometry.rotations import multiply, quaternion_from_euler, quaternion_from_yaw
 from framerunner.geometry.vectors import Quaternion, Vec3
 from framerunner.vision_evaluation.base_scores import rate_base
-from framerunner.vision_evaluation.labelled_images import Disturbance
+from framerunner.vision_evaluation.camera_chain import CameraChain
 from offboard.navigation.camera_model import CameraModel
 from scenarios.models import Base, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
@@ -196,7 +196,7 @@ def test_what_is_behind_the_camera_is_not_looked_for() -> None:
 
 
 def test_it_is_rated_on_a_level() -> None:
-    scores = rate_base(load_level("crowded"), 60, 3, Disturbance())
+    scores = rate_base(load_level("crowded"), 60, 3, CameraChain())
     assert scores.others >= 25
     assert scores.false_alarms == 0
     assert sum(found for _, found, _, _ in scores.samples) > 0.5 * len(scores.samples)
