@@ -19,6 +19,7 @@ from framerunner.terminal import table_console
 from framerunner.vision_evaluation.backgrounds import Backgrounds
 from framerunner.vision_evaluation.camera_chain import CameraChain
 from framerunner.vision_evaluation.labelled_images import LabelledImage, labelled_images
+from framerunner.vision_evaluation.own_pictures import OwnPictures
 from framerunner.vision_evaluation.scores import (
     RATED_ANGLE_DEG,
     RATED_DISTANCE_M,
@@ -45,10 +46,13 @@ class VisionSettings:
     out: Path
     backgrounds: Backgrounds | None = None
     detector: str | DetectorMaker | None = None  # of others, to be rated beside ours
+    pictures: OwnPictures | None = None  # instead of painted images
 
     @property
     def title(self) -> str:
         """What the images are, for people."""
+        if self.pictures is not None:
+            return f"pictures of {self.pictures.folder}"
         parts = [f"level {self.level.name}"]
         if self.backgrounds is not None:
             parts.append(f"{len(self.backgrounds.photographs)} photographs")
@@ -105,9 +109,13 @@ def write_dataset(settings: VisionSettings) -> None:
 
 def _shown(settings: VisionSettings) -> Iterator[LabelledImage]:
     """The images, while a bar on standard error shows how far it is."""
-    images: Iterable[LabelledImage] = labelled_images(
-        settings.level, settings.images, settings.seed, settings.chain, settings.backgrounds
-    )
+    images: Iterable[LabelledImage]
+    if settings.pictures is None:
+        images = labelled_images(
+            settings.level, settings.images, settings.seed, settings.chain, settings.backgrounds
+        )
+    else:
+        images = settings.pictures.images()
     console = Console(stderr=True)
     yield from track(
         images,
@@ -127,11 +135,10 @@ def _make_folder(path: Path) -> None:
 
 
 def _as_json(settings: VisionSettings, scores: Scores) -> dict[str, object]:
+    painted = {"level": settings.level.name, "seed": settings.seed, "chain": asdict(settings.chain)}
     return {
-        "level": settings.level.name,
+        **(painted if settings.pictures is None else {"pictures": str(settings.pictures.folder)}),
         "images": scores.images,
-        "seed": settings.seed,
-        "chain": asdict(settings.chain),
         "detectors": [asdict(row) for row in scores.in_sum()],
         "by_distance_m": [asdict(row) for row in scores.by_distance()],
         "by_angle_deg": [asdict(row) for row in scores.by_angle()],
