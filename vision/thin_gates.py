@@ -30,6 +30,7 @@ _PLACES = (0.08 + 0.84 * (np.arange(10.0) + 0.5) / 10.0)[:, None]  # along a sid
 _REACHES = (3, 2, 2)  # pixels on both sides of an estimate in which a ridge is looked for
 _LEAST_SHARE, _LEAST_EXCESS = 0.2, 2.0  # in the middle along a ring
 _LEAST_CLEAR = 0.4
+_FEW, _CLEAR_OF_MANY, _STD_OF_MANY_PX = 2, 0.5, 0.25  # an image with many rings has round ones, too
 _LEAST_STD_PX, _STD_SHARE = 0.15, 0.7  # of corners, by the ridges' distances from straight lines
 
 
@@ -67,6 +68,8 @@ def find_rings(filled: FilledPixels) -> list[Ring]:
         ring = Ring(filled.colours[plane], corners[k] + offset, float(clear[k]), std_px)
         if not any(_overlap(ring, other) for other in rings):
             rings.append(ring)
+    if len(rings) > _FEW:
+        rings = [ring for ring in rings if ring.clear > _CLEAR_OF_MANY and ring.std_px < _STD_OF_MANY_PX]
     return rings
 
 
