@@ -30,6 +30,7 @@ _MAX_OWN_UNSEEN = 0.4  # share of a bar that seems to be seen although it was no
 _WHOLE = 0.9  # share of a bar that is seen if nothing hides it; shaded and thin bars may have gaps
 _MAX_CORNER_STD_PX = 2.5
 _EDGE_ON, _OBLIQUE = 0.13, 0.23  # cosines: the bars of a gate that is seen edge-on hide one another
+_THINNEST_PX = 0.15  # a bar that fills less of a pixel has no colour
 _NOTHING, _SOMETHING = 0.35, 0.7  # shares of a side; for the second clearest side
 _NO_OPENING, _SPOT = 0.6, 0.4  # shares of a region in the middle of its outline
 _LEAST_ERROR_PX = 0.4  # may be between the corners of a pose and of the lines, besides two deviations
@@ -151,8 +152,8 @@ def _fit_any(patch: ImagePatch, sides: Sides, model: GateModel) -> FittedGate | 
         lines, meetings, poses = _fit(patch, (a, b, c, d), model)
     corners = _outer_corners(meetings, poses[0], model, False) if poses else None
     if corners is None:
-        if not patch.may_be_cut:
-            return None  # nothing explains why no more is seen of it
+        if patch.among_others or not patch.may_be_cut:
+            return None  # it is one of many, or nothing explains why no more is seen of it
         corners = _corners_without_pose(patch, lines)
     return _fitted(corners, False, poses, meetings) if any(corners) else None
 
@@ -311,6 +312,8 @@ def _explains(patch: ImagePatch, pose: ModelPose, missing: int, model: GateModel
 
 def _outer_corners(meetings: _Meetings, pose: ModelPose, model: GateModel, whole: bool) -> Corners | None:
     """The corners of the outline in the gate's middle plane, from those of the bars' axes."""
+    if model.focal_px * model.shape.bar_m < _THINNEST_PX * hypot(*pose.shift_m.tolist()):
+        return None
     outer, axes = (
         pose.project(model.outer_corners, model.focal_px),
         pose.project(model.axes_corners, model.focal_px),

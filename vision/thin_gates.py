@@ -32,6 +32,7 @@ _LEAST_SHARE, _LEAST_EXCESS = 0.2, 2.0  # in the middle along a ring
 _LEAST_CLEAR = 0.4
 _LEAST_CLEAR_PROPOSED = 0.15  # of rings that a network proposes
 _AXES = 0.94  # of an outline's size, between the axes of its bars
+_FEW, _CLEAR_OF_MANY, _STD_OF_MANY_PX = 2, 0.5, 0.25  # an image with many rings has round ones, too
 _LEAST_STD_PX, _STD_SHARE = 0.15, 0.7  # of corners, by the ridges' distances from straight lines
 
 
@@ -77,6 +78,8 @@ def find_rings(filled: FilledPixels, proposed: Floats | None = None) -> list[Rin
         ring = Ring(filled.colours[plane], corners[k] + offset, float(clear[k]), std_px)
         if not any(_overlap(ring, other) for other in rings):
             rings.append(ring)
+    if proposed is None and len(rings) > _FEW:  # else the network judges
+        rings = [ring for ring in rings if ring.clear > _CLEAR_OF_MANY and ring.std_px < _STD_OF_MANY_PX]
     return rings
 
 

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Literal
 from cyclopts import App, Parameter
 
 from framerunner.commands import WholeNumber, check_range
+from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from framerunner.vision_evaluation.camera_chain import CameraChain
     from framerunner.vision_evaluation.evaluate import VisionSettings
+    from framerunner.vision_evaluation.own_pictures import OwnPictures
 
 _MAX_IMAGES = 1_000_000
 
@@ -59,6 +61,7 @@ def evaluate(
     *,
     options: ImageOptions = _USUAL,
     detector: str | None = None,
+    labelled: Path | None = None,
     out: Path | None = None,
 ) -> int:
     """Tell how often and how exactly frames are found: by shape, and by the paper's boxes.
@@ -76,15 +79,23 @@ def evaluate(
 
         framerunner vision evaluate --backgrounds my_photographs --preset h264
 
+        framerunner vision evaluate --labelled my_pictures
+
     Args:
         options: which images.
         detector: one that a package adds, to be rated beside ours
+        labelled: folder of your own pictures and their labels.json, instead of painted images
         out: folder for the report and the picture
     """
     from framerunner.vision_evaluation.evaluate import evaluate_vision
 
+    pictures = None if labelled is None else _own_pictures(labelled, options)
     default = Path("runs") / f"vision-{Path(options.level).stem}-{options.images}-{options.seed}"
+    if pictures is not None:
+        default = Path("runs") / f"vision-{pictures.folder.name}"
     settings = _settings(options, out or default)
+    if pictures is not None:
+        settings = replace(settings, pictures=pictures, images=len(pictures.labels.images))
     evaluate_vision(replace(settings, detector=detector))
     return 0
 
@@ -109,6 +120,16 @@ def dataset(
 
     write_dataset(_settings(options, folder))
     return 0
+
+
+def _own_pictures(folder: Path, options: ImageOptions) -> OwnPictures:
+    from framerunner.vision_evaluation.own_pictures import OwnPictures
+
+    if options != _USUAL:
+        raise SettingError(
+            "--labelled: rates your pictures as they are; leave out the options of painted images"
+        )
+    return OwnPictures.of_folder(folder)
 
 
 def _settings(options: ImageOptions, out: Path) -> VisionSettings:

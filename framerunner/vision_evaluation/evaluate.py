@@ -20,6 +20,7 @@ from framerunner.vision_evaluation.backgrounds import Backgrounds
 from framerunner.vision_evaluation.base_scores import BaseScores, rate_base
 from framerunner.vision_evaluation.camera_chain import CameraChain
 from framerunner.vision_evaluation.labelled_images import LabelledImage, labelled_images
+from framerunner.vision_evaluation.own_pictures import OwnPictures
 from framerunner.vision_evaluation.scores import (
     RATED_ANGLE_DEG,
     RATED_DISTANCE_M,
@@ -46,10 +47,13 @@ class VisionSettings:
     out: Path
     backgrounds: Backgrounds | None = None
     detector: str | DetectorMaker | None = None  # of others, to be rated beside ours
+    pictures: OwnPictures | None = None  # instead of painted images
 
     @property
     def title(self) -> str:
         """What the images are, for people."""
+        if self.pictures is not None:
+            return f"pictures of {self.pictures.folder}"
         parts = [f"level {self.level.name}"]
         if self.backgrounds is not None:
             parts.append(f"{len(self.backgrounds.photographs)} photographs")
@@ -66,8 +70,10 @@ def evaluate_vision(settings: VisionSettings) -> None:
     _make_folder(settings.out)
     scores, examples = detect_all(_shown(settings), settings.detector)
     print_scores(scores, settings.title)
-    base = rate_base(settings.level, settings.images, settings.seed, settings.chain)
-    print_base_scores(base)
+    base = None
+    if settings.pictures is None:
+        base = rate_base(settings.level, settings.images, settings.seed, settings.chain)
+        print_base_scores(base)
     report = settings.out / REPORT
     report.write_text(json.dumps(finite(_as_json(settings, scores, base), 5), indent=1), encoding="utf-8")
     from framerunner.vision_evaluation.picture import save_picture
@@ -108,9 +114,13 @@ def write_dataset(settings: VisionSettings) -> None:
 
 def _shown(settings: VisionSettings) -> Iterator[LabelledImage]:
     """The images, while a bar on standard error shows how far it is."""
-    images: Iterable[LabelledImage] = labelled_images(
-        settings.level, settings.images, settings.seed, settings.chain, settings.backgrounds
-    )
+    images: Iterable[LabelledImage]
+    if settings.pictures is None:
+        images = labelled_images(
+            settings.level, settings.images, settings.seed, settings.chain, settings.backgrounds
+        )
+    else:
+        images = settings.pictures.images()
     console = Console(stderr=True)
     yield from track(
         images,
@@ -129,17 +139,19 @@ def _make_folder(path: Path) -> None:
         raise SettingError(f"{path}: cannot be a folder ({error.strerror}); choose another") from error
 
 
-def _as_json(settings: VisionSettings, scores: Scores, base: BaseScores) -> dict[str, object]:
+def _as_json(settings: VisionSettings, scores: Scores, base: BaseScores | None) -> dict[str, object]:
+    painted = {"level": settings.level.name, "seed": settings.seed, "chain": asdict(settings.chain)}
+    of_base: dict[str, object] = {}
+    if base is not None:
+        of_base["base_by_distance_m"] = [asdict(row) for row in base.rows()]
+        of_base["base_false_alarms"] = {"of": base.others, "count": base.false_alarms}
     return {
-        "level": settings.level.name,
+        **(painted if settings.pictures is None else {"pictures": str(settings.pictures.folder)}),
         "images": scores.images,
-        "seed": settings.seed,
-        "chain": asdict(settings.chain),
         "detectors": [asdict(row) for row in scores.in_sum()],
         "by_distance_m": [asdict(row) for row in scores.by_distance()],
         "by_angle_deg": [asdict(row) for row in scores.by_angle()],
-        "base_by_distance_m": [asdict(row) for row in base.rows()],
-        "base_false_alarms": {"of": base.others, "count": base.false_alarms},
+        **of_base,
         "false_alarms": scores.false_alarms,
         "median_ms": {kind: float(np.median(times)) for kind, times in scores.times_ms.items()},
         "p99_ms": {kind: float(np.percentile(times, 99)) for kind, times in scores.times_ms.items()},

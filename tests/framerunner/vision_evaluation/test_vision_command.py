@@ -14,6 +14,7 @@ from framerunner.geometry.rotations import quaternion_from_euler, rotation, rota
 from framerunner.vision_evaluation.backgrounds import Backgrounds
 from framerunner.vision_evaluation.camera_chain import PRESETS, CameraChain
 from framerunner.vision_evaluation.labelled_images import labelled_images
+from framerunner.vision_evaluation.own_pictures import OwnPictures
 from scenarios.models import Camera
 from scenarios.random_scenarios import load_level
 from sitl.camera_projection import Pinhole
@@ -50,6 +51,52 @@ def test_the_data_set_has_what_is_in_each_image(tmp_path):
     before = (tmp_path / "labels.json").read_bytes()
     assert run(["vision", "dataset", str(tmp_path), *options]) == 2
     assert (tmp_path / "labels.json").read_bytes() == before
+
+
+def _write_own_pictures(folder, count):
+    """Painted pictures, and their labels as one would click them; the gates that are labelled."""
+    camera, images, gates = None, [], []
+    for number, one in enumerate(labelled_images(load_level("calm"), count, 70, CameraChain())):
+        camera = one.calibration
+        cv2.imwrite(str(folder / f"{number}.png"), one.image)
+        seen = [gate for gate in one.gates if gate.seen and gate.corners_px]
+        clicked = []
+        for gate in seen:
+            corners = [(x + camera.cx_px, y + camera.cy_px) for x, y in gate.corners_px]
+            clicked.append({"colour": gate.colour, "corners": corners, "whole": gate.whole})
+        images.append({"image": f"{number}.png", "frames": clicked})
+        gates += seen
+    labels = {"focal_px": camera.fx_px, "images": images}
+    (folder / "labels.json").write_text(json.dumps(labels))
+    return labels, gates
+
+
+def test_own_pictures_are_rated_by_the_corners_of_their_gates(tmp_path):
+    _, gates = _write_own_pictures(tmp_path, 15)
+    known = [gate for image in OwnPictures.of_folder(tmp_path).images() for gate in image.gates]
+    assert [gate.distance_m for gate in known] == pytest.approx([gate.distance_m for gate in gates], rel=1e-3)
+    out = tmp_path / "out"
+    assert run(["vision", "evaluate", "--labelled", str(tmp_path), "--out", str(out)]) == 0
+    report = json.loads((out / "vision.json").read_text())
+    assert report["images"] == 15
+    assert report["detectors"][1]["found"] == 1.0
+    assert report["false_alarms"]["frames"] == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"focal_px": None}, "focal_px or calibration"),
+        ({"images": [{"image": "none.png"}]}, "none.png"),
+        ({"images": [{"image": "0.png", "frames": [{"colour": "pink", "corners": [[0, 0]] * 4}]}]}, "colour"),
+        ({"images": [{"image": "0.png", "frames": [{"colour": "red", "corners": [[5, 5]] * 4}]}]}, "corners"),
+    ],
+)
+def test_labels_that_cannot_be_used_are_named(tmp_path, capsys, change, said):
+    labels, _ = _write_own_pictures(tmp_path, 1)
+    (tmp_path / "labels.json").write_text(json.dumps(labels | change))
+    assert run(["vision", "evaluate", "--labelled", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    assert said in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("chain", [CameraChain(), CameraChain(noise=3, blur_px=(0.6, 0.6), light=(0.7, 0.7))])
