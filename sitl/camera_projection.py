@@ -222,7 +222,7 @@ class Projection:
     to_cut: list[int]  # per face, not 0 if it must be cut
     near_m: float  # depth of the near plane
     window: Window
-    views: list[list[int]]  # per part left, top, right, bottom on the canvas, and how much finer it is painted
+    views: list[list[int]]  # per part left, top, right, bottom on the canvas, and how much finer
 
     def outline(self, face: MeshFace) -> Ints | None:
         """Corners of a seen face in sixteenths of a pixel, shape (k, 2); None if it is cut away."""

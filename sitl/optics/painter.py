@@ -5,9 +5,9 @@ in which nothing is painted over by what it hides.
 
 Pixels: OpenCV's convention, whole coordinates at pixel centres, so the optical axis is at ((w - 1) / 2,
 (h - 1) / 2) and projection agrees with `cv2.projectPoints`. Pixels are painted whose centres are
-inside a polygon (`camera_projection` takes back what OpenCV paints beyond it). Small bodies are painted two or
-four times as finely, and the camera takes means of the canvas's pixels, so edges are anti-aliased where they
-are, and a bar thinner than a pixel is as bright as its share.
+inside a polygon (`camera_projection` takes back what OpenCV paints beyond it). Small bodies are painted two
+or four times as finely, and the camera takes means of the canvas's pixels, so edges are anti-aliased where
+they are, and a bar thinner than a pixel is as bright as its share.
 """
 
 from __future__ import annotations
