@@ -161,7 +161,7 @@ class Detections:
     ] = None
     frames: tuple[GateSighting, ...] = ()  # by shape; only from the gate finder
     obstacle_edges: tuple[ObstacleEdge, ...] = ()  # from left to right; only from the gate finder
-    base: BaseSighting | None = None  # only where it is expected
+    base: Annotated[BaseSighting | None, Field(description="the base, where it is expected and seen")] = None
 
 
 @dataclass(frozen=True, slots=True)

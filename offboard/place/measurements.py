@@ -1,4 +1,4 @@
-"""What the filter of the place measures: reported velocity and height, and corners of gates.
+"""What the filter of the place measures: what the vehicle reports, corners of gates, points known before.
 
 Each function gives the measurement's model: residual, Jacobian and noise at a state (`PlaceFilter`).
 """

@@ -61,10 +61,11 @@ IMAGE_STD_M = 0.001
 
 
 class PlaceEstimator:
-    """Estimates the drone's place from its states, and from the gates that images show.
+    """Estimates the drone's place from its states, and from the gates and known points that images show.
 
     Args:
         camera: of the drone.
+        shapes: of the gates of each colour.
     """
 
     def __init__(self, camera: CameraModel, shapes: GateShapes) -> None:

@@ -4,9 +4,10 @@ Far to near: sky, ground to the horizon, the hall's walls, tatami, shadows, then
 in which nothing is painted over by what it hides.
 
 Pixels: OpenCV's convention, whole coordinates at pixel centres, so the optical axis is at ((w - 1) / 2,
-(h - 1) / 2) and projection agrees with `cv2.projectPoints`. A polygon's border is painted on the *nearest*
-pixels: a detected box is neither wider nor narrower than the true outline on average (each edge within half a
-pixel), and a bar thinner than a pixel does not vanish.
+(h - 1) / 2) and projection agrees with `cv2.projectPoints`. Pixels are painted whose centres are
+inside a polygon (`camera_projection` takes back what OpenCV paints beyond it). Small bodies are painted two
+or four times as finely, and the camera takes means of the canvas's pixels, so edges are anti-aliased where
+they are, and a bar thinner than a pixel is as bright as its share.
 """
 
 from __future__ import annotations
