@@ -51,8 +51,9 @@ async def test_a_gate_that_is_hit_is_named_and_marked(browser, program):
     await expect(user.page.locator('.t-frame[data-colour="red"]')).to_have_count(
         2
     )  # from above and its height
-    await user.press("Stop", user.page.locator(".e-controls"))
-    await expect(user.page.locator(LINE)).to_have_text("You stopped the flight.")
+    # As fast as possible, the flight has ended by itself before anybody can stop it.
+    await expect(user.page.locator(".e-controls").get_by_role("button", name="Stop")).to_be_disabled()
+    await expect(user.page.locator(".t-hit")).to_have_count(1)
     assert not user.complaints
     await user.page.context.close()
 
