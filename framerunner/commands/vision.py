@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from framerunner.commands import WholeNumber, check_range
+from framerunner.commands import WholeNumber, check_range, say, write_new
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
@@ -119,6 +119,54 @@ def dataset(
     from framerunner.vision_evaluation.evaluate import write_dataset
 
     write_dataset(_settings(options, folder))
+    return 0
+
+
+@app.command
+def labels(
+    folder: Path,
+    *,
+    source: Annotated[Literal["tii"], Parameter(name="--from")],
+    opening: tuple[float, float],
+    bar: float,
+    calibration: Path,
+    colour: Literal["red", "green", "blue", "cyan", "magenta"] = "red",
+) -> int:
+    """Make labels.json of the labels of a public data set, for `vision evaluate --labelled`.
+
+    `tii` is "Race Against the Machine" (https://github.com/tii-racing/drone-racing-dataset), which you
+    download yourself: pictures, and for each a text file of the same name with the corners of the openings.
+
+    **Example**
+
+        framerunner vision labels flight-01a --from tii --opening 1.5 1.5 --bar 0.3 --calibration calib.json
+
+    Args:
+        folder: with pictures and text files, in it or in folders of it; labels.json is written to it
+        source: the data set
+        opening: width and height of its gates between the bars, metres
+        bar: width of the bars, seen from the front, metres
+        calibration: of its camera: a JSON file of the data set, or one of `framerunner camera calibrate`
+        colour: by which the detector to be rated calls these gates
+    """
+    from framerunner.geometry.gate_shape import BAR_LIMITS_M, SIZE_LIMITS_M
+    from framerunner.vision_evaluation.own_pictures import FILE, PictureShape
+    from framerunner.vision_evaluation.tii_labels import convert
+
+    check_range("--bar", bar, *BAR_LIMITS_M)
+    for size_m in opening:
+        check_range("--opening", size_m, SIZE_LIMITS_M[0], SIZE_LIMITS_M[1] - 2 * bar)
+    outer_width_m, outer_height_m = (size_m + 2 * bar for size_m in opening)
+    shape = PictureShape(outer_width_m=outer_width_m, outer_height_m=outer_height_m, bar_m=bar, depth_m=bar)
+    if (folder / FILE).exists():
+        raise SettingError(f"{folder / FILE}: is there already and is left as it is; move it away")
+    converted = convert(folder, shape, colour, calibration)
+    write_new({folder / FILE: converted.labels.as_text()}, "FOLDER")
+    pictures = converted.labels.images
+    whole = sum(gate.whole for picture in pictures for gate in picture.frames)
+    say(f"{FILE}: {len(pictures)} pictures, {whole} gates wholly in view")
+    if converted.unlabelled:
+        say(f"{converted.unlabelled} pictures have no text file and are left out")
     return 0
 
 
