@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from framerunner.camera_calibration.calibration_file import load_calibration
+from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.errors import SettingError
 from framerunner.files.text_file import TextError, read_bytes
 from framerunner.geometry.gate_shape import BAR_LIMITS_M, SIZE_LIMITS_M, GateShape, GateShapes
@@ -25,7 +25,7 @@ from vision.calibration.model import Calibration
 from vision.gate_model import GateModel, ModelPose, Point
 from vision.gate_pose import as_seen, find_poses
 
-FILE = "labels.json"
+FILE, CALIBRATION = "labels.json", "camera.yaml"
 _MAX_BYTES = 100_000_000
 _DIGITS = 6
 _Size = Annotated[float, Field(ge=SIZE_LIMITS_M[0], le=SIZE_LIMITS_M[1])]
@@ -175,6 +175,20 @@ class OwnPictures:
             whole=gate.whole,
             opening_px=given if of_opening else (),
         )
+
+
+def keep_calibration(calibration: Calibration, folder: Path, source: str) -> str:
+    """Have a calibration in a folder of pictures; its name there.
+
+    Raises:
+        SettingError: the folder has another one, or cannot be written to. `source` names the calibration.
+    """
+    path = folder / CALIBRATION
+    if not path.exists():
+        save_calibration(calibration, path)
+    elif load_calibration(path) != calibration:
+        raise SettingError(f"{path}: is another calibration than {source}; remove one of them")
+    return CALIBRATION
 
 
 def given_corners(corners: Sequence[tuple[float, float]], lens: Lens) -> Corners:

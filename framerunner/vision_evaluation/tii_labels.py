@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
+from framerunner.camera_calibration.calibration_file import load_calibration
 from framerunner.errors import SettingError
 from framerunner.files.text_file import TextError, read_text
 from framerunner.vision_evaluation.backgrounds import ENDINGS
@@ -26,10 +26,10 @@ from framerunner.vision_evaluation.own_pictures import (
     LabelledPicture,
     PictureLabels,
     PictureShape,
+    keep_calibration,
 )
 from vision.calibration.model import Calibration
 
-CALIBRATION = "camera.yaml"
 _NUMBERS = 17  # in a line
 _VISIBLE = 2
 
@@ -160,12 +160,7 @@ def _calibration(path: Path, folder: Path, size_px: tuple[int, int]) -> str:
         calibration = _of_matrices(_text(path), path, size_px)
     else:
         calibration = load_calibration(path)
-    ours = folder / CALIBRATION
-    if not ours.exists():
-        save_calibration(calibration, ours)
-    elif load_calibration(ours) != calibration:
-        raise SettingError(f"{ours}: is another calibration than {path}; remove one of them")
-    return CALIBRATION
+    return keep_calibration(calibration, folder, str(path))
 
 
 def _of_matrices(text: str, path: Path, size_px: tuple[int, int]) -> Calibration:
