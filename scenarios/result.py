@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
@@ -278,6 +278,9 @@ class StandingPlace(_Record):
     yaw_rad: float
 
 
+TimedPosition: TypeAlias = tuple[float, float, float, float]  # seconds since motors on, arena metres
+
+
 class Standing(_Record):
     """How a try stands, as `/referee.json` has it."""
 
@@ -292,6 +295,7 @@ class Standing(_Record):
     snapshot: RefereeSnapshot
     report: RefereeReport  # what the try would be worth if it ended now
     faults: FaultFacts = FaultFacts()
+    flown_path: tuple[TimedPosition, ...] = ()  # every 0.1 s; only if a report was asked for
 
     @property
     def ended(self) -> bool:

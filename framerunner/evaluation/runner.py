@@ -34,6 +34,7 @@ from framerunner.runs.recorder import RunRecords
 from framerunner.runs.run_folder import RunFolder
 from framerunner.runs.track import ChartRecord, Track
 from offboard.mission import Mission
+from scenarios.result import TimedPosition
 from scenarios.verdict import Verdict
 from sitl.temporary_folder import TemporaryFolder
 
@@ -341,7 +342,12 @@ def thinned(track: Track, step_s: float = TRACK_STEP_S) -> Track:
             kept.append(index)
     columns = ([round(column[index], 3) for index in kept] for column in (times, track.x, track.y, track.z))
     time_s, x, y, z = columns
-    return Track(time_s, x, y, z, [states[index] for index in kept], track.estimates)
+    true_path: list[TimedPosition] = []
+    for sample in track.true_path:
+        if not true_path or sample[0] - true_path[-1][0] >= step_s - 1e-6:
+            at_s, at_x, at_y, at_z = (round(value, 3) for value in sample)
+            true_path.append((at_s, at_x, at_y, at_z))
+    return Track(time_s, x, y, z, [states[index] for index in kept], track.estimates, true_path)
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,7 +94,9 @@ async def fly(
     why = None if outcome.ended == "finished" else outcome.reason
     report = await judge.report(outcome.mission_state, why)
     standing = await judge.standing()
-    track = recorder.track(began_us := None if standing is None else standing.began_us)
+    track = recorder.track(
+        began_us := None if standing is None else standing.began_us, true_path=judge.flown_path()
+    )
     more = {**fault_fields(await judge.faults(), report, plan.scenario.sensors), **measured()}
     cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
     more |= {"cause": cause, "judged_by": judge.source, **_bound(plan, report)}

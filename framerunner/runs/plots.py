@@ -67,6 +67,8 @@ _BASE = "#c9b892"
 _PRISM = "#7846b4"  # poles and walls
 _HALO = [withStroke(linewidth=2.5, foreground="white")]
 _CROSSING_MARK: dict[str, Any] = {"marker": "o", "ms": 5.5, "mfc": "white", "mec": _INK, "mew": 1.3}
+_TRUE_PATH: dict[str, Any] = {"color": _INK, "lw": 0.9}
+_SHOWN_ERROR_M = 0.05  # a true path that is nearer to the known one than this is not drawn
 _END_MARK: dict[str, Any] = {"marker": "X", "ms": 8, "mfc": _INK, "mec": "white"}
 
 
@@ -111,7 +113,10 @@ def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) ->
         _draw_path(axes, view, track, styles)
         _draw_marks(axes, view, track, times_s)
     _set_limits(top, side, scenario, track)
-    _draw_legend(notes, spent_s, styles, has_estimates=bool(track.estimates))
+    error_m = track.largest_error_m()
+    if error_m > _SHOWN_ERROR_M:
+        _draw_true_path(top, side, track)
+    _draw_legend(notes, spent_s, styles, has_estimates=bool(track.estimates), error_m=error_m)
     _write_title(figure, *_headline(scenario, result))
     return figure
 
@@ -319,6 +324,12 @@ def _draw_path(axes: Axes, view: _View, track: Track, styles: _Styles) -> None:
         axes.plot(*zip(*entries[kind], strict=True), ls="", marker="o", ms=3.6, color=colour, zorder=6)
 
 
+def _draw_true_path(top: Axes, side: Axes, track: Track) -> None:
+    for axes, view in ((top, _from_above), (side, _from_the_side)):
+        across, up = zip(*(view(*at) for _, *at in track.true_path), strict=True)
+        axes.plot(across, up, **_TRUE_PATH, zorder=7)
+
+
 def _draw_marks(axes: Axes, view: _View, track: Track, times_s: Mapping[str, float]) -> None:
     """Mark the crossings and the end of the path."""
     for time_s in times_s.values():
@@ -357,7 +368,9 @@ def _limits(values: Sequence[float], low: float, high: float) -> tuple[float, fl
     )
 
 
-def _draw_legend(axes: Axes, spent_s: Mapping[str, float], styles: _Styles, *, has_estimates: bool) -> None:
+def _draw_legend(
+    axes: Axes, spent_s: Mapping[str, float], styles: _Styles, *, has_estimates: bool, error_m: float
+) -> None:
     """Name the kinds of states in order of appearance, with the time spent in each, and the marks."""
     handles = []
     for kind, seconds in spent_s.items():
@@ -373,6 +386,8 @@ def _draw_legend(axes: Axes, spent_s: Mapping[str, float], styles: _Styles, *, h
         handles.append(
             Line2D([], [], color=_FAINT, lw=0.9, linestyle=_ESTIMATE_DASH, label="frame as estimated")
         )
+    if error_m > _SHOWN_ERROR_M:
+        handles.append(Line2D([], [], **_TRUE_PATH, label=f"true path, up to {error_m:.2f} m away"))
     if not handles:
         axes.text(0, 0.95, "Nothing was recorded.", va="top", fontsize=10, color=_INK)
         return

@@ -8,15 +8,18 @@ from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite
 
+import numpy as np
+
 from framerunner.geometry.vectors import Vec3
 from framerunner.wire.mission_report import TransitionTaken
 from offboard.app import Moment
 from offboard.navigation.view import GateEstimate
+from scenarios.result import TimedPosition
 
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Where a drone was; all sequences but the last one have the same length.
+    """Where a drone was, as its app knew it; all sequences but the last two have the same length.
 
     Attributes:
         time_s: since motors on, not decreasing, shape (n,).
@@ -25,6 +28,7 @@ class Track:
         z: see x.
         mission_state: the state's id at each sample, such as "red.turning"; "" where there is none.
         estimates: the gates as the navigator knew them at the end; empty without a navigator.
+        true_path: where a simulated drone truly was: seconds since motors on, arena metres; empty if unknown.
 
     Raises:
         ValueError: the sequences have different lengths.
@@ -36,6 +40,7 @@ class Track:
     z: Sequence[float] = ()
     mission_state: Sequence[str] = ()
     estimates: Sequence[GateEstimate] = ()
+    true_path: Sequence[TimedPosition] = ()
 
     def __post_init__(self) -> None:
         lengths = {name: len(getattr(self, name)) for name in ("time_s", "x", "y", "z", "mission_state")}
@@ -64,6 +69,17 @@ class Track:
             x, y, z = (values[i] + part * (values[j] - values[i]) for values in (self.x, self.y, self.z))
             return (x, y, z)
         return None
+
+    def largest_error_m(self) -> float:
+        """The largest distance between the known and the true path at one time; 0 if that is unknown."""
+        if not self.true_path or not len(self):
+            return 0.0
+        true = np.array(self.true_path)
+        known = np.array([self.x, self.y, self.z], float)
+        inside = (true[:, 0] >= self.time_s[0]) & (true[:, 0] <= self.time_s[-1])
+        at = [np.interp(true[inside, 0], self.time_s, values) for values in known]
+        errors = np.linalg.norm(np.transpose(at).reshape(-1, 3) - true[inside, 1:], axis=1)
+        return float(np.nanmax(errors, initial=0.0))
 
     def stretches(self) -> Iterator[tuple[str, range]]:
         """Stretches flown in one kind of state, in order of time.
@@ -107,12 +123,12 @@ class TrackRecorder:
         if moment.navigation is not None:
             self._estimates = moment.navigation.gates
 
-    def track(self, began_us: int | None) -> Track:
+    def track(self, began_us: int | None, *, true_path: Sequence[TimedPosition] = ()) -> Track:
         """Return the track so far; times count from `began_us`, vehicle time, or from the first tick."""
         if began_us is None:
             began_us = self._time_us[0] if self._time_us else 0
         time_s = [(time_us - began_us) / 1e6 for time_us in self._time_us]
-        return Track(time_s, self._x, self._y, self._z, self._mission_state, self._estimates)
+        return Track(time_s, self._x, self._y, self._z, self._mission_state, self._estimates, true_path)
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,6 +125,19 @@ def test_the_legend_has_the_states_in_order_of_appearance():
     ]
 
 
+@pytest.mark.parametrize(("beside_m", "label"), [(0.9, "true path, up to 0.90 m away"), (0.02, None)])
+def test_the_true_path_of_a_drone_that_drifts_is_drawn(beside_m, label):
+    true_path = [
+        (t, x, y + beside_m * t / 4, z)
+        for t, x, y, z in zip(TRACK.time_s, TRACK.x, TRACK.y, TRACK.z, strict=True)
+    ]
+    figure = draw_track(SCENARIO, replace(TRACK, true_path=true_path), RESULT)
+    labels = [entry for entry in legend_entries(figure) if entry.startswith("true")]
+    assert labels == ([label] if label else [])
+    lines = [line.get_ydata()[-1] for line in figure.axes[0].lines]
+    assert (pytest.approx(-3 + beside_m) in lines) == (label is not None)
+
+
 def test_estimated_gates_are_drawn_beside_the_true_ones():
     red = GateEstimate("red", (3.5, 1.0, 2.0), pi / 2, (0.25, 0.5, 0.1), 0.1, False, True, 9, 0)
     other = GateEstimate("constructor", (0.0, 0.0, 1.0), 0.0, (inf, 1.0, 1.0), 0.1, False, False, 1, 0)
