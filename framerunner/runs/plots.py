@@ -67,8 +67,8 @@ _BASE = "#c9b892"
 _PRISM = "#7846b4"  # poles and walls
 _HALO = [withStroke(linewidth=2.5, foreground="white")]
 _CROSSING_MARK: dict[str, Any] = {"marker": "o", "ms": 5.5, "mfc": "white", "mec": _INK, "mew": 1.3}
-_TRUE_PATH: dict[str, Any] = {"color": _INK, "lw": 0.9}
-_SHOWN_ERROR_M = 0.05  # a true path that is nearer to the known one than this is not drawn
+_REPORTED_PATH: dict[str, Any] = {"color": _FAINT, "lw": 0.9}
+_SHOWN_ERROR_M = 0.05  # a reported path that is nearer to the true one than this is not drawn
 _END_MARK: dict[str, Any] = {"marker": "X", "ms": 8, "mfc": _INK, "mec": "white"}
 
 
@@ -97,9 +97,12 @@ def draw_scenario(scenario: Scenario) -> Figure:
 def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) -> Figure:
     """Return a flight from above and from the side, its path coloured by the mission's state.
 
+    The path is the true one where that is known; the reported one is drawn thin if it is somewhere else.
     The track may be empty; the result is None if the flight was not judged.
     """
     figure, top, side, notes = _new_figure()
+    reported, track = track, track.as_flown()
+    error_m = track.largest_distance_m(reported)
     times_s = {} if result is None else result.times_s
     _draw_top(top, scenario, {gate.colour: _crossing_label(gate, times_s) for gate in scenario.frames})
     _draw_side(side, scenario)
@@ -110,12 +113,12 @@ def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) ->
         for i, kind in enumerate(spent_s)
     }
     for axes, view in ((top, _from_above), (side, _from_the_side)):
+        if error_m > _SHOWN_ERROR_M:
+            points = (view(*at) for at in zip(reported.x, reported.y, reported.z, strict=True))
+            axes.plot(*zip(*points, strict=True), **_REPORTED_PATH, zorder=5)
         _draw_path(axes, view, track, styles)
         _draw_marks(axes, view, track, times_s)
     _set_limits(top, side, scenario, track)
-    error_m = track.largest_error_m()
-    if error_m > _SHOWN_ERROR_M:
-        _draw_true_path(top, side, track)
     _draw_legend(notes, spent_s, styles, has_estimates=bool(track.estimates), error_m=error_m)
     _write_title(figure, *_headline(scenario, result))
     return figure
@@ -324,12 +327,6 @@ def _draw_path(axes: Axes, view: _View, track: Track, styles: _Styles) -> None:
         axes.plot(*zip(*entries[kind], strict=True), ls="", marker="o", ms=3.6, color=colour, zorder=6)
 
 
-def _draw_true_path(top: Axes, side: Axes, track: Track) -> None:
-    for axes, view in ((top, _from_above), (side, _from_the_side)):
-        across, up = zip(*(view(*at) for _, *at in track.true_path), strict=True)
-        axes.plot(across, up, **_TRUE_PATH, zorder=7)
-
-
 def _draw_marks(axes: Axes, view: _View, track: Track, times_s: Mapping[str, float]) -> None:
     """Mark the crossings and the end of the path."""
     for time_s in times_s.values():
@@ -387,7 +384,7 @@ def _draw_legend(
             Line2D([], [], color=_FAINT, lw=0.9, linestyle=_ESTIMATE_DASH, label="frame as estimated")
         )
     if error_m > _SHOWN_ERROR_M:
-        handles.append(Line2D([], [], **_TRUE_PATH, label=f"true path, up to {error_m:.2f} m away"))
+        handles.append(Line2D([], [], **_REPORTED_PATH, label=f"as reported, up to {error_m:.2f} m off"))
     if not handles:
         axes.text(0, 0.95, "Nothing was recorded.", va="top", fontsize=10, color=_INK)
         return

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
-from math import isfinite
+from math import dist, isfinite
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from scenarios.result import TimedPosition
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Where a drone was, as its app knew it; all sequences but the last two have the same length.
+    """Where a drone was, as it reported; all sequences but the last two have the same length.
 
     Attributes:
         time_s: since motors on, not decreasing, shape (n,).
@@ -70,16 +70,21 @@ class Track:
             return (x, y, z)
         return None
 
-    def largest_error_m(self) -> float:
-        """The largest distance between the known and the true path at one time; 0 if that is unknown."""
-        if not self.true_path or not len(self):
-            return 0.0
-        true = np.array(self.true_path)
-        known = np.array([self.x, self.y, self.z], float)
-        inside = (true[:, 0] >= self.time_s[0]) & (true[:, 0] <= self.time_s[-1])
-        at = [np.interp(true[inside, 0], self.time_s, values) for values in known]
-        errors = np.linalg.norm(np.transpose(at).reshape(-1, 3) - true[inside, 1:], axis=1)
-        return float(np.nanmax(errors, initial=0.0))
+    def as_flown(self) -> Track:
+        """The same track with the true positions, as far as they are known."""
+        if not self.true_path:
+            return self
+        true_s, *true_m = np.array(self.true_path).T
+        x, y, z = (np.interp(self.time_s, true_s, values).tolist() for values in true_m)
+        return replace(self, x=x, y=y, z=z)
+
+    def largest_distance_m(self, other: Track) -> float:
+        """Between the samples of two tracks with the same times; samples that are not finite are left out."""
+        pairs = zip(
+            zip(self.x, self.y, self.z, strict=True), zip(other.x, other.y, other.z, strict=True), strict=True
+        )
+        distances_m = [dist(mine, others) for mine, others in pairs]
+        return max((distance_m for distance_m in distances_m if isfinite(distance_m)), default=0.0)
 
     def stretches(self) -> Iterator[tuple[str, range]]:
         """Stretches flown in one kind of state, in order of time.

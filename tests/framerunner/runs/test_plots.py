@@ -125,17 +125,18 @@ def test_the_legend_has_the_states_in_order_of_appearance():
     ]
 
 
-@pytest.mark.parametrize(("beside_m", "label"), [(0.9, "true path, up to 0.90 m away"), (0.02, None)])
-def test_the_true_path_of_a_drone_that_drifts_is_drawn(beside_m, label):
+@pytest.mark.parametrize(("beside_m", "label"), [(0.9, "as reported, up to 0.90 m off"), (0.02, None)])
+def test_the_path_is_the_true_one_and_what_a_drone_that_drifts_reports_is_beside_it(beside_m, label):
     true_path = [
         (t, x, y + beside_m * t / 4, z)
         for t, x, y, z in zip(TRACK.time_s, TRACK.x, TRACK.y, TRACK.z, strict=True)
     ]
     figure = draw_track(SCENARIO, replace(TRACK, true_path=true_path), RESULT)
-    labels = [entry for entry in legend_entries(figure) if entry.startswith("true")]
-    assert labels == ([label] if label else [])
-    lines = [line.get_ydata()[-1] for line in figure.axes[0].lines]
-    assert (pytest.approx(-3 + beside_m) in lines) == (label is not None)
+    entries = legend_entries(figure)
+    assert (label in entries) if label else not any(entry.startswith("as reported") for entry in entries)
+    path = coloured_line(figure, 0, STATE_COLOURS[2])  # of the crossing, and there the mark of red's
+    assert list(path.get_ydata()[:2]) == pytest.approx([2.0 + beside_m / 2, 2.5 + beside_m * 3 / 4])
+    assert any(list(line.get_ydata()) == [pytest.approx(2.0 + beside_m / 2)] for line in figure.axes[0].lines)
 
 
 def test_estimated_gates_are_drawn_beside_the_true_ones():
