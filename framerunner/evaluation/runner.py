@@ -11,7 +11,7 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Coroutine, Generator, Iterable, Iterator
+from collections.abc import Coroutine, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -342,12 +342,17 @@ def thinned(track: Track, step_s: float = TRACK_STEP_S) -> Track:
             kept.append(index)
     columns = ([round(column[index], 3) for index in kept] for column in (times, track.x, track.y, track.z))
     time_s, x, y, z = columns
-    true_path: list[TimedPosition] = []
-    for sample in track.true_path:
-        if not true_path or sample[0] - true_path[-1][0] >= step_s - 1e-6:
-            at_s, at_x, at_y, at_z = (round(value, 3) for value in sample)
-            true_path.append((at_s, at_x, at_y, at_z))
-    return Track(time_s, x, y, z, [states[index] for index in kept], track.estimates, true_path)
+    true_path, estimated = (_thinned_path(path, step_s) for path in (track.true_path, track.estimated_path))
+    return Track(time_s, x, y, z, [states[index] for index in kept], track.estimates, true_path, estimated)
+
+
+def _thinned_path(path: Sequence[TimedPosition], step_s: float) -> list[TimedPosition]:
+    kept: list[TimedPosition] = []
+    for sample in path:
+        if not kept or sample[0] - kept[-1][0] >= step_s - 1e-6:
+            time_s, x, y, z = (round(value, 3) for value in sample)
+            kept.append((time_s, x, y, z))
+    return kept
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,7 +40,7 @@ def kept(path, plan, **options):
 
 
 def test_rows_are_found_again_in_the_order_of_the_scenarios(tmp_path, plan):
-    flown = replace(TRACK, true_path=[(0.0, 0.1, 0.2, 0.3)])
+    flown = replace(TRACK, true_path=[(0.0, 0.1, 0.2, 0.3)], estimated_path=[(0.0, 0.1, 0.2, 0.4)])
     failed = made_row("calm-3", "timed out", track=flown)
     error = made_row("calm-2", "error", traceback="Traceback: this and that")
     keep(tmp_path / "a" / "b", plan, failed, made_row("calm-1"))
