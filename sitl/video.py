@@ -336,6 +336,7 @@ class DroneVideo:
             snapshot=referee.snapshot(),
             report=referee.report(query.get("state", ""), query.get("ended")),
             faults=simulation.fault_facts(),
+            flown_path=referee.flown_path if "state" in query else (),
         )
         return standing.model_dump(mode="json")
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3, turned
-from offboard.drone import DroneState, ReportedAccuracy
+from offboard.drone import DroneState, PlaceEstimate, ReportedAccuracy
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.gates.gate_map import GateMap
 from offboard.navigation.gates.gate_measurement import GateView, view_of
@@ -220,18 +220,20 @@ class PlaceEstimator:
         if place is None or motion is None:
             return reported
         (x, y, z), velocity_m_s, turn_rad = motion
-        camera = reported.camera_attitude_arena
+        yaw, camera = remainder(reported.yaw + turn_rad, 2 * pi), reported.camera_attitude_arena
+        covariance = place.covariance(reported.time_us)
+        covariance_m2, yaw_std_rad = covariance[:3, :3].ravel().tolist(), sqrt(covariance[TURN, TURN])
         return replace(
             reported,
             x=x,
             y=y,
             z=z,
-            yaw=remainder(reported.yaw + turn_rad, 2 * pi),
+            yaw=yaw,
             velocity_arena_m_s=velocity_m_s,
             position_age_s=0.0,
             attitude_arena=turned_by(turn_rad, reported.attitude_arena),
             camera_attitude_arena=None if camera is None else turned_by(turn_rad, camera),
-            position_std_m=place.position_std_m(reported.time_us),
+            estimate=PlaceEstimate((x, y, z), yaw, tuple(covariance_m2), yaw_std_rad),
         )
 
     @property

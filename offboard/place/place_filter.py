@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, inf, radians, sin, sqrt
+from math import cos, inf, radians, sin
 from typing import TypeAlias
 
 import numpy as np
@@ -104,10 +104,12 @@ class PlaceFilter:
         """What must be added to the reported heading."""
         return float(self.x[TURN])
 
-    def position_std_m(self, time_us: int) -> float:
-        """Standard deviation of the position at a time, of the coordinate known worst."""
-        variances, later_s = self.p.diagonal(), (time_us - self.time_us) * 1e-6
-        return sqrt((variances[POSITION] + later_s**2 * variances[VELOCITY]).max())
+    def covariance(self, time_us: int) -> Floats:
+        """Of x, y, z and the turn at a time soon after the state's, shape (4, 4)."""
+        moved = np.eye(4, OWN)
+        moved[POSITION, VELOCITY] = (time_us - self.time_us) * 1e-6 * np.eye(3)
+        covariance: Floats = moved @ self.p[:OWN, :OWN] @ moved.T
+        return covariance
 
     def turned_rad(self, motion: InertialMotion, *, settling: bool) -> float:
         """The turn after a motion: that of the reported heading and of the gyroscope, by their noise."""

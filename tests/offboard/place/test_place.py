@@ -152,7 +152,7 @@ def test_the_error_of_the_place_stays_within_what_is_stated():
         states, _ = fly(Vehicle(seed))
         flying = [s for s in states if not s.landed]
         wrong = errors(states)
-        stated = np.array([s.position_std_m for s in flying])
+        stated = np.array([max(s.estimate.position_std_m) for s in flying])
         assert (stated > 0.0).all()
         inside += (np.abs(wrong) < 3.0 * stated[:, None]).all(axis=1).tolist()
         squares.append(float((wrong[-100:, :2] ** 2).sum(axis=1).mean()))
