@@ -17,7 +17,7 @@ from framerunner.files.yaml_file import FileKind
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from scenarios.air import Wind
-from scenarios.models import COLOURS, Arena, Base, Camera, Gate, Light, Scenario, StartPose
+from scenarios.models import COLOURS, Arena, Base, BaseMarker, Camera, Gate, Light, Scenario, StartPose
 from scenarios.part import Part
 from scenarios.random_conditions import RandomClutter, RandomEffects, RandomFault, RandomLight, RandomWind
 from scenarios.random_numbers import (
@@ -142,6 +142,7 @@ class Level(Part):
     clutter: RandomClutter | None = Field(
         None, description="a hall around the arena with things on walls and floor"
     )
+    base_marker: BaseMarker | None = Field(None, description="printed markers on the base; by default none")
     airframe: str | None = Field(None, description="name of the drone to fly; by default the challenge's")
     sensors: str | None = Field(None, description="name of the drone's sensor suite, or a file of one")
 
@@ -187,7 +188,7 @@ def random_scenario(level: Level, seed: int) -> Scenario:
     scenario = Scenario(
         name=f"{level.name}-{seed}",
         description=f"Random scenario of level {level.name}, seed {seed}.",
-        base=base,
+        base=base if level.base_marker is None else base.model_copy(update={"marker": level.base_marker}),
         start=StartPose(x_m=base.x_m, y_m=base.y_m, yaw_rad=yaw_rad),
         frames=gates,
         wind=Wind() if level.wind is None else level.wind.draw(seed),
