@@ -21,6 +21,7 @@ from scenarios.air import Wind
 from scenarios.faults.declaration import Fault
 from scenarios.goals import Goal
 from scenarios.imaging.effects import CameraEffects, Hall, Patch
+from scenarios.imaging.textures import Texture
 from scenarios.part import Component, Metres, OnDrone, Part, Turn
 
 
@@ -337,6 +338,7 @@ class Scenario(Part):
         "sensors",
         "wind",
         "faults",
+        "floor_texture",
         "hall",
         "patches",
         "gripper",
@@ -354,6 +356,9 @@ class Scenario(Part):
     walls: tuple[Wall, ...] = Field((), description="obstacles that stand on the floor")
     camera: Camera = Field(Camera(), description="the drone's camera")
     light: Light = Field(Light(), description="sun and sky")
+    floor_texture: Texture | None = Field(
+        None, description="of the floor, up to the hall's walls if there is one; by default tatami mats"
+    )
     hall: Hall | None = Field(None, description="walls around the arena that are only seen")
     patches: tuple[Patch, ...] = Field((), description="flat things on the floor and on the hall's walls")
     try_limit_s: float = Field(180.0, ge=1, le=36000, description="longest try, motors on to motors off")

@@ -22,6 +22,7 @@ from scenarios.imaging.effects import (
     PatchColour,
     Surface,
 )
+from scenarios.imaging.textures import MAX_TEXTURE_SEED, Pattern, Texture
 from scenarios.models import Arena, Camera, Light
 from scenarios.part import Part
 from scenarios.random_numbers import Range, random_stream, within
@@ -170,6 +171,28 @@ class RandomLight(Part):
             ambient=self.ambient.draw_value(random_stream(seed, "light.ambient")),
             turn_rad_s=self.turn_rad_s.draw_value(random_stream(seed, "light.turn")),
         )
+
+
+class RandomTextures(Part):
+    """Patterns of floor and walls, each of a list equally likely, in a variant of their own."""
+
+    floor: tuple[Pattern, ...] = Field((), max_length=20, description="of the floor; empty: tatami mats")
+    walls: tuple[Pattern, ...] = Field((), max_length=20, description="of the hall's walls; empty: plain")
+
+    def draw_floor(self, seed: int) -> Texture | None:
+        """Draw the floor's texture."""
+        return _draw_texture(self.floor, random_stream(seed, "textures.floor"))
+
+    def draw_walls(self, seed: int) -> Texture | None:
+        """Draw the walls' texture."""
+        return _draw_texture(self.walls, random_stream(seed, "textures.walls"))
+
+
+def _draw_texture(patterns: tuple[Pattern, ...], stream: Generator) -> Texture | None:
+    if not patterns:
+        return None
+    pattern = patterns[int(stream.random() * len(patterns))]
+    return Texture(pattern=pattern, seed=int(stream.random() * MAX_TEXTURE_SEED))
 
 
 class RandomClutter(Part):

@@ -23,6 +23,7 @@ import numpy.typing as npt
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from scenarios.models import Arena, Light, Scenario, UprightGate
+from sitl.optics.texture import FaceTexture
 from sitl.solids import gate_solids
 
 Bgr = tuple[int, int, int]
@@ -49,7 +50,7 @@ WALL = "hall"
 
 _MAT_M = 2.0  # edge of one mat of the tatami
 _DARKEST = 0.3  # share of its colour that every face keeps: a gate's colour must stay recognisable
-_SHADOW = 0.6  # brightness of the floor in a shadow
+SHADOW = 0.6  # brightness of the floor in a shadow
 _FLAT_M = 1e-7  # corners nearer to a plane than this lie on it
 _UP: Vec3 = (0.0, 0.0, 1.0)
 
@@ -62,6 +63,7 @@ class Face:
     normal_arena: Vec3  # unit vector to the side it is seen from
     colour: Bgr  # as painted, shading included
     name: str  # of its solid; "tatami" or "ground" on the floor
+    texture: FaceTexture | None = None  # a picture instead of the colour
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,11 +111,16 @@ def _dim(colour: Bgr, share: float) -> Bgr:
 
 
 def lit(colour: Bgr, normal: Vec3, light: Light) -> Bgr:
-    """The colour of a face: ambient light and the sun by Lambert's law, no darker than `_DARKEST`."""
+    """The colour of a face in a light, see `brightness`."""
+    return _dim(colour, brightness(normal, light))
+
+
+def brightness(normal: Vec3, light: Light) -> float:
+    """Share of its colour that a face has: ambient light and the sun by Lambert's law, `_DARKEST` or more."""
     x, y, z = light.sun_direction_arena
     length = hypot(x, y, z)
     facing = -(normal[0] * x + normal[1] * y + normal[2] * z) / length if length > 0 else 0.0
-    return _dim(colour, max(_DARKEST, light.ambient + (1.0 - light.ambient) * max(0.0, facing)))
+    return max(_DARKEST, light.ambient + (1.0 - light.ambient) * max(0.0, facing))
 
 
 def _on_floor(corners_xy: Sequence[Sequence[float]] | Floats, colour: Bgr, name: str) -> Face:
@@ -257,7 +264,7 @@ def _outline(points: Floats) -> npt.NDArray[np.float32]:
 
 def _in_shadow(outline: npt.NDArray[np.float32], light: Light, *, on_tatami: bool) -> Face:
     name, colour = ("tatami", TATAMI_BGR) if on_tatami else ("ground", GROUND_BGR)
-    return _on_floor(outline.tolist(), _dim(lit(colour, _UP, light), _SHADOW), name)
+    return _on_floor(outline.tolist(), _dim(lit(colour, _UP, light), SHADOW), name)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from math import hypot
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from scenarios.imaging.textures import Texture
 from scenarios.part import Part
 
 MAX_K, MAX_P = 1.0, 0.1
@@ -139,5 +140,8 @@ class Patch(Part):
 class Hall(Part):
     """A room around the arena. It is only seen: nothing collides with its walls."""
 
+    often_unused: ClassVar = ("wall_texture",)
+
     beyond_m: float = Field(1.5, ge=0.01, le=100, description="from the arena's border to the walls")
     height_m: float = Field(5.0, ge=0.1, le=100, description="of the ceiling")
+    wall_texture: Texture | None = Field(None, description="of the walls; by default they are plain")

@@ -73,3 +73,15 @@ layout:
 """
     with pytest.raises(LevelError, match=message):
         LEVEL_FILES.parse(layout + section, "bad.yaml")
+
+
+def test_textures_are_drawn_from_streams_of_their_own():
+    fields = INDOOR.model_dump(exclude_none=True)
+    textured = Level.model_validate({**fields, "textures": {"floor": ["wood", "carpet"], "walls": ["brick"]}})
+    drawn = [random_scenario(textured, seed) for seed in range(20)]
+    assert {scenario.floor_texture.pattern for scenario in drawn} == {"wood", "carpet"}
+    assert len({scenario.floor_texture.seed for scenario in drawn}) == len(drawn)
+    assert {scenario.hall.wall_texture.pattern for scenario in drawn} == {"brick"}
+    plain = random_scenario(INDOOR, 5)
+    hall = drawn[5].hall.model_copy(update={"wall_texture": None})
+    assert drawn[5].model_copy(update={"floor_texture": None, "hall": hall}) == plain
