@@ -457,7 +457,7 @@ class MavsdkDrone:
         assert self._alignment is not None, "ready() comes first"
         sample, missed = self._feed.take_samples()
         for jump in self._resets.take():
-            self._alignment = followed(self._alignment, jump)
+            self._alignment = followed(self._alignment, jump, drifts=self._inertial.drifts)
             self._tracker.reset()
         feed, alignment, dialect = self._feed, self._alignment, self._stream
         skipped = tuple(reported_state(before, feed, alignment, dialect) for before in missed)

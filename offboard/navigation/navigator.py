@@ -36,7 +36,9 @@ SEARCH_AFTER_M = 2.0  # from behind a gate to the drone, when it is chosen where
 
 
 class Navigator:
-    """The world model, the path, and the action that is flown. All positions are in arena axes.
+    """The world model, the path, and the action that is flown.
+
+    Positions are in the axes of flight: those of the arena, but continuous (`FlightAxes`).
 
     Attributes:
         expected_base: see `WorldModel.expected_base`.
@@ -71,9 +73,10 @@ class Navigator:
             sent: the command that it has had since the last tick; None if it had none, or it is not known.
 
         Returns:
-            The drone's state as it is estimated now.
+            The drone's state as it is estimated now, in the arena. It is flown in the axes of flight.
         """
-        state = self._world.observe(state, images)
+        estimated = self._world.observe(state, images)
+        state = self._world.in_flight(estimated)
         if sent is not None:
             sent = _plus(sent, [-v for v in self._added_m_s])
         self._added_m_s = (0.0, 0.0, 0.0)
@@ -81,7 +84,7 @@ class Navigator:
         self._state = state
         if self._start_m is None:
             self._start_m = position_now(state)
-        return state
+        return estimated
 
     def is_known(self, colour: str) -> bool:
         """The gate is on the map."""
@@ -169,6 +172,7 @@ class Navigator:
     def step_back(self, colour: str) -> VelocityFluCommand:
         """Fly back from a gate, to one of its sides, facing it."""
         state, _ = self._begin(f"step back from {colour}")
+        self._world.stay_by(colour)
         if self._goal is None:
             gate, here_m = self._world.gate(colour), position_now(state)
             if gate is None:
@@ -185,6 +189,7 @@ class Navigator:
 
     def _cross(self, colour: str) -> VelocityFluCommand:
         state, now_s = self._begin(f"cross {colour}")
+        self._world.stay_by(colour)
         crossing = self._crossing
         if crossing is None or crossing.colour != colour or crossing.refusal:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)

@@ -16,7 +16,7 @@ import numpy as np
 
 from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3, turned
-from offboard.drone import DroneState, PlaceEstimate, ReportedAccuracy
+from offboard.drone import SURE_OF_POSITION_M, DroneState, PlaceEstimate, ReportedAccuracy
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.gates.gate_map import GateMap
 from offboard.navigation.gates.gate_measurement import GateView, view_of
@@ -28,8 +28,7 @@ from offboard.place.measurements import Eye, points, report, stands
 from offboard.place.place_filter import POSITION, TURN, VELOCITY, Floats, PlaceFilter
 from vision.types import BaseSighting, GateSighting
 
-# A place that is known no better than this, or this many times worse than at the start, is not known.
-SURE_M = 0.1
+# A place that is known so many times worse than at the start is not known, if it is known worse than this.
 SURE_FACTOR = 2.0
 ALWAYS_SURE_M = 0.01
 SURE_RAD = 0.02
@@ -81,11 +80,6 @@ class PlaceEstimator:
         self._fused_us = 0
         self._misfits = 0  # of known points, in a row
 
-    @property
-    def estimates(self) -> bool:
-        """Whether the filter is used; else the vehicle's reports are."""
-        return self._filter is not None
-
     def add(self, state: DroneState) -> None:
         """Take in a state as the vehicle reports it; call it once a tick, before images are used.
 
@@ -127,7 +121,9 @@ class PlaceEstimator:
     def _knows_position(self, accuracy: ReportedAccuracy) -> bool:
         if self._first_std_m is None:
             self._first_std_m = accuracy.position_std_m
-        return accuracy.position_std_m < min(SURE_M, max(ALWAYS_SURE_M, SURE_FACTOR * self._first_std_m))
+        return accuracy.position_std_m < min(
+            SURE_OF_POSITION_M, max(ALWAYS_SURE_M, SURE_FACTOR * self._first_std_m)
+        )
 
     def _bridge(self, place: PlaceFilter, last: DroneState, state: DroneState) -> None:
         """Go on while the IMU's samples are missing: by how far the vehicle reports to have moved."""
@@ -235,6 +231,20 @@ class PlaceEstimator:
             camera_attitude_arena=None if camera is None else turned_by(turn_rad, camera),
             estimate=PlaceEstimate((x, y, z), yaw, tuple(covariance_m2), yaw_std_rad),
         )
+
+    def places_m(self, time_us: int) -> tuple[Vec3, dict[str, Vec3]] | None:
+        """Where the drone is at a time, and the gates in the filter; None while the reports are used.
+
+        What an image or a report has changed is the difference of two calls for one time.
+        """
+        place, motion = self._filter, self._motion_at(time_us)
+        if place is None or motion is None:
+            return None
+        gates = {}
+        for colour, at in place.gates.items():
+            x, y, z = place.x[at : at + 3].tolist()
+            gates[colour] = (x, y, z)
+        return motion[0], gates
 
     @property
     def velocity_error_flu_m_s(self) -> Vec3:
