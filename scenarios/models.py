@@ -51,6 +51,7 @@ DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
 _SHORTEST_DIRECTION = 1e-6
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
+PERSON_CLEAR_M = 0.3  # from the arena to the middle of a person
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
@@ -415,6 +416,18 @@ class Scenario(Part):
                 if patch.surface != "floor":
                     message = "is a wall of the hall, and there is none; add hall: {} or put it on the floor"
                     raise refusal(patch.surface, message, "patches", index, "surface")
+        return self
+
+    @model_validator(mode="after")
+    def _people_are_outside_the_arena(self) -> Self:
+        arena, hall = self.arena, self.hall or Hall()
+        for index, person in enumerate(hall.people):
+            beyond_m = max(abs(person.x_m) - arena.length_x_m / 2, abs(person.y_m) - arena.width_y_m / 2)
+            if not PERSON_CLEAR_M <= beyond_m <= hall.beyond_m:
+                message = (
+                    f"is not between arena and walls; keep it {PERSON_CLEAR_M} m or more outside the arena"
+                )
+                raise refusal(person.x_m, message, "hall", "people", index, "x_m")
         return self
 
     @model_validator(mode="after")

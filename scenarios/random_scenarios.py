@@ -20,14 +20,8 @@ from scenarios.air import Wind
 from scenarios.imaging.effects import Hall
 from scenarios.models import COLOURS, Arena, Base, Camera, Gate, Light, Scenario, StartPose
 from scenarios.part import Part
-from scenarios.random_conditions import (
-    RandomClutter,
-    RandomEffects,
-    RandomFault,
-    RandomLight,
-    RandomTextures,
-    RandomWind,
-)
+from scenarios.random_conditions import RandomEffects, RandomFault, RandomLight, RandomWind
+from scenarios.random_hall import RandomClutter, RandomTextures
 from scenarios.random_numbers import (
     MAX_DRAWS,
     STEPS_PER_UNIT,
@@ -207,16 +201,16 @@ def random_scenario(level: Level, seed: int) -> Scenario:
         light=Light() if level.light is None else level.light.draw(seed),
         floor_texture=None if level.textures is None else level.textures.draw_floor(seed),
         hall=_draw_hall(level, seed),
-        patches=() if level.clutter is None else level.clutter.draw(seed),
+        patches=() if level.clutter is None else level.clutter.draw_patches(seed),
         **{name: value for name in ("airframe", "sensors") if (value := getattr(level, name)) is not None},
     )
     return scenario if level.obstacles is None else add_obstacles(scenario, level.obstacles, seed)
 
 
 def _draw_hall(level: Level, seed: int) -> Hall | None:
-    if level.clutter is None or level.textures is None:
-        return None if level.clutter is None else level.clutter.hall
-    return level.clutter.hall.model_copy(update={"wall_texture": level.textures.draw_walls(seed)})
+    if level.clutter is None:
+        return None
+    return level.clutter.draw_hall(seed, None if level.textures is None else level.textures.draw_walls(seed))
 
 
 def _draw_layout(level: Level, seed: int) -> tuple[Base, tuple[Gate, ...]]:

@@ -151,7 +151,7 @@ def _mats(arena: Arena, light: Light) -> tuple[Face, ...]:
     )
 
 
-def _face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: Light) -> Face:
+def box_face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: Light) -> Face:
     """A face given in a box's own axes (metres from its centre)."""
     c, s = box.turn
     turned = (c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], normal[2])
@@ -166,14 +166,14 @@ def _base_body(box: Solid, mark_share: float, light: Light) -> Body:
         return Body(box, _upright_faces(box, BASE_BGR, light))
     mark = mark_share * half
     inset: list[Vec3] = [(-mark, -mark, top), (mark, -mark, top), (mark, mark, top), (-mark, mark, top)]
-    mark_face = _face(box, inset, _UP, BASE_MARK_BGR, light)
+    mark_face = box_face(box, inset, _UP, BASE_MARK_BGR, light)
     return Body(box, (*_upright_faces(box, BASE_BGR, light), mark_face))
 
 
 def _upright_faces(box: Solid, colour: Bgr, light: Light) -> tuple[Face, ...]:
     """The sides and the top of a box on the floor."""
     return tuple(
-        _face(box, _side(box.half_extents_m, axis, sign), _normal(axis, sign), colour, light)
+        box_face(box, _side(box.half_extents_m, axis, sign), _normal(axis, sign), colour, light)
         for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1), (2, 1))
     )
 
@@ -190,15 +190,15 @@ def _gate_body(gate: UprightGate, light: Light) -> Body:
     inner: Vec3 = (outer[0], outer[1] - gate.bar_m, outer[2] - gate.bar_m)
     around = ((1, 1), (1, -1), (2, 1), (2, -1))
     faces = [
-        _face(box, _side(inner, axis, sign), _normal(axis, -sign), colour, light) for axis, sign in around
+        box_face(box, _side(inner, axis, sign), _normal(axis, -sign), colour, light) for axis, sign in around
     ]
     for sign in (1, -1):
         x, y, z, v, w = sign * outer[0], outer[1], outer[2], inner[1], inner[2]
         for y0, y1, z0, z1 in ((-y, y, w, z), (-y, y, -z, -w), (v, y, -w, w), (-y, -v, -w, w)):
             quad: list[Vec3] = [(x, y0, z0), (x, y1, z0), (x, y1, z1), (x, y0, z1)]
-            faces.append(_face(box, quad, _normal(0, sign), colour, light))
+            faces.append(box_face(box, quad, _normal(0, sign), colour, light))
     faces += [
-        _face(box, _side(outer, axis, sign), _normal(axis, sign), colour, light) for axis, sign in around
+        box_face(box, _side(outer, axis, sign), _normal(axis, sign), colour, light) for axis, sign in around
     ]
     return Body(box, tuple(faces), len(around))
 

@@ -11,28 +11,18 @@ from math import cos, sin
 import numpy as np
 
 from framerunner.geometry.vectors import Vec3
-from scenarios.imaging.effects import Hall, Patch, PatchColour, Surface
+from scenarios.imaging.effects import Hall, Patch
+from scenarios.imaging.furnishings import Surface, Window
 from scenarios.models import Arena, Light, Scenario
-from sitl.camera_scene import WALL, Bgr, Face, Floats, Scene, brightness, lit
+from sitl.camera_scene import WALL, Bgr, Body, Face, Floats, Scene, brightness, lit
+from sitl.optics.colours import CEILING_BGR, DAY_BGR, HALL_BGR, PATCH_BGR, SILL_BGR
+from sitl.optics.people import person_body
+from sitl.optics.pictures import picture_pyramid
 from sitl.optics.texture import FaceTexture, Pyramid, on_face, texture_pyramid
-
-HALL_BGR: Bgr = (196, 204, 206)
-CEILING_BGR: Bgr = (226, 228, 228)
-PATCH_BGR: dict[PatchColour, Bgr] = {
-    "red": (36, 28, 214),
-    "green": (60, 172, 34),
-    "blue": (196, 66, 24),
-    "cyan": (216, 178, 22),
-    "magenta": (150, 34, 206),
-    "yellow": (20, 208, 240),
-    "orange": (22, 118, 236),
-    "white": (240, 242, 242),
-    "black": (34, 32, 30),
-}
-"""Colours of print and cloth: less pure than a gate's."""
 
 _LIFT_M = 0.002  # of a thing above what it is on; it decides nothing but keeps faces apart
 _BEHIND_WALLS_M = 0.2  # how far a textured floor goes on behind the walls, which are painted over it
+_SILL_M = 0.06  # height of a window's sill, and how far it goes beyond the frame
 _Axes = tuple[Vec3, Vec3, Vec3, Vec3]  # origin, across, up, normal
 
 
@@ -57,7 +47,8 @@ class HallFaces:
             self._floor = texture_pyramid(scenario.floor_texture, 2.0 * x, 2.0 * y)
         if hall.wall_texture is not None:
             self._wall = texture_pyramid(hall.wall_texture, 2.0 * max(x, y), hall.height_m)
-        self._dimmed: dict[str, tuple[float, Pyramid]] = {}
+        self._pictures = [picture_pyramid(picture) for picture in hall.pictures]
+        self._dimmed: dict[str | int, tuple[float, Pyramid]] = {}
 
     @property
     def is_floor_textured(self) -> bool:
@@ -71,12 +62,16 @@ class HallFaces:
             scene: of the scenario in that light.
             light: on all of them.
         """
-        walls = [] if self._scenario.hall is None else self._walls(light)
+        walls = [] if self._scenario.hall is None else [*self._walls(light), *self._on_walls(light)]
         walls += self._patches(light, on_floor=False)
         if self._floor is None:
             return (*walls, scene.tatami, *scene.mats)
         # Walls hide where the floor ends.
         return (self._textured_floor(self._floor, light), *walls)
+
+    def people(self, light: Light) -> list[Body]:
+        """Who stands around the arena."""
+        return [person_body(person, light) for person in self._hall.people]
 
     def after_shadows(self, light: Light) -> tuple[Face, ...]:
         """What lies on the floor."""
@@ -112,7 +107,23 @@ class HallFaces:
         above = ((0.0, 0.0, hall.height_m), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
         return [*faces, _face(above, _rectangle(0.0, 0.0, x, y), CEILING_BGR, light)]
 
-    def _lit(self, key: str, picture: Pyramid, face: Face, light: Light) -> Pyramid:
+    def _on_walls(self, light: Light) -> list[Face]:
+        """Windows and pictures."""
+        arena, hall = self._scenario.arena, self._hall
+        faces: list[Face] = []
+        for window in hall.windows:
+            faces += _window_faces(window, _axes(window.surface, arena, hall), light)
+        for index, (picture, pyramid) in enumerate(zip(hall.pictures, self._pictures, strict=True)):
+            axes = _axes(picture.surface, arena, hall)
+            half_w, half_h = picture.width_m / 2, picture.height_m / 2
+            outline = _rectangle(picture.across_m, picture.up_m, half_w, half_h)
+            face = _face(axes, outline, HALL_BGR, light, lift_m=_LIFT_M, name="picture")
+            upper_left_m = (picture.across_m - half_w, picture.up_m + half_h)
+            texture = _hung(self._lit(index, pyramid, face, light), axes, upper_left_m)
+            faces.append(replace(face, texture=texture))
+        return faces
+
+    def _lit(self, key: str | int, picture: Pyramid, face: Face, light: Light) -> Pyramid:
         """A picture in the light on a face; kept until that differs by a number of the image."""
         share = round(brightness(face.normal_arena, light) * 255.0) / 255.0
         before, dimmed = self._dimmed.get(key, (None, picture))
@@ -147,6 +158,22 @@ def _axes(surface: Surface, arena: Arena, hall: Hall) -> _Axes:
     return axes[surface]
 
 
+def _window_faces(window: Window, axes: _Axes, light: Light) -> list[Face]:
+    """Its panes, which shine, then the bars of its frame and the one in its middle, and its sill."""
+    x, y, half_w, half_h = window.across_m, window.up_m, window.width_m / 2, window.height_m / 2
+    bar, colour = window.bar_m / 2, PATCH_BGR[window.colour]
+    bars = [_rectangle(x, y + sign * (half_h - bar), half_w, bar) for sign in (1.0, -1.0)]
+    bars += [_rectangle(x + side * (half_w - bar), y, bar, half_h) for side in (1.0, 0.0, -1.0)]
+    sill = _rectangle(x, y - half_h - _SILL_M / 2, half_w + _SILL_M, _SILL_M / 2)
+    panes = _face(axes, _rectangle(x, y, half_w, half_h), DAY_BGR, light, lift_m=_LIFT_M, name="window")
+    frame = [_face(axes, part, colour, light, lift_m=_LIFT_M, name="window") for part in bars]
+    return [
+        replace(panes, colour=DAY_BGR),
+        *frame,
+        _face(axes, sill, SILL_BGR, light, lift_m=_LIFT_M, name="window"),
+    ]
+
+
 def _patch_faces(patch: Patch, axes: _Axes, light: Light) -> list[Face]:
     """A rectangle, or the four parts of its border."""
     half_w, half_h, border = patch.width_m / 2, patch.height_m / 2, patch.border_m
@@ -158,7 +185,9 @@ def _patch_faces(patch: Patch, axes: _Axes, light: Light) -> list[Face]:
     c, s = cos(patch.turn_rad), sin(patch.turn_rad)
     turn = np.array([[c, s], [-s, c]])
     middle = np.array([patch.across_m, patch.up_m])
-    return [_face(axes, part @ turn + middle, PATCH_BGR[patch.colour], light, _LIFT_M) for part in parts]
+    return [
+        _face(axes, part @ turn + middle, PATCH_BGR[patch.colour], light, lift_m=_LIFT_M) for part in parts
+    ]
 
 
 def _rectangle(x: float, y: float, half_x: float, half_y: float) -> Floats:
@@ -172,7 +201,9 @@ def _rectangle(x: float, y: float, half_x: float, half_y: float) -> Floats:
     )
 
 
-def _face(axes: _Axes, flat: Floats, colour: Bgr, light: Light, lift_m: float = 0.0) -> Face:
+def _face(
+    axes: _Axes, flat: Floats, colour: Bgr, light: Light, *, lift_m: float = 0.0, name: str = WALL
+) -> Face:
     origin, across, up, normal = (np.array(axis) for axis in axes)
     corners = origin + flat[:, :1] * across + flat[:, 1:] * up + lift_m * normal
-    return Face(corners, axes[3], lit(colour, axes[3], light), WALL)
+    return Face(corners, axes[3], lit(colour, axes[3], light), name)

@@ -145,8 +145,8 @@ class Painter:
         """The scene in the light of a time."""
         light = self._scenario.light.after(time_us / 1e6)
         scene = build_scene(self._scenario, light)
-        tree = PaintTree(scene.bodies)
         surroundings = self._surroundings
+        tree = PaintTree((*scene.bodies, *surroundings.people(light)))
         below = surroundings.before_shadows(scene, light)
         floor = (*below, *scene.shadows, *surroundings.after_shadows(light))
         mesh = Mesh([*floor, *tree.faces], [len(floor) + first for first in tree.parts], self._pinhole)
