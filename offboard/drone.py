@@ -249,5 +249,8 @@ class Drone(Protocol):
         """
         ...
 
+    def report_place(self, state: DroneState) -> None:
+        """Tell the vehicle where the app has estimated it to be, if it knows that from nothing else."""
+
     async def close(self) -> None:
         """Release the vehicle."""
