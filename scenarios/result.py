@@ -306,6 +306,7 @@ class Standing(_Record):
     stands_at: StandingPlace | None = (
         None  # None if it does not stand upright with its motors off, or unknown
     )
+    position_arena_m: tuple[Metres, Metres, Metres] | None = None  # where it truly is; None if unknown
     snapshot: RefereeSnapshot
     report: RefereeReport  # what the try would be worth if it ended now
     faults: FaultFacts = FaultFacts()

@@ -333,6 +333,7 @@ class DroneVideo:
             time_us=simulation.time_us,
             local_frame=None if origin_arena_m is None else LocalFrame(origin_arena_m=origin_arena_m),
             stands_at=standing_place(simulation.truth),
+            position_arena_m=simulation.truth.position_arena_m,
             snapshot=referee.snapshot(),
             report=referee.report(query.get("state", ""), query.get("ended")),
             faults=simulation.fault_facts(),

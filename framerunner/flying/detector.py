@@ -12,6 +12,7 @@ from vision.base.model import BaseShape
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.detectors import Detector, DetectorMaker, new_detector, others_detector
+from vision.tracks.tracker import DetectorWithTracks, PointTracker
 
 
 def plan_detector(plan: FlightPlan) -> Detector:
@@ -35,7 +36,12 @@ def plan_detector(plan: FlightPlan) -> Detector:
 
 def _with_base(detector: Detector, plan: FlightPlan, calibration: Calibration) -> Detector:
     """A detector that looks for the base, too; a drone that starts from the floor has none."""
-    if plan.mission is None or plan.mission.vision == "boxes" or plan.lift_m:
+    if plan.mission is None or plan.mission.vision == "boxes":
+        return detector
+    if plan.alone:
+        lens = None if calibration.is_ideal else Lens(calibration)
+        detector = DetectorWithTracks(detector, PointTracker(lens))
+    if plan.lift_m:
         return detector
     return DetectorWithBase(detector, base_finder(plan.scenario.base, calibration))
 
