@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from scenarios.random_scenarios import Level, load_level, random_scenario
     from scenarios.result import FlightResult
     from vision.calibration.model import Calibration
-    from vision.detectors import Detector, DetectorMaker, new_detector
-    from vision.sighting_maker import SightingMaker
+    from vision.detectors import Detector, DetectorMaker, SightingMaker, new_detector
     from vision.types import Detection, Detections, GateCorner, GatePose, GateSighting
 
     __version__: str
@@ -41,7 +40,7 @@ _MODULES = {
     "Mission": "offboard.mission",
     "Pilot": "offboard.pilot",
     "Scenario": "scenarios.models",
-    "SightingMaker": "vision.sighting_maker",
+    "SightingMaker": "vision.detectors",
     "Simulator": "framerunner.simulator",
     "TrueState": "scenarios.models",
     "UserError": "framerunner.errors",
