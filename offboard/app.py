@@ -264,6 +264,8 @@ class _Flight:
         command = self.engine.tick(imu, detections, state.time_us, state, images=images, sent=self.sent)
         if self.engine.has_navigator:
             self.perception.space_images(self.engine.image_period_s)
+        if self.flying and self.engine.drone is not None:
+            self.drone.report_place(self.engine.drone)
         motors_on = self.engine.pilot.cmd.on
         self.motors_requested = self.motors_requested or motors_on
         self.sent = None

@@ -42,6 +42,9 @@ class ImuInterval:
     specific_force_flu_m_s2: Vec3
 
 
+SURE_OF_POSITION_M = 0.1  # a vehicle that says more of its position does not know it
+
+
 @dataclass(frozen=True, slots=True)
 class ReportedAccuracy:
     """What the vehicle tells of the errors of its own estimate (standard deviations), and of its jumps.
@@ -245,6 +248,9 @@ class Drone(Protocol):
             OutsideBoxError: the drone has left its box and does not come back.
         """
         ...
+
+    def report_place(self, state: DroneState) -> None:
+        """Tell the vehicle where the app has estimated it to be, if it knows that from nothing else."""
 
     async def close(self) -> None:
         """Release the vehicle."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
-from math import hypot
+from math import dist, hypot, inf
+from typing import TypeAlias
 
 from framerunner.geometry.axes import Pose
 from framerunner.geometry.vectors import Vec3
@@ -21,12 +22,15 @@ from offboard.navigation.search.likelihood import Glimpses
 from offboard.navigation.seen_space import SeenSpace, ViewedSpace
 from offboard.navigation.view import GateEstimate, Surroundings
 from offboard.place.base_landmark import BaseLandmark
+from offboard.place.flight_axes import AT_GATE_M, NEAR_M, FlightAxes
 from offboard.place.place import PlaceEstimator
 from scenarios.models import COLOURS
 from vision.types import BaseExpectation, Detections
 
 START_SPARE_M = 0.02  # by which what is known to be free at the start exceeds what the drone needs
 IMAGES_WAITING = 32  # for the drone's pose when they were exposed
+
+_Places: TypeAlias = tuple[Vec3, dict[str, Vec3]]  # of the drone and the gates, arena axes
 
 
 class WorldModel:
@@ -41,7 +45,10 @@ class WorldModel:
         camera = self._camera = CameraModel.of(surroundings.camera)
         self._surroundings = surroundings
         self._history = PoseHistory(camera)
-        self._place = PlaceEstimator(camera, surroundings.shapes)
+        self._place = PlaceEstimator(camera, surroundings.shapes, alone=surroundings.alone)
+        self._axes = FlightAxes()
+        self._near = ""  # colour of the gate that the drone is flown by
+        self._axes_us: int | None = None
         self._base = BaseLandmark(camera, surroundings.base)
         self._map = GateMap(camera, surroundings.arena, surroundings.shapes)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
@@ -54,6 +61,7 @@ class WorldModel:
         self._image_us = -1
         self._waiting: deque[Detections] = deque(maxlen=IMAGES_WAITING)
         self._known: dict[str, GateEstimate] = {}  # by colour
+        self._in_flight: dict[str, GateEstimate] = {}  # likewise, in the axes of flight
         self._gates: tuple[PathGate, ...] | None = None  # that a path must keep clear of; None: not made yet
 
     def observe(self, state: DroneState, images: Sequence[Detections]) -> DroneState:
@@ -66,6 +74,7 @@ class WorldModel:
             The state now, by all that is known.
         """
         self._place.add(state)
+        before = self._place.places_m(state.time_us)
         if self._start_m is None:
             self._start_m = (state.x, state.y, state.z)
         for earlier in state.missed:
@@ -85,16 +94,47 @@ class WorldModel:
             if pose is not None:
                 self._use(image, pose, correction if is_there else None)
         self._place.advance()
-        if self._place.estimates:
-            self._know()
+        after = self._place.places_m(state.time_us)
+        if before is not None and after is not None:
+            self._move_axes(before, after, state.time_us)
+            self._know(after[1])
         return self._place.state(state)
 
-    def _know(self) -> None:
+    def _move_axes(self, before: _Places, after: _Places, time_us: int) -> None:
+        """Let the axes of flight take in by what this tick has corrected the place."""
+        step_s = 0.0 if self._axes_us is None else (time_us - self._axes_us) * 1e-6
+        (drone_m, gates_m), (drone_after_m, gates_after_m) = before, after
+        gate_m, gate_after_m = gates_m.get(self._near), gates_after_m.get(self._near)
+        jump, away_m = _minus(drone_after_m, drone_m), inf
+        if gate_m is not None and gate_after_m is not None:
+            away_m = dist(drone_after_m, gate_after_m)
+            jump = _minus(gate_after_m, gate_m) if away_m < AT_GATE_M else jump
+        self._axes.jump(jump, step_s, held=away_m < NEAR_M)
+        self._axes_us, self._near = time_us, ""
+
+    def stay_by(self, colour: str) -> None:
+        """The drone is flown by a gate at this tick: see `FlightAxes`."""
+        self._near = colour
+
+    def in_flight(self, state: DroneState) -> DroneState:
+        """The drone's state in the axes of flight, which are the arena's if the vehicle knows its place."""
+        if not any(self._axes.offset_m):
+            return state
+        x, y, z = self._axes.of((state.x, state.y, state.z))
+        return replace(state, x=x, y=y, z=z)
+
+    def _know(self, in_filter: Container[str]) -> None:
         """Note what is known of each gate now, relative to the drone."""
         best = [estimate for estimate in map(self._map.best, COLOURS) if estimate is not None]
-        known = {estimate.colour: self._place.known(estimate) for estimate in best}
-        if known != self._known:
-            self._known, self._gates = known, None
+        self._known = {estimate.colour: self._place.known(estimate) for estimate in best}
+        in_flight = {
+            colour: replace(known, position_m=self._axes.of(known.position_m))
+            if colour in in_filter
+            else known
+            for colour, known in self._known.items()
+        }
+        if in_flight != self._in_flight:
+            self._in_flight, self._gates = in_flight, None
 
     @property
     def velocity_error_flu_m_s(self) -> Vec3:
@@ -117,6 +157,7 @@ class WorldModel:
             poses = [pose] * len(image.frames) if poses is None else poses
             self._place.see(image.frames, poses, correction, self._map)
             self._see_base(image, pose, correction)
+            self._see_tracks(image, pose)
         self._obstacle_map.update(position_m, attitude, image.obstacle_edges)
         self.seen_space.update(position_m, attitude, image.obstacle_edges)
         self._explorer.coverage.update(position_m, attitude, image.obstacle_edges)
@@ -126,12 +167,23 @@ class WorldModel:
         self.viewed_space.needed = others or len(known) < len(COLOURS)
         self._glimpses.update(position_m, attitude, image, known, self._map.is_lookalike)
 
+    def _pose_of_row(self, down_px: float, pose: DronePose) -> DronePose | None:
+        """The drone's pose when a row of an image was read out; None if the states around it are missing."""
+        at_us = pose.time_us + round(1e6 * self._camera.read_after_s(down_px))
+        return self._history.at(at_us, self._place.correction(at_us))
+
+    def _see_tracks(self, image: Detections, pose: DronePose) -> None:
+        correction = self._place.correction(pose.time_us)
+        if image.tracks is not None and correction is not None:
+            rows = (self._pose_of_row(row_px, pose) for row_px in (-inf, 0.0, inf))
+            self._place.see_tracks(image.tracks, [each or pose for each in rows], correction)
+
     def _see_base(self, image: Detections, pose: DronePose, correction: PoseCorrection) -> None:
         sighting, base = image.base, self._base
+        correction = self._place.correction(pose.time_us) or correction  # gates may have changed it
         if sighting is None:
             return
-        at_us = pose.time_us + round(1e6 * self._camera.read_after_s(base.row_px(sighting)))
-        pose = self._history.at(at_us, self._place.correction(at_us)) or pose
+        pose = self._pose_of_row(base.row_px(sighting), pose) or pose
         if self._place.see_points(base.points_m(sighting), sighting, pose, correction):
             base.seen_us.append(pose.time_us)
 
@@ -160,22 +212,20 @@ class WorldModel:
         poses = []
         for sighting in image.frames:
             rows = [corner.down_px for corner in sighting.corners if corner is not None]
-            after_s = self._camera.read_after_s(sum(rows) / len(rows)) if rows else 0.0
-            at_us = pose.time_us + round(1e6 * after_s)
-            at = self._history.at(at_us, self._place.correction(at_us))
+            at = self._pose_of_row(sum(rows) / len(rows) if rows else 0.0, pose)
             poses.append(pose if at is None else replace(at, time_us=pose.time_us))
         return poses
 
     def gate(self, colour: str) -> GateEstimate | None:
-        """The gate of a colour; None if it is not on the map."""
+        """The gate of a colour in the axes of flight; None if it is not on the map."""
         known = self._map.best(colour)
-        return known if known is None else self._known.get(colour, known)
+        return known if known is None else self._in_flight.get(colour, known)
 
     @property
     def gates(self) -> tuple[GateEstimate, ...]:
-        """All gates on the map."""
+        """All gates on the map, in the arena."""
         return tuple(
-            self.gate(gate.colour) or gate if gate is self._map.best(gate.colour) else gate
+            self._known.get(gate.colour, gate) if gate is self._map.best(gate.colour) else gate
             for gate in self._map.gates
         )
 
@@ -227,3 +277,7 @@ class WorldModel:
             for (x, y, radius_m), gap_m in zip(columns_m, gaps_m, strict=True)
             if gap_m > 0.0
         )
+
+
+def _minus(a: Vec3, b: Vec3) -> Vec3:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

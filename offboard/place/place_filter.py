@@ -25,6 +25,7 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 
 POSITION, TURN, VELOCITY, BIAS, OWN = slice(0, 3), 3, slice(4, 7), slice(7, 10), 10
 GATE = 4  # numbers of a gate
+CLONE = 4  # numbers of a drone's place at an earlier time: as the first ones of the state
 
 # Noise, as densities and random walks per root of a second: of a small IMU on a vibrating drone, whose
 # reported roll and pitch are wrong by tenths of a degree.
@@ -82,6 +83,7 @@ class PlaceFilter:
         x: the state, shape (10 + 4 gates,).
         p: its covariance.
         gates: the first index of each gate, by colour.
+        clones: likewise, of where the drone was at some times.
     """
 
     def __init__(
@@ -98,6 +100,7 @@ class PlaceFilter:
         stds = [position_std_m] * 3 + [START_TURN_RAD] + [velocity_std_m_s] * 3 + [START_BIAS_M_S2] * 3
         self.p = np.diag(np.square(stds))
         self.gates: dict[str, int] = {}
+        self.clones: dict[int, int] = {}
 
     @property
     def turn_rad(self) -> float:
@@ -111,10 +114,9 @@ class PlaceFilter:
         covariance: Floats = moved @ self.p[:OWN, :OWN] @ moved.T
         return covariance
 
-    def turned_rad(self, motion: InertialMotion, *, settling: bool) -> float:
+    def turned_rad(self, motion: InertialMotion, reported_std_rad: float) -> float:
         """The turn after a motion: that of the reported heading and of the gyroscope, by their noise."""
-        reported, gyro = (TURN_SETTLING_RAD if settling else TURN_RAD) ** 2, GYRO_RAD**2
-        return self.turn_rad + motion.turn_rad * reported / (reported + gyro)
+        return self.turn_rad + motion.turn_rad / (1.0 + (GYRO_RAD / reported_std_rad) ** 2)
 
     def moved(self, motion: InertialMotion) -> tuple[Vec3, Vec3]:
         """Position and velocity after a motion; the state stays."""
@@ -136,7 +138,7 @@ class PlaceFilter:
         )
         return position, velocity
 
-    def predict(self, motion: InertialMotion, *, settling: bool = False) -> None:
+    def predict(self, motion: InertialMotion, reported_std_rad: float = TURN_RAD) -> None:
         """Let the time of a motion pass.
 
         Covariance of a double integrator driven by white noise: Bar-Shalom, Li & Kirubarajan, "Estimation
@@ -144,7 +146,7 @@ class PlaceFilter:
 
         Args:
             motion: since the state.
-            settling: the vehicle may just be correcting its heading.
+            reported_std_rad: of the reported heading, after a second; infinite: it is not used.
         """
         position, velocity = self.moved(motion)
         step_s = motion.duration_s
@@ -163,9 +165,8 @@ class PlaceFilter:
         p[:OWN] = f @ p[:OWN]
         p[:, :OWN] = p[:, :OWN] @ f.T
         p[:OWN, :OWN] += step_s * _BY_TIME + step_s**2 * _BY_TIME_2 + step_s**3 * _BY_TIME_3
-        reported, gyro = (TURN_SETTLING_RAD if settling else TURN_RAD) ** 2, GYRO_RAD**2
-        p[TURN, TURN] += step_s * reported * gyro / (reported + gyro)
-        self.x[TURN] = self.turned_rad(motion, settling=settling)
+        p[TURN, TURN] += step_s * GYRO_RAD**2 / (1.0 + (GYRO_RAD / reported_std_rad) ** 2)
+        self.x[TURN] = self.turned_rad(motion, reported_std_rad)
         self.time_us += round(step_s * 1e6)
 
     def displace(self, time_us: int, by_m: Vec3, std_m: float, velocity_std_m_s: float) -> None:
@@ -192,7 +193,7 @@ class PlaceFilter:
         """
         common = np.zeros((len(self.x), 4))
         common[:4] = np.eye(4)
-        for at in self.gates.values():
+        for at in (*self.gates.values(), *self.clones.values()):
             x, y, _ = self.x[at : at + 3] - self.x[POSITION]
             common[at : at + GATE] = np.eye(GATE)
             common[at : at + 2, TURN] = (-y, x)
@@ -265,10 +266,39 @@ class PlaceFilter:
 
     def drop_gate(self, colour: str) -> None:
         """Forget a gate."""
-        at = self.gates.pop(colour)
-        kept = np.r_[0:at, at + GATE : len(self.x)]
+        self._cut(self.gates.pop(colour), GATE)
+
+    def add_clone(self, time_us: int) -> None:
+        """Keep where the drone is now, as it is at a time."""
+        now = np.r_[0:CLONE]
+        self.clones[time_us] = len(self.x)
+        self.x = np.concatenate((self.x, self.x[now]))
+        self.p = np.block([[self.p, self.p[:, now]], [self.p[now], self.p[np.ix_(now, now)]]])
+
+    def drop_clone(self, time_us: int) -> None:
+        """Forget where the drone was at a time."""
+        self._cut(self.clones.pop(time_us), CLONE)
+
+    def _cut(self, at: int, count: int) -> None:
+        kept = np.r_[0:at, at + count : len(self.x)]
         self.x, self.p = self.x[kept], self.p[np.ix_(kept, kept)]
-        self.gates = {other: n if n < at else n - GATE for other, n in self.gates.items()}
+        self.gates = {other: n if n < at else n - count for other, n in self.gates.items()}
+        self.clones = {other: n if n < at else n - count for other, n in self.clones.items()}
+
+    def inform(self, index: npt.NDArray[np.intp], information: Floats, vector: Floats) -> None:
+        """Use measurements by what they say of a part of the state (information filter).
+
+        Args:
+            index: of that part, shape (k,).
+            information: Jacobian's transpose times inverse noise times Jacobian, shape (k, k).
+            vector: likewise times the residual, shape (k,).
+        """
+        across = self.p[:, index]
+        inner = np.eye(len(index)) + information @ across[index]
+        gain = np.linalg.solve(inner.T, across.T).T  # covariance of all with that part, afterwards
+        self.x = self.x + gain @ vector
+        p = self.p - gain @ information @ across.T
+        self.p = 0.5 * (p + p.T)
 
     def gate(self, colour: str) -> Floats | None:
         """x, y, z and yaw of a gate; None if it is not estimated."""

@@ -274,3 +274,46 @@ def test_what_has_another_colour_than_the_task_s_gates_does_not_move_the_drone()
     alone, _ = fly(Vehicle(6), gates=lambda _: ())
     assert np.abs(errors(states)[-1]).max() < 0.3
     assert std_m(states[-1]) > 0.9 * std_m(alone[-1])
+
+
+NEAR_RED = gate_at(1.4, 0.1, 1.2, 0.2)
+UNSEEN_S, SEEN_AGAIN_S, END_S = 12.0, 16.0, 18.0
+
+
+def fly_by_gate(end_s, *, stays):
+    """The drone in the arena and in flight, and the gate in flight: it is not seen for a while."""
+    vehicle = Vehicle(8)
+    world = WorldModel(Surroundings(Arena(), Base(), Camera()), CONTEST)
+    flown = []
+    for time_us in range(TICK_US, round(1e6 * end_s), TICK_US):
+        image_us = time_us - LATE_US
+        blind = UNSEEN_S < image_us * 1e-6 < SEEN_AGAIN_S
+        is_due = image_us > 0 and image_us % IMAGE_US == 0 and not blind
+        images = (vehicle.image(image_us, (NEAR_RED,)),) if is_due else ()
+        if stays:
+            world.stay_by("red")
+        state = world.observe(vehicle.state(time_us), images)
+        at = world.in_flight(state)
+        if time_us > 1e6 * UNSEEN_S:
+            gate = world.gate("red")
+            flown.append([(s.x, s.y, s.z) for s in (state, at)] + [gate.position_m])
+    return np.array(flown).transpose(1, 0, 2)
+
+
+def steps_m(places):
+    return np.linalg.norm(np.diff(places, axis=0), axis=1)
+
+
+def test_a_correction_of_the_place_does_not_move_the_drone_in_flight_while_it_is_by_a_gate():
+    arena, flown, gate = fly_by_gate(END_S, stays=True)
+    assert steps_m(arena).max() > 0.1  # else nothing was tested
+    assert steps_m(flown).max() < 0.04
+    assert np.abs(flown - arena)[-1].max() > 0.1
+    true = np.array((NEAR_RED.x_m, NEAR_RED.y_m)) - truth(END_S - 0.05)[0][:2]
+    assert (gate - flown)[-1, :2] == pytest.approx(true, abs=0.03)
+
+
+def test_away_from_a_gate_flight_comes_back_to_the_arena_after_a_correction():
+    arena, flown, _ = fly_by_gate(END_S + 1.5, stays=False)
+    assert steps_m(flown).max() < 0.06 < steps_m(arena).max()
+    assert np.abs(flown - arena)[-1].max() < 0.02
