@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import dist, hypot, inf
 from typing import TypeAlias
@@ -74,7 +74,7 @@ class WorldModel:
             The state now, by all that is known.
         """
         self._place.add(state)
-        before = self._place.places_m(state.time_us)
+        expected, gates_m = self._place.correction(state.time_us), self._place.gates_m
         if self._start_m is None:
             self._start_m = (state.x, state.y, state.z)
         for earlier in state.missed:
@@ -94,11 +94,12 @@ class WorldModel:
             if pose is not None:
                 self._use(image, pose, correction if is_there else None)
         self._place.advance()
-        after = self._place.places_m(state.time_us)
-        if before is not None and after is not None:
-            self._move_axes(before, after, state.time_us)
-            self._know(after[1])
-        return self._place.state(state)
+        estimated = self._place.state(state)
+        if expected is not None:
+            here_m = (estimated.x, estimated.y, estimated.z)
+            self._move_axes((expected.position_m, gates_m), (here_m, self._place.gates_m), state.time_us)
+            self._know()
+        return estimated
 
     def _move_axes(self, before: _Places, after: _Places, time_us: int) -> None:
         """Let the axes of flight take in by what this tick has corrected the place."""
@@ -123,8 +124,9 @@ class WorldModel:
         x, y, z = self._axes.of((state.x, state.y, state.z))
         return replace(state, x=x, y=y, z=z)
 
-    def _know(self, in_filter: Container[str]) -> None:
+    def _know(self) -> None:
         """Note what is known of each gate now, relative to the drone."""
+        in_filter = self._place.gates_m
         best = [estimate for estimate in map(self._map.best, COLOURS) if estimate is not None]
         self._known = {estimate.colour: self._place.known(estimate) for estimate in best}
         in_flight = {

@@ -44,14 +44,18 @@ _Seen: TypeAlias = tuple[GateView, Eye]
 
 
 class GateLandmarks:
-    """One gate of each colour in the filter: the one that the map knows best."""
+    """One gate of each colour in the filter: the one that the map knows best.
+
+    Attributes:
+        unsized: gates in the filter that may be things of another size still.
+    """
 
     def __init__(self) -> None:
         self._used: dict[str, GateView] = {}
         self._contradicted: dict[str, int] = {}
         self._elsewhere: dict[str, int] = {}
         self._certain: set[str] = set()
-        self._unsized: set[str] = set()  # gates in the filter that may be things of another size
+        self.unsized: set[str] = set()
 
     def see(self, place: PlaceFilter, seen: Mapping[str, Sequence[_Seen]], gates: GateMap) -> None:
         """Use the gates in an image, after the map has used them.
@@ -94,7 +98,7 @@ class GateLandmarks:
             return
         self._used[colour] = view
         place.update(_corners(place, colour, view, eye))
-        if colour in self._unsized:
+        if colour in self.unsized:
             self._compare_size(place, colour)
 
     def _compare_size(self, place: PlaceFilter, colour: str) -> None:
@@ -102,7 +106,7 @@ class GateLandmarks:
         off, std = place.size(colour)
         ratio = SIZE_STD / std * exp(-0.5 * (off / std) ** 2)
         if ratio > IS_GATE:
-            self._unsized.discard(colour)
+            self.unsized.discard(colour)
             place.update(size(place.gates[colour], GATE_SIZE_STD))
         elif ratio < IS_NONE:
             self._drop(place, colour)
@@ -126,14 +130,14 @@ class GateLandmarks:
                 place.add_gate(colour, state, noise, SIZE_STD)
                 place.update(_corners(place, colour, view, eye))
                 self._used[colour] = view
-                self._unsized.add(colour)
+                self.unsized.add(colour)
                 return
 
     def _compare(self, place: PlaceFilter, colour: str, known: GateEstimate | None) -> None:
         """Drop a gate that the map has elsewhere."""
         state = place.gate(colour)
         assert state is not None, "it is in the filter"
-        if colour in self._unsized:
+        if colour in self.unsized:
             state = place.if_sized(colour)
         away = known is None or (
             hypot(*(a - b for a, b in zip(state[:3].tolist(), known.position_m, strict=True))) > ELSEWHERE_M
@@ -146,16 +150,16 @@ class GateLandmarks:
     def _drop(self, place: PlaceFilter, colour: str) -> None:
         """Forget a gate that was none, or is elsewhere; one that was believed has moved the drone."""
         place.drop_gate(colour)
-        if colour not in self._unsized:
+        if colour not in self.unsized:
             place.doubt(DROPPED_M, DROPPED_RAD)
-        self._unsized.discard(colour)
+        self.unsized.discard(colour)
         for counts in (self._contradicted, self._elsewhere):
             counts.pop(colour, None)
         self._used.pop(colour, None)
 
     def known(self, place: PlaceFilter, estimate: GateEstimate) -> GateEstimate:
         """A gate of the map, the best of its colour, as the filter has it: exact relative to the drone."""
-        if estimate.colour in self._unsized:
+        if estimate.colour in self.unsized:
             return replace(estimate, certain=False)
         state = place.gate(estimate.colour)
         assert state is not None, "it is in the filter"
