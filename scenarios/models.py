@@ -21,6 +21,7 @@ from scenarios.air import Wind
 from scenarios.faults.declaration import Fault
 from scenarios.goals import Goal
 from scenarios.imaging.effects import CameraEffects, Hall, Patch
+from scenarios.imaging.textures import Texture
 from scenarios.part import Component, Metres, OnDrone, Part, Turn
 
 
@@ -50,6 +51,7 @@ DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
 _SHORTEST_DIRECTION = 1e-6
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
+PERSON_CLEAR_M = 0.3  # from the arena to the middle of a person
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
@@ -337,6 +339,7 @@ class Scenario(Part):
         "sensors",
         "wind",
         "faults",
+        "floor_texture",
         "hall",
         "patches",
         "gripper",
@@ -354,6 +357,9 @@ class Scenario(Part):
     walls: tuple[Wall, ...] = Field((), description="obstacles that stand on the floor")
     camera: Camera = Field(Camera(), description="the drone's camera")
     light: Light = Field(Light(), description="sun and sky")
+    floor_texture: Texture | None = Field(
+        None, description="of the floor, up to the hall's walls if there is one; by default tatami mats"
+    )
     hall: Hall | None = Field(None, description="walls around the arena that are only seen")
     patches: tuple[Patch, ...] = Field((), description="flat things on the floor and on the hall's walls")
     try_limit_s: float = Field(180.0, ge=1, le=36000, description="longest try, motors on to motors off")
@@ -410,6 +416,18 @@ class Scenario(Part):
                 if patch.surface != "floor":
                     message = "is a wall of the hall, and there is none; add hall: {} or put it on the floor"
                     raise refusal(patch.surface, message, "patches", index, "surface")
+        return self
+
+    @model_validator(mode="after")
+    def _people_are_outside_the_arena(self) -> Self:
+        arena, hall = self.arena, self.hall or Hall()
+        for index, person in enumerate(hall.people):
+            beyond_m = max(abs(person.x_m) - arena.length_x_m / 2, abs(person.y_m) - arena.width_y_m / 2)
+            if not PERSON_CLEAR_M <= beyond_m <= hall.beyond_m:
+                message = (
+                    f"is not between arena and walls; keep it {PERSON_CLEAR_M} m or more outside the arena"
+                )
+                raise refusal(person.x_m, message, "hall", "people", index, "x_m")
         return self
 
     @model_validator(mode="after")

@@ -20,6 +20,7 @@ from framerunner.geometry.rotations import RotationRows
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from sitl.camera_scene import WALL, Bgr, Face
+from sitl.optics.texture import FaceTexture
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -76,12 +77,13 @@ class Pinhole:
 
 @dataclass(frozen=True, slots=True)
 class MeshFace:
-    """Number of a face, the range of its corners among all corners, and its colour."""
+    """Number of a face, the range of its corners among all corners, and its colour or picture."""
 
     index: int
     start: int
     stop: int
     colour: Bgr
+    texture: FaceTexture | None
 
 
 class Mesh:
@@ -97,7 +99,8 @@ class Mesh:
         stops = np.cumsum([len(face.corners_arena_m) for face in faces]).tolist()
         starts = [0, *stops[:-1]]
         self.faces = tuple(
-            MeshFace(index, starts[index], stops[index], face.colour) for index, face in enumerate(faces)
+            MeshFace(index, starts[index], stops[index], face.colour, face.texture)
+            for index, face in enumerate(faces)
         )
         corners = np.concatenate([face.corners_arena_m for face in faces])
         self._corners = np.vstack([corners.T, np.ones(len(corners))])
@@ -128,7 +131,8 @@ class Mesh:
                 canvas has: every corner is where it is when its own row is read. Between corners, edges are
                 straight.
         """
-        matrix = self._borders @ self._pinhole.matrix(eye_arena_m, rotation)
+        to_canvas = self._pinhole.matrix(eye_arena_m, rotation)
+        matrix = self._borders @ to_canvas
         near_m = self._pinhole.near_m
         matrix[3, 3] -= near_m
         matrix[4, 3] += self._pinhole.far_m
@@ -153,7 +157,16 @@ class Mesh:
         seen &= is_wide | (crossing != 0)
         pixels = np.rint(inset, out=inset).T.astype(np.int32, order="C")
         return Projection(
-            projected, pixels, seen.tobytes(), crossing.tolist(), near_m, self._window, views.T.tolist()
+            eye_arena_m=eye_arena_m,
+            matrix=to_canvas,
+            drift=drift,
+            corners=projected,
+            pixels=pixels,
+            seen=seen.tobytes(),
+            to_cut=crossing.tolist(),
+            near_m=near_m,
+            window=self._window,
+            views=views.T.tolist(),
         )
 
     def _neighbours(self, faces: Sequence[Face], corners: Floats) -> Ints64:
@@ -216,6 +229,9 @@ class Mesh:
 class Projection:
     """All faces seen from one pose of the camera; u and v in sixteenths of a pixel."""
 
+    eye_arena_m: Vec3
+    matrix: Floats  # see `Pinhole.matrix`
+    drift: Floats | None  # see `Mesh.project`
     corners: Floats  # columns (u w, v w, w, ...), one for every corner
     pixels: Ints  # (u, v) of every corner in the view of its part, shape (n, 2); wrong where cuts are needed
     seen: bytes  # per face, 1 if it faces the eye and is not wholly outside the view

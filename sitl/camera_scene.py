@@ -23,6 +23,7 @@ import numpy.typing as npt
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from scenarios.models import Arena, Light, Scenario, UprightGate
+from sitl.optics.texture import FaceTexture
 from sitl.solids import gate_solids
 
 Bgr = tuple[int, int, int]
@@ -49,7 +50,7 @@ WALL = "hall"
 
 _MAT_M = 2.0  # edge of one mat of the tatami
 _DARKEST = 0.3  # share of its colour that every face keeps: a gate's colour must stay recognisable
-_SHADOW = 0.6  # brightness of the floor in a shadow
+SHADOW = 0.6  # brightness of the floor in a shadow
 _FLAT_M = 1e-7  # corners nearer to a plane than this lie on it
 _UP: Vec3 = (0.0, 0.0, 1.0)
 
@@ -62,6 +63,7 @@ class Face:
     normal_arena: Vec3  # unit vector to the side it is seen from
     colour: Bgr  # as painted, shading included
     name: str  # of its solid; "tatami" or "ground" on the floor
+    texture: FaceTexture | None = None  # a picture instead of the colour
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,11 +111,16 @@ def _dim(colour: Bgr, share: float) -> Bgr:
 
 
 def lit(colour: Bgr, normal: Vec3, light: Light) -> Bgr:
-    """The colour of a face: ambient light and the sun by Lambert's law, no darker than `_DARKEST`."""
+    """The colour of a face in a light, see `brightness`."""
+    return _dim(colour, brightness(normal, light))
+
+
+def brightness(normal: Vec3, light: Light) -> float:
+    """Share of its colour that a face has: ambient light and the sun by Lambert's law, `_DARKEST` or more."""
     x, y, z = light.sun_direction_arena
     length = hypot(x, y, z)
     facing = -(normal[0] * x + normal[1] * y + normal[2] * z) / length if length > 0 else 0.0
-    return _dim(colour, max(_DARKEST, light.ambient + (1.0 - light.ambient) * max(0.0, facing)))
+    return max(_DARKEST, light.ambient + (1.0 - light.ambient) * max(0.0, facing))
 
 
 def _on_floor(corners_xy: Sequence[Sequence[float]] | Floats, colour: Bgr, name: str) -> Face:
@@ -144,7 +151,7 @@ def _mats(arena: Arena, light: Light) -> tuple[Face, ...]:
     )
 
 
-def _face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: Light) -> Face:
+def box_face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: Light) -> Face:
     """A face given in a box's own axes (metres from its centre)."""
     c, s = box.turn
     turned = (c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], normal[2])
@@ -159,14 +166,14 @@ def _base_body(box: Solid, mark_share: float, light: Light) -> Body:
         return Body(box, _upright_faces(box, BASE_BGR, light))
     mark = mark_share * half
     inset: list[Vec3] = [(-mark, -mark, top), (mark, -mark, top), (mark, mark, top), (-mark, mark, top)]
-    mark_face = _face(box, inset, _UP, BASE_MARK_BGR, light)
+    mark_face = box_face(box, inset, _UP, BASE_MARK_BGR, light)
     return Body(box, (*_upright_faces(box, BASE_BGR, light), mark_face))
 
 
 def _upright_faces(box: Solid, colour: Bgr, light: Light) -> tuple[Face, ...]:
     """The sides and the top of a box on the floor."""
     return tuple(
-        _face(box, _side(box.half_extents_m, axis, sign), _normal(axis, sign), colour, light)
+        box_face(box, _side(box.half_extents_m, axis, sign), _normal(axis, sign), colour, light)
         for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1), (2, 1))
     )
 
@@ -183,15 +190,15 @@ def _gate_body(gate: UprightGate, light: Light) -> Body:
     inner: Vec3 = (outer[0], outer[1] - gate.bar_m, outer[2] - gate.bar_m)
     around = ((1, 1), (1, -1), (2, 1), (2, -1))
     faces = [
-        _face(box, _side(inner, axis, sign), _normal(axis, -sign), colour, light) for axis, sign in around
+        box_face(box, _side(inner, axis, sign), _normal(axis, -sign), colour, light) for axis, sign in around
     ]
     for sign in (1, -1):
         x, y, z, v, w = sign * outer[0], outer[1], outer[2], inner[1], inner[2]
         for y0, y1, z0, z1 in ((-y, y, w, z), (-y, y, -z, -w), (v, y, -w, w), (-y, -v, -w, w)):
             quad: list[Vec3] = [(x, y0, z0), (x, y1, z0), (x, y1, z1), (x, y0, z1)]
-            faces.append(_face(box, quad, _normal(0, sign), colour, light))
+            faces.append(box_face(box, quad, _normal(0, sign), colour, light))
     faces += [
-        _face(box, _side(outer, axis, sign), _normal(axis, sign), colour, light) for axis, sign in around
+        box_face(box, _side(outer, axis, sign), _normal(axis, sign), colour, light) for axis, sign in around
     ]
     return Body(box, tuple(faces), len(around))
 
@@ -257,7 +264,7 @@ def _outline(points: Floats) -> npt.NDArray[np.float32]:
 
 def _in_shadow(outline: npt.NDArray[np.float32], light: Light, *, on_tatami: bool) -> Face:
     name, colour = ("tatami", TATAMI_BGR) if on_tatami else ("ground", GROUND_BGR)
-    return _on_floor(outline.tolist(), _dim(lit(colour, _UP, light), _SHADOW), name)
+    return _on_floor(outline.tolist(), _dim(lit(colour, _UP, light), SHADOW), name)
 
 
 @dataclass(frozen=True, slots=True)

@@ -205,7 +205,7 @@ def read_workflow(text, folder):
 
 
 KINDS = {
-    "camera.md": [read_scenario, read_scenario, read_level, read_calibration, read_part_of_calibration],
+    "camera.md": [*[read_scenario] * 4, read_level, read_calibration, read_part_of_calibration],
     "ci.md": [read_workflow],
     "devices.md": [read_scenario],
     "faults.md": [read_scenario],

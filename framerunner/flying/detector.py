@@ -11,6 +11,7 @@ from vision.base.model import BaseShape
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.detectors import Detector, DetectorMaker, new_detector, others_detector
+from vision.tracks.tracker import DetectorWithTracks, PointTracker
 
 
 def plan_detector(plan: FlightPlan) -> Detector:
@@ -34,9 +35,13 @@ def plan_detector(plan: FlightPlan) -> Detector:
 
 def _with_base(detector: Detector, plan: FlightPlan, calibration: Calibration) -> Detector:
     """A detector that looks for the base, too; a drone that starts from the floor has none."""
-    if plan.mission is None or plan.mission.vision == "boxes" or plan.lift_m:
+    if plan.mission is None or plan.mission.vision == "boxes":
         return detector
     lens = None if calibration.is_ideal else Lens(calibration)
+    if plan.alone:
+        detector = DetectorWithTracks(detector, PointTracker(lens))
+    if plan.lift_m:
+        return detector
     finder = BaseFinder(base_shape(plan.scenario.base), calibration.fx_px, lens)
     return DetectorWithBase(detector, finder)
 

@@ -60,6 +60,7 @@ class Navigator:
         self._chosen_s = 0.0
         self._crossing: CrossingAttempt | None = None
         self._steps_back = 0
+        self._alone = surroundings.alone
         self._added_m_s: Vec3 = (0.0, 0.0, 0.0)  # to the command at the last tick
 
     def observe(
@@ -104,7 +105,12 @@ class Navigator:
     def image_period_s(self) -> float:
         """In which one image is enough; 0: all are needed, in fast flight or near what is not certain."""
         state, crossing = self._state, self._crossing
-        if state is None or hypot(*state.velocity_arena_m_s) > SPACED_M_S or self._flight.looks:
+        if (
+            self._alone
+            or state is None
+            or hypot(*state.velocity_arena_m_s) > SPACED_M_S
+            or self._flight.looks
+        ):
             return 0.0
         if crossing is not None and self._action == f"cross {crossing.colour}":
             estimate = self._world.gate(crossing.colour)

@@ -45,7 +45,7 @@ class WorldModel:
         camera = self._camera = CameraModel.of(surroundings.camera)
         self._surroundings = surroundings
         self._history = PoseHistory(camera)
-        self._place = PlaceEstimator(camera, surroundings.shapes)
+        self._place = PlaceEstimator(camera, surroundings.shapes, alone=surroundings.alone)
         self._axes = FlightAxes()
         self._near = ""  # colour of the gate that the drone is flown by
         self._axes_us: int | None = None
@@ -159,6 +159,7 @@ class WorldModel:
             poses = [pose] * len(image.frames) if poses is None else poses
             self._place.see(image.frames, poses, correction, self._map)
             self._see_base(image, pose, correction)
+            self._see_tracks(image, pose)
         self._obstacle_map.update(position_m, attitude, image.obstacle_edges)
         self.seen_space.update(position_m, attitude, image.obstacle_edges)
         self._explorer.coverage.update(position_m, attitude, image.obstacle_edges)
@@ -168,12 +169,23 @@ class WorldModel:
         self.viewed_space.needed = others or len(known) < len(COLOURS)
         self._glimpses.update(position_m, attitude, image, known, self._map.is_lookalike)
 
+    def _pose_of_row(self, down_px: float, pose: DronePose) -> DronePose | None:
+        """The drone's pose when a row of an image was read out; None if the states around it are missing."""
+        at_us = pose.time_us + round(1e6 * self._camera.read_after_s(down_px))
+        return self._history.at(at_us, self._place.correction(at_us))
+
+    def _see_tracks(self, image: Detections, pose: DronePose) -> None:
+        correction = self._place.correction(pose.time_us)
+        if image.tracks is not None and correction is not None:
+            rows = (self._pose_of_row(row_px, pose) for row_px in (-inf, 0.0, inf))
+            self._place.see_tracks(image.tracks, [each or pose for each in rows], correction)
+
     def _see_base(self, image: Detections, pose: DronePose, correction: PoseCorrection) -> None:
         sighting, base = image.base, self._base
+        correction = self._place.correction(pose.time_us) or correction  # gates may have changed it
         if sighting is None:
             return
-        at_us = pose.time_us + round(1e6 * self._camera.read_after_s(base.row_px(sighting)))
-        pose = self._history.at(at_us, self._place.correction(at_us)) or pose
+        pose = self._pose_of_row(base.row_px(sighting), pose) or pose
         if self._place.see_points(base.points_m(sighting), sighting, pose, correction):
             base.seen_us.append(pose.time_us)
 
@@ -202,9 +214,7 @@ class WorldModel:
         poses = []
         for sighting in image.frames:
             rows = [corner.down_px for corner in sighting.corners if corner is not None]
-            after_s = self._camera.read_after_s(sum(rows) / len(rows)) if rows else 0.0
-            at_us = pose.time_us + round(1e6 * after_s)
-            at = self._history.at(at_us, self._place.correction(at_us))
+            at = self._pose_of_row(sum(rows) / len(rows) if rows else 0.0, pose)
             poses.append(pose if at is None else replace(at, time_us=pose.time_us))
         return poses
 

@@ -64,6 +64,18 @@ def report(
     return at
 
 
+def height(height_m: float, std_m: float) -> Model:
+    """The height above the arena's floor."""
+    noise = np.array(((std_m**2,),))
+
+    def at(state: Floats) -> Measurement:
+        jacobian = np.zeros((1, len(state)))
+        jacobian[0, 2] = 1.0
+        return Measurement(np.array((height_m - state[2],)), jacobian, noise)
+
+    return at
+
+
 def stands(position_m: Vec3, turn_rad: float, std_m: float, turn_std_rad: float, std_m_s: float) -> Model:
     """A drone at rest, whose place and heading are known: position, turn and velocity."""
     known = np.array((*position_m, turn_rad, 0.0, 0.0, 0.0))

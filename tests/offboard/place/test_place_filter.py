@@ -12,7 +12,7 @@ from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.gates.gate_measurement import GateView
 from offboard.place.inertial_track import GRAVITY_M_S2, InertialTrack
 from offboard.place.measurements import Eye, corners, points, report, size, stands
-from offboard.place.place_filter import OWN, TURN, PlaceFilter
+from offboard.place.place_filter import OWN, TURN, TURN_SETTLING_RAD, PlaceFilter
 from scenarios.models import Camera
 
 CAMERA = CameraModel.of(Camera())
@@ -77,7 +77,7 @@ def test_a_heading_that_the_gyroscope_does_not_confirm_is_a_turn_of_the_reports(
     motion = track.between(0, 500_000)
     assert motion.turn_rad == pytest.approx(-0.04, abs=1e-9)
     place = PlaceFilter(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    place.predict(motion, settling=True)
+    place.predict(motion, TURN_SETTLING_RAD)
     assert -0.04 <= place.turn_rad < -0.038  # the gyroscope is believed while the vehicle corrects itself
 
 
