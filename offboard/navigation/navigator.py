@@ -77,7 +77,7 @@ class Navigator:
             The drone's state as it is estimated now, in the arena. It is flown in the axes of flight.
         """
         estimated = self._world.observe(state, images)
-        state = self._world.in_flight(estimated)
+        state = self._world.axes.of_state(estimated)
         if sent is not None:
             sent = _plus(sent, [-v for v in self._added_m_s])
         self._added_m_s = (0.0, 0.0, 0.0)
@@ -178,7 +178,7 @@ class Navigator:
     def step_back(self, colour: str) -> VelocityFluCommand:
         """Fly back from a gate, to one of its sides, facing it."""
         state, _ = self._begin(f"step back from {colour}")
-        self._world.stay_by(colour)
+        self._world.axes.stay_by(colour)
         if self._goal is None:
             gate, here_m = self._world.gate(colour), position_now(state)
             if gate is None:
@@ -195,7 +195,7 @@ class Navigator:
 
     def _cross(self, colour: str) -> VelocityFluCommand:
         state, now_s = self._begin(f"cross {colour}")
-        self._world.stay_by(colour)
+        self._world.axes.stay_by(colour)
         crossing = self._crossing
         if crossing is None or crossing.colour != colour or crossing.refusal:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)

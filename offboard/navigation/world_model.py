@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from math import dist, hypot, inf
-from typing import TypeAlias
+from math import hypot, inf
 
 from framerunner.geometry.axes import Pose
 from framerunner.geometry.vectors import Vec3
@@ -22,7 +21,7 @@ from offboard.navigation.search.likelihood import Glimpses
 from offboard.navigation.seen_space import SeenSpace, ViewedSpace
 from offboard.navigation.view import GateEstimate, Surroundings
 from offboard.place.base_landmark import BaseLandmark
-from offboard.place.flight_axes import AT_GATE_M, NEAR_M, FlightAxes
+from offboard.place.flight_axes import FlightAxes, DroneAndGates
 from offboard.place.place import PlaceEstimator
 from scenarios.models import COLOURS
 from vision.types import BaseExpectation, Detections
@@ -30,13 +29,12 @@ from vision.types import BaseExpectation, Detections
 START_SPARE_M = 0.02  # by which what is known to be free at the start exceeds what the drone needs
 IMAGES_WAITING = 32  # for the drone's pose when they were exposed
 
-_Places: TypeAlias = tuple[Vec3, dict[str, Vec3]]  # of the drone and the gates, arena axes
-
 
 class WorldModel:
     """Everything seen so far, in arena axes. Images are used at the drone's pose when they were exposed.
 
     Attributes:
+        axes: in which the drone is flown.
         seen_space: where nothing stands.
         viewed_space: where a gate would have been seen.
     """
@@ -46,9 +44,7 @@ class WorldModel:
         self._surroundings = surroundings
         self._history = PoseHistory(camera)
         self._place = PlaceEstimator(camera, surroundings.shapes, alone=surroundings.alone)
-        self._axes = FlightAxes()
-        self._near = ""  # colour of the gate that the drone is flown by
-        self._axes_us: int | None = None
+        self.axes = FlightAxes()
         self._base = BaseLandmark(camera, surroundings.base)
         self._map = GateMap(camera, surroundings.arena, surroundings.shapes)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
@@ -96,33 +92,10 @@ class WorldModel:
         self._place.advance()
         estimated = self._place.state(state)
         if expected is not None:
-            here_m = (estimated.x, estimated.y, estimated.z)
-            self._move_axes((expected.position_m, gates_m), (here_m, self._place.gates_m), state.time_us)
+            after = DroneAndGates((estimated.x, estimated.y, estimated.z), self._place.gates_m)
+            self.axes.correct(DroneAndGates(expected.position_m, gates_m), after, state.time_us)
             self._know()
         return estimated
-
-    def _move_axes(self, before: _Places, after: _Places, time_us: int) -> None:
-        """Let the axes of flight take in by what this tick has corrected the place."""
-        step_s = 0.0 if self._axes_us is None else (time_us - self._axes_us) * 1e-6
-        (drone_m, gates_m), (drone_after_m, gates_after_m) = before, after
-        gate_m, gate_after_m = gates_m.get(self._near), gates_after_m.get(self._near)
-        jump, away_m = _minus(drone_after_m, drone_m), inf
-        if gate_m is not None and gate_after_m is not None:
-            away_m = dist(drone_after_m, gate_after_m)
-            jump = _minus(gate_after_m, gate_m) if away_m < AT_GATE_M else jump
-        self._axes.jump(jump, step_s, held=away_m < NEAR_M)
-        self._axes_us, self._near = time_us, ""
-
-    def stay_by(self, colour: str) -> None:
-        """The drone is flown by a gate at this tick: see `FlightAxes`."""
-        self._near = colour
-
-    def in_flight(self, state: DroneState) -> DroneState:
-        """The drone's state in the axes of flight, which are the arena's if the vehicle knows its place."""
-        if not any(self._axes.offset_m):
-            return state
-        x, y, z = self._axes.of((state.x, state.y, state.z))
-        return replace(state, x=x, y=y, z=z)
 
     def _know(self) -> None:
         """Note what is known of each gate now, relative to the drone."""
@@ -130,7 +103,7 @@ class WorldModel:
         best = [estimate for estimate in map(self._map.best, COLOURS) if estimate is not None]
         self._known = {estimate.colour: self._place.known(estimate) for estimate in best}
         in_flight = {
-            colour: replace(known, position_m=self._axes.of(known.position_m))
+            colour: replace(known, position_m=self.axes.of(known.position_m))
             if colour in in_filter
             else known
             for colour, known in self._known.items()
@@ -279,7 +252,3 @@ class WorldModel:
             for (x, y, radius_m), gap_m in zip(columns_m, gaps_m, strict=True)
             if gap_m > 0.0
         )
-
-
-def _minus(a: Vec3, b: Vec3) -> Vec3:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

@@ -291,9 +291,9 @@ def fly_by_gate(end_s, *, stays):
         is_due = image_us > 0 and image_us % IMAGE_US == 0 and not blind
         images = (vehicle.image(image_us, (NEAR_RED,)),) if is_due else ()
         if stays:
-            world.stay_by("red")
+            world.axes.stay_by("red")
         state = world.observe(vehicle.state(time_us), images)
-        at = world.in_flight(state)
+        at = world.axes.of_state(state)
         if time_us > 1e6 * UNSEEN_S:
             gate = world.gate("red")
             flown.append([(s.x, s.y, s.z) for s in (state, at)] + [gate.position_m])
