@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import dist, inf
-from typing import TypeAlias
+from math import inf
 
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState
@@ -14,11 +13,9 @@ from offboard.navigation.gates.gate_map import GateMap
 from offboard.navigation.pose_history import DronePose, PoseCorrection, PoseHistory
 from offboard.navigation.view import GateEstimate, Surroundings
 from offboard.place.base_landmark import BaseLandmark
-from offboard.place.flight_axes import AT_GATE_M, NEAR_M, FlightAxes
+from offboard.place.flight_axes import DroneAndGates, FlightAxes
 from offboard.place.place import PlaceEstimator
 from vision.types import BaseExpectation, Detections
-
-_Places: TypeAlias = tuple[Vec3, dict[str, Vec3]]  # of the drone and the gates, arena axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +43,14 @@ class Localization:
         self._place = PlaceEstimator(camera, surroundings.shapes, alone=surroundings.alone)
         self._base = BaseLandmark(camera, surroundings.base)
         self._axes = FlightAxes()
-        self._near = ""  # colour of the gate that the drone is flown by
-        self._axes_us: int | None = None
-        self._before: _Places | None = None  # images changed the place in this tick
+        self._before: DroneAndGates | None = None  # images changed the place in this tick
 
     def add(self, state: DroneState) -> None:
         """Add the state of a tick."""
         self._place.add(state)
-        self._before = self._place.places_m(state.time_us)
+        expected = self._place.correction(state.time_us)
+        if expected is not None:
+            self._before = DroneAndGates(expected.position_m, self._place.gates_m)
         for earlier in state.missed:
             self._history.add(earlier)
         self._history.add(state)
@@ -101,19 +98,12 @@ class Localization:
             Colours of the gates in the filter; None while the vehicle's reports are used.
         """
         self._place.advance()
-        before, after = self._before, self._place.places_m(time_us)
-        if before is None or after is None:
+        before, now = self._before, self._place.correction(time_us)
+        if before is None or now is None:
             return None
-        step_s = 0.0 if self._axes_us is None else (time_us - self._axes_us) * 1e-6
-        (drone_m, gates_m), (drone_after_m, gates_after_m) = before, after
-        gate_m, gate_after_m = gates_m.get(self._near), gates_after_m.get(self._near)
-        jump, away_m = _minus(drone_after_m, drone_m), inf
-        if gate_m is not None and gate_after_m is not None:
-            away_m = dist(drone_after_m, gate_after_m)
-            jump = _minus(gate_after_m, gate_m) if away_m < AT_GATE_M else jump
-        self._axes.jump(jump, step_s, held=away_m < NEAR_M)
-        self._axes_us, self._near = time_us, ""
-        return frozenset(gates_after_m)
+        gates_m = self._place.gates_m
+        self._axes.correct(before, DroneAndGates(now.position_m, gates_m), time_us)
+        return frozenset(gates_m)
 
     def state(self, reported: DroneState) -> DroneState:
         """The drone's state now, by all that is known."""
@@ -125,7 +115,7 @@ class Localization:
 
     def stay_by(self, colour: str) -> None:
         """The drone is flown by a gate at this tick: see `FlightAxes`."""
-        self._near = colour
+        self._axes.stay_by(colour)
 
     def gate_in_flight(self, known: GateEstimate) -> GateEstimate:
         """A gate in the axes of flight."""
@@ -133,10 +123,7 @@ class Localization:
 
     def state_in_flight(self, state: DroneState) -> DroneState:
         """The drone's state in the axes of flight, which are the arena's if the vehicle knows its place."""
-        if not any(self._axes.offset_m):
-            return state
-        x, y, z = self._axes.of((state.x, state.y, state.z))
-        return replace(state, x=x, y=y, z=z)
+        return self._axes.of_state(state)
 
     @property
     def velocity_error_flu_m_s(self) -> Vec3:
@@ -180,7 +167,3 @@ class Localization:
         pose = self._pose_of_row(base.row_px(sighting), pose) or pose
         if self._place.see_points(base.points_m(sighting), sighting, pose, correction):
             base.seen_us.append(pose.time_us)
-
-
-def _minus(a: Vec3, b: Vec3) -> Vec3:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

@@ -250,19 +250,18 @@ class PlaceEstimator:
             estimate=PlaceEstimate((x, y, z), yaw, tuple(covariance_m2), yaw_std_rad),
         )
 
-    def places_m(self, time_us: int) -> tuple[Vec3, dict[str, Vec3]] | None:
-        """Where the drone is at a time, and the gates in the filter; None while the reports are used.
-
-        What an image or a report has changed is the difference of two calls for one time.
-        """
-        place, motion = self._filter, self._motion_at(time_us)
-        if place is None or motion is None:
-            return None
-        gates = {}
+    @property
+    def gates_m(self) -> dict[str, Vec3]:
+        """Where the gates are that the filter has and knows to be gates, by colour."""
+        place = self._filter
+        found: dict[str, Vec3] = {}
+        if place is None:
+            return found
         for colour, at in place.gates.items():
-            x, y, z = place.x[at : at + 3].tolist()
-            gates[colour] = (x, y, z)
-        return motion[0], gates
+            if colour not in self._landmarks.unsized:
+                x, y, z = place.x[at : at + 3].tolist()
+                found[colour] = (x, y, z)
+        return found
 
     @property
     def velocity_error_flu_m_s(self) -> Vec3:
