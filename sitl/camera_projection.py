@@ -273,7 +273,7 @@ def _are_along(starts: Floats, ends: Floats, of_face: Ints64) -> Flags:
 
 
 def _squares(points: Floats, starts: Floats, ends: Floats) -> Floats:
-    """About the squares of the distances from all points to all line segments, m², shape (points, segments)."""
+    """About the squares of the distances of all points and line segments, m², shape (points, segments)."""
     edges = ends - starts
     lengths2 = np.maximum((edges * edges).sum(axis=1), 1e-12)
     ways2 = (points * points).sum(axis=1)[:, None] - 2.0 * points @ starts.T + (starts * starts).sum(axis=1)
