@@ -18,7 +18,7 @@ from framerunner.geometry.axes import flip_vector
 from framerunner.geometry.vectors import Vec3
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from framerunner.wire.vehicle_telemetry import MessageOrder
-from offboard.drone import ImuInterval, ReportedAccuracy
+from offboard.drone import SURE_OF_POSITION_M, ImuInterval, ReportedAccuracy
 from offboard.link.direct import subscribe
 
 RATE_HZ = 250.0  # requested; PX4 has 200 samples a second by itself
@@ -60,6 +60,16 @@ class InertialFeed:
             with contextlib.suppress(MavsdkError):
                 await plugin.set_rate_odometry(ACCURACY_HZ)
 
+    @property
+    def drifts(self) -> bool:
+        """The vehicle is not sure of its position, and sends what the app needs to estimate it."""
+        accuracy = self.accuracy
+        return accuracy is not None and accuracy.position_std_m > SURE_OF_POSITION_M and self._has_no_gaps
+
+    @property
+    def _has_no_gaps(self) -> bool:
+        return 0.0 < self._usual_us <= LONGEST_US
+
     def take(self, until_us: int) -> tuple[ImuInterval, ...]:
         """The samples before a vehicle time since the last call, oldest first.
 
@@ -68,7 +78,7 @@ class InertialFeed:
         samples, taken = self._samples, []
         while samples and samples[0].time_us < until_us:
             taken.append(samples.popleft())
-        return tuple(taken) if 0.0 < self._usual_us <= LONGEST_US else ()
+        return tuple(taken) if self._has_no_gaps else ()
 
     def _on_imu(self, message: Message) -> None:
         if message.get_srcComponent() != AUTOPILOT_COMPONENT_ID or not self._order.is_next(message.time_usec):
