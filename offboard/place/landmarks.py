@@ -74,17 +74,18 @@ class GateLandmarks:
             return
         share, number = min(fits)
         view, eye = seen[number]
-        if share > GATE_FACTOR:
-            self._contradicted[colour] = self._contradicted.get(colour, 0) + 1
-            if self._contradicted[colour] >= CONTRADICTIONS:
-                self._drop(place, colour)
-            return
-        self._contradicted[colour] = 0
-        used = self._used[colour]
-        if not is_moved(view, used) and view.time_us - used.time_us < NOVEL_US:
-            return
-        self._used[colour] = view
-        place.update(corners(view, eye, first, yaw_var))
+        if share <= GATE_FACTOR:
+            used = self._used[colour]
+            if not is_moved(view, used) and view.time_us - used.time_us < NOVEL_US:
+                self._contradicted[colour] = 0
+                return
+            most2 = GATE_FACTOR * CHI_SQUARED[sum(view.seen)]  # also where it leads to, which may be far away
+            if place.update(corners(view, eye, first, yaw_var), most2):
+                self._contradicted[colour], self._used[colour] = 0, view
+                return
+        self._contradicted[colour] = self._contradicted.get(colour, 0) + 1
+        if self._contradicted[colour] >= CONTRADICTIONS:
+            self._drop(place, colour)
 
     def _begin(self, place: PlaceFilter, colour: str, seen: Sequence[_Seen], gates: GateMap) -> None:
         """Let a gate join the filter."""

@@ -21,7 +21,7 @@ from vision.types import PointTracks
 LEAST_IMAGES = 3  # that show a point
 MOST_IMAGES = 8  # after which a point is used, and begins anew
 SPREAD = 3  # numbers of images by which this differs from point to point: not all are used at once
-STD_PX = 0.7  # of a point, with what its image's attitude is wrong by
+STD_PX = 0.8  # of a point, with what its image's attitude is wrong by
 FLOOR_STD_M = 0.02
 DEPTH_M, DEPTH_STD_M = 5.0, 5.0  # of a point that may be anywhere
 ANYWHERE_STD_M = 30.0  # across that
