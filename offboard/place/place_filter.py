@@ -199,11 +199,6 @@ class PlaceFilter:
             common[at : at + 2, TURN] = (-y, x)
         self.p += common * np.square((*std_m, heading_std_rad)) @ common.T
 
-    def doubt_motion(self, velocity_std_m_s: float, bias_std_m_s2: float) -> None:
-        """Know less well how fast the drone is, and by how much its accelerometer is wrong."""
-        self.p[np.arange(4, 7), np.arange(4, 7)] += velocity_std_m_s**2
-        self.p[np.arange(7, 10), np.arange(7, 10)] += bias_std_m_s2**2
-
     def distance2(self, model: Model) -> float | None:
         """Square of a measurement's Mahalanobis distance; None if it cannot be made."""
         at = model(self.x)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.vectors import ZERO3
 from offboard.navigation.camera_model import NEAREST_M
 from offboard.place.measurements import Eye
 from offboard.place.place_filter import CLONE, Floats, PlaceFilter
@@ -32,7 +33,7 @@ FARTHEST_M = 14.0  # of a point of the floor
 ROUNDS = 4
 GATE_SIGMA = 3.0
 LOST_SHARE, LOST_LEAST, LOST_IMAGES = 0.35, 4, 3  # too few of the points fit, of so many, in images in a row
-LOST_M_S, LOST_M_S2 = 0.5, 0.1  # by which velocity and the accelerometer's bias are known less well then
+LOST_M_S = 0.5  # by which the velocity is known less well then
 FLOOR_WORSE = 6.0  # by which a point of the floor may fit worse than one anywhere, squares of deviations
 
 
@@ -153,7 +154,7 @@ class PointWindow:
             self._lost = self._lost + 1 if fits.sum() < LOST_SHARE * len(due) else 0
         if self._lost >= LOST_IMAGES:
             self._lost = 0
-            place.doubt_motion(LOST_M_S, LOST_M_S2)
+            place.displace(place.time_us, ZERO3, 0.0, LOST_M_S)
 
 
 class _Cameras(NamedTuple):
