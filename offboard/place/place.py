@@ -55,6 +55,7 @@ ERROR_S = 2.0
 LEAST_POSITION_STD_M = 0.005
 LEAST_VELOCITY_STD_M_S = 0.03
 LEAST_HEIGHT_STD_M = 0.05
+HEIGHT_FACTOR = 2.0  # a height farther off than so many deviations is known less well than the vehicle says
 
 RESET_TURN_RAD = radians(3.0)
 BLIND_M = 0.1  # of the reported way in a gap of the IMU's samples, per root of a second
@@ -192,6 +193,7 @@ class PlaceEstimator:
             place.update(height(state.z, height_std_m))
             return
         slow = sqrt(2.0 * ERROR_S / step_s)
+        height_std_m = slow * max(height_std_m, abs(state.z - float(place.x[2])) / HEIGHT_FACTOR)
         level, climb = (
             slow * max(std, LEAST_VELOCITY_STD_M_S)
             for std in (accuracy.velocity_std_m_s, accuracy.climb_std_m_s)
