@@ -24,8 +24,8 @@ MOST_PX = 60.0
 """Larger gates are fitted in a reduced image, in which their bars are thin."""
 _PLACES = (0.08 + 0.84 * (np.arange(10.0) + 0.5) / 10.0)[:, None]  # along a side, shape (10, 1)
 _REACHES = (3, 2, 2)  # pixels on both sides of an estimate in which a ridge is looked for
-_LEAST_MORE, _LEAST_PURER = 0.25, 0.06  # of a colour in its bars than beside them, see `_more_of_colour`
-_LEAST_CHANGE, _DARK = 8.0, 3.0  # of 255: less is noise
+_LEAST_PURER = 0.08  # of a colour in its bars than beside them
+_DARK = 3.0  # of 255: less is noise
 _LIKELY = np.array([1.0 if len(own) == 1 else 0.6 for own in CHANNELS.values()])  # compressed colours mix
 _LEAST_CLEAR = 0.2  # else the outline that was proposed is better
 _OUTLINE_STD_PX = 1.7
@@ -60,10 +60,10 @@ def fit_ring(filled: FilledPixels, outline: Floats) -> Ring | None:
     quad = (middle + _AXES * (outline - middle) - origin + 0.5) / scale - 0.5
     planes = np.array([(0.0, plane * filled.pitch) for plane in range(len(CHANNELS))])
     corners, deviations = _fitted(filled.share, quad + planes[:, None])
-    more, purer = _more_of_colour(filled, corners - planes[:, None])
-    k = int((np.clip(more, 0.0, 1.0) * np.maximum(purer, 0.0) * _LIKELY).argmax())
+    purer = _purer(filled, corners - planes[:, None])
+    k = int((purer * _LIKELY).argmax())
     colour = tuple(CHANNELS)[k]
-    if more[k] < _LEAST_MORE or purer[k] < _LEAST_PURER or colour not in PRIMARIES:
+    if purer[k] < _LEAST_PURER or colour not in PRIMARIES:
         return None
     if _clearness(filled.share, corners[k : k + 1])[0] > _LEAST_CLEAR:
         axes, std_px = corners[k] - planes[k], hypot(_LEAST_STD_PX, _STD_SHARE * deviations[k])
@@ -143,31 +143,30 @@ def _clearness(share: Shares, corners: Floats) -> Floats:
     return clear
 
 
-def _more_of_colour(filled: FilledPixels, corners: Floats) -> tuple[Floats, Floats]:
-    """How far the channel of each colour exceeds the others along its ring, compared with outside.
+def _purer(filled: FilledPixels, corners: Floats) -> Floats:
+    """How much purer each colour is along its ring than outside of it.
 
     Args:
         filled: the pixels.
         corners: of the ring of each colour in the part, shape (n, 4, 2).
 
     Returns:
-        That by the largest change of a channel, which is about 1 where a bar has a pure colour; and by how
-        much the logarithm of its part of the others changes, which is 0 in a shadow. Shape (n,) each.
+        By how much the logarithm of its channels' ratio to the others is larger, shape (n,). A shadow changes
+        all channels by the same factor, so it does not change that.
     """
     begin, along, across, length = _sides(corners)
     places = begin + along * _PLACES
-    inside, outside = (_at(filled.pixels, each) for each in (places, places - _beyond(length) * across))
-    change = np.median(np.abs(inside - outside).max(axis=-1), axis=(1, 2))
-    more, purer = np.zeros(len(corners)), np.zeros(len(corners))
+    inside, outside = (
+        _at(filled.pixels, each) + _DARK for each in (places, places - _beyond(length) * across)
+    )
+    purer = np.zeros(len(corners))
     for k, own in enumerate(CHANNELS.values()):
         others = [channel for channel in range(3) if channel not in own]
-        (own_in, most_in), (own_out, most_out) = (
-            (each[k][..., own].min(axis=-1), each[k][..., others].max(axis=-1)) for each in (inside, outside)
-        )
-        more[k] = np.median(own_in - most_in - own_out + most_out)
-        parts = (own_in + _DARK) * (most_out + _DARK) / ((own_out + _DARK) * (most_in + _DARK))
-        purer[k] = np.median(np.log(parts))
-    return more / np.maximum(change, _LEAST_CHANGE), purer
+        ratios = [
+            each[k][..., own].min(axis=-1) / each[k][..., others].max(axis=-1) for each in (inside, outside)
+        ]
+        purer[k] = np.median(np.log(ratios[0] / ratios[1]))
+    return purer
 
 
 def _beyond(length: Floats) -> Floats:
