@@ -26,161 +26,121 @@ from vision.types import Image
 Shares = npt.NDArray[np.float32]
 Box = tuple[int, int, int, int]  # column, row, columns, rows
 
-_CHANNELS = {"red": 2, "green": 1, "blue": 0}
-"""Of each colour of the task its channel."""
+CHANNELS = {"red": (2,), "green": (1,), "blue": (0,), "cyan": (0, 1), "magenta": (0, 2)}
+"""Of each colour of a gate the channels that are bright in it."""
+_PRIMARIES = (0, 1, 2)
 
-ZERO_EXCESS = 64.0
-"""The excess of a pixel whose channels are equal."""
 _LEAST_EXCESS = 12  # more than around
-_LEAST_NEAR = 5  # beside a pixel of a line
-_NEAR = np.ones((3, 3), np.uint8)
-_THIN = np.ones((9, 9), np.uint8)  # what is narrower stands out against what is around it
+_COLUMNS = 160  # to which an image is reduced before anything is looked for
+_THIN = np.ones((5, 5), np.uint8)  # what is narrower stands out against what is around it
+_MIN_PIXELS = 6
 _AROUND_PX = 15
-_BESIDE = np.ones((5, 5), np.uint8)
-_LEAST_SHARE, _HALF = (
-    0.08,
-    0.5,
-)  # a pixel is of a bar with this share at least, and half the largest beside it
 _DARK = 0.1  # of the bright channels' value
 _BRIGHT_PERCENT, _BRIGHT = 90, 0.75  # a gate is less bright than the brightest tenth of an image
 _LEAST_BRIGHT = 60.0
 _LEAST_SQUARE = 900.0  # of the difference between a colour and what is around
 _GRID = 4
-_MIN_PIXELS = 20
-_MARGIN_PX = 4
 _GAP_ROWS = 4  # between the planes of two colours
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilledPixels:
-    """The pixels that colours fill more than those around them, in a part of an image.
-
-    The planes of several colours are below one another, so that what is done with them is done once.
+    """How far colours fill the pixels of a part of an image.
 
     Attributes:
-        colours: which.
         origin: column and row of the part in the image.
-        pitch: rows from the first row of a colour to that of the next one.
-        share: how far the colour fills each pixel, about 0..1, shape (colours * pitch, columns).
-        excess: how far the colour's channel exceeds the larger of the others, plus `ZERO_EXCESS`, same shape.
-        mask: 255 where it is a bar, the same.
-        broad: 255 where it is a bar by colour alone, of which a camera sends half the resolution, the same.
+        scale: columns and rows of the image for one of the part.
+        pitch: rows of the plane of a colour, which are below one another.
+        share: how far each of `CHANNELS` fills each pixel, about 0..1, shape (colours * pitch, columns).
+        pixels: of the part, BGR, without the noise of single pixels, shape (rows, columns, 3).
     """
 
-    colours: tuple[str, ...]
     origin: tuple[int, int]
+    scale: tuple[float, float]
     pitch: int
     share: Shares
-    excess: Plane
-    mask: Plane
-    broad: Plane
+    pixels: Image
 
 
-def find_filled(image: Image, known: Sequence[Box]) -> FilledPixels | None:
-    """Find what may be thin bars of the colours of gates; None if there is nothing.
-
-    Args:
-        image: BGR, shape (height, width, 3), uint8.
-        known: boxes in which nothing is looked for.
-    """
-    planes = split_planes(image)
-    coloured: dict[str, tuple[Plane, Plane]] = {}
-    boxes: list[Box] = []
-    for colour, own in _CHANNELS.items():
-        excess = _excess(planes, own)
-        thin = np.asarray(cv2.morphologyEx(excess, cv2.MORPH_TOPHAT, _THIN), np.uint8)
+def has_coloured_lines(image: Image, known: Sequence[Box]) -> bool:
+    """Whether there may be more gates: thin things of their colours outside some boxes."""
+    shrink = image.shape[1] / _COLUMNS
+    size = (_COLUMNS, max(round(image.shape[0] / shrink), 1))
+    planes = split_planes(np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8))
+    for own in _PRIMARIES:
+        excess = _pure_excess(planes, own)
+        thin = cv2.morphologyEx(excess, cv2.MORPH_TOPHAT, _THIN)
         for column, row, columns, rows in known:
-            thin[max(row - 2, 0) : row + rows + 2, max(column - 2, 0) : column + columns + 2] = 0
-        # Most of a ring also exceeds the other channels, which grey between other colours does not.
+            left, top = int(column / shrink), int(row / shrink)
+            right, bottom = int((column + columns) / shrink), int((row + rows) / shrink)
+            thin[max(top - 1, 0) : bottom + 2, max(left - 1, 0) : right + 2] = 0
+        # Most of a gate also exceeds the other channels, which grey between other colours does not.
         more = cv2.bitwise_and(
-            cv2.compare(thin, _LEAST_EXCESS, cv2.CMP_GT), cv2.compare(excess, ZERO_EXCESS + 2.0, cv2.CMP_GT)
+            cv2.compare(thin, _LEAST_EXCESS, cv2.CMP_GT), cv2.compare(excess, 2.0, cv2.CMP_GT)
         )
         if cv2.countNonZero(more) >= _MIN_PIXELS:
-            boxes.append(_grown(cv2.boundingRect(more), image.shape))
-            coloured[colour] = (excess, thin)
-    if not boxes:
-        return None
-    box = _union(boxes)
-    mixture = _Mixture(image, box)
-    left, top, wide, high = box
-    part = (slice(top, top + high), slice(left, left + wide))
-    pitch = high + _GAP_ROWS
-    shape = (pitch * len(coloured), wide)
-    share = np.zeros(shape, np.float32)
-    excesses, mask, broad = np.zeros((3, *shape), np.uint8)
-    for k, (colour, (excess, thin)) in enumerate(coloured.items()):
-        rows_of = slice(k * pitch, k * pitch + high)
-        share[rows_of] = mixture.share(_CHANNELS[colour])
-        excesses[rows_of] = excess[part]
-        near = cv2.dilate(cv2.compare(thin[part], _LEAST_NEAR, cv2.CMP_GT), _NEAR)
-        mask[rows_of] = _bars(share[rows_of], near)
-        broad[rows_of] = _broad(thin[part])
-    return FilledPixels(tuple(coloured), (left, top), pitch, share, excesses, mask, broad)
+            return True
+    return False
 
 
-def _grown(box: Sequence[int], shape: Sequence[int]) -> Box:
-    """A box and some pixels around it, within an image."""
-    column, row, columns, rows = box
-    left, top = max(column - _MARGIN_PX, 0), max(row - _MARGIN_PX, 0)
-    right, bottom = min(column + columns + _MARGIN_PX, shape[1]), min(row + rows + _MARGIN_PX, shape[0])
-    return (left, top, right - left, bottom - top)
+def brightness_of_gates(image: Image) -> float:
+    """How bright the channels of a gate's colour are in the light of an image, 0..255."""
+    brightness = np.percentile(image[::_GRID, ::_GRID].max(axis=2), _BRIGHT_PERCENT)
+    return max(_LEAST_BRIGHT, _BRIGHT * float(brightness))
 
 
-def _union(boxes: Sequence[Box]) -> Box:
-    left, top = min(box[0] for box in boxes), min(box[1] for box in boxes)
-    right, bottom = max(box[0] + box[2] for box in boxes), max(box[1] + box[3] for box in boxes)
-    return (left, top, right - left, bottom - top)
-
-
-def _excess(planes: Sequence[Plane], own: int) -> Plane:
-    """How far a channel exceeds the larger of the others, plus `ZERO_EXCESS`, without the noise of pixels."""
-    one, other = (plane for channel, plane in enumerate(planes) if channel != own)
-    excess = cv2.addWeighted(planes[own], 1.0, cv2.max(one, other), -1.0, ZERO_EXCESS)
-    return np.asarray(cv2.blur(excess, (3, 3)), np.uint8)
-
-
-def _bars(share: Shares, coloured: Plane) -> Plane:
-    """The pixels of lines: at least half as much filled as the most filled one beside them."""
-    filled = cv2.min(share, coloured.astype(np.float32))
-    limit = np.maximum(_HALF * cv2.dilate(filled, _BESIDE), _LEAST_SHARE)
-    return np.asarray(cv2.compare(filled, limit, cv2.CMP_GT), np.uint8)
-
-
-def _broad(thin: Plane) -> Plane:
-    """The same by how far the channels exceed others alone."""
-    limit = np.maximum(cv2.convertScaleAbs(cv2.dilate(thin, _BESIDE), alpha=_HALF), np.uint8(_LEAST_EXCESS))
-    return np.asarray(cv2.compare(thin, limit, cv2.CMP_GT), np.uint8)
-
-
-class _Mixture:
-    """A part of an image, what is around each of its pixels, and what is the same for all colours.
+def fill_around(
+    image: Image, corners: npt.NDArray[np.float64], most_px: float, bright: float
+) -> FilledPixels:
+    """How far each colour fills the pixels around a quadrilateral.
 
     Args:
         image: BGR, shape (height, width, 3), uint8.
-        box: the part.
+        corners: of it, columns and rows, shape (4, 2).
+        most_px: a larger quadrilateral is reduced to about this size.
+        bright: see `brightness_of_gates`.
     """
+    height, width = image.shape[:2]
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    shrink = max(1, round(float((high - low).max()) / most_px))
+    margin = shrink * _AROUND_PX
+    left, top = (max(int(each) - margin, 0) for each in low.tolist())
+    right, bottom = min(int(high[0]) + margin + 1, width), min(int(high[1]) + margin + 1, height)
+    part = image[top:bottom, left:right]
+    size = (max((right - left) // shrink, 1), max((bottom - top) // shrink, 1))
+    if shrink > 1:
+        part = np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_AREA), np.uint8)
+    scale = ((right - left) / size[0], (bottom - top) / size[1])
+    share = np.vstack(
+        [
+            cv2.copyMakeBorder(plane, 0, _GAP_ROWS, 0, 0, cv2.BORDER_REPLICATE)
+            for plane in _shares(part, bright)
+        ]
+    )
+    pixels = np.asarray(cv2.blur(part, (3, 3)), np.uint8)
+    return FilledPixels((left, top), scale, size[1] + _GAP_ROWS, share, pixels)
 
-    def __init__(self, image: Image, box: Box) -> None:
-        column, row, columns, rows = box
-        left, top = max(column - _AROUND_PX, 0), max(row - _AROUND_PX, 0)
-        self._part = (slice(row - top, row - top + rows), slice(column - left, column - left + columns))
-        seen = image[top : row + rows + _AROUND_PX, left : column + columns + _AROUND_PX]
-        pixels = seen.astype(np.float32)
-        self._around = cv2.blur(pixels, (_AROUND_PX, _AROUND_PX))
-        self._beyond = pixels - self._around
-        one = np.ones((1, 3), np.float32)
-        self._along = cv2.transform(self._beyond * self._around, one)
-        self._square = cv2.transform(self._around * self._around, one)
-        brightness = np.percentile(image[::_GRID, ::_GRID].max(axis=2), _BRIGHT_PERCENT)
-        self._bright = max(_LEAST_BRIGHT, _BRIGHT * float(brightness))
 
-    def share(self, own: int) -> Shares:
-        """How far the colour of a channel fills each pixel of the part."""
-        part = self._part
-        colour = np.full((1, 3), _DARK * self._bright, np.float32)
-        colour[0, own] = self._bright
-        above = cv2.transform(self._beyond[part], colour) - self._along[part]
-        square = self._square[part] - 2.0 * cv2.transform(self._around[part], colour)
-        square += float((colour * colour).sum())
-        shares: Shares = above / np.maximum(square, _LEAST_SQUARE)
-        return shares
+def _pure_excess(planes: Sequence[Plane], own: int) -> npt.NDArray[np.int16]:
+    """How far a channel exceeds the larger of the others, less half of the difference of these."""
+    one, other = (plane for channel, plane in enumerate(planes) if channel != own)
+    excess = cv2.addWeighted(planes[own], 1.0, cv2.max(one, other), -1.5, 0.0, dtype=cv2.CV_16S)
+    return np.asarray(cv2.add(excess, np.right_shift(cv2.min(one, other), 1), dtype=cv2.CV_16S), np.int16)
+
+
+def _shares(part: Image, bright: float) -> list[Shares]:
+    """How far each colour fills each pixel of a part of an image."""
+    pixels = part.astype(np.float32)
+    around = cv2.blur(pixels, (_AROUND_PX, _AROUND_PX))
+    beyond = pixels - around
+    one = np.ones((1, 3), np.float32)
+    along = cv2.transform(beyond * around, one)
+    around_square = cv2.transform(around * around, one)
+    shares = []
+    for own in CHANNELS.values():
+        colour = np.full((1, 3), _DARK * bright, np.float32)
+        colour[0, list(own)] = bright
+        above = cv2.transform(beyond, colour) - along
+        square = around_square - 2.0 * cv2.transform(around, colour) + float((colour * colour).sum())
+        shares.append(above / np.maximum(square, _LEAST_SQUARE))
+    return shares

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import acos, copysign, degrees, hypot
 
 import cv2
@@ -14,13 +14,13 @@ from framerunner.geometry.gate_shape import GateShapes
 from vision.calibration.lens import Lens, straight_box
 from vision.colour_regions import OBSTACLE, PRIMARIES, SECONDARIES, ColourMask, find_colours
 from vision.detector import measure
-from vision.fill_shares import find_filled
+from vision.fill_shares import brightness_of_gates, fill_around, has_coloured_lines
 from vision.gate_fit import FittedGate, fit_gate, gate_of_axes
 from vision.gate_model import GateModel, Point, Sides
-from vision.learned.proposals import GateProposals
+from vision.learned.judge import LEAST_CHANCE, Floats, Outline, Outlines, find_outlines, judge
 from vision.outer_sides import named_sides, outer_sides, sides_by_opening
 from vision.patch import ImagePatch, cut_patch
-from vision.thin_gates import Ring, find_rings
+from vision.thin_gates import MOST_PX, Ring, fit_ring
 from vision.types import (
     NOT_SEEN,
     Detection,
@@ -42,11 +42,24 @@ _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are
 _MIN_FRAGMENT_PX = 3
 _MAX_FRAGMENTS = 12
 _SHEET_PX, _SHEET_SHARE, _BARS_SHARE = 5.0, 0.9, 0.6
-_CLUTTER = 4  # regions of a colour; among more of them, small ones are not taken for gates by it alone
+_CLUTTER = 4  # regions; of more, only those are fitted that networks see a gate in
+_MOST_APART = 4  # fragments that are also looked at alone
 _LARGE_PX = 40
-_THIN_BAR_PX = 2.5  # wider bars have pixels of their own colour, which tell how wide they are
-_LEAST_CHANCE, _LEAST_LIKELY = 0.2, 0.1  # of a network: of what it proposes, and of what is found without it
+_THIN_BAR_SHARE = (
+    1 / 128
+)  # of the image's width; wider bars have pixels of their own colour, which tell their width
+_SURE = 0.6  # chance from which on a gate is found by networks alone
 _OPENING_PX = 12  # a region smaller than this is not looked at for an opening
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Region:
+    """Pixels of a pure colour that may be parts of one gate."""
+
+    mask: ColourMask  # of that colour
+    others: tuple[ColourMask, ...]  # of all other colours
+    fragments: list[_Contour]  # their outlines
+    box: _Box
 
 
 class GateFinder:
@@ -64,10 +77,7 @@ class GateFinder:
         focal_px: float,
         lens: Lens | None = None,
         shapes: GateShapes | None = None,
-        *,
-        learned: bool = False,
     ) -> None:
-        self._learned = learned
         self._focal_px = focal_px
         known = shapes or GateShapes()
         self._models = {colour: GateModel(known.of(colour), focal_px) for colour in PRIMARIES + SECONDARIES}
@@ -91,53 +101,62 @@ class GateFinder:
         if self._lens is not None:
             self._lens.check_size(image.shape[1], image.shape[0])
         masks = find_colours(image)
-        found: dict[str, list[_Found]] = {}
-        edges: tuple[ObstacleEdge, ...] = ()
-        for mask in masks:
-            others = [other for other in masks if other is not mask]
-            if mask.colour == OBSTACLE:
-                edges = _obstacle_edges(mask, others)
-                if self._lens is not None:
-                    edges = _straight_edges(edges, self._lens)
-            else:
-                found[mask.colour] = self._find_colour(mask, others)
-        known = [box for each in found.values() for box, _ in each]
-        filled = find_filled(image, known)
-        proposals = GateProposals(image, _LEAST_CHANCE) if self._learned else None
-        proposed = None if proposals is None else proposals.outside(known)
-        for ring in () if filled is None else find_rings(filled, proposed):
-            thin = self._thin_sighting(ring, image)
-            if thin is not None:
-                found.setdefault(ring.colour, []).append(thin)
+        regions = _regions(masks)
+        seen: tuple[Floats, Outlines] | None = None
+        if len(regions) > _CLUTTER or has_coloured_lines(image, [region.box for region in regions]):
+            seen = find_outlines(image)
+            regions = [region for region in regions if _is_worth_fitting(region, seen[1])]
+        found = [one for region in regions for one in self._of_region(region)]
+        known = [box for box, _ in found]
+        if seen is None and len(found) < len(regions) and has_coloured_lines(image, known):
+            seen = find_outlines(image)
+        if seen is not None:
+            chances, outlines = seen
+            found = _likely(image, found, outlines)
+            known = [box for box, _ in found]
+            found += self._of_outlines(image, known, outlines[chances > _SURE])
+        edges = self._obstacle_edges(masks)
         height, width = image.shape[:2]
-        if proposals is not None:
-            for colour, sightings in found.items():
-                found[colour] = [one for one in sightings if _is_likely(one, proposals, width, height)]
-        numbers = {c: self._numbers(c, found[c], width, height) for c in PRIMARIES if found.get(c)}
+        by_colour = {c: [one for one in found if one[1].colour == c] for c in PRIMARIES}
+        numbers = {c: self._numbers(c, ones, width, height) for c, ones in by_colour.items() if ones}
         return Detections(
             red=numbers.get("red", NOT_SEEN),
             green=numbers.get("green", NOT_SEEN),
             blue=numbers.get("blue", NOT_SEEN),
             time_us=time_us,
-            frames=tuple(sighting for each in found.values() for _, sighting in each),
+            frames=tuple(sighting for _, sighting in found),
             obstacle_edges=edges,
         )
 
-    def _find_colour(self, mask: ColourMask, others: Sequence[ColourMask]) -> list[_Found]:
-        """The gates of one colour whose pixels are pure."""
+    def _obstacle_edges(self, masks: Sequence[ColourMask]) -> tuple[ObstacleEdge, ...]:
+        """The lower ends of obstacles."""
+        for mask in masks:
+            if mask.colour == OBSTACLE:
+                edges = _obstacle_edges(mask, [other for other in masks if other is not mask])
+                return edges if self._lens is None else _straight_edges(edges, self._lens)
+        return ()
+
+    def _of_region(self, region: _Region) -> list[_Found]:
+        """The gates that pixels of a pure colour are."""
+        sighting = self._sighting(region, np.concatenate(region.fragments))
+        if (sighting is None or not sighting[1].whole) and 1 < len(region.fragments) <= _MOST_APART:
+            # What is joined may be two things: a gate, and mixed colours at an obstacle's edge.
+            each = [self._sighting(region, fragment) for fragment in region.fragments]
+            alone = [one for one in each if one is not None and (sighting is None or one[1].whole)]
+            if alone:
+                return alone
+        return [] if sighting is None else [sighting]
+
+    def _of_outlines(self, image: Image, known: Sequence[_Box], outlines: Outlines) -> list[_Found]:
+        """The gates that networks see outside boxes."""
         found: list[_Found] = []
-        groups = _groups(mask, others)
-        if len(groups) > _CLUTTER:
-            groups = [group for group in groups if max(_bounding_box(np.concatenate(group))[2:]) >= _LARGE_PX]
-        for group in groups:
-            sighting = self._sighting(mask, others, np.concatenate(group))
-            if (sighting is None or not sighting[1].whole) and 1 < len(group) <= _CLUTTER:
-                # What is joined may be two things: a gate, and mixed colours at an obstacle's edge.
-                each = [self._sighting(mask, others, fragment) for fragment in group]
-                alone = [one for one in each if one is not None and (sighting is None or one[1].whole)]
-                if alone:
-                    found += alone
-                    continue
+        bright = 0.0
+        for outline in outlines:
+            if any(_is_inside(outline, box) for box in known):
+                continue
+            bright = bright or brightness_of_gates(image)
+            ring = fit_ring(fill_around(image, outline, MOST_PX, bright), outline)
+            sighting = None if ring is None else self._thin_sighting(ring, image)
             if sighting is not None:
                 found.append(sighting)
         return found
@@ -161,7 +180,7 @@ class GateFinder:
         if best is None:
             return None
         distance_m = hypot(*best.poses[0].position_flu_m)
-        if self._focal_px * model.shape.bar_m > _THIN_BAR_PX * distance_m:
+        if self._focal_px * model.shape.bar_m > _THIN_BAR_SHARE * width * distance_m:
             return None
         box = _bounding_box(np.rint(ring.corners).astype(np.int32))
         return box, GateSighting(ring.colour, best.corners, best.whole, best.poses)
@@ -179,8 +198,9 @@ class GateFinder:
             numbers = replace(numbers, signed_a=_signed_angle(largest.poses[0]))
         return numbers
 
-    def _sighting(self, mask: ColourMask, others: Sequence[ColourMask], points: _Contour) -> _Found | None:
-        """The gate that a group of fragments shows, if it is one."""
+    def _sighting(self, region: _Region, points: _Contour) -> _Found | None:
+        """The gate that some of the fragments of a region show, if it is one."""
+        mask, others = region.mask, region.others
         height, width = mask.mask.shape
         box = _bounding_box(points)
         if _is_filled(mask, points, box):
@@ -212,14 +232,39 @@ class GateFinder:
         return best
 
 
-def _is_likely(found: _Found, proposals: GateProposals, width: int, height: int) -> bool:
-    """Whether the network does not deny a gate; of what is seen in part it is not asked."""
-    _, sighting = found
-    if not sighting.whole or not sighting.poses:
+def _is_inside(outline: Outline, box: _Box) -> bool:
+    """Whether the middle of an outline is in a box."""
+    column, row, columns, rows = box
+    x, y = outline.mean(axis=0).tolist()
+    return bool(column <= x < column + columns and row <= y < row + rows)
+
+
+def _is_worth_fitting(region: _Region, outlines: Outlines) -> bool:
+    """Whether networks see a gate in a region, or it may be a part of one, which they do not know."""
+    if any(_is_inside(outline, region.box) for outline in outlines):
         return True
-    corners = [(corner.right_px, corner.down_px) for corner in sighting.corners if corner is not None]
-    right, down = np.mean(corners, axis=0).tolist()
-    return proposals.chance_near(right + (width - 1) / 2, down + (height - 1) / 2) > _LEAST_LIKELY
+    column, row, columns, rows = region.box
+    height, width = region.mask.mask.shape
+    cut = column == 0 or row == 0 or column + columns == width or row + rows == height
+    if cut and max(columns, rows) >= _LARGE_PX:
+        return True
+    around = (slice(max(row - 2, 0), row + rows + 2), slice(max(column - 2, 0), column + columns + 2))
+    return any(other.colour == OBSTACLE and other.mask[around].any() for other in region.others)
+
+
+def _likely(image: Image, found: Sequence[_Found], outlines: Outlines) -> list[_Found]:
+    """Those of some gates that networks do not deny; of what is seen in part they are not asked."""
+    height, width = image.shape[:2]
+    asked = [
+        one
+        for one in found
+        if one[1].whole and one[1].poses and not any(_is_inside(each, one[0]) for each in outlines)
+    ]
+    corners = [[(corner.right_px, corner.down_px) for corner in one[1].corners if corner] for one in asked]
+    places = np.array(corners).reshape(-1, 4, 2) + np.array([(width - 1) / 2, (height - 1) / 2])
+    chances, _ = judge(image, places)
+    denied = [one for one, chance in zip(asked, chances.tolist(), strict=True) if chance < LEAST_CHANCE]
+    return [one for one in found if one not in denied]
 
 
 def _is_filled(mask: ColourMask, points: _Contour, box: _Box) -> bool:
@@ -246,6 +291,18 @@ def _is_filled(mask: ColourMask, points: _Contour, box: _Box) -> bool:
 def _bounding_box(points: _Contour) -> _Box:
     column, row, columns, rows = cv2.boundingRect(points)
     return (column, row, columns, rows)
+
+
+def _regions(masks: Sequence[ColourMask]) -> list[_Region]:
+    """What may be gates by colour."""
+    regions = []
+    for mask in masks:
+        if mask.colour != OBSTACLE:
+            others = tuple(other for other in masks if other is not mask)
+            for fragments in _groups(mask, others):
+                box = _bounding_box(np.concatenate(fragments))
+                regions.append(_Region(mask, others, fragments, box))
+    return regions
 
 
 def _groups(mask: ColourMask, others: Sequence[ColourMask]) -> list[list[_Contour]]:

@@ -1,9 +1,8 @@
-"""Gates among thin lines of one colour, of which an image of anything has many.
+"""Where the bars of a proposed gate are, however thin they are, and which colour they have.
 
-A gate is a ring of four straight bars. Its opening is a hole in the pixels of the lines, and nearly a
-quadrilateral; a photograph has few such holes. Each quadrilateral is fitted to the ridges of the colour's
-share beside its sides, which are the axes of the bars; all of them at once. What is a gate then has all along
-its four sides about the same share, and less on both sides of them.
+The sides of a proposed outline are moved to the ridges of the colour's share beside them, which are the axes
+of the bars where the share is alike along all four sides, and less on both sides of them. The gate has the
+colour whose channel exceeds the others most in its bars, compared with what is around them.
 """
 
 from __future__ import annotations
@@ -15,119 +14,62 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vision.colour_regions import Plane
-from vision.fill_shares import ZERO_EXCESS, FilledPixels, Shares
+from vision.colour_regions import PRIMARIES
+from vision.fill_shares import CHANNELS, FilledPixels, Shares
+from vision.types import Image
 
 Floats = npt.NDArray[np.float64]
-Points = npt.NDArray[np.int32]
 
-_JOINED = np.ones((3, 3), np.uint8)  # gaps in lines that are closed
-_MIN_COLUMNS, _MIN_ROWS = 3, 3
-_MAX_QUADS = 48
-_LEAST_AREA = 4.0
-_LEAST_QUAD = 0.7  # area of an opening over that of the quadrilateral around it
+MOST_PX = 60.0
+"""Larger gates are fitted in a reduced image, in which their bars are thin."""
 _PLACES = (0.08 + 0.84 * (np.arange(10.0) + 0.5) / 10.0)[:, None]  # along a side, shape (10, 1)
 _REACHES = (3, 2, 2)  # pixels on both sides of an estimate in which a ridge is looked for
-_LEAST_SHARE, _LEAST_EXCESS = 0.2, 2.0  # in the middle along a ring
-_LEAST_CLEAR = 0.4
-_LEAST_CLEAR_PROPOSED = 0.15  # of rings that a network proposes
+_LEAST_PURER = 0.08  # of a colour in its bars than beside them
+_DARK = 3.0  # of 255: less is noise
+_LIKELY = np.array([1.0 if len(own) == 1 else 0.6 for own in CHANNELS.values()])  # compressed colours mix
+_LEAST_CLEAR = 0.2  # else the outline that was proposed is better
+_OUTLINE_STD_PX = 1.7
 _AXES = 0.94  # of an outline's size, between the axes of its bars
-_FEW, _CLEAR_OF_MANY, _STD_OF_MANY_PX = 2, 0.5, 0.25  # an image with many rings has round ones, too
-_LEAST_STD_PX, _STD_SHARE = 0.15, 0.7  # of corners, by the ridges' distances from straight lines
+_LEAST_STD_PX, _STD_SHARE = 0.2, 2.5  # of corners, by the ridges' distances from straight lines
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ring:
-    """What may be a gate.
+    """Four bars of one colour.
 
     Attributes:
         colour: of its bars.
         corners: where the axes of its bars meet, columns and rows of the image, shape (4, 2), clockwise.
-        clear: how clearly the weakest side is a line, at most 1.
         std_px: standard deviation of the corners' coordinates.
     """
 
     colour: str
     corners: Floats
-    clear: float
     std_px: float
 
 
-def find_rings(filled: FilledPixels, proposed: Floats | None = None) -> list[Ring]:
-    """Find candidates, the clearest first; each is somewhere else.
+def fit_ring(filled: FilledPixels, outline: Floats) -> Ring | None:
+    """Fit the bars of a gate; None if it is not red, green or blue.
 
     Args:
-        filled: the pixels.
-        proposed: outlines of what probably is a gate, columns and rows of the image, shape (n, 4, 2).
+        filled: the pixels around it.
+        outline: its corners, clockwise, columns and rows of the image, shape (4, 2).
     """
-    quads = _quads(filled)
-    holes = len(quads)
-    if proposed is not None:
-        quads += _proposed_quads(filled, proposed)
-    if not quads:
-        return []
-    corners, deviations = _fitted(filled.share, np.array(quads))
-    clear = np.where(_is_of_colour(filled, corners), _clearness(filled.share, corners), -1.0)
-    rings: list[Ring] = []
-    for k in np.argsort(-clear, kind="stable").tolist():
-        if clear[k] < (_LEAST_CLEAR if k < holes else _LEAST_CLEAR_PROPOSED):
-            continue
-        plane = int(corners[k, :, 1].mean()) // filled.pitch
-        offset = (filled.origin[0], filled.origin[1] - plane * filled.pitch)
-        std_px = hypot(_LEAST_STD_PX, _STD_SHARE * deviations[k])
-        ring = Ring(filled.colours[plane], corners[k] + offset, float(clear[k]), std_px)
-        if not any(_overlap(ring, other) for other in rings):
-            rings.append(ring)
-    if proposed is None and len(rings) > _FEW:  # else the network judges
-        rings = [ring for ring in rings if ring.clear > _CLEAR_OF_MANY and ring.std_px < _STD_OF_MANY_PX]
-    return rings
-
-
-def _proposed_quads(filled: FilledPixels, proposed: Floats) -> list[Floats]:
-    """Between the axes of the bars of proposed gates, in the plane of each colour."""
-    rows, columns = filled.share.shape
-    rows //= len(filled.colours)
-    middles = proposed.mean(axis=1, keepdims=True)
-    quads = []
-    for quad in middles + _AXES * (proposed - middles) - np.array(filled.origin):
-        column, row = quad.mean(axis=0)
-        if 0 <= column < columns and 0 <= row < rows:
-            quads += [quad + np.array([0, plane * filled.pitch]) for plane in range(len(filled.colours))]
-    return quads
-
-
-def _quads(filled: FilledPixels) -> list[Floats]:
-    """Quadrilaterals around the openings of lines, clockwise in the image, the largest first."""
-    found: list[tuple[float, Floats]] = []
-    joined = [cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _JOINED) for mask in (filled.mask, filled.broad)]
-    for mask in joined:
-        contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-        if hierarchy is None:
-            continue
-        for k in np.flatnonzero(hierarchy[0, :, 3] >= 0).tolist():
-            quad = _quad(np.asarray(contours[k], np.int32))
-            if quad is not None:
-                found.append(quad)
-    return [quad for _, quad in sorted(found, key=lambda one: -one[0])[:_MAX_QUADS]]
-
-
-def _quad(hole: Points) -> tuple[float, Floats] | None:
-    """The quadrilateral around an opening and its area; None if it is another shape."""
-    _, _, wide, high = cv2.boundingRect(hole)
-    if wide < _MIN_COLUMNS or high < _MIN_ROWS:
+    middle = outline.mean(axis=0)
+    scale, origin = np.array(filled.scale), np.array(filled.origin)
+    quad = (middle + _AXES * (outline - middle) - origin + 0.5) / scale - 0.5
+    planes = np.array([(0.0, plane * filled.pitch) for plane in range(len(CHANNELS))])
+    corners, deviations = _fitted(filled.share, quad + planes[:, None])
+    purer = _purer(filled, corners - planes[:, None])
+    k = int((purer * _LIKELY).argmax())
+    colour = tuple(CHANNELS)[k]
+    if purer[k] < _LEAST_PURER or colour not in PRIMARIES:
         return None
-    hull = cv2.convexHull(hole, clockwise=False)
-    filled = cv2.contourArea(hole) + 2.0
-    if len(hull) < 4 or filled < _LEAST_QUAD * cv2.contourArea(hull):  # the quadrilateral is around the hull
-        return None
-    quad = cv2.approxPolyN(hull.astype(np.float32), 4).reshape(-1, 2).astype(np.float64)
-    if len(quad) < 4:
-        return None
-    (x0, y0), (x1, y1), (x2, y2), (x3, y3) = quad.tolist()
-    area = 0.5 * ((x2 - x0) * (y3 - y1) - (x3 - x1) * (y2 - y0))
-    if abs(area) < _LEAST_AREA or filled < _LEAST_QUAD * abs(area):
-        return None
-    return abs(area), quad if area > 0.0 else quad[::-1]
+    if _clearness(filled.share, corners[k : k + 1])[0] > _LEAST_CLEAR:
+        axes, std_px = corners[k] - planes[k], hypot(_LEAST_STD_PX, _STD_SHARE * deviations[k])
+    else:
+        axes, std_px = quad, _OUTLINE_STD_PX
+    return Ring(colour, (axes + 0.5) * scale - 0.5 + origin, std_px * max(filled.scale))
 
 
 def _fitted(share: Shares, corners: Floats) -> tuple[Floats, Floats]:
@@ -201,30 +143,30 @@ def _clearness(share: Shares, corners: Floats) -> Floats:
     return clear
 
 
-def _is_of_colour(filled: FilledPixels, corners: Floats) -> npt.NDArray[np.bool_]:
-    """Whether rings are filled enough, and their channel exceeds the others, and more so than around them.
-
-    A shadow on a coloured floor is a ring of the floor's colour, but of less of it.
+def _purer(filled: FilledPixels, corners: Floats) -> Floats:
+    """How much purer each colour is along its ring than outside of it.
 
     Args:
         filled: the pixels.
-        corners: of rings, shape (n, 4, 2).
+        corners: of the ring of each colour in the part, shape (n, 4, 2).
 
     Returns:
-        Shape (n,).
+        By how much the logarithm of its channels' ratio to the others is larger, shape (n,). A shadow changes
+        all channels by the same factor, so it does not change that.
     """
     begin, along, across, length = _sides(corners)
     places = begin + along * _PLACES
-    outside = places - _beyond(length) * across
-    share = np.median(_at(filled.share, places), axis=(1, 2))
-    excess = _at(filled.excess, places)
-    more = np.median(excess - _at(filled.excess, outside), axis=(1, 2))
-    enough: npt.NDArray[np.bool_] = (
-        (share > _LEAST_SHARE)
-        & (np.median(excess, axis=(1, 2)) > ZERO_EXCESS + _LEAST_EXCESS)
-        & (more > _LEAST_EXCESS)
+    inside, outside = (
+        _at(filled.pixels, each) + _DARK for each in (places, places - _beyond(length) * across)
     )
-    return enough
+    purer = np.zeros(len(corners))
+    for k, own in enumerate(CHANNELS.values()):
+        others = [channel for channel in range(3) if channel not in own]
+        ratios = [
+            each[k][..., own].min(axis=-1) / each[k][..., others].max(axis=-1) for each in (inside, outside)
+        ]
+        purer[k] = np.median(np.log(ratios[0] / ratios[1]))
+    return purer
 
 
 def _beyond(length: Floats) -> Floats:
@@ -233,19 +175,11 @@ def _beyond(length: Floats) -> Floats:
     return beyond
 
 
-def _at(share: Shares | Plane, places: Floats) -> Floats:
-    """Between the numbers of the four pixels around each place, shape (...)."""
+def _at(share: Shares | Image, places: Floats) -> Floats:
+    """Between the numbers of the four pixels around each place, shape (...) or (..., 3)."""
     x, y = places[..., 0].astype(np.float32), places[..., 1].astype(np.float32)
     flat = cv2.remap(
         share, x.reshape(len(x), -1), y.reshape(len(x), -1), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
-    values: Floats = flat.reshape(x.shape).astype(np.float64)
+    values: Floats = flat.reshape(*x.shape, *share.shape[2:]).astype(np.float64)
     return values
-
-
-def _overlap(one: Ring, other: Ring) -> bool:
-    """Whether the centre of one is inside another, or the other way round."""
-    return any(
-        cv2.pointPolygonTest(a.corners.astype(np.float32), tuple(b.corners.mean(axis=0).tolist()), False) >= 0
-        for a, b in ((one, other), (other, one))
-    )

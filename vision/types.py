@@ -19,8 +19,6 @@ from framerunner.geometry.vectors import Quaternion, Vec3
 Image = npt.NDArray[np.uint8]
 Vision = Literal["boxes", "frames"]
 """How gates are detected: the paper's box of each colour, or by contour and shape."""
-LEARNED = "learned"
-"""Name of the detector by shape to which a network proposes gates."""
 M: JsonDict = {"unit": "m"}
 PX: JsonDict = {"unit": "px"}
 DEG: JsonDict = {"unit": "deg"}

@@ -27,7 +27,7 @@ def plan_detector(plan: FlightPlan) -> Detector:
     others = others_of(plan)
     calibration = plan.calibration or true_calibration(plan.scenario.camera)
     if others is not None:
-        return _with_base(others_detector(others, calibration, plan.gate_shapes), plan, calibration)
+        return _with_base(others_detector(others, calibration), plan, calibration)
     if plan.mission is None or plan.mission.vision == "boxes":
         return new_detector("boxes", shapes=plan.gate_shapes)  # with the paper's focal length
     detector = new_detector(plan.mission.vision, calibration=calibration, shapes=plan.gate_shapes)

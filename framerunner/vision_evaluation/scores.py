@@ -144,7 +144,7 @@ def detect_all(
             camera = (calibration, one.shapes)
             detectors = {k: new_detector(k, calibration=calibration, shapes=one.shapes) for k in KINDS}
             if others is not None:
-                detectors[detector_name(others)] = others_detector(others, calibration, one.shapes)
+                detectors[detector_name(others)] = others_detector(others, calibration)
             for detector in detectors.values():
                 detector(one.image, None)  # the first call loads code
         found = {kind: _timed(detector, one.image) for kind, detector in detectors.items()}

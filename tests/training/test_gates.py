@@ -1,4 +1,6 @@
-"""Training of the network that proposes gates, and the data that it is trained on."""
+"""Training of the networks that propose and judge gates, and the data that they are trained on."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,13 +34,29 @@ def test_the_targets_are_where_the_gates_are(data):
         assert (offsets[[2, 3], 1] > offsets[[1, 0], 1]).all()
 
 
-def test_it_trains(data, tmp_path):
+@pytest.fixture
+def folder(data, tmp_path):
+    images, gates = data
+    np.save(tmp_path / "images.npy", images)
+    np.save(tmp_path / "gates.npy", gates)
+    return tmp_path
+
+
+def test_it_trains(folder):
     pytest.importorskip("torch")
     pytest.importorskip("onnx")
     from training.gates.train import train
 
-    images, gates = data
-    np.save(tmp_path / "images.npy", images)
-    np.save(tmp_path / "gates.npy", gates)
-    train(tmp_path, tmp_path / "out", seconds=60.0, seed=1, most_steps=2)
-    assert (tmp_path / "out" / "gates.onnx").stat().st_size < 2_000_000
+    train(folder, folder / "out", seconds=60.0, seed=1, most_steps=2)
+    assert (folder / "out" / "gates.onnx").stat().st_size < 2_000_000
+
+
+def test_the_judge_trains(folder):
+    pytest.importorskip("torch")
+    pytest.importorskip("onnx")
+    import vision.learned
+    from training.gates.judge import train
+
+    proposals = Path(vision.learned.__file__).with_name("gates.onnx")
+    train(folder, folder / "out", proposals, seconds=60.0, seed=1, most_steps=2)
+    assert (folder / "out" / "judge.onnx").stat().st_size < 2_000_000

@@ -5,47 +5,63 @@ import numpy as np
 import pytest
 
 from vision.bar_edges import find_edges
-from vision.fill_shares import find_filled
+from vision.fill_shares import brightness_of_gates, fill_around, has_coloured_lines
 from vision.gate_finder import GateFinder
 from vision.patch import ImagePatch
-from vision.thin_gates import find_rings
+from vision.thin_gates import MOST_PX, fit_ring
 
-OUTLINE = np.array([[140.0, 100.0], [162.0, 103.0], [161.0, 114.5], [139.0, 111.0]])  # the bars' axes
+AXES = np.array([[140.0, 100.0], [162.0, 103.0], [161.0, 114.5], [139.0, 111.0]])
+COLOURS = [("red", (10, 10, 220)), ("green", (10, 220, 10)), ("blue", (220, 10, 10))]
 
 
-def scene(colour_bgr, ground_bgr, *, fill=0.4, scale=8):
+def scene(colour_bgr, ground_bgr, *, axes=AXES, fill=0.4, scale=8):
     """A ring whose bars fill a pixel by a share, before a ground of one colour."""
     filled = np.zeros((240 * scale, 320 * scale), np.float32)
-    points = np.rint((OUTLINE + 0.5) * scale).astype(np.int32)
+    points = np.rint((axes + 0.5) * scale).astype(np.int32)
     cv2.polylines(filled, [points], True, 1.0, round(fill * scale), cv2.LINE_8)
     share = cv2.resize(filled, (320, 240), interpolation=cv2.INTER_AREA)[..., None]
     return np.rint(share * np.array(colour_bgr) + (1.0 - share) * np.array(ground_bgr)).astype(np.uint8)
 
 
+def ring_near(image, axes):
+    """What is fitted to an outline that is a pixel off."""
+    outline = axes.mean(axis=0) + (axes - axes.mean(axis=0)) / 0.94 + np.array([[0.8, -0.7]])
+    return fit_ring(fill_around(image, outline, MOST_PX, brightness_of_gates(image)), outline)
+
+
 @pytest.mark.parametrize("ground", [(200, 205, 210), (40, 42, 45), (120, 140, 135)])
-@pytest.mark.parametrize(
-    ("colour", "bgr"), [("red", (10, 10, 220)), ("green", (10, 220, 10)), ("blue", (220, 10, 10))]
-)
+@pytest.mark.parametrize(("colour", "bgr"), COLOURS)
 def test_a_ring_of_faint_bars_is_found_where_it_is(colour, bgr, ground):
-    filled = find_filled(scene(bgr, ground), [])
-    rings = [ring for ring in find_rings(filled) if ring.colour == colour]
-    assert len(rings) == 1
-    off_px = min(np.abs(np.roll(rings[0].corners, k, axis=0) - OUTLINE).max() for k in range(4))
-    assert off_px < 0.5
+    ring = ring_near(scene(bgr, ground), AXES)
+    assert ring is not None
+    assert ring.colour == colour
+    assert np.abs(ring.corners - AXES).max() < 0.5
 
 
-def test_what_is_known_is_not_looked_for():
-    image = scene((10, 10, 220), (200, 205, 210))
-    assert find_filled(image, [(136, 96, 30, 24)]) is None
+def test_a_large_ring_is_fitted_as_well():
+    axes = (AXES - AXES.mean(axis=0)) * 5.0 + (160.0, 120.0)
+    ring = ring_near(scene((10, 10, 220), (200, 205, 210), axes=axes, fill=5.0), axes)
+    assert ring is not None
+    assert ring.colour == "red"
+    assert np.abs(ring.corners - axes).max() < 1.0
 
 
-def test_three_bars_or_a_shadow_on_a_coloured_floor_are_no_ring():
-    image = scene((10, 10, 220), (200, 205, 210))
-    image[104:118, 134:144] = (200, 205, 210)
-    shadow = scene((20, 60, 80), (56, 176, 226))
-    for nothing in (image, shadow):
-        filled = find_filled(nothing, [])
-        assert filled is None or not find_rings(filled)
+def test_a_grey_ring_has_no_colour():
+    assert ring_near(scene((90, 90, 90), (200, 200, 200)), AXES) is None
+
+
+@pytest.mark.parametrize(("colour", "bgr"), COLOURS)
+def test_thin_lines_are_seen_outside_of_what_is_known(colour, bgr):
+    image = scene(bgr, (200, 205, 210))
+    assert has_coloured_lines(image, []), colour
+    assert not has_coloured_lines(image, [(136, 96, 30, 24)])
+
+
+def test_shadows_and_corners_of_a_coloured_floor_are_no_lines_of_a_gate():
+    image = scene((20, 60, 80), (56, 176, 226))
+    image[:90] = 130
+    image[86:90, 100:110] = (56, 176, 226)
+    assert not has_coloured_lines(image, [])
 
 
 def test_the_finder_gives_its_pose():

@@ -11,14 +11,15 @@ from framerunner.vision_evaluation.backgrounds import Backgrounds
 from vision.types import Image
 
 _SIZE = (480, 640)
-_COPIES = 3  # of a photograph, in other colours
+_LEAST_COLOURED = 60  # copies of photographs in other colours, together
 _SHARE_DRAWN = 0.25
 
 
 def training_backgrounds(folder: Path, stream: np.random.Generator) -> Backgrounds:
     """The photographs of a folder, copies of them in other colours, and drawn pictures."""
     photographs = Backgrounds.of_folder(folder).photographs
-    coloured = [_in_other_colours(one, stream) for one in photographs for _ in range(_COPIES)]
+    copies = -(-_LEAST_COLOURED // len(photographs))
+    coloured = [_in_other_colours(one, stream) for one in photographs for _ in range(copies)]
     pictures = [*photographs, *coloured]
     count = round(len(pictures) * _SHARE_DRAWN / (1.0 - _SHARE_DRAWN))
     drawn = [_drawn(stream) for _ in range(count)]

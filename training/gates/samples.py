@@ -51,7 +51,7 @@ def draw_batch(
     for k in range(count):
         n = int(stream.integers(len(images)))
         part, seen = _part(images[n], gates[n], size, stream)
-        part, seen = _changed(part, seen, stream)
+        part, seen = changed(part, seen, stream)
         batch.images[k] = part.transpose(2, 0, 1) / np.float32(255.0)
         for gate in seen:
             _mark(batch, k, gate)
@@ -84,7 +84,7 @@ def _part(
     return np.asarray(part, np.uint8), gates
 
 
-def _changed(part: Image, gates: Floats, stream: np.random.Generator) -> tuple[Image, Floats]:
+def changed(part: Image, gates: Floats, stream: np.random.Generator) -> tuple[Image, Floats]:
     """Mirrored, channels exchanged, lighter or darker, with noise and compressed: each sometimes."""
     if stream.random() < 0.5:
         part = part[:, ::-1]

@@ -29,6 +29,7 @@ def train(
     seconds: float,
     seed: int,
     start: Path | None = None,
+    best_rate: float = BEST_RATE,
     most_steps: int | None = None,
 ) -> GateNetwork:
     """Train for a time, or some steps, and write the network.
@@ -39,6 +40,7 @@ def train(
         seconds: how long; the rate of learning rises over the first twentieth of it, and falls to its end.
         seed: of the first weights and of all that is drawn.
         start: weights of an earlier training (`gates.pt`) to go on from.
+        best_rate: the largest rate of learning.
         most_steps: end after so many.
     """
     torch.manual_seed(seed)
@@ -50,7 +52,7 @@ def train(
     if start is not None:
         network.load_state_dict(torch.load(start))
     network = network.to(memory_format=torch.channels_last)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=BEST_RATE, weight_decay=1e-3)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=best_rate, weight_decay=1e-3)
     begun = saved = time.monotonic()
     step = seen = 0
     sums = np.zeros(3)
@@ -59,7 +61,7 @@ def train(
         log.write("seconds,step,images,centres,corners\n")
         while (share := (time.monotonic() - begun) / seconds) < 1.0 and step != most_steps:
             size, count = PARTS[step % 4 == 3]
-            rate = BEST_RATE * min(1.0, share / 0.05) * 0.5 * (1.0 + np.cos(np.pi * share)) + LEAST_RATE
+            rate = best_rate * min(1.0, share / 0.05) * 0.5 * (1.0 + np.cos(np.pi * share)) + LEAST_RATE
             for group in optimiser.param_groups:
                 group["lr"] = rate
             batch = draw_batch(images, gates, count, size, stream)
@@ -106,8 +108,12 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=1500.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--start", type=Path)
+    parser.add_argument("--rate", type=float, default=BEST_RATE)
     options = parser.parse_args()
-    train(options.data, options.out, seconds=options.seconds, seed=options.seed, start=options.start)
+    train(
+        options.data, options.out,
+        seconds=options.seconds, seed=options.seed, start=options.start, best_rate=options.rate,
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float32]
 _COLUMNS, _ROWS = 320, 240
 _CELL_PX, _OFFSET_PX = 4, 16.0  # as in `training/gates/samples.py`
 _BESIDE = np.ones((3, 3), np.uint8)
-_MOST = 8
+_MOST = 5
 
 
 class GateProposals:
@@ -34,10 +34,10 @@ class GateProposals:
         cell_px: columns and rows of a cell.
     """
 
-    def __init__(self, image: Image, least: float) -> None:
+    def __init__(self, image: Image, least: float, network: cv2.dnn.Net | None = None) -> None:
         height, width = image.shape[:2]
         scale = np.array([width / _COLUMNS, height / _ROWS])
-        network = _network()
+        network = _network() if network is None else network
         network.setInput(cv2.dnn.blobFromImage(_resized(image), 1.0 / 255.0))
         maps: Floats = network.forward()[0]
         self.chances: Floats = 1.0 / (1.0 + np.exp(-maps[0]))
@@ -76,6 +76,11 @@ def _resized(image: Image) -> Image:
     return np.asarray(cv2.resize(image, (_COLUMNS, _ROWS), interpolation=cv2.INTER_AREA), np.uint8)
 
 
+def read_network(path: Path) -> cv2.dnn.Net:
+    """A network of a file of ONNX."""
+    return cv2.dnn.readNetFromONNX(str(path), cv2.dnn.ENGINE_CLASSIC)
+
+
 @cache
 def _network() -> cv2.dnn.Net:
-    return cv2.dnn.readNetFromONNX(str(Path(__file__).with_name("gates.onnx")))
+    return read_network(Path(__file__).with_name("gates.onnx"))
