@@ -157,7 +157,10 @@ class WorldModel:
             poses = [pose] * len(image.frames) if poses is None else poses
             self._place.see(image.frames, poses, correction, self._map)
             self._see_base(image, pose, correction)
-            self._see_tracks(image, pose)
+            after = self._place.correction(pose.time_us)  # gates and base may have changed it
+            if image.tracks is not None and after is not None:
+                rows = (self._pose_of_row(row_px, pose) for row_px in (-inf, 0.0, inf))
+                self._place.see_tracks(image.tracks, [each or pose for each in rows], after)
         self._obstacle_map.update(position_m, attitude, image.obstacle_edges)
         self.seen_space.update(position_m, attitude, image.obstacle_edges)
         self._explorer.coverage.update(position_m, attitude, image.obstacle_edges)
@@ -171,12 +174,6 @@ class WorldModel:
         """The drone's pose when a row of an image was read out; None if the states around it are missing."""
         at_us = pose.time_us + round(1e6 * self._camera.read_after_s(down_px))
         return self._history.at(at_us, self._place.correction(at_us))
-
-    def _see_tracks(self, image: Detections, pose: DronePose) -> None:
-        correction = self._place.correction(pose.time_us)
-        if image.tracks is not None and correction is not None:
-            rows = (self._pose_of_row(row_px, pose) for row_px in (-inf, 0.0, inf))
-            self._place.see_tracks(image.tracks, [each or pose for each in rows], correction)
 
     def _see_base(self, image: Detections, pose: DronePose, correction: PoseCorrection) -> None:
         sighting, base = image.base, self._base
