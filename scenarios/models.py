@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from framerunner.errors import UserError
 from framerunner.files.yaml_file import refusal
 from framerunner.geometry.axes import flip_quaternion
+from framerunner.geometry.base_marker import FACES, BaseMarkers, MarkerFamily
 from framerunner.geometry.gate_shape import BAR_LIMITS_M, PAPER_GATE, SIZE_LIMITS_M, GateShape
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.solids import Solid
@@ -76,8 +77,30 @@ class Arena(Part):
     margin_m: float = Field(1.0, ge=0, le=100, description="how far outside the app lets the drone fly")
 
 
+class BaseMarker(Part):
+    """Printed markers on the base: on top, and below the top on each side; `scenario markers` makes them."""
+
+    family: MarkerFamily = Field("aruco_4x4", description="kind of markers; aruco_4x4 is read from farther")
+    first: int = Field(0, ge=0, le=10_000, description="number of the top's; the sides have the next four")
+    edge_m: float = Field(0.27, ge=0.02, le=5, description="edge of the black square")
+
+    @property
+    def markers(self) -> BaseMarkers:
+        """As a camera reads them."""
+        return BaseMarkers(self.family, self.first, self.edge_m)
+
+    @model_validator(mode="after")
+    def _are_in_their_family(self) -> Self:
+        last = self.markers.count - FACES
+        if self.first > last:
+            raise refusal(self.first, f"is too large for {self.family}; use {last} or less", "first")
+        return self
+
+
 class Base(Part):
     """The cube the drone starts from and lands on."""
+
+    often_unused: ClassVar = ("marker",)
 
     x_m: Metres = Field(0.0, description="centre")
     y_m: Metres = Field(0.0, description="centre")
@@ -89,6 +112,15 @@ class Base(Part):
         lt=1,
         description="edge of the brighter square on its top, as a share of the top's; 0: none",
     )
+    marker: BaseMarker | None = Field(None, description="printed markers on it; by default there are none")
+
+    @model_validator(mode="after")
+    def _has_room_for_markers(self) -> Self:
+        if self.marker is not None and self.marker.markers.sheet_m > min(self.edge_m, self.top_m):
+            most_m = min(self.edge_m, self.top_m) * self.marker.edge_m / self.marker.markers.sheet_m
+            message = f"is too large for the base with its white rim; use {most_m:.3f} or less"
+            raise refusal(self.marker.edge_m, message, "marker", "edge_m")
+        return self
 
     @property
     def solid(self) -> Solid:

@@ -18,7 +18,7 @@ from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from scenarios.air import Wind
 from scenarios.imaging.effects import Hall
-from scenarios.models import COLOURS, Arena, Base, Camera, Gate, Light, Scenario, StartPose
+from scenarios.models import COLOURS, Arena, Base, BaseMarker, Camera, Gate, Light, Scenario, StartPose
 from scenarios.part import Part
 from scenarios.random_conditions import RandomEffects, RandomFault, RandomLight, RandomWind
 from scenarios.random_hall import RandomClutter, RandomTextures
@@ -147,6 +147,7 @@ class Level(Part):
     textures: RandomTextures | None = Field(
         None, description="what floor and walls look like; by default tatami mats and plain walls"
     )
+    base_marker: BaseMarker | None = Field(None, description="printed markers on the base; by default none")
     airframe: str | None = Field(None, description="name of the drone to fly; by default the challenge's")
     sensors: str | None = Field(None, description="name of the drone's sensor suite, or a file of one")
 
@@ -192,7 +193,7 @@ def random_scenario(level: Level, seed: int) -> Scenario:
     scenario = Scenario(
         name=f"{level.name}-{seed}",
         description=f"Random scenario of level {level.name}, seed {seed}.",
-        base=base,
+        base=base if level.base_marker is None else base.model_copy(update={"marker": level.base_marker}),
         start=StartPose(x_m=base.x_m, y_m=base.y_m, yaw_rad=yaw_rad),
         frames=gates,
         wind=Wind() if level.wind is None else level.wind.draw(seed),

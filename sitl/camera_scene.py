@@ -20,9 +20,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.base_marker import BaseMarkers
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
-from scenarios.models import Arena, Light, Scenario, UprightGate
+from scenarios.models import Arena, Base, Light, Scenario, UprightGate
 from sitl.optics.texture import FaceTexture
 from sitl.solids import gate_solids
 
@@ -43,6 +44,8 @@ TATAMI_MAT_BGR: Bgr = (55, 168, 204)
 PRISM_BGR: Bgr = (160, 66, 109)  # of poles and walls: violet
 BASE_BGR: Bgr = (168, 170, 172)
 BASE_MARK_BGR: Bgr = (238, 238, 238)
+PAPER_BGR: Bgr = (238, 238, 238)
+INK_BGR: Bgr = (26, 26, 26)
 DRONE_BGR: Bgr = (64, 62, 60)
 
 WALL = "hall"
@@ -98,7 +101,7 @@ def build_scene(scenario: Scenario, light: Light | None = None) -> Scene:
         mats=_mats(arena, light),
         shadows=tuple(shadows),
         bodies=(
-            _base_body(base, scenario.base.mark_share, light),
+            _base_body(scenario.base, light),
             *(_gate_body(gate, light) for gate in gates),
             *(Body(prism, _upright_faces(prism, PRISM_BGR, light)) for prism in prisms),
         ),
@@ -160,14 +163,31 @@ def box_face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light
     )
 
 
-def _base_body(box: Solid, mark_share: float, light: Light) -> Body:
+def _base_body(base: Base, light: Light) -> Body:
+    box = base.solid
     half, _, top = box.half_extents_m
-    if mark_share == 0.0:
-        return Body(box, _upright_faces(box, BASE_BGR, light))
-    mark = mark_share * half
-    inset: list[Vec3] = [(-mark, -mark, top), (mark, -mark, top), (mark, mark, top), (-mark, mark, top)]
-    mark_face = box_face(box, inset, _UP, BASE_MARK_BGR, light)
-    return Body(box, (*_upright_faces(box, BASE_BGR, light), mark_face))
+    faces = list(_upright_faces(box, BASE_BGR, light))
+    if base.mark_share > 0.0:
+        mark = base.mark_share * half
+        inset: list[Vec3] = [(-mark, -mark, top), (mark, -mark, top), (mark, mark, top), (-mark, mark, top)]
+        faces.append(box_face(box, inset, _UP, BASE_MARK_BGR, light))
+    if base.marker is not None:
+        faces += _markers(box, base.marker.markers, light)
+    return Body(box, tuple(faces))
+
+
+def _markers(box: Solid, markers: BaseMarkers, light: Light) -> list[Face]:
+    """White sheets, black squares on them, and white cells in these."""
+    half, _, half_height = box.half_extents_m
+    sheet, black = markers.sheet_m / 2, markers.edge_m / 2
+    found = []
+    for marked in markers.faces(2 * half, 2 * half_height):
+        parts = [((-sheet, sheet, -sheet, sheet), PAPER_BGR), ((-black, black, -black, black), INK_BGR)]
+        parts += [(part, PAPER_BGR) for part in markers.white_parts(marked.number)]
+        for part, colour in parts:
+            local = [(x, y, z - half_height) for x, y, z in marked.rectangle(*part)]
+            found.append(box_face(box, local, marked.normal, colour, light))
+    return found
 
 
 def _upright_faces(box: Solid, colour: Bgr, light: Light) -> tuple[Face, ...]:

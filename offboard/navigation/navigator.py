@@ -41,14 +41,14 @@ class Navigator:
     Positions are in the axes of flight: those of the arena, but continuous (`FlightAxes`).
 
     Attributes:
-        expected_base: see `WorldModel.expected_base`.
+        expected_base: see `Localization.expected_base`.
     """
 
     def __init__(self, surroundings: Surroundings, limits: CommandLimits = CONTEST) -> None:
         self._style = style_of(limits)
         self._camera = CameraModel.of(surroundings.camera)
         self._world = WorldModel(surroundings, self._style)
-        self.expected_base = self._world.expected_base
+        self.expected_base = self._world.localization.expected_base
         self._flight = PathFlight(surroundings.arena, self._style, limits)
         self._places = LookingPlaces(surroundings.arena, self._style)
         self._start_m: Vec3 | None = None
@@ -77,7 +77,7 @@ class Navigator:
             The drone's state as it is estimated now, in the arena. It is flown in the axes of flight.
         """
         estimated = self._world.observe(state, images)
-        state = self._world.in_flight(estimated)
+        state = self._world.localization.state_in_flight(estimated)
         if sent is not None:
             sent = _plus(sent, [-v for v in self._added_m_s])
         self._added_m_s = (0.0, 0.0, 0.0)
@@ -164,12 +164,12 @@ class Navigator:
         """Fly to a point on a smooth path; to one on the base, when that was looked at if need be."""
         state, _ = self._begin("fly to goal")
         flight = self._flight
-        known = self._world.base_known(state.time_us - round(SIGHTINGS_S * 1e6))
+        known = self._world.localization.base_known(state.time_us - round(SIGHTINGS_S * 1e6))
         no_path = flight.path is None and flight.search is None and bool(flight.refusal)
         searched = self._way_home.searches
         goal = self._way_home.goal(goal_m, state, known, no_path=no_path)
         if self._way_home.searches and not searched:
-            self._world.doubt_place()
+            self._world.localization.doubt()
         if self._goal != goal:
             self._goal = goal
             flight.change()
@@ -178,7 +178,7 @@ class Navigator:
     def step_back(self, colour: str) -> VelocityFluCommand:
         """Fly back from a gate, to one of its sides, facing it."""
         state, _ = self._begin(f"step back from {colour}")
-        self._world.stay_by(colour)
+        self._world.localization.stay_by(colour)
         if self._goal is None:
             gate, here_m = self._world.gate(colour), position_now(state)
             if gate is None:
@@ -195,7 +195,7 @@ class Navigator:
 
     def _cross(self, colour: str) -> VelocityFluCommand:
         state, now_s = self._begin(f"cross {colour}")
-        self._world.stay_by(colour)
+        self._world.localization.stay_by(colour)
         crossing = self._crossing
         if crossing is None or crossing.colour != colour or crossing.refusal:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)
@@ -236,7 +236,7 @@ class Navigator:
 
     def _compensated(self, command: VelocityFluCommand) -> VelocityFluCommand:
         """What to command to a vehicle that is wrong about its velocity, so that it flies a command."""
-        added = self._world.velocity_error_flu_m_s
+        added = self._world.localization.velocity_error_flu_m_s
         if not any(added):
             return command
         self._added_m_s = added

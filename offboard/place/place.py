@@ -55,6 +55,7 @@ ERROR_S = 2.0
 LEAST_POSITION_STD_M = 0.005
 LEAST_VELOCITY_STD_M_S = 0.03
 LEAST_HEIGHT_STD_M = 0.05
+HEIGHT_FACTOR = 2.0  # a height farther off than so many deviations is known less well than the vehicle says
 
 RESET_TURN_RAD = radians(3.0)
 BLIND_M = 0.1  # of the reported way in a gap of the IMU's samples, per root of a second
@@ -192,6 +193,7 @@ class PlaceEstimator:
             place.update(height(state.z, height_std_m))
             return
         slow = sqrt(2.0 * ERROR_S / step_s)
+        height_std_m = slow * max(height_std_m, abs(state.z - float(place.x[2])) / HEIGHT_FACTOR)
         level, climb = (
             slow * max(std, LEAST_VELOCITY_STD_M_S)
             for std in (accuracy.velocity_std_m_s, accuracy.climb_std_m_s)
@@ -250,19 +252,18 @@ class PlaceEstimator:
             estimate=PlaceEstimate((x, y, z), yaw, tuple(covariance_m2), yaw_std_rad),
         )
 
-    def places_m(self, time_us: int) -> tuple[Vec3, dict[str, Vec3]] | None:
-        """Where the drone is at a time, and the gates in the filter; None while the reports are used.
-
-        What an image or a report has changed is the difference of two calls for one time.
-        """
-        place, motion = self._filter, self._motion_at(time_us)
-        if place is None or motion is None:
-            return None
-        gates = {}
+    @property
+    def gates_m(self) -> dict[str, Vec3]:
+        """Where the gates are that the filter has and knows to be gates, by colour."""
+        place = self._filter
+        found: dict[str, Vec3] = {}
+        if place is None:
+            return found
         for colour, at in place.gates.items():
-            x, y, z = place.x[at : at + 3].tolist()
-            gates[colour] = (x, y, z)
-        return motion[0], gates
+            if colour not in self._landmarks.unsized:
+                x, y, z = place.x[at : at + 3].tolist()
+                found[colour] = (x, y, z)
+        return found
 
     @property
     def velocity_error_flu_m_s(self) -> Vec3:

@@ -1,7 +1,7 @@
 """The filter of the drone's place: an extended Kalman filter over the drone and the gates that it has seen.
 
 The state is the drone's position and velocity in the arena, the angle by which its reported heading is wrong,
-the accelerometer's bias, and for each gate x, y, z and yaw: simultaneous localisation and mapping
+the accelerometer's bias, and for each gate x, y, z, yaw and size: simultaneous localisation and mapping
 (Durrant-Whyte & Bailey, IEEE Robotics & Automation Magazine 13(2), 2006). Roll and pitch are taken as
 reported: the vehicle's own filter knows them by gravity to a fraction of a degree, and what is left acts like
 a bias.
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, inf, radians, sin
+from math import cos, inf, radians, sin, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -24,8 +24,8 @@ from offboard.place.inertial_track import InertialMotion
 Floats: TypeAlias = npt.NDArray[np.float64]
 
 POSITION, TURN, VELOCITY, BIAS, OWN = slice(0, 3), 3, slice(4, 7), slice(7, 10), 10
-GATE = 4  # numbers of a gate
-CLONE = 4  # numbers of a drone's place at an earlier time: as the first ones of the state
+POSE = 4  # numbers of a place: x, y, z and heading; those of the drone come first
+SIZE, GATE = 4, 5  # of a gate: the logarithm of its size over that of its shape; numbers in all
 
 # Noise, as densities and random walks per root of a second: of a small IMU on a vibrating drone, whose
 # reported roll and pitch are wrong by tenths of a degree.
@@ -80,10 +80,12 @@ class PlaceFilter:
 
     Attributes:
         time_us: of the state.
-        x: the state, shape (10 + 4 gates,).
+        x: the state, shape (10 + 5 gates,).
         p: its covariance.
-        gates: the first index of each gate, by colour.
-        clones: likewise, of where the drone was at some times.
+        gates: the first index of each gate, by colour. Its place is where one of the size of its shape would
+            be, as seen from where it was seen first: that place is known, whatever its size.
+        seen_from_m: that place of the drone, by colour.
+        clones: the first index of where the drone was, by some times.
     """
 
     def __init__(
@@ -100,6 +102,7 @@ class PlaceFilter:
         stds = [position_std_m] * 3 + [START_TURN_RAD] + [velocity_std_m_s] * 3 + [START_BIAS_M_S2] * 3
         self.p = np.diag(np.square(stds))
         self.gates: dict[str, int] = {}
+        self.seen_from_m: dict[str, Floats] = {}
         self.clones: dict[int, int] = {}
 
     @property
@@ -195,7 +198,7 @@ class PlaceFilter:
         common[:4] = np.eye(4)
         for at in (*self.gates.values(), *self.clones.values()):
             x, y, _ = self.x[at : at + 3] - self.x[POSITION]
-            common[at : at + GATE] = np.eye(GATE)
+            common[at : at + POSE] = np.eye(POSE)
             common[at : at + 2, TURN] = (-y, x)
         self.p += common * np.square((*std_m, heading_std_rad)) @ common.T
 
@@ -246,22 +249,26 @@ class PlaceFilter:
         self.x, self.p = at, kept @ self.p @ kept.T + gain @ noise @ gain.T
         return True
 
-    def add_gate(self, colour: str, state: Floats, covariance: Floats) -> None:
+    def add_gate(self, colour: str, state: Floats, covariance: Floats, size_std: float) -> None:
         """Begin to estimate a gate: x, y, z and yaw as seen from the drone where it is estimated to be.
 
         Args:
             colour: of the gate, which is not in the state yet.
-            state: in the arena.
+            state: in the arena, if it has the size of its shape.
             covariance: of the errors of seeing it, those of the drone's place not included, shape (4, 4).
+            size_std: standard deviation of the logarithm of its size.
         """
         n = len(self.x)
+        noise = np.diag((0.0, 0.0, 0.0, 0.0, size_std**2))
+        noise[:POSE, :POSE] = covariance
+        self.seen_from_m[colour] = self.x[POSITION].copy()
+        x, y, _ = state[:3] - self.x[POSITION]
         j = np.zeros((GATE, n))
         j[:3, POSITION] = np.eye(3)
-        x, y, _ = state[:3] - self.x[POSITION]
-        j[:, TURN] = (-y, x, 0.0, 1.0)
+        j[:POSE, TURN] = (-y, x, 0.0, 1.0)
         across = j @ self.p
-        self.p = np.block([[self.p, across.T], [across, across @ j.T + covariance]])
-        self.x = np.concatenate((self.x, state))
+        self.p = np.block([[self.p, across.T], [across, across @ j.T + noise]])
+        self.x = np.concatenate((self.x, state, (0.0,)))
         self.gates[colour] = n
 
     def drop_gate(self, colour: str) -> None:
@@ -270,14 +277,14 @@ class PlaceFilter:
 
     def add_clone(self, time_us: int) -> None:
         """Keep where the drone is now, as it is at a time."""
-        now = np.r_[0:CLONE]
+        now = np.r_[0:POSE]
         self.clones[time_us] = len(self.x)
         self.x = np.concatenate((self.x, self.x[now]))
         self.p = np.block([[self.p, self.p[:, now]], [self.p[now], self.p[np.ix_(now, now)]]])
 
     def drop_clone(self, time_us: int) -> None:
         """Forget where the drone was at a time."""
-        self._cut(self.clones.pop(time_us), CLONE)
+        self._cut(self.clones.pop(time_us), POSE)
 
     def _cut(self, at: int, count: int) -> None:
         kept = np.r_[0:at, at + count : len(self.x)]
@@ -303,17 +310,30 @@ class PlaceFilter:
     def gate(self, colour: str) -> Floats | None:
         """x, y, z and yaw of a gate; None if it is not estimated."""
         at = self.gates.get(colour)
-        return None if at is None else self.x[at : at + GATE]
+        return None if at is None else self.x[at : at + POSE]
+
+    def size(self, colour: str) -> tuple[float, float]:
+        """The logarithm of a gate's size, and its standard deviation."""
+        at = self.gates[colour] + SIZE
+        return float(self.x[at]), sqrt(self.p[at, at])
+
+    def if_sized(self, colour: str) -> Floats:
+        """x, y, z and yaw of a gate if it has the size of its shape."""
+        first = self.gates[colour]
+        at = first + SIZE
+        by_size: Floats = self.p[first : first + POSE, at] / self.p[at, at]
+        sized: Floats = self.x[first : first + POSE] - self.x[at] * by_size
+        return sized
 
     def gate_from_drone(self, colour: str) -> Floats:
         """Covariance of a gate's place and yaw relative to the drone, in the arena's axes, shape (4, 4)."""
         first = self.gates[colour]
-        gate = slice(first, first + GATE)
+        gate = slice(first, first + POSE)
         px, py = self.x[:2].tolist()
         x, y = self.x[first : first + 2].tolist()
         by_drone = np.array(
             ((1.0, 0.0, 0.0, py - y), (0.0, 1.0, 0.0, x - px), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
         )
-        relative = self.p[gate] - by_drone @ self.p[:GATE]  # its position and turn come first
-        covariance: Floats = relative[:, gate] - relative[:, :GATE] @ by_drone.T
+        relative = self.p[gate] - by_drone @ self.p[:POSE]
+        covariance: Floats = relative[:, gate] - relative[:, :POSE] @ by_drone.T
         return covariance

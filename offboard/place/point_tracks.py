@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from offboard.navigation.camera_model import NEAREST_M
 from offboard.place.measurements import Eye
-from offboard.place.place_filter import CLONE, Floats, PlaceFilter
+from offboard.place.place_filter import POSE, Floats, PlaceFilter
 from vision.types import PointTracks
 
 Bools = npt.NDArray[np.bool_]
@@ -139,8 +139,8 @@ class PointWindow:
                 seen[row, slot[each]] = self._images[each].seen[number]
                 shown[row, slot[each]] = 1.0
         first = [place.clones[each] for each in times]
-        index = (np.array(first)[:, None] + np.arange(CLONE)).ravel()
-        cameras = _Cameras.of(place.x[index].reshape(-1, CLONE), list(self._images.values()), seen[:, :, 2])
+        index = (np.array(first)[:, None] + np.arange(POSE)).ravel()
+        cameras = _Cameras.of(place.x[index].reshape(-1, POSE), list(self._images.values()), seen[:, :, 2])
         found = _fitted(cameras, seen[:, :, :2], shown / STD_PX**2, self._focal_px)
         covariance = place.p[np.ix_(index, index)]
         fits = found.fit(covariance, 2.0 * shown.sum(axis=1) - 3.0)

@@ -185,7 +185,7 @@ def test_what_the_vehicle_reports_too_much_of_its_velocity_is_told():
     vehicle = Vehicle(1)
     vehicle.state = constant_error(vehicle, (0.12, 0.0, 0.0))
     _, world = fly(vehicle)
-    forward, left, _ = world.velocity_error_flu_m_s
+    forward, left, _ = world.localization.velocity_error_flu_m_s
     assert hypot(forward, left) == pytest.approx(0.12, abs=0.04)
 
 
@@ -208,7 +208,7 @@ def test_a_vehicle_that_knows_its_place_or_sends_no_samples_is_believed(vehicle)
     for time_us in range(TICK_US, 3_000_000, TICK_US):
         state = vehicle.state(time_us)
         assert world.observe(state, ()) is state
-    assert world.velocity_error_flu_m_s == (0.0, 0.0, 0.0)
+    assert world.localization.velocity_error_flu_m_s == (0.0, 0.0, 0.0)
 
 
 def test_a_vehicle_that_loses_its_motion_capture_is_not_believed_any_longer():
@@ -254,7 +254,7 @@ def test_a_vehicle_whose_samples_end_in_flight_is_followed_by_its_reports():
     moved = errors(states)[-1] - errors(reported)[-1]
     assert np.abs(moved).max() < 0.4  # as far from the reports as when the samples ended
     assert std_m(states[-1]) > 0.2
-    assert hypot(*world.velocity_error_flu_m_s) < 0.1
+    assert hypot(*world.localization.velocity_error_flu_m_s) < 0.1
 
 
 def test_the_same_flight_gives_the_same_estimate():
@@ -291,9 +291,9 @@ def fly_by_gate(end_s, *, stays):
         is_due = image_us > 0 and image_us % IMAGE_US == 0 and not blind
         images = (vehicle.image(image_us, (NEAR_RED,)),) if is_due else ()
         if stays:
-            world.stay_by("red")
+            world.localization.stay_by("red")
         state = world.observe(vehicle.state(time_us), images)
-        at = world.in_flight(state)
+        at = world.localization.state_in_flight(state)
         if time_us > 1e6 * UNSEEN_S:
             gate = world.gate("red")
             flown.append([(s.x, s.y, s.z) for s in (state, at)] + [gate.position_m])
