@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2
+from math import atan2, hypot
 from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import Field, model_validator
@@ -38,6 +38,8 @@ _WINDOW_HEIGHT_M = Range(low=0.8, high=1.6)
 _SILL_M = Range(low=0.7, high=1.2)
 _WINDOW_COLOURS: tuple[PatchColour, ...] = ("white", "white", "black", "red", "green", "blue")
 _PERSON_HEIGHT_M = Range(low=1.5, high=1.95)
+_PEOPLE_APART_M = 0.9
+_PERSON_DRAWS = 30
 _PERSON_SPREAD_M = 0.3  # of a person's middle from a wall
 
 
@@ -105,7 +107,7 @@ class RandomClutter(Part):
             wall_texture=wall_texture,
             windows=tuple(self._window(WALLS[index % 4], windows) for index in range(self.windows)),
             pictures=tuple(self._picture(WALLS[index % 4], pictures) for index in range(self.pictures)),
-            people=tuple(self._person(WALLS[index % 4], people) for index in range(self.people)),
+            people=self._draw_people(people),
         )
 
     def draw_patches(self, seed: int) -> tuple[Patch, ...]:
@@ -168,6 +170,17 @@ class RandomClutter(Part):
             width_m=self.size_m.draw_value(stream),
             height_m=self.size_m.draw_value(stream),
         )
+
+    def _draw_people(self, stream: Generator) -> tuple[Person, ...]:
+        """People who do not stand in each other; if there is no room for one, he is left out."""
+        people: list[Person] = []
+        for index in range(self.people):
+            for _ in range(_PERSON_DRAWS):
+                person = self._person(WALLS[index % 4], stream)
+                if all(hypot(person.x_m - p.x_m, person.y_m - p.y_m) >= _PEOPLE_APART_M for p in people):
+                    people.append(person)
+                    break
+        return tuple(people)
 
     def _person(self, surface: HallWall, stream: Generator) -> Person:
         """Somebody before a wall, who looks about to the middle of the arena."""

@@ -36,6 +36,7 @@ _CUT_BITS = 0b00111101  # beyond the near plane or the window
 _MOST_ROLLED = 2.0  # heights of the canvas: what is farther above or below it moves with this row
 _FINE_PX = 20_000  # what is painted finely has no more pixels than this
 _SAME_M = 1e-6  # edges nearer than this are the same
+_NEAR_M2 = 1e-4  # of edges that may be so near; much more than the rounding of a large arena's places
 _LEAST_TURN = 1e-3  # twice the area of a corner's triangle, so that edges in line do not divide by zero
 _LEAST_WIDTH = 0.62
 """Pixels: with this, polygons of all widths below one are as wide as they should be on average."""
@@ -183,9 +184,7 @@ class Mesh:
                 part = part[[faces[k].name == WALL for k in of_face[part]]]
             if not len(part):
                 continue
-            is_along = of_face[part][:, None] != of_face[part]
-            for points in (corners[part], ends[part]):
-                is_along &= _distances(points, corners[part], ends[part]) < _SAME_M
+            is_along = _are_along(corners[part], ends[part], of_face[part])
             beside[part] = np.where(is_along.any(axis=1), of_face[part][is_along.argmax(axis=1)], len(faces))
         return beside
 
@@ -261,12 +260,35 @@ def inset_outline(points: Floats) -> Ints | None:
     return np.rint(inset).T.astype(np.int32, order="C") if is_wide[0] else None
 
 
+def _are_along(starts: Floats, ends: Floats, of_face: Ints64) -> Flags:
+    """Which edges of faces lie on which edges of other faces, shape (n, n)."""
+    along: Flags = of_face[:, None] != of_face
+    for points in (starts, ends):
+        along &= _squares(points, starts, ends) < _NEAR_M2
+    first, second = np.nonzero(along)
+    for points in (starts, ends):
+        apart_m = _distances(points[first], starts[second], ends[second])
+        along[first, second] &= apart_m < _SAME_M
+    return along
+
+
+def _squares(points: Floats, starts: Floats, ends: Floats) -> Floats:
+    """About the squares of the distances of all points and line segments, m², shape (points, segments)."""
+    edges = ends - starts
+    lengths2 = np.maximum((edges * edges).sum(axis=1), 1e-12)
+    ways2 = (points * points).sum(axis=1)[:, None] - 2.0 * points @ starts.T + (starts * starts).sum(axis=1)
+    dots = points @ edges.T - (starts * edges).sum(axis=1)
+    share = np.clip(dots / lengths2, 0.0, 1.0)
+    squares: Floats = ways2 - share * (2.0 * dots - share * lengths2)
+    return squares
+
+
 def _distances(points: Floats, starts: Floats, ends: Floats) -> Floats:
-    """From every point to every line segment, metres, shape (points, segments)."""
+    """From each point to its line segment, metres, shape (n,)."""
     along = ends - starts
-    beyond = points[:, None] - starts
-    share = (beyond * along).sum(axis=-1) / np.maximum((along * along).sum(axis=-1), 1e-12)
-    apart: Floats = np.linalg.norm(beyond - np.clip(share, 0.0, 1.0)[..., None] * along, axis=-1)
+    beyond = points - starts
+    share = (beyond * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
+    apart: Floats = np.linalg.norm(beyond - np.clip(share, 0.0, 1.0)[:, None] * along, axis=1)
     return apart
 
 

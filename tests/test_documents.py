@@ -91,6 +91,7 @@ GIVEN = {
 }
 PRINTED = {
     "api.md": "clean clean after",
+    "detectors.md": "clean clean after",
     "evaluation.md": "clean ",
     "gymnasium.md": "",
     "missions.md": "name: first",
@@ -214,7 +215,7 @@ KINDS = {
     "real-drone.md": [read_whole_scenario],
     "scenarios.md": [
         read_whole_scenario,
-        *[read_scenario] * 4,
+        *[read_scenario] * 5,
         read_airframe,
         read_scenario,
         read_scenario,

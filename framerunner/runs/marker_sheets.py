@@ -70,8 +70,10 @@ def _page(scenario: Scenario, markers: BaseMarkers, face: MarkedFace) -> Figure:
     parts += [(part, "white") for part in markers.white_parts(face.number)]
     for (left_m, right_m, lower_m, upper_m), colour in parts:
         corner = (x_mm + 1e3 * left_m, y_mm + 1e3 * lower_m)
-        size = (1e3 * (right_m - left_m), 1e3 * (upper_m - lower_m))
-        axes.add_patch(Rectangle(corner, *size, facecolor=colour, linewidth=0.0, antialiased=False))
+        wide_mm, high_mm = 1e3 * (right_m - left_m), 1e3 * (upper_m - lower_m)
+        axes.add_patch(
+            Rectangle(corner, wide_mm, high_mm, facecolor=colour, linewidth=0.0, antialiased=False)
+        )
     top_mm = y_mm - sheet_mm / 2 - _LINE_MM
     words = (
         f"framerunner, base of scenario {scenario.name}: {face.name}",

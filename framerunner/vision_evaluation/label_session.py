@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import acos, degrees, hypot
+from math import acos, degrees, hypot, inf
 from pathlib import Path
 
 import cv2
@@ -21,12 +21,11 @@ from framerunner.vision_evaluation.own_pictures import (
     OwnPictures,
     PictureLabels,
     given_corners,
-    poses_of,
 )
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
-from vision.gate_model import rectangle
-from vision.gate_pose import as_seen
+from vision.gate_model import GateModel, rectangle
+from vision.gate_pose import as_seen, find_poses
 from vision.types import Image
 
 _PLACES_OF_A_SIDE = 8  # at which a line is drawn that the lens bends
@@ -154,7 +153,7 @@ class LabelSession:
         labels = self.head.labels
         shape, of_opening = labels.shape.gate, labels.corners_of == "opening"
         given = given_corners(gate.corners, lens)
-        poses = poses_of(given, shape, lens.focal_px, of_opening=of_opening)
+        poses = find_poses(given, GateModel.of_corners(shape, lens.focal_px, of_opening=of_opening), inf)
         if not poses:
             return ShownGate(problem="no upright frame looks so; move its corners, or click them again")
         pose = as_seen(poses[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import acos, degrees, hypot, inf
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -22,7 +22,7 @@ from framerunner.vision_evaluation.openings import Corners, outline_of
 from framerunner.wire.finite_json import finite
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
-from vision.gate_model import GateModel, ModelPose, Point
+from vision.gate_model import GateModel
 from vision.gate_pose import as_seen, find_poses
 
 FILE, CALIBRATION = "labels.json", "camera.yaml"
@@ -155,7 +155,7 @@ class OwnPictures:
         """What the corners of a gate tell of it; of two poses, the better one."""
         given = given_corners(gate.corners, lens)
         shape, of_opening = self.labels.shape.gate, self.labels.corners_of == "opening"
-        poses = poses_of(given, shape, lens.focal_px, of_opening=of_opening)
+        poses = find_poses(given, GateModel.of_corners(shape, lens.focal_px, of_opening=of_opening), inf)
         if not poses:
             raise SettingError(
                 f"{self.folder / FILE}: {path.name}: frames.{number}.corners: no upright gate looks so; "
@@ -196,20 +196,3 @@ def given_corners(corners: Sequence[tuple[float, float]], lens: Lens) -> Corners
     columns, rows = lens.size_px
     places = np.array(corners) - np.array([(columns - 1) / 2, (rows - 1) / 2])
     return tuple((x, y) for x, y in lens.ideal(places).tolist())
-
-
-def poses_of(
-    corners: Sequence[Point], shape: GateShape, focal_px: float, *, of_opening: bool
-) -> list[ModelPose]:
-    """The poses of a gate with these corners of its outline, or of its opening, the better one first.
-
-    The model's shape is one whose bars' axes meet at these corners.
-    """
-    grown_m = -shape.bar_m if of_opening else shape.bar_m
-    return find_poses(corners, GateModel(_grown(shape, grown_m), focal_px), inf)
-
-
-def _grown(shape: GateShape, by_m: float) -> GateShape:
-    return replace(
-        shape, outer_width_m=shape.outer_width_m + by_m, outer_height_m=shape.outer_height_m + by_m
-    )

@@ -46,8 +46,8 @@ class InertialFeed:
 
     def subscribe(self, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
         """Subscribe to MAVSDK's synchronous plugin `mavlink_direct`."""
-        subscribe(direct, "HIGHRES_IMU", self._on_imu)
-        subscribe(direct, "ODOMETRY", self._on_odometry)
+        subscribe(direct, "HIGHRES_IMU", self.take_imu)
+        subscribe(direct, "ODOMETRY", self.take_odometry)
 
     async def request(self, plugin: Any) -> None:  # noqa: ANN401
         """Request both, by MAVSDK's asyncio `telemetry`; a vehicle that refuses is flown as it reports.
@@ -80,7 +80,8 @@ class InertialFeed:
             taken.append(samples.popleft())
         return tuple(taken) if self._has_no_gaps else ()
 
-    def _on_imu(self, message: Message) -> None:
+    def take_imu(self, message: Message) -> None:
+        """Take a HIGHRES_IMU."""
         if message.get_srcComponent() != AUTOPILOT_COMPONENT_ID or not self._order.is_next(message.time_usec):
             return
         last_us, self._last_us = self._last_us, message.time_usec
@@ -95,7 +96,8 @@ class InertialFeed:
         self._usual_us = usual_us + 0.1 * (min(period_us, 10 * LONGEST_US) - usual_us)
         self._samples.append(ImuInterval(message.time_usec, flip_vector(rate), flip_vector(force)))
 
-    def _on_odometry(self, message: Message) -> None:
+    def take_odometry(self, message: Message) -> None:
+        """Take an ODOMETRY."""
         is_autopilots = message.get_srcComponent() == AUTOPILOT_COMPONENT_ID
         if not is_autopilots or message.frame_id != mavlink.MAV_FRAME_LOCAL_NED:
             return

@@ -85,21 +85,22 @@ class GateLandmarks:
             return
         share, number = min(fits)
         view, eye = seen[number]
-        if share > GATE_FACTOR:
-            if not eye.sees(place.x, place.x[first : first + 3].tolist()):
-                return  # what is seen is another one, such as a poster
-            self._contradicted[colour] = self._contradicted.get(colour, 0) + 1
-            if self._contradicted[colour] >= CONTRADICTIONS:
-                self._drop(place, colour)
-            return
-        self._contradicted[colour] = 0
-        used = self._used[colour]
-        if not is_moved(view, used) and view.time_us - used.time_us < NOVEL_US:
-            return
-        self._used[colour] = view
-        place.update(_corners(place, colour, view, eye))
-        if colour in self.unsized:
-            self._compare_size(place, colour)
+        if share <= GATE_FACTOR:
+            used = self._used[colour]
+            if not is_moved(view, used) and view.time_us - used.time_us < NOVEL_US:
+                self._contradicted[colour] = 0
+                return
+            most2 = GATE_FACTOR * CHI_SQUARED[sum(view.seen)]  # also where it leads to, which may be far away
+            if place.update(_corners(place, colour, view, eye), most2):
+                self._contradicted[colour], self._used[colour] = 0, view
+                if colour in self.unsized:
+                    self._compare_size(place, colour)
+                return
+        elif not eye.sees(place.x, place.x[first : first + 3].tolist()):
+            return  # what is seen is another one, such as a poster
+        self._contradicted[colour] = self._contradicted.get(colour, 0) + 1
+        if self._contradicted[colour] >= CONTRADICTIONS:
+            self._drop(place, colour)
 
     def _compare_size(self, place: PlaceFilter, colour: str) -> None:
         """Decide whether a thing has the size of a gate, as soon as that is clear."""

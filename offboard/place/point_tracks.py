@@ -12,22 +12,28 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from framerunner.geometry.vectors import ZERO3
 from offboard.navigation.camera_model import NEAREST_M
 from offboard.place.measurements import Eye
 from offboard.place.place_filter import POSE, Floats, PlaceFilter
 from vision.types import PointTracks
 
+Bools = npt.NDArray[np.bool_]
+
 LEAST_IMAGES = 3  # that show a point
 MOST_IMAGES = 8  # after which a point is used, and begins anew
 SPREAD = 3  # numbers of images by which this differs from point to point: not all are used at once
-STD_PX = 0.7  # of a point, with what its image's attitude is wrong by
+STD_PX = 0.8  # of a point, with what its image's attitude is wrong by
 FLOOR_STD_M = 0.02
 DEPTH_M, DEPTH_STD_M = 5.0, 5.0  # of a point that may be anywhere
 ANYWHERE_STD_M = 30.0  # across that
 FARTHEST_M = 14.0  # of a point of the floor
 ROUNDS = 4
 GATE_SIGMA = 3.0
+LOST_SHARE, LOST_LEAST, LOST_IMAGES = 0.35, 4, 3  # too few of the points fit, of so many, in images in a row
+LOST_M_S = 0.5  # by which the velocity is known less well then
 FLOOR_WORSE = 6.0  # by which a point of the floor may fit worse than one anywhere, squares of deviations
 
 
@@ -83,6 +89,7 @@ class PointWindow:
         self._focal_px = focal_px
         self._images: dict[int, _Image] = {}  # by time, oldest first
         self._open: dict[int, list[int]] = {}  # times of the images that show a point and have not been used
+        self._lost = 0  # images in a row in which most points did not fit
 
     def see(self, place: PlaceFilter, tracks: PointTracks, first: Eye, middle: Eye, last: Eye) -> None:
         """Use an image, to whose time the filter was brought.
@@ -140,9 +147,14 @@ class PointWindow:
         cameras = _Cameras.of(place.x[index].reshape(-1, POSE), list(self._images.values()), seen[:, :, 2])
         found = _fitted(cameras, seen[:, :, :2], shown / STD_PX**2, self._focal_px)
         covariance = place.p[np.ix_(index, index)]
-        information, vector = found.used(covariance, 2.0 * shown.sum(axis=1) - 3.0)
-        if information is not None:
-            place.inform(index, information, vector)
+        fits = found.fit(covariance, 2.0 * shown.sum(axis=1) - 3.0)
+        if fits.any():
+            place.inform(index, found.information[fits].sum(axis=0), found.vector[fits].sum(axis=0))
+        if len(due) >= LOST_LEAST:
+            self._lost = self._lost + 1 if fits.sum() < LOST_SHARE * len(due) else 0
+        if self._lost >= LOST_IMAGES:
+            self._lost = 0
+            place.displace(place.time_us, ZERO3, 0.0, LOST_M_S)
 
 
 class _Cameras(NamedTuple):
@@ -186,20 +198,18 @@ class _Points(NamedTuple):
     vector: Floats
     usable: Floats
 
-    def used(self, covariance: Floats, freedom: Floats) -> tuple[Floats | None, Floats]:
-        """The sum of those that fit what was known before: information and vector; None if none does.
+    def fit(self, covariance: Floats, freedom: Floats) -> Bools:
+        """Which of them fit what was known before, shape (n,).
 
         The Mahalanobis distance follows from the information by the matrix inversion lemma.
         """
         usable = self.usable > 0.0
-        cost, information, vector = self.cost[usable], self.information[usable], self.vector[usable]
+        information, vector = self.information[usable], self.vector[usable]
         gained = covariance @ vector[:, :, None]
         inner = np.linalg.solve(np.eye(len(covariance)) + covariance @ information, gained)
-        distance2 = cost - (vector[:, None, :] @ inner)[:, 0, 0]
-        fits = distance2 <= (freedom + GATE_SIGMA * np.sqrt(2.0 * freedom))[usable]
-        if not fits.any():
-            return None, vector
-        return information[fits].sum(axis=0), vector[fits].sum(axis=0)
+        distance2 = self.cost[usable] - (vector[:, None, :] @ inner)[:, 0, 0]
+        usable[usable] = distance2 <= (freedom + GATE_SIGMA * np.sqrt(2.0 * freedom))[usable]
+        return usable
 
 
 def _fitted(cameras: _Cameras, pixels: Floats, weights: Floats, focal_px: float) -> _Points:

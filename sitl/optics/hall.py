@@ -17,11 +17,12 @@ from scenarios.models import Arena, Light, Scenario
 from sitl.camera_scene import WALL, Bgr, Body, Face, Floats, Scene, brightness, lit
 from sitl.optics.colours import CEILING_BGR, DAY_BGR, HALL_BGR, PATCH_BGR, SILL_BGR
 from sitl.optics.people import person_body
-from sitl.optics.pictures import picture_pyramid
+from sitl.optics.pictures import picture_pyramids
 from sitl.optics.texture import FaceTexture, Pyramid, on_face, texture_pyramid
 
 _LIFT_M = 0.002  # of a thing above what it is on; it decides nothing but keeps faces apart
 _BEHIND_WALLS_M = 0.2  # how far a textured floor goes on behind the walls, which are painted over it
+_LIGHT_STEPS = 100.0  # of the brightness of pictures
 _SILL_M = 0.06  # height of a window's sill, and how far it goes beyond the frame
 _Axes = tuple[Vec3, Vec3, Vec3, Vec3]  # origin, across, up, normal
 
@@ -47,7 +48,7 @@ class HallFaces:
             self._floor = texture_pyramid(scenario.floor_texture, 2.0 * x, 2.0 * y)
         if hall.wall_texture is not None:
             self._wall = texture_pyramid(hall.wall_texture, 2.0 * max(x, y), hall.height_m)
-        self._pictures = [picture_pyramid(picture) for picture in hall.pictures]
+        self._pictures = picture_pyramids(hall.pictures)
         self._dimmed: dict[str | int, tuple[float, Pyramid]] = {}
 
     @property
@@ -124,8 +125,8 @@ class HallFaces:
         return faces
 
     def _lit(self, key: str | int, picture: Pyramid, face: Face, light: Light) -> Pyramid:
-        """A picture in the light on a face; kept until that differs by a number of the image."""
-        share = round(brightness(face.normal_arena, light) * 255.0) / 255.0
+        """A picture in the light on a face, made again when that has changed by a step."""
+        share = round(brightness(face.normal_arena, light) * _LIGHT_STEPS) / _LIGHT_STEPS
         before, dimmed = self._dimmed.get(key, (None, picture))
         if before != share:
             dimmed = picture.dimmed(share)

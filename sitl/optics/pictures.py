@@ -5,6 +5,7 @@ scikit-image is no dependency, and its photographs are not copied: they are read
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from zlib import crc32
@@ -22,27 +23,31 @@ _DRAWN_PX = (384, 512)  # height and width of a picture that is drawn
 _SHAPES = 40
 
 
-def picture_pyramid(picture: Picture) -> Pyramid:
-    """The image of a picture, stretched to its size.
+def picture_pyramids(pictures: Sequence[Picture]) -> list[Pyramid]:
+    """The images of pictures, each stretched to its size.
 
     Raises:
-        TextureError: the file cannot be read.
+        TextureError: a file cannot be read.
     """
-    image = _image(picture.image)
+    installed = find_spec("skimage") if pictures else None
+    folders = [] if installed is None else [Path(each) for each in installed.submodule_search_locations or ()]
+    images = {name: _image(name, folders) for name in {picture.image for picture in pictures}}
+    return [_pyramid(picture, images[picture.image]) for picture in pictures]
+
+
+def _image(name: str, folders: Sequence[Path]) -> Image:
+    if name not in PHOTOGRAPHS:
+        return read_photograph(Path(name))
+    files = (folder / "data" / f"{name}{ending}" for folder in folders for ending in (".png", ".jpg"))
+    path = next((file for file in files if file.is_file()), None)
+    return _drawn(name) if path is None else read_photograph(path)
+
+
+def _pyramid(picture: Picture, image: Image) -> Pyramid:
     scale = _MAX_EDGE_PX / max(picture.width_m, picture.height_m)
     size = (max(1, round(scale * picture.width_m)), max(1, round(scale * picture.height_m)))
     base = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
     return Pyramid.of(base, picture.width_m, picture.height_m)
-
-
-def _image(name: str) -> Image:
-    if name not in PHOTOGRAPHS:
-        return read_photograph(Path(name))
-    installed = find_spec("skimage")
-    folders = [] if installed is None else [Path(each) for each in installed.submodule_search_locations or ()]
-    files = (folder / "data" / f"{name}{ending}" for folder in folders for ending in (".png", ".jpg"))
-    path = next((file for file in files if file.is_file()), None)
-    return _drawn(name) if path is None else read_photograph(path)
 
 
 def _drawn(name: str) -> Image:

@@ -20,8 +20,10 @@ MOST = 48
 CELL_PX = 40  # one point in each square of this size
 BORDER_PX = 6
 LEAST_RESPONSE = 1e-6  # smaller eigenvalue of the gradients' covariance
+ABOVE_NOISE = 6.0  # times the response in the middle of all pixels
 LEAST_FOLLOWED = 1e-6
-_WINDOW = (17, 17)
+BLUR = (3, 3)
+_WINDOW = (13, 13)
 _LEVELS = 3
 _CRITERIA = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.02)
 MOST_BACK_PX = 0.5  # followed there and back, a point is so near to where it was
@@ -53,7 +55,7 @@ class PointTracker:
             image: BGR, shape (height, width, 3), uint8.
             time_us: vehicle time of its exposure.
         """
-        grey = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), (3, 3), 0)
+        grey = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), BLUR, 0)
         late = self._time_us is None or not 0 < time_us - self._time_us <= LONGEST_US
         if late or self._before is None:
             self._points, self._numbers = self._points[:0], self._numbers[:0]
@@ -105,7 +107,8 @@ class PointTracker:
         best = of_cells.argmax(axis=2)
         strength = np.take_along_axis(of_cells, best[:, :, None], axis=2)[:, :, 0]
         strength[taken] = 0.0
-        row, column = np.nonzero(strength > LEAST_RESPONSE)
+        noise = float(np.median(response[::4, ::4]))
+        row, column = np.nonzero(strength > max(LEAST_RESPONSE, ABOVE_NOISE * noise))
         order = np.argsort(-strength[row, column], kind="stable")[: MOST - len(self._points)]
         row, column = row[order], column[order]
         y, x = np.divmod(best[row, column], CELL_PX)

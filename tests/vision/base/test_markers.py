@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+import framerunner
 from framerunner.flying.detector import base_finder, true_calibration
 from framerunner.geometry.base_marker import BaseMarkers
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.vision_evaluation.base_scores import rate_base
 from framerunner.vision_evaluation.camera_chain import CameraChain
 from scenarios.models import Base, BaseMarker, Scenario
-from scenarios.random_scenarios import load_level
+from scenarios.random_scenarios import load_level, random_scenario
 from sitl.camera import SimulatedCamera
 from vision.base.markers import MarkerReader
 from vision.types import BaseExpectation
@@ -54,3 +55,21 @@ def test_apriltags_are_read_and_markers_of_others_are_not():
     assert finder_of(MARKED).find(image, ANYWHERE) is None
     others = MarkerReader(BaseMarkers("apriltag_36h11", 40, 0.27), 0.5, 0.51)
     assert others.find(image, ANYWHERE) is None
+
+
+def test_a_drone_without_motion_capture_lands_by_them(monkeypatch):
+    read = []
+    find = MarkerReader.find
+
+    def noted(self, image, expected):
+        found = find(self, image, expected)
+        read.append(found is not None)
+        return found
+
+    monkeypatch.setattr(MarkerReader, "find", noted)
+    level = load_level("calm").model_copy(update={"base_marker": BaseMarker(), "sensors": "flow"})
+    result = framerunner.fly(random_scenario(level, 8401))
+    assert result.completed, result.reason
+    assert result.landing_error_m < 0.1
+    assert sum(read) >= 4
+    assert sum(read) > 0.5 * len(read)

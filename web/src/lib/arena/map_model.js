@@ -44,7 +44,7 @@ export class MapModel {
       ball.removeFromParent();
     }
     for (const gate of map?.frames ?? []) this.#addGate(gate, scenario);
-    if (map?.place) this.#addBall(map.place, PLACE_COLOUR);
+    if (map?.place) this.#addBall(map.place, PLACE_COLOUR, 0.6);
     for (const point of map?.path ?? []) this.#path.add(point, rgbOf(PATH_COLOUR));
   }
 
@@ -80,11 +80,11 @@ export class MapModel {
     }
   }
 
-  /** @param {{p: number[], std: number[]|null}} place @param {string} colour */
-  #addBall(place, colour) {
+  /** @param {{p: number[], std: number[]|null}} place @param {string} colour @param {number} [opacity] */
+  #addBall(place, colour, opacity = 0.3) {
     const axes = halfAxesOf(place);
     if (!axes) return;
-    const paint = { color: colour, transparent: true, opacity: 0.3, depthWrite: false };
+    const paint = { color: colour, transparent: true, opacity, depthWrite: false };
     const ball = new THREE.Mesh(this.#ball, new THREE.MeshBasicMaterial(paint));
     ball.position.fromArray(place.p);
     ball.scale.fromArray(axes);
