@@ -21,8 +21,8 @@ from offboard.response.estimate import LevelComing, ResponseEstimate, YawAhead
 from offboard.response.rate_response import Coming
 from offboard.response.tilt_loop import STEP_S
 
-OFFSET_GAIN_PER_S2 = 10.0  # an offset in plan is closed within half a second, without swinging
-VELOCITY_GAIN_PER_S = 6.0
+OFFSET_GAIN_PER_S2 = 7.0  # an offset in plan is closed within half a second, without swinging
+VELOCITY_GAIN_PER_S = 4.5
 SOON_S = 0.2  # a vehicle that is later closes it more slowly
 MAX_OFFSET_M = 0.3  # a larger one is closed at the speed of this one
 CLIMB_GAIN_PER_S = (1.6, 3.5)  # an offset in height is closed at least and at most at this rate,

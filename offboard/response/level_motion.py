@@ -11,7 +11,7 @@ from offboard.response.tilt_loop import GRAVITY_M_S2, STEP_S, Plan
 _DRAG_PER_M = (0.4, 0.8)  # prior of drag by mass: mean, standard deviation
 _DRAG_WANDER = 0.01  # by the root of a second
 _DISTURBANCE_M_S2 = 0.3  # standard deviation at first
-_DISTURBANCE_WANDER = 0.6  # m/s^2 by the root of a second
+_DISTURBANCE_WANDER = 0.1  # m/s^2 by the root of a second
 _NOISE_M_S2 = 0.35  # of a velocity's change over a step
 _LONGEST_S = 0.15  # between two velocities that are compared
 

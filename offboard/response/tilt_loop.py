@@ -42,7 +42,7 @@ _STATES = 9  # coefficients, and the trims of both axes
 # Of multicopters of any size, as in `TiltLoop`: they accelerate by 2 to 6 1/s of the velocity's error.
 _PRIOR = np.array((0.0, 0.08, 0.3, 0.4, 0.3, 0.5, 0.5, 0.0, 0.0))
 _PRIOR_STD = np.array((0.04, 0.1, 0.15, 0.15, 0.35, 0.8, 0.3, 0.05, 0.05))
-_WANDER = np.array((0.001, 0.003, 0.003, 0.003, 0.003, 0.01, 0.005, 0.006, 0.006)) ** 2 * STEP_S
+_WANDER = np.array((0.001, 0.003, 0.003, 0.003, 0.003, 0.01, 0.005, 0.03, 0.03)) ** 2 * STEP_S
 _LAGGED_COST = 4.0  # of a first lag, in log likelihood
 _DEAD_COST = 0.5  # likewise of each step beside the usual dead time
 _USUAL_STEPS = 2
