@@ -146,11 +146,13 @@ def run(arguments: list[str]) -> int:
 
 def _reason(error: Exception) -> str | None:
     """The message for the user; None for a fault of this program."""
-    from cyclopts import CycloptsError
+    from cyclopts import CycloptsError, ValidationError
 
     from framerunner.errors import UserError, is_disk_full
     from framerunner.extras import install_advice
 
+    if isinstance(error, ValidationError) and error.argument is not None:  # of `within`
+        return f"{error.argument.name} {error.exception_message}"
     if isinstance(error, CycloptsError):
         return " ".join(str(error).split()) + " Try --help."
     if isinstance(error, UserError):

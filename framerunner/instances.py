@@ -38,7 +38,8 @@ def claimed_instance() -> Iterator[int]:
     for instance in range(INSTANCES):
         path = Path(gettempdir()) / f"framerunner-instance-{instance}.lock"
         try:
-            lock = FileLock(path, timeout=0, mode=0o666).acquire()  # every user of this machine may take it
+            # Every user of this machine may take it, and a thread may give back what another one claimed.
+            lock = FileLock(path, timeout=0, mode=0o666, thread_local=False).acquire()
         except OSError:  # it is claimed, or its name is taken by something else
             continue
         with lock:

@@ -263,7 +263,7 @@ class _Flight:
         self.motors_requested = self.motors_requested or motors_on
         self.sent = None
         if motors_on and self.flying:
-            limited = self._command(command, state)
+            limited = self._command(command, self.engine.drone or state)
             self.sent = limited.command
         else:
             limited = LimitedCommand(self.limits.limited(command))
@@ -272,7 +272,7 @@ class _Flight:
             await self.drone.motors_on(confirmed=not self.engine.has_navigator)
             self.flying = True
             self.started_us = None  # counts from the next tick, the first with motors on
-            self._command(command, state)
+            self._command(command, self.engine.drone or state)
         elif self.flying and not motors_on:
             await self._stop_motors()
         self.ticks += 1
@@ -295,7 +295,7 @@ class _Flight:
 
     def _command(self, command: VelocityFluCommand, state: DroneState) -> LimitedCommand:
         """Let the drone fly a command, as far as its limits allow."""
-        limited = self.drone.command(command)
+        limited = self.drone.command(command, state)
         if limited.kept_in_box:
             self.kept_in_box_us += min(state.time_us - self.commanded_us, MAX_STEP_US)
         self.commanded_us = state.time_us

@@ -8,11 +8,49 @@ from math import isfinite, isnan
 from typing import Literal, Protocol
 
 from framerunner.errors import UserError
-from framerunner.geometry.vectors import Quaternion
+from framerunner.geometry.vectors import Quaternion, Vec3
 
 
 class DroneError(UserError):
     """The drone cannot do what was requested; the message is one line for people."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImuInterval:
+    """Means of an IMU's samples over an interval, less the biases that the vehicle has estimated.
+
+    Attributes:
+        time_us: vehicle time of its end.
+        period_us: its length; intervals follow each other without gaps unless samples were lost.
+        angular_rate_flu_rad_s: of the body.
+        specific_force_flu_m_s2: likewise; at rest (0, 0, g).
+    """
+
+    time_us: int
+    period_us: int
+    angular_rate_flu_rad_s: Vec3
+    specific_force_flu_m_s2: Vec3
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedAccuracy:
+    """What the vehicle tells of the errors of its own estimate (standard deviations), and of its jumps.
+
+    Attributes:
+        position_std_m: of north and east, the larger one.
+        height_std_m: of the height.
+        velocity_std_m_s: of north and east, the larger one.
+        climb_std_m_s: of the vertical velocity.
+        heading_std_rad: of the heading.
+        resets: how often the estimate has jumped, 0 to 255, then from 0 again.
+    """
+
+    position_std_m: float
+    height_std_m: float
+    velocity_std_m_s: float
+    climb_std_m_s: float
+    heading_std_rad: float
+    resets: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +73,9 @@ class DroneState:
     position_age_s: float = 0.0  # how much older the position and the velocity are than `time_us`
     attitude_arena: Quaternion = (1.0, 0.0, 0.0, 0.0)  # body FLU to arena, with the heading `yaw`
     camera_attitude_arena: Quaternion | None = None  # of a camera on a gimbal, forward-left-up to arena
+    imu: tuple[ImuInterval, ...] = ()  # since the state before, oldest first; empty: it sends none
+    position_std_m: float = 0.0  # of what the app has estimated itself, of the coordinate known worst; else 0
+    accuracy: ReportedAccuracy | None = None  # None: the vehicle does not tell
     missed: tuple[DroneState, ...] = ()  # at the ticks that were skipped before this one, oldest first
 
     @property
@@ -59,27 +100,24 @@ class VelocityFluCommand:
         return not isnan(self.forward_m_s + self.left_m_s + self.up_m_s + self.yaw_rate_rad_s)
 
 
-LimitName = Literal["class", "box", "cap"]
-
-
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """What a limit has changed in a command.
+    """What a limit, not that of the mission's class, has changed in a command.
 
     Attributes:
-        limit: that of the mission's class, the box, or a cap on a drone that may be real.
+        limit: the box, or a cap on a drone that may be real.
         quantity: such as "level speed".
         words: what was changed and why, for people.
     """
 
-    limit: LimitName
+    limit: Literal["box", "cap"]
     quantity: str
     words: str
 
 
 @dataclass(frozen=True, slots=True)
 class LimitedCommand:
-    """A command within all limits, and what they have changed in it, in their order."""
+    """A command within all limits, and what box and caps have changed in it, in their order."""
 
     command: VelocityFluCommand
     clips: tuple[Clip, ...] = ()
@@ -92,7 +130,7 @@ class LimitedCommand:
     @property
     def remark(self) -> str:
         """What the box and the caps have changed, for people; empty if nothing."""
-        return "; ".join(dict.fromkeys(clip.words for clip in self.clips if clip.limit != "class"))
+        return "; ".join(dict.fromkeys(clip.words for clip in self.clips))
 
 
 class Drone(Protocol):
@@ -159,8 +197,12 @@ class Drone(Protocol):
     async def refuse(self) -> None:
         """Let the vehicle that an operator gave back hold, and wait until it is given back again."""
 
-    def command(self, command: VelocityFluCommand) -> LimitedCommand:
+    def command(self, command: VelocityFluCommand, at: DroneState | None = None) -> LimitedCommand:
         """Set the velocity to fly from now on. Never blocks.
+
+        Args:
+            command: wanted.
+            at: where the app has estimated the drone to be, for its box; None: where it is reported.
 
         Returns:
             The velocity that is sent, by the adapter's `VelocityLimits`; zero if none is flown now.

@@ -55,9 +55,9 @@ class DryRunDrone(MavsdkDrone):
     async def refuse(self) -> None:
         """Nobody gives the vehicle back."""
 
-    def command(self, command: VelocityFluCommand) -> LimitedCommand:
+    def command(self, command: VelocityFluCommand, at: DroneState | None = None) -> LimitedCommand:
         """Send the setpoint that would be flown."""
-        limited = self._limits.limit(command, self._latest)
+        limited = self._limits.limit(command, at or self._latest)
         if self._runs:
             self._send(limited.command)
         return limited

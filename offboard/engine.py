@@ -47,6 +47,7 @@ class MissionEngine:
     Attributes:
         state: full id of the present state, such as "red.turning"; empty before the first tick.
         transition: the transition taken in the last tick; None if none was.
+        drone: its state in the last tick, as the navigator has estimated it; as it was given without one.
     """
 
     def __init__(
@@ -64,6 +65,7 @@ class MissionEngine:
         self.pilot.limits = limits
         self._navigator = _new_navigator(mission, surroundings, limits)
         self.pilot._navigator = self._navigator
+        self.drone: DroneState | None = None
         self._present: ChartRow | None = None
         self._started_us = 0
         self._entered_us = 0
@@ -126,12 +128,13 @@ class MissionEngine:
         pilot = self.pilot
         pilot.imu = imu
         pilot.cam = cam
-        self.transition = None
+        self.transition, self.drone = None, state
         try:
             if self._navigator is not None:
                 if state is None:
                     raise PilotError("its map of frames needs the drone's state; give it to each tick")
-                self._navigator.observe(state, images, sent)
+                self.drone = at = self._navigator.observe(state, images, sent)
+                pilot.imu = Imu(at.x, at.y, at.z, at.yaw, at.position_std_m)
             self._count_unseen(time_us)
             if self._present is None:
                 self._start(time_us)

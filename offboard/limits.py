@@ -16,7 +16,7 @@ from math import hypot, inf
 
 from framerunner.errors import SettingError
 from framerunner.geometry.vectors import Vec3, turned
-from offboard.drone import Clip, DroneError, DroneState, LimitedCommand, LimitName, VelocityFluCommand
+from offboard.drone import Clip, DroneError, DroneState, LimitedCommand, VelocityFluCommand
 from scenarios.models import Scenario
 
 FLOOR_M = 0.15  # minimum height of the drone's centre away from its start
@@ -198,21 +198,20 @@ class VelocityLimits:
             OutsideBoxError: the drone has been outside for seconds and does not come nearer.
         """
         clips: list[Clip] = []
-        if self._of_class is not None:
-            command = _with_speeds(command, self._of_class, "class", clips)
+        if self._of_class is not None:  # no clip: a mission may rely on it, as the paper's command infinity
+            command = self._of_class.limited(command)
         if state is not None:
             command = self._kept_in(command, state, clips)
             if correct is not None and (corrected := correct(command, state)) is not command:
                 command = self._kept_in(corrected, state, clips)
         if self._caps is not None:
             if command.is_number:
-                command = _with_speeds(command, self._caps, "cap", clips)
+                command = _capped(command, self._caps, clips)
             else:
                 clips.append(Clip("cap", "numbers", "a command is not a number, so the drone hovers"))
                 command = STILL
         for clip in clips:
-            if clip.limit != "class":  # a mission may rely on its class: the paper's commands infinity
-                self._tell_once(clip, state)
+            self._tell_once(clip, state)
         return LimitedCommand(command, tuple(clips))
 
     def _kept_in(
@@ -252,24 +251,20 @@ class VelocityLimits:
             logger.warning("cap on %s: %s (said once)", clip.quantity, clip.words)
 
 
-def _with_speeds(
-    command: VelocityFluCommand, limits: CommandLimits, name: LimitName, clips: list[Clip]
-) -> VelocityFluCommand:
-    """The command within limits of its speeds; the same object if nothing exceeds them."""
+def _capped(command: VelocityFluCommand, limits: CommandLimits, clips: list[Clip]) -> VelocityFluCommand:
+    """The command within caps on its speeds."""
     kept = limits.limited(command)
-    if kept == command:
-        return command
     level_m_s = hypot(kept.forward_m_s, kept.left_m_s)
     wanted_m_s = hypot(command.forward_m_s, command.left_m_s)
     if (kept.forward_m_s, kept.left_m_s) != (command.forward_m_s, command.left_m_s):
         words = f"{wanted_m_s:.2f} m/s level commanded, {level_m_s:g} flown"
-        clips.append(Clip(name, "level speed", words))
+        clips.append(Clip("cap", "level speed", words))
     if kept.up_m_s != command.up_m_s:
         words = f"{command.up_m_s:.2f} m/s upwards commanded, {kept.up_m_s:g} flown"
-        clips.append(Clip(name, "vertical speed", words))
+        clips.append(Clip("cap", "vertical speed", words))
     if kept.yaw_rate_rad_s != command.yaw_rate_rad_s:
         words = f"{command.yaw_rate_rad_s:.2f} rad/s commanded, {kept.yaw_rate_rad_s:g} flown"
-        clips.append(Clip(name, "yaw rate", words))
+        clips.append(Clip("cap", "yaw rate", words))
     return kept
 
 

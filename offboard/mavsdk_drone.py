@@ -22,6 +22,7 @@ from offboard.link.companion import Companion
 from offboard.link.connections import check_is_free, new_mavsdk, open_connections
 from offboard.link.dialect import Dialect
 from offboard.link.direct import synchronous
+from offboard.link.inertial import InertialFeed
 from offboard.link.process_guard import ProcessGuard
 from offboard.link.reported_state import reported_state
 from offboard.link.resets import ResetFeed, followed
@@ -104,6 +105,7 @@ class MavsdkDrone:
         self._feed = TelemetryFeed()
         self._ticks = TickSource(self._feed)
         self._resets = ResetFeed()
+        self._inertial = InertialFeed()
         self._sent = VelocityFluCommand()
         self._system_id = system_id
         self._advice = "give another address"
@@ -187,6 +189,7 @@ class MavsdkDrone:
         steps = self._ticks.steps
         self._dialect = new = await open_dialect(system, self._direct, self._feed, room_m, stepped=steps)
         self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct), new.kind.numbered_modes)
+        self._inertial.subscribe(synchronous(self._direct))
         if new.has_resets:
             self._resets.subscribe(synchronous(self._direct))
         if new.exchange is None:
@@ -208,7 +211,7 @@ class MavsdkDrone:
                 ) from None
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        await self._ticks.before_arming(self._telemetry, self._resets.request)
+        await self._ticks.before_arming(self._telemetry, self._resets.request, self._inertial.request)
         self._resets.take()  # those until now are in the start's pose
         self._alignment = ArenaAlignment(self._start_arena, pose_of(self._feed))
         await self._ticks.begin()
@@ -385,7 +388,7 @@ class MavsdkDrone:
             "setpoints have ended, so the vehicle's failsafe for that has to act"
         )
 
-    def command(self, command: VelocityFluCommand) -> LimitedCommand:
+    def command(self, command: VelocityFluCommand, at: DroneState | None = None) -> LimitedCommand:
         """Set the velocity to fly; ignored without motors on, or while an operator has the vehicle."""
         latest = self._latest
         if not self._commanding:
@@ -395,9 +398,14 @@ class MavsdkDrone:
                 return LimitedCommand(STILL)
             self._flown_manually = False
             self._tracker.reset()  # the vehicle was moved by others
-        limited = self._limits.limit(command, latest, self._tracker.correct if self._corrects else None)
+        limited = self._limits.limit(command, at or latest, self._correct if self._corrects else None)
         self._send(limited.command)
         return limited
+
+    def _correct(self, command: VelocityFluCommand, _at: DroneState) -> VelocityFluCommand:
+        """What a vehicle that answers late must be sent: by its own reports."""
+        assert self._latest is not None, "there was a tick"
+        return self._tracker.correct(command, self._latest)
 
     async def close(self) -> None:
         """End all commanding, let a disarmed vehicle hold and, without a companion, disconnect."""
@@ -453,7 +461,7 @@ class MavsdkDrone:
             self._tracker.reset()
         feed, alignment, dialect = self._feed, self._alignment, self._stream
         skipped = tuple(reported_state(before, feed, alignment, dialect) for before in missed)
-        return reported_state(sample, feed, alignment, dialect, skipped)
+        return reported_state(sample, feed, alignment, dialect, skipped, inertial=self._inertial)
 
     def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s

@@ -56,6 +56,14 @@ class Imu:
     y: Annotated[float, Field(description="to the left of the floor's centre", json_schema_extra=M)] = 0.0
     z: Annotated[float, Field(description="height above the floor", json_schema_extra=M)] = 0.0
     yaw: Annotated[float, Field(description="heading, counter-clockwise from x", json_schema_extra=RAD)] = 0.0
+    std_m: Annotated[
+        float,
+        Field(
+            description="standard deviation of the position; 0: the drone itself knows where it is",
+            ge=0,
+            json_schema_extra=M,
+        ),
+    ] = 0.0
 
 
 @dataclass(slots=True)

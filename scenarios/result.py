@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import unicodedata
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
@@ -306,33 +304,6 @@ def first_error(error: ValidationError) -> str:
     """The first error in one line: field, then reason."""
     first = error.errors(include_url=False, include_input=False)[0]
     return f"{'.'.join(str(step) for step in first['loc'])}: {first['msg']}".removeprefix(": ")
-
-
-_FORMULA = frozenset("=+-@")
-_INVISIBLE = frozenset({"Cc", "Cf", "Zs", "Zl", "Zp"})
-
-
-def spreadsheet_cell(text: str) -> str:
-    """Put a ' before each part of a text that a spreadsheet would take for a formula.
-
-    A cell that begins with = + - or @ is a formula, which may fetch a page or start a program; spaces,
-    invisible characters and full-width forms (＝) before or instead of it do not prevent that. Where a comma
-    is the decimal separator, a semicolon begins the next cell, so what follows one counts as well.
-
-    Args:
-        text: from any source; not a number, whose sign would be taken for a formula's.
-    """
-    if _is_formula(text) or text[:1] in {"\t", "\r"}:
-        return f"'{text}"
-    parts = re.split(r"([;\n\r])", text)
-    return "".join(f"'{part}" if _is_formula(part) else part for part in parts)
-
-
-def _is_formula(text: str) -> bool:
-    for character in text:
-        if unicodedata.category(character) not in _INVISIBLE:
-            return unicodedata.normalize("NFKC", character)[0] in _FORMULA
-    return False
 
 
 _OPTIONAL = (

@@ -38,7 +38,7 @@ from vision.types import Detections
 
 PROGRAMS = {page: found for page in PAGES if (found := blocks(page, "python"))}
 FILES = {page: found for page in PAGES if (found := blocks(page, "yaml"))}
-IN_REAL_TIME = {("api.md", 1), ("api.md", 2), ("simulator.md", 0)}
+IN_REAL_TIME = {("api.md", 1), ("ci.md", 0), ("simulator.md", 0)}
 
 
 def names_of_the_map():
@@ -198,8 +198,14 @@ def read_with_omissions(text, folder):
     assert list(yaml.safe_load(text)) == ["templates"]
 
 
+def read_workflow(text, folder):
+    (job,) = yaml.safe_load(text)["jobs"].values()
+    assert [step["run"] for step in job["steps"] if "run" in step][-1] == "pytest"
+
+
 KINDS = {
     "camera.md": [read_scenario, read_scenario, read_level, read_calibration, read_part_of_calibration],
+    "ci.md": [read_workflow],
     "devices.md": [read_scenario],
     "faults.md": [read_scenario],
     "flight-files.md": [read_options],
@@ -259,6 +265,21 @@ def test_messages_in_troubleshooting_are_those_of_the_program():
     unknown = [each for each in shown if each.removesuffix("…").strip() not in texts]
     assert len(shown) > 20
     assert [each for each in unknown if not each.startswith(composed)] == []
+
+
+def test_no_node_of_a_diagram_has_a_name_that_mermaid_reserves():
+    """It draws an error instead of such a diagram."""
+    reserved = re.compile(r"(?<![\w\"-])(class|end|graph|style|subgraph|click|default)(?=\[|\(| *--|$)")
+    drawn = [(page, text) for page in PAGES for text in blocks(page, "mermaid")]
+    found = [
+        (page, line.strip())
+        for page, text in drawn
+        if text.startswith("flowchart")
+        for line in text.splitlines()
+        if reserved.search(line) and line.strip() not in ("end",)
+    ]
+    assert len(drawn) > 8
+    assert found == []
 
 
 @pytest.mark.parametrize("page", sorted((DOCS / "tutorials").glob("*.md")), ids=lambda path: path.name)

@@ -109,7 +109,9 @@ def find_edges(patch: ImagePatch, sides: Sides, half_px: Widths) -> BarEdges:
     base = np.where(is_steep, t * stride + u, u * stride + t).astype(np.intp)
     across = np.where(is_steep, inward, inward * stride).astype(np.intp)
     slack = np.maximum(_SLACK_PX, _SLACK_SHARE * half)
-    offsets = np.arange(-_OUTSIDE_PX, ceil(float((2.0 * half + slack).max())) + 2)
+    # A pose that brings a bar next to the camera expects it wider than any image.
+    widest = min(float((2.0 * half + slack).max()), float(max(labels.shape)))
+    offsets = np.arange(-_OUTSIDE_PX, ceil(widest) + 2)
     index = base[..., None] + across[..., None] * offsets
     around = labels.reshape(-1).take(index, mode="clip").reshape(-1, len(offsets))
     outer, outer_ok, inner, inner_ok = (

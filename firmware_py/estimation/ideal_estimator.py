@@ -115,7 +115,10 @@ class IdealEstimator:
         origin_ned_m: the local frame's origin in the sensors' frame, shape (3,); None before a first sample.
         has_position: whether the last sample had a horizontal position; else it is dead reckoning.
         stands: not used.
+        imu: None: the ideal sensors deliver a state.
     """
+
+    imu = None
 
     def __init__(self, sensor_origin: GeodeticPoint) -> None:
         self.state = VehicleState()

@@ -125,11 +125,19 @@ class InertialEstimator:
         self._publish(imu)
         return _is_finite(self.state)
 
+    @property
+    def imu(self) -> ImuSample | None:
+        """The newest sample, less the estimated biases."""
+        sample, filtered = self.latest.imu, self.aiding.target.filter
+        if sample is None:
+            return None
+        return sample.less(filtered.gyro_bias_frd_rad_s, filtered.accel_bias_frd_m_s2)
+
     def report(self) -> EstimatorReport:
         """The condition now."""
         aiding, watches, now_us = self.aiding, self._watches, self._now_us
         healthy = watches.healthy(now_us)
-        if self._has_no_fix():
+        if _has_no_fix(self.latest):
             healthy -= {Sensor.GPS}
         relied_on = aiding.relied_on(now_us - _RELIED_ON_US)
         known = self._alignment is None
@@ -160,15 +168,11 @@ class InertialEstimator:
         problem = self._watches.problem(self._now_us)
         if problem:
             return problem
-        if self._has_no_fix():
+        if _has_no_fix(self.latest):
             return NO_FIX
         if not known:
             return NOT_ALIGNED
         return "" if has_height else NO_HEIGHT
-
-    def _has_no_fix(self) -> bool:
-        """Whether the receiver delivers, but has no position yet, or no longer."""
-        return self.latest.gps is not None and self.latest.gps.fix_type < FixType.FIX_3D
 
     def _is_recent(self, fused_us: int) -> bool:
         return fused_us != NEVER_US and self._now_us - fused_us <= self._settings.no_aid_us
@@ -315,6 +319,11 @@ def _is_usable(imu: ImuSample, last_us: int) -> bool:
     p, q, r = imu.angular_rate_frd_rad_s
     x, y, z = imu.specific_force_frd_m_s2
     return imu.time_us > last_us and imu.period_us > 0 and isfinite(p + q + r + x + y + z)
+
+
+def _has_no_fix(latest: Readings) -> bool:
+    """Whether the receiver delivers, but has no position yet, or no longer."""
+    return latest.gps is not None and latest.gps.fix_type < FixType.FIX_3D
 
 
 def _is_finite(state: VehicleState) -> bool:

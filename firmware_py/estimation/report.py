@@ -13,7 +13,7 @@ from typing import Protocol
 from firmware_py.types import VehicleState
 from framerunner.geometry.vectors import NAN3, Vec3
 from framerunner.vehicle.geodesy import GeodeticPoint
-from framerunner.vehicle.measurements import ExternalPose, Readings, Sensors
+from framerunner.vehicle.measurements import ExternalPose, ImuSample, Readings, Sensors
 
 
 class Sensor(Enum):
@@ -135,6 +135,10 @@ class StateEstimator(Protocol):
     @property
     def origin(self) -> GeodeticPoint | None:
         """Where on Earth the local frame's origin is; None before it is known."""
+
+    @property
+    def imu(self) -> ImuSample | None:
+        """The newest sample of the IMU, less its estimated biases; None if there is no IMU, or none yet."""
 
     def report(self) -> EstimatorReport:
         """The condition now."""

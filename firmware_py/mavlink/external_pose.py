@@ -15,7 +15,7 @@ from enum import IntFlag
 from math import hypot, isfinite
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.service import AutopilotService
 from firmware_py.mavlink.time_sync import Clocks
 from firmware_py.parameters import Parameters
 from framerunner.geometry.rotations import normalized, quaternion_from_euler
@@ -109,12 +109,11 @@ def _position_ned_m(frame: int, x: float, y: float, z: float) -> Vec3:
     return (x, -y, -z) if frame == mavlink.MAV_FRAME_LOCAL_FLU else NAN3
 
 
-class ExternalPoseService(Service):
+class ExternalPoseService(AutopilotService):
     """Passes poses of motion capture and visual odometry to the estimator."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange, clocks: Clocks) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._clocks = clocks
         self._refused_us = -_REPEAT_TEXT_US
         self.handlers = {

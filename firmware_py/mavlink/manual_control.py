@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.service import AutopilotService
 from firmware_py.types import ManualInput
 from framerunner.wire.dialect import BROADCAST, Message, boot_ms, mavlink
 from framerunner.wire.exchange import Exchange
@@ -19,12 +19,11 @@ _UNKNOWN_RSSI = 255
 _STALE_US = 500_000  # COM_RC_LOSS_T's default
 
 
-class ManualControlService(Service):
+class ManualControlService(AutopilotService):
     """Passes sticks to the autopilot; streams a remote control's channels, if there is one, as PX4."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._pulses_us: list[int] = []  # of the channels that are given, from the first on
         self._channels_received_us = -_STALE_US
         self.handlers = {

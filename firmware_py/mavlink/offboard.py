@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import isfinite
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.service import AutopilotService
 from firmware_py.offboard_requests import (
     LocalTarget,
     SetpointRefusal,
@@ -39,12 +39,11 @@ _FLIGHT_GROUP = 0  # of SET_ACTUATOR_CONTROL_TARGET: roll, pitch, yaw, thrust
 _HAS_VELOCITY = 1 << 1  # est_capabilities of FOLLOW_TARGET
 
 
-class OffboardService(Service):
+class OffboardService(AutopilotService):
     """Passes setpoints to the autopilot and reports refusals as texts."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._refused_us: dict[str, int] = {}  # by text: one for each frame number and some more
         self.handlers = {
             mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: self._local,

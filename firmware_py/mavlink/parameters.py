@@ -14,7 +14,7 @@ from __future__ import annotations
 from struct import pack, unpack
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Service, VehicleCommand
+from firmware_py.mavlink.service import AutopilotService, VehicleCommand
 from firmware_py.parameters import Parameter, ParameterError
 from firmware_py.status import CommandResult
 from framerunner.wire.dialect import Message, mavlink
@@ -35,15 +35,14 @@ _TYPES = {
 _EXTENDED_BYTES = 128
 
 
-class _ParameterProtocol(Service):
+class _ParameterProtocol(AutopilotService):
     """What both protocols share: one list at a time on each link, and the reasons for refusals as texts."""
 
     _first_index = 0  # of a list
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
-        self._autopilot = autopilot
+        super().__init__(autopilot, exchange)
         self._parameters = autopilot.parameters
-        self._exchange = exchange
         self._next_index: dict[str, int] = {}  # of the lists being sent, by link name
         self._refusal = ""
         self._refusal_us = -_REPEAT_TEXT_US

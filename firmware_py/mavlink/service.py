@@ -97,8 +97,7 @@ class Service:
     """One MAVLink service of one of the vehicle's components.
 
     A service sets its tables in its constructor, and overrides `update` if it sends messages unrequested. No
-    two services of a component have an entry for the same id. Most are given `autopilot` and `exchange`, the
-    vehicle's links and time.
+    two services of a component have an entry for the same id.
 
     Attributes:
         component_id: of the component.
@@ -126,7 +125,15 @@ class Service:
         """Send again what is sent regularly; called ten times a second while vehicle time stands."""
 
 
-class DeviceComponent(Service):
+class AutopilotService(Service):
+    """One that knows the autopilot, and by `exchange` the vehicle's links and time."""
+
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
+        self._autopilot = autopilot
+        self._exchange = exchange
+
+
+class DeviceComponent(AutopilotService):
     """A component beside the autopilot: it sends a heartbeat once a second, with the vehicle's mode.
 
     Attributes:
@@ -136,8 +143,7 @@ class DeviceComponent(Service):
     kind: int
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._heartbeat_due_us = 0
 
     def update(self) -> None:

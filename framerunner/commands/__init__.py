@@ -65,9 +65,25 @@ def for_genuine(autopilot: str, scenario: Scenario) -> Scenario:
 
 def check_range(option: str, value: float | None, low: float, high: float) -> None:
     """Raise SettingError for a number outside low to high, or not a number; None is an option not given."""
-    if value is not None and not low <= value <= high:
-        given, lowest, highest = (f"{n:g}" if isinstance(n, float) else n for n in (value, low, high))
-        raise SettingError(f"{option} {given}: must be from {lowest} to {highest}")
+    if problem := _outside(value, low, high):
+        raise SettingError(f"{option} {problem}")
+
+
+def within(low: float, high: float) -> Parameter:
+    """Let an option take numbers from low to high only; that it is another is told as by `check_range`."""
+
+    def validate(_type: Any, value: float | None) -> None:  # noqa: ANN401 - the library's signature
+        if problem := _outside(value, low, high):
+            raise ValueError(problem)
+
+    return Parameter(validator=validate)
+
+
+def _outside(value: float | None, low: float, high: float) -> str:
+    if value is None or low <= value <= high:
+        return ""
+    given, lowest, highest = (f"{n:g}" if isinstance(n, float) else n for n in (value, low, high))
+    return f"{given}: must be from {lowest} to {highest}"
 
 
 NamedPilot = Annotated[

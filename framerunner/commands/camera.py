@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from framerunner.commands import ShowLayout, WholeNumber, check_range, say
+from framerunner.commands import ShowLayout, WholeNumber, say, within
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
@@ -32,9 +32,9 @@ class BoardOptions:
         marker: edge of a marker, mm
     """
 
-    columns: WholeNumber = 8
-    rows: WholeNumber = 5
-    square: float = 30.0
+    columns: Annotated[WholeNumber, within(4, 20)] = 8
+    rows: Annotated[WholeNumber, within(3, 20)] = 5
+    square: Annotated[float, within(5.0, 500.0)] = 30.0
     marker: float = 22.0
 
 
@@ -49,7 +49,7 @@ def camera(
     no_base: bool = False,
     level: bool = False,
     bind: str = "127.0.0.1",
-    port: WholeNumber = 8100,
+    port: Annotated[WholeNumber, within(1, 65535)] = 8100,
     show_layout: ShowLayout = False,
 ) -> int:
     """Render what a camera on a drone would see of the arena, from the pose that the drone reports.
@@ -76,8 +76,6 @@ def camera(
         port: TCP port of the video
         show_layout: tell every app the layout.
     """
-    check_range("--port", port, 1, 65535)
-
     from framerunner.virtual_camera.camera import VirtualCamera
     from framerunner.virtual_camera.server import COMPONENT_ID, SYSTEM_ID, CameraServer
     from framerunner.wire.transports.vehicle_link import VehicleLink
@@ -122,7 +120,7 @@ def calibrate(
     /,
     *,
     out: Path = Path("camera.yaml"),
-    views: WholeNumber = 20,
+    views: Annotated[WholeNumber, within(8, 60)] = 20,
     printed: BoardOptions = _USUAL_BOARD,
 ) -> int:
     """Find focal length, optical axis and lens distortion from images of the board.
@@ -146,8 +144,6 @@ def calibrate(
         views: how many different views to take from a camera, 8 to 60
         printed: the board.
     """
-    check_range("--views", views, 8, 60)
-
     from framerunner.camera_calibration.calibrate import calibrate as run
 
     run(_board(printed), sources, views, out, say)
@@ -159,9 +155,9 @@ def latency(
     source: str,
     /,
     *,
-    seconds: WholeNumber = 20,
+    seconds: Annotated[WholeNumber, within(8, 300)] = 20,
     led: Path | None = None,
-    display_delay: float = 0.03,
+    display_delay: Annotated[float, within(0.0, 0.2)] = 0.03,
 ) -> int:
     """Measure how long the camera's images take from exposure to arrival.
 
@@ -181,9 +177,6 @@ def latency(
         led: file that switches an LED instead: /sys/class/leds/NAME/brightness; 1 is lit, 0 dark
         display_delay: of terminal and screen, s; it is subtracted. An LED has none
     """
-    check_range("--seconds", seconds, 8, 300)
-    check_range("--display-delay", display_delay, 0.0, 0.2)
-
     from framerunner.camera_calibration.latency import film, led_light, terminal_light
 
     light = terminal_light() if led is None else led_light(led)
@@ -242,7 +235,7 @@ def extrinsics(
     camera: str | None = None,
     calibration: Path = Path("camera.yaml"),
     position: str | None = None,
-    seconds: WholeNumber = 180,
+    seconds: Annotated[WholeNumber, within(20, 1800)] = 180,
 ) -> int:
     """Measure how the camera is mounted on the drone: roll, pitch, yaw, place, and the delay of its images.
 
@@ -266,8 +259,6 @@ def extrinsics(
             default that of the file, else 0.08 m forward
         seconds: s for which a live drone is watched, 20 to 1800
     """
-    check_range("--seconds", seconds, 20, 1800)
-
     from framerunner.camera_calibration.mounting_report import finish, measure_recorded, place_of
     from framerunner.commands.options.named_numbers import place_of_lens
 
@@ -296,9 +287,6 @@ def _board(options: BoardOptions) -> CharucoBoard:
     columns, rows, square, marker = astuple(options)
     from vision.calibration.board import CharucoBoard
 
-    check_range("--columns", columns, 4, 20)
-    check_range("--rows", rows, 3, 20)
-    check_range("--square", square, 5.0, 500.0)
     if not 0.4 * square <= marker <= 0.9 * square:
         raise SettingError(
             f"--marker {marker:g}: must be from {0.4 * square:g} to {0.9 * square:g}, 0.4 to 0.9 of --square"

@@ -6,9 +6,9 @@ import asyncio
 import time
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from framerunner.commands import check_range
+from framerunner.commands import within
 
 if TYPE_CHECKING:
     from vision.calibration.model import Calibration
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def doctor(
     *,
     drone: str = "udpin://0.0.0.0:14540",
-    seconds: float = 6.0,
+    seconds: Annotated[float, within(2.0, 600.0)] = 6.0,
     camera: str | None = None,
     calibration: Path | None = None,
 ) -> int:
@@ -47,8 +47,6 @@ def doctor(
         camera: URL or device of its camera, as for `fly --camera`: it is watched, too
         calibration: calibration of its camera, a file of `framerunner camera calibrate`
     """
-    check_range("--seconds", seconds, 2.0, 600.0)
-
     from framerunner.camera_calibration.calibration_file import load_calibration
     from vision.sources import open_source
 

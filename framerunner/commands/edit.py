@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import socket
 import webbrowser
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +11,7 @@ from urllib.parse import quote
 
 from cyclopts import Parameter
 
-from framerunner.commands import NamedPilot, check_range, say
+from framerunner.commands import NamedPilot, say
 from framerunner.commands.monitor import PagesPort
 from framerunner.errors import SettingError
 
@@ -50,7 +49,6 @@ def edit(
         port: TCP port of the pages.
         browser: open the page in the browser
     """
-    check_range("--port", port, 0, 65535)
     from framerunner.commands.monitor import equipment, prepare_server
     from framerunner.editing.documents.session import EditorSession
     from framerunner.monitor.run import serve
@@ -97,25 +95,24 @@ def _drone_url(given: str | None) -> str:
     """Where drones are heard: as given, or at the port to which they send, or at a free one if that is taken.
 
     Raises:
-        LinkError: the URL is none.
-        SettingError: its port is taken.
+        LinkError: the URL is none, or its port is taken.
     """
     from framerunner.child_process import free_port
-    from framerunner.editing.live import GROUND_PORT, is_free
-    from framerunner.wire.transports.urls import parse_url
+    from framerunner.editing.live import GROUND_PORT
+    from framerunner.wire.transports.sockets import check_free
+    from framerunner.wire.transports.urls import LinkError, parse_url
 
-    if given is None:
-        if is_free(GROUND_PORT, socket.SOCK_DGRAM):
-            return f"udpin://127.0.0.1:{GROUND_PORT}"
+    if given is not None:
+        check_free(parse_url(given), "choose another --drone, or leave it out")
+        return given
+    usual = f"udpin://127.0.0.1:{GROUND_PORT}"
+    try:
+        check_free(parse_url(usual), "")
+    except LinkError:
         port = free_port()
         say(
             f"UDP port {GROUND_PORT} is taken, by a monitor for example, which shows other drones; those "
             f"that are started in the editor are shown here, by port {port}"
         )
         return f"udpin://127.0.0.1:{port}"
-    url = parse_url(given)
-    if url.scheme == "udpin" and not is_free(url.number, socket.SOCK_DGRAM):
-        raise SettingError(
-            f"--drone {given}: port {url.number} is taken; choose another, or leave --drone out"
-        )
-    return given
+    return usual

@@ -17,6 +17,7 @@ from framerunner.commands import (
     check_range,
     say,
     with_sensors,
+    within,
 )
 from framerunner.commands.options.flight import (
     GENUINE,
@@ -81,6 +82,7 @@ class FlightOptions:
     response: Response = None
     speed: Annotated[
         float | None,
+        within(0.01, _MAX_GENUINE_SPEED),
         Parameter(
             help="with --px4 or --ardupilot: simulated seconds a second, if the machine can, 0.01 to "
             f"{_MAX_GENUINE_SPEED:g}; {_GENUINE_SPEED:g} if not given"
@@ -239,7 +241,6 @@ def _genuine_use(
     from framerunner.evaluation.runner import GenuineUse
     from framerunner.instances import INSTANCES
 
-    check_range("--speed", speed, 0.01, _MAX_GENUINE_SPEED)
     check_range("--jobs", jobs, 1, INSTANCES)
     program_of(autopilot)
     return GenuineUse(autopilot, _GENUINE_SPEED if speed is None else speed)

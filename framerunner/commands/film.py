@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Annotated
 
-from framerunner.commands import check_range
+from framerunner.commands import check_range, within
 from framerunner.errors import SettingError
 
 
@@ -13,8 +14,8 @@ def film(
     flight: Path,
     *,
     out: Path | None = None,
-    speed: float | None = None,
-    seconds: float | None = None,
+    speed: Annotated[float | None, within(0.1, 200.0)] = None,
+    seconds: Annotated[float | None, within(3.0, 600.0)] = None,
     size: str | None = None,
     fps: float | None = None,
     force: bool = False,
@@ -53,8 +54,6 @@ def film(
         raise SettingError(f"--out {target}: its folder does not exist; make it first")
     if speed is not None and seconds is not None:
         raise SettingError("--seconds: chooses the speed itself; leave out --speed or --seconds")
-    check_range("--speed", speed, 0.1, 200.0)
-    check_range("--seconds", seconds, 3.0, 600.0)
     check_range("--fps", fps, 1.0, 25.0 if suffix == ".gif" else 60.0)
     size_px = _size(size or ("640x360" if suffix == ".gif" else "960x540"))
 

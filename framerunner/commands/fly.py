@@ -17,11 +17,11 @@ from framerunner.commands import (
     NamedPilot,
     Sensors,
     WholeNumber,
-    check_range,
     for_genuine,
     say,
     with_faults,
     with_sensors,
+    within,
 )
 from framerunner.commands.options.flight import (
     DRONE_GROUP,
@@ -99,10 +99,10 @@ class SimulationOptions:
         response: a vehicle that answers late.
     """
 
-    speed: float = 1.0
-    instance: WholeNumber | None = None
+    speed: Annotated[float, within(0.01, 100)] = 1.0
+    instance: Annotated[WholeNumber | None, within(0, 9)] = None
     lockstep: bool = False
-    seed: WholeNumber | None = None
+    seed: Annotated[WholeNumber | None, within(0, 2**63 - 1)] = None
     sensors: Sensors = None
     fault: Faults = ()
     response: Response = None
@@ -191,10 +191,6 @@ def fly(
     if simulated.instance == 0:  # as without the option
         del given["instance"]
     check_rules(_RULES, given)
-    check_range("--camera-delay", flown.camera_delay, 0.0, 0.5)
-    check_range("--speed", simulated.speed, 0.01, 100)
-    check_range("--instance", simulated.instance, 0, 9)
-    check_range("--seed", simulated.seed, 0, 2**63 - 1)
     api, autopilot, drone = _simulator_api(flown.simulator), genuine.autopilot, flown.drone
     if autopilot is not None:
         program_of(autopilot)

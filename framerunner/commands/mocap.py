@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from framerunner.commands import check_range
+from framerunner.commands import check_range, within
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
@@ -29,11 +29,11 @@ class Sending:
         origin: LATITUDE,LONGITUDE,ALTITUDE of the room, degrees and metres: set in a drone that has none
     """
 
-    rate: float = 50.0
-    delay: float = 0.0
-    position_sigma: float = 0.005
-    attitude_sigma: float = 0.01
-    velocity_sigma: float = 0.05
+    rate: Annotated[float, within(1.0, 250.0)] = 50.0
+    delay: Annotated[float, within(0.0, 500.0)] = 0.0
+    position_sigma: Annotated[float, within(0.0, 10.0)] = 0.005
+    attitude_sigma: Annotated[float, within(0.0, 3.0)] = 0.01
+    velocity_sigma: Annotated[float, within(0.0, 10.0)] = 0.05
     origin: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
 
 
@@ -42,10 +42,10 @@ def mocap(
     *,
     drone: str = "udpin://0.0.0.0:14540",
     frame: Literal["flu", "ned", "enu", "yup"] = "flu",
-    forward: float = 0.0,
+    forward: Annotated[float, within(-360.0, 360.0)] = 0.0,
     body: str | None = None,
     sending: Sending | None = None,
-    seconds: float | None = None,
+    seconds: Annotated[float | None, within(1.0, 1e6)] = None,
 ) -> int:
     """Send a motion capture's poses to a drone with PX4 or ArduPilot, and check that it uses them.
 
@@ -82,18 +82,10 @@ def mocap(
         sending: how poses are sent.
         seconds: stop after this many seconds; if not given at Ctrl-C
     """
-    check_range("--forward", forward, -360.0, 360.0)
-    check_range("--seconds", seconds, 1.0, 1e6)
     return _send(source, drone, (frame, body), _settings(sending or Sending(), forward), seconds)
 
 
 def _settings(sending: Sending, forward: float) -> SendSettings:
-    check_range("--rate", sending.rate, 1.0, 250.0)
-    check_range("--delay", sending.delay, 0.0, 500.0)
-    check_range("--position-sigma", sending.position_sigma, 0.0, 10.0)
-    check_range("--attitude-sigma", sending.attitude_sigma, 0.0, 3.0)
-    check_range("--velocity-sigma", sending.velocity_sigma, 0.0, 10.0)
-
     from framerunner.mocap.facts import SendSettings
 
     return SendSettings(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from framerunner.commands import NamedPilot, WholeNumber, check_range, say
+from framerunner.commands import NamedPilot, WholeNumber, say, within
 from framerunner.commands.options.flight import Lifeline
 from framerunner.errors import SettingError
 
@@ -38,7 +38,9 @@ SYSTEM_ID = 250
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 
 
-PagesPort = Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")]
+PagesPort = Annotated[
+    WholeNumber, within(0, 65535), Parameter(help="TCP port of the pages; 0 lets the system choose")
+]
 
 
 def monitor(
@@ -91,7 +93,6 @@ def monitor(
         key: PEM file of the certificate's private key, if that is not in the same file
         lifeline: stop when standard input ends.
     """
-    check_range("--port", port, 0, 65535)
     from framerunner.child_process import until_standard_input_ends
     from framerunner.monitor.run import serve
     from framerunner.monitor.settings import MonitorSettings

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from framerunner.camera_calibration.camera_delay import delay_of
-from framerunner.commands import DEFAULT_MISSION, check_range
+from framerunner.commands import DEFAULT_MISSION, within
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def preflight(
     *,
     drone: str = "udpin://0.0.0.0:14540",
     camera: str | None = None,
-    camera_delay: float | None = None,
+    camera_delay: Annotated[float | None, within(0.0, 0.5)] = None,
     calibration: Path | None = None,
     mission: str = DEFAULT_MISSION,
     max_speed: float = 2.0,
@@ -67,7 +67,6 @@ def preflight(
         accept: name of a check that may fail; may be repeated
         out: folder for the flight card and for old parameters
     """
-    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     if restore_parameters is not None:
         return _restore(drone, restore_parameters, any_vehicle=any_vehicle)
     if any_vehicle:

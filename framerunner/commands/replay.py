@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from framerunner.commands import WholeNumber, check_range
+from framerunner.commands import WholeNumber, within
 from framerunner.errors import SettingError
 
 
@@ -18,7 +18,7 @@ def replay(
     speed: float = 1.0,
     fast: bool = False,
     video: Annotated[bool | None, Parameter(negative="--no-video")] = None,
-    port: WholeNumber = 8090,
+    port: Annotated[WholeNumber, within(0, 65535)] = 8090,
     pilot: str | None = None,
 ) -> int:
     """Show a flight again: its states in the terminal, its images at http://127.0.0.1:8090/.
@@ -45,7 +45,6 @@ def replay(
     speed = 0.0 if fast else speed
     if speed != 0.0 and not 0.01 <= speed <= 1000:
         raise SettingError(f"--speed {speed:g}: must be from 0.01 to 1000, or 0 for as fast as possible")
-    check_range("--port", port, 0, 65535)
     with_video = speed > 0.0 if video is None else video
 
     from framerunner.flying.display import result_lines

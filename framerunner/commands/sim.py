@@ -21,6 +21,7 @@ from framerunner.commands import (
     say,
     with_faults,
     with_sensors,
+    within,
 )
 from framerunner.commands.genuine import ardupilot_server, px4_server
 from framerunner.commands.options.rules import OptionRule, check_rules, given_in
@@ -176,10 +177,10 @@ class StartedBy:
 def sim(
     *,
     scenario: str = "open-field",
-    speed: float = 1.0,
-    instance: WholeNumber = 0,
+    speed: Annotated[float, within(0.01, 1000)] = 1.0,
+    instance: Annotated[WholeNumber, within(0, _MAX_INSTANCES - 1)] = 0,
     count: WholeNumber = 1,
-    seed: WholeNumber = 0,
+    seed: Annotated[WholeNumber, within(0, 2**63 - 1)] = 0,
     fault: Faults = (),
     connections: SimulatorConnections | None = None,
     onboard: Onboard | None = None,
@@ -222,8 +223,6 @@ def sim(
         monitor: open the Game Monitor as well, on http://127.0.0.1:8080/
         started_by: what the program that started it wants.
     """
-    check_range("--speed", speed, 0.01, 1000)
-    check_range("--instance", instance, 0, _MAX_INSTANCES - 1)
     check_range("--count", count, 1, _MAX_INSTANCES - instance)
     chosen, onboard, flown_by = (
         connections or SimulatorConnections(),
@@ -233,7 +232,6 @@ def sim(
     given = given_in(chosen, onboard, flown_by)
     given |= {name: True for name, is_given in (("count", count != 1), ("monitor", monitor)) if is_given}
     check_rules(_RULES, given)
-    check_range("--seed", seed, 0, 2**63 - 1)
     watched = monitor and flown_by.autopilot == "own"
     watcher = _monitor(scenario, chosen.video_port, count) if watched else None
     if watcher is not None:

@@ -9,20 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
-from typing import Literal, get_args
 
 from pydantic import Field
 
 from framerunner.errors import UserError
 from framerunner.files.text_file import decode_text, read_text
 from framerunner.files.yaml_file import FileKind
+from offboard.chart.mission_texts import Language
 from offboard.mission import MISSIONS
 from scenarios.loader import parse_scenario
 from scenarios.models import Scenario
 from scenarios.part import Part
-
-Language = Literal["en", "es"]
-LANGUAGES: tuple[Language, ...] = get_args(Language)
 
 
 class LessonError(UserError):

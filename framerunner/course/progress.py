@@ -15,8 +15,8 @@ from typing import Literal
 from pydantic import TypeAdapter, ValidationError
 
 from framerunner.errors import SettingError
+from framerunner.files.spreadsheet import csv_text
 from framerunner.files.text_file import append_in_folder, read_in_folder
-from framerunner.monitor.competition.views import csv_text
 
 EventKind = Literal["opened", "flown", "passed", "reset"]
 MAX_LEARNER = 60  # characters of a name

@@ -36,11 +36,12 @@ from framerunner.course.progress import (
 )
 from framerunner.editing.editor_messages import MAX_TEXT, StartBatch
 from framerunner.editing.service import EditingService, EditingSettings
-from framerunner.editing.words import Language, Said, language_of, reason, say
+from framerunner.editing.words import Said, language_of, reason
 from framerunner.errors import UserError
 from framerunner.files.text_file import make_file
 from framerunner.monitor.access import Role, Visitor
 from framerunner.monitor.visitors.pupils import PupilBook, file_key
+from offboard.chart.mission_texts import Language
 
 _NOT_STORED = {"Cache-Control": "no-store"}
 
@@ -84,9 +85,9 @@ class CourseRouter:
         def demand(request: Request, learner: str | None = None) -> Visitor:
             visitor = who(request)
             if not visitor.may_learn:
-                raise HTTPException(403, say(Said("access.course"), language_of(request)))
+                raise HTTPException(403, Said("access.course").text(language_of(request)))
             if visitor.role is Role.PUPIL and learner not in (None, visitor.name):
-                raise HTTPException(403, say(Said("access.learner", name=visitor.name), language_of(request)))
+                raise HTTPException(403, Said("access.learner", name=visitor.name).text(language_of(request)))
             return visitor
 
         @router.get("/api/course")
@@ -110,7 +111,7 @@ class CourseRouter:
             except UserError as error:
                 raise HTTPException(400, reason(error, language)) from None
             if name in self._checked:
-                raise HTTPException(409, say(Said("lesson.one_check", name=name), language))
+                raise HTTPException(409, Said("lesson.one_check", name=name).text(language))
             lines = self._check(name, found, text, language)
             return StreamingResponse(lines, media_type="application/x-ndjson", headers=_NOT_STORED)
 
@@ -122,7 +123,7 @@ class CourseRouter:
 
         def teacher(request: Request) -> None:
             if not demand(request).may_teach:
-                raise HTTPException(403, say(Said("access.teach"), language_of(request)))
+                raise HTTPException(403, Said("access.teach").text(language_of(request)))
 
         async def table() -> dict[str, dict[str, LessonProgress]]:
             try:
@@ -195,7 +196,7 @@ class CourseRouter:
     async def _check(self, learner: str, lesson: Lesson, text: str, language: Language) -> AsyncIterator[str]:
         """Lines that tell the place in the line, and at last the verdict."""
         if learner in self._checked:  # since the request was taken
-            yield _line({"passed": False, "reason": say(Said("lesson.one_check", name=learner), language)})
+            yield _line({"passed": False, "reason": Said("lesson.one_check", name=learner).text(language)})
             return
         self._checked.add(learner)
         watcher = _Result(language)
@@ -236,7 +237,7 @@ class _Result:
         elif message["kind"] == "refused":
             self._told.put_nowait({"reason": message["text"]})
         elif message["kind"] == "batch_ended":
-            words = message["text"] or say(Said("lesson.no_result"), self.language)
+            words = message["text"] or Said("lesson.no_result").text(self.language)
             self._told.put_nowait({"reason": words})
 
 

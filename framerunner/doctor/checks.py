@@ -46,16 +46,6 @@ _SLOW_ESTIMATOR = (
     ("EKF2_TAU_POS", 0.15, "s"),
     ("EKF2_TAU_VEL", 0.15, "s"),
 )
-_MEASURING = (
-    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
-    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
-    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
-    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
-    | mavlink.MAV_SYS_STATUS_SENSOR_GPS
-    | mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW
-    | mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION
-    | mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION
-)
 _ATTITUDES = ("ATTITUDE", "ATTITUDE_QUATERNION")
 _MULTICOPTERS = (
     mavlink.MAV_TYPE_QUADROTOR,
@@ -64,7 +54,7 @@ _MULTICOPTERS = (
     mavlink.MAV_TYPE_TRICOPTER,
     mavlink.MAV_TYPE_COAXIAL,
 )
-_SENSORS = {
+_MEASURING = {
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO: "gyroscope",
     mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL: "accelerometer",
     mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG: "compass",
@@ -73,6 +63,8 @@ _SENSORS = {
     mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW: "optical flow",
     mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION: "vision position",
     mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION: "range finder",
+}
+_SENSORS = _MEASURING | {
     mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS: "motor outputs",
     mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER: "radio control",
     mavlink.MAV_SYS_STATUS_GEOFENCE: "geofence",
@@ -145,7 +137,7 @@ def _health(record: Record) -> Checks:
         return
     unhealthy = status.onboard_control_sensors_enabled & status.onboard_control_sensors_present
     unhealthy &= ~status.onboard_control_sensors_health
-    unhealthy_names = ", ".join(name for bit, name in _SENSORS.items() if unhealthy & bit)
+    unhealthy_names = _names(unhealthy)
     ready = status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK
     mode = record.mode_name.lower()
     if not ready and not record.armed and record.arming.ready_for_offboard:
@@ -174,7 +166,7 @@ def _sensors(record: Record) -> Checks:
     status = record.latest.get("SYS_STATUS")
     if status is None:
         return
-    present = status.onboard_control_sensors_present & _MEASURING
+    present = status.onboard_control_sensors_present & sum(_MEASURING)
     used = present & status.onboard_control_sensors_enabled & status.onboard_control_sensors_health
     failing = present & ~status.onboard_control_sensors_health
     idle = present & ~used & ~failing

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, StringConstraints, TypeAdapter
 
-from framerunner.editing.words import Language
 from framerunner.runs.track import StateSpan
 from framerunner.wire.mission_report import GuardNow, Plain, ValueNow
 from offboard.authoring import StrictModel
+from offboard.chart.mission_texts import Language
 
 MAX_TEXT = 100_000
 """Characters of a mission."""

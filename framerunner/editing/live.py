@@ -7,9 +7,8 @@ program does, however that ends. Its files are in the folder of runs, so it can 
 from __future__ import annotations
 
 import asyncio
-import json
-import socket
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,15 +19,13 @@ from framerunner.child_process import ChildProcess
 from framerunner.editing import editor_messages
 from framerunner.editing.places import find_scenario
 from framerunner.editing.words import Said, reason
-from framerunner.errors import UserError
+from framerunner.errors import SettingError, UserError
+from framerunner.runs.run_files import RunFiles
 from framerunner.wire.transports.urls import parse_url
 from scenarios.loader import dump_yaml
+from scenarios.result import ResultError
 
-INSTANCES = 10
 GROUND_PORT = 14550  # to which simulators always send
-_UDP_PORTS = (14540, 14580, 18570)  # of instance 0: the app's, and the simulator's two
-_VIDEO_PORT = 8100
-_HERE = "127.0.0.1"
 _MAX_REASON = 500
 
 
@@ -62,7 +59,6 @@ class LiveFlight:
         self._settings = settings
         self._tell = tell
         self._flying: asyncio.Task[None] | None = None
-        self._last_line = ""
         self.latest: editor_messages.Live | None = None
 
     async def start(self, request: editor_messages.StartLive) -> Said | None:
@@ -72,12 +68,15 @@ class LiveFlight:
         url = parse_url(self._settings.drone_url)
         if url.scheme != "udpin":
             return Said("live.no_link", url=url.text)
-        instance = await asyncio.to_thread(free_instance)
-        if instance is None:
+        claim = ExitStack()
+        try:
+            instance = await asyncio.to_thread(_claimed, claim)
+        except SettingError:
             return Said("live.no_ports")
-        link = () if url.number == GROUND_PORT else (f"udpout://{_HERE}:{url.number}",)
+        link = () if url.number == GROUND_PORT else (f"udpout://127.0.0.1:{url.number}",)
         self._show(request, "starting")
         self._flying = asyncio.create_task(self._fly(request, instance, link))
+        self._flying.add_done_callback(lambda _flown: claim.close())
         return None
 
     def stop(self) -> bool:
@@ -148,11 +147,10 @@ class LiveFlight:
     def _verdict_of_new_run(self, before: set[str]) -> str:
         """The verdict's reason of the run that is new; "" if there is none."""
         for name in sorted(self._runs() - before, reverse=True):
-            try:
-                result = json.loads((self._settings.runs / name / "result.json").read_bytes())
-                return str(result["reason"])
-            except (OSError, ValueError, KeyError, TypeError):
-                continue
+            with suppress(OSError, ResultError):
+                result = RunFiles(self._settings.runs / name).load_result()
+                if result is not None:
+                    return result.reason
         return ""
 
     def _show(
@@ -163,24 +161,8 @@ class LiveFlight:
         self._tell(shown)
 
 
-def free_instance() -> int | None:
-    """The first instance of the simulated drone whose ports nothing uses; None if there is none."""
-    for instance in range(INSTANCES):
-        udp = (port + instance for port in _UDP_PORTS)
-        if all(is_free(port, socket.SOCK_DGRAM) for port in udp) and is_free(
-            _VIDEO_PORT + instance, socket.SOCK_STREAM
-        ):
-            return instance
-    return None
+def _claimed(claim: ExitStack) -> int:
+    """An instance of the simulated drone, until the claim is closed; SettingError: there is none."""
+    from framerunner.instances import claimed_instance
 
-
-def is_free(port: int, kind: socket.SocketKind) -> bool:
-    """Whether a port of this machine can be listened on now; 0 stands for any free one."""
-    with socket.socket(socket.AF_INET, kind) as probe:
-        if kind == socket.SOCK_STREAM:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((_HERE, port))
-        except OSError:
-            return False
-        return True
+    return claim.enter_context(claimed_instance())

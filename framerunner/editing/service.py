@@ -19,8 +19,9 @@ from framerunner.editing import editor_messages
 from framerunner.editing.live import LiveFlight, LiveSettings
 from framerunner.editing.session_runs import forget_old
 from framerunner.editing.waiting_queue import WaitingQueue
-from framerunner.editing.words import Language, Said, say
+from framerunner.editing.words import Said
 from framerunner.editing.workers import FlightProcess, WorkerPool
+from offboard.chart.mission_texts import Language
 
 _MAX_OWN_RUNS = 4  # flights under control of one page
 _MAX_WAITING = 300
@@ -378,7 +379,7 @@ class EditingService:
         why = Said("flight.cancelled") if job.cancelled else how or Said("flight.no_result")
         if not job.is_batch and not job.cancelled:
             why = Said("flight.ended_process", how=why)
-        text = say(why, job.language)
+        text = why.text(job.language)
         if not job.is_batch:
             ended = editor_messages.Ended(
                 run=job.name, text=text, lost_in="", result=None, counts={}, spans=()
@@ -414,7 +415,7 @@ class EditingService:
 
 
 def _refuse(watcher: Watcher, tag: int, why: Said, *, run: str = "") -> None:
-    _put(watcher, editor_messages.Refused(tag=tag, text=say(why, watcher.language), run=run))
+    _put(watcher, editor_messages.Refused(tag=tag, text=why.text(watcher.language), run=run))
 
 
 def _put(watcher: Watcher, message: BaseModel) -> None:

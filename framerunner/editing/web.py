@@ -60,9 +60,10 @@ from starlette.websockets import WebSocket
 from framerunner.course.lessons import load_lessons
 from framerunner.editing import editor_messages
 from framerunner.editing.service import EditingService, EditingSettings
-from framerunner.editing.words import Language, Said, language_of, say
+from framerunner.editing.words import Said, language_of
 from framerunner.monitor.access import Visitor
 from framerunner.monitor.channel import Channel, ChannelTerms, PageMessageError, refuse
+from offboard.chart.mission_texts import Language
 from scenarios.loader import list_scenarios
 from scenarios.random_scenarios import LEVEL_FILES
 
@@ -101,7 +102,7 @@ class EditingRouter:
         async def editing(websocket: WebSocket) -> None:
             language = language_of(websocket)
             if not who(websocket).may_learn:
-                await refuse(websocket, say(Said("access.fly"), language))
+                await refuse(websocket, Said("access.fly").text(language))
                 return
             await websocket.accept()
             page = EditorPage(websocket, language)
@@ -112,7 +113,7 @@ class EditingRouter:
                 if not (visitor.may_teach if is_live else visitor.may_learn):
                     # A flight in the simulator is seen on all pages, and is a try of the contest.
                     why = Said("access.live" if is_live and visitor.may_learn else "access.fly")
-                    page.send(editor_messages.Refused(tag=request.tag, text=say(why, language)))
+                    page.send(editor_messages.Refused(tag=request.tag, text=why.text(language)))
                     return
                 await self._service.do(request.model_copy(update={"language": language}), page)
 

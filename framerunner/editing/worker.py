@@ -26,12 +26,13 @@ from framerunner.editing.batch import fly_batch
 from framerunner.editing.places import find_scenario
 from framerunner.editing.run_reporter import RunReporter
 from framerunner.editing.session_runs import KeptFlight
-from framerunner.editing.words import Language, Said, SaidError, reasons, say
+from framerunner.editing.words import Said, SaidError, reasons
 from framerunner.errors import UserError
 from framerunner.evaluation.runner import processor_limit
 from framerunner.flying.lockstep import lockstep_flight
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.run_control import RunControl
+from offboard.chart.mission_texts import Language
 from offboard.mission import Mission, MissionError, mission_from_text
 from offboard.pilot_file import PilotSource, find_pilot
 
@@ -105,7 +106,7 @@ def refusal(tag: int, error: UserError, language: Language, run: str = "") -> ed
     lines = reasons(error, language)
     text = lines[0]
     if len(lines) > 1:
-        text = say(Said("flight.more", first=text, count=len(lines) - 1), language)
+        text = Said("flight.more", first=text, count=len(lines) - 1).text(language)
     return editor_messages.Refused(
         tag=tag, text=text, lines=lines if isinstance(error, MissionError) else (), run=run
     )

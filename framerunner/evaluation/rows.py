@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Iterable, Mapping
-from io import StringIO
 
 from pydantic import Field
 
+from framerunner.files import spreadsheet
 from framerunner.runs.track import Track
-from scenarios.result import FlightResult, spreadsheet_cell
+from scenarios.result import FlightResult
 from scenarios.verdict import Verdict
 
 _REAL_TIME_ONLY = ("lift_m", "timing", "wall_time_s", "real_time_factor", "started")
@@ -55,24 +54,12 @@ def csv_text(rows: Iterable[EvaluationRow]) -> str:
 
     Lists are joined by ";", times in states are written "turning=2.5;crossing=4", unknown values are empty.
     """
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for row in rows:
-        writer.writerow([_cell(row, name) for name in COLUMNS])
-    return text.getvalue()
+    return spreadsheet.csv_text(
+        COLUMNS, ([_value(row, name) for name in COLUMNS] for row in rows), line_end="\n"
+    )
 
 
-def _cell(row: EvaluationRow, name: str) -> str:
-    if row.verdict is Verdict.ERROR and name not in _COLUMNS_OF_ERRORS:
-        return ""  # it did not end, so its numbers are no results
-    value = getattr(row, name)
-    if isinstance(value, Mapping):
-        return ";".join(f"{spreadsheet_cell(key)}={number}" for key, number in value.items())
-    if isinstance(value, tuple):
-        return ";".join(spreadsheet_cell(part) if isinstance(part, str) else str(part) for part in value)
-    if isinstance(value, str):
-        return spreadsheet_cell(value)
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return "" if value is None else str(value)
+def _value(row: EvaluationRow, name: str) -> object:
+    """A value of a row; None if a fault of the program ended the flight: its numbers are no results."""
+    is_known = row.verdict is not Verdict.ERROR or name in _COLUMNS_OF_ERRORS
+    return getattr(row, name) if is_known else None

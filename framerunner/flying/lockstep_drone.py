@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncGenerator, Callable, Sequence
 from dataclasses import dataclass
-from math import degrees, pi, radians
+from math import degrees, pi, radians, sqrt
 from struct import Struct
 
 from firmware_py.autopilot import Autopilot
@@ -22,11 +22,19 @@ from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_ve
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
 from framerunner.flying.response import LateResponse
-from framerunner.geometry.axes import ArenaAlignment, Pose
+from framerunner.geometry.axes import ArenaAlignment, Pose, flip_vector
 from framerunner.geometry.rotations import normalized, quaternion_from_euler
 from framerunner.geometry.vectors import Vec3
+from framerunner.vehicle.measurements import ImuSample
 from offboard.arming import Arming
-from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityFluCommand
+from offboard.drone import (
+    DroneError,
+    DroneState,
+    ImuInterval,
+    LimitedCommand,
+    ReportedAccuracy,
+    VelocityFluCommand,
+)
 from offboard.limits import STILL, VelocityLimits
 from offboard.link.gimbal import GimbalAttitude
 from scenarios.models import TrueState
@@ -133,6 +141,8 @@ class LockstepDrone:
         self._command = VelocityFluCommand()
         self._commanding = False
         self._resend_us = _NEVER_US
+        self._imu: list[ImuInterval] = []  # since the last tick
+        self._imu_us = -1
         self._link = FaultyLink(simulation)
 
     async def connect(self) -> None:
@@ -244,11 +254,11 @@ class LockstepDrone:
 
     refuse = hold  # no operator takes this drone, so none gives it back
 
-    def command(self, command: VelocityFluCommand) -> LimitedCommand:
+    def command(self, command: VelocityFluCommand, at: DroneState | None = None) -> LimitedCommand:
         """Set the velocity to fly from now on. Without motors on it is ignored."""
         if not self._commanding:
             return LimitedCommand(STILL)
-        limited = self._limits.limit(command, self._latest)
+        limited = self._limits.limit(command, at or self._latest)
         self._send(limited.command)
         return limited
 
@@ -288,7 +298,7 @@ class LockstepDrone:
     def _advance(self, until_us: int = 0) -> None:
         """Let a control tick pass, and more until a time or until the link sends something by itself."""
         simulation, observers, state = self._simulation, self._observers, self._autopilot.state
-        link = self._link
+        link, estimator = self._link, self._autopilot.estimator
         until_us = min(
             until_us,
             self._resend_us,
@@ -302,6 +312,10 @@ class LockstepDrone:
             truth = simulation.truth
             for observe in observers:
                 observe(truth)
+            imu = estimator.imu
+            if imu is not None and imu.time_us > self._imu_us:
+                self._imu_us = imu.time_us
+                self._imu.append(_received_imu(imu))
             if self._response is not None and self._resend_us != _NEVER_US:
                 airborne = self._autopilot.status.landed_state is not LandedState.ON_GROUND
                 late = self._response.step(state.yaw_rad, state.time_us, airborne=airborne)
@@ -359,6 +373,8 @@ class LockstepDrone:
         camera_attitude = None
         if self._gimbal_attitude is not None:
             camera_attitude = alignment.attitude(self._gimbal_attitude.ned(yaw_rad))
+        imu = tuple(self._imu)
+        self._imu.clear()
         return DroneState(
             state.time_us,
             *pose.position_m,
@@ -371,7 +387,33 @@ class LockstepDrone:
             (state.time_us - self._received.position_us) * 1e-6,
             alignment.attitude(quaternion_from_euler(roll_rad, pitch_rad, yaw_rad)),
             camera_attitude,
+            imu=imu,
+            accuracy=_accuracy(self._autopilot) if self._imu_us >= 0 else None,
         )
+
+
+def _received_imu(sample: ImuSample) -> ImuInterval:
+    """A sample as HIGHRES_IMU carries it, at the rate of the autopilot's ticks."""
+    return ImuInterval(
+        sample.time_us,
+        sample.period_us,
+        flip_vector(single(sample.angular_rate_frd_rad_s)),
+        flip_vector(single(sample.specific_force_frd_m_s2)),
+    )
+
+
+def _accuracy(autopilot: Autopilot) -> ReportedAccuracy:
+    """What ODOMETRY tells of errors and jumps of the estimate."""
+    report = autopilot.estimator.report()
+    position, velocity = report.position_variance_m2, report.velocity_variance_m2_s2
+    return ReportedAccuracy(
+        sqrt(max(position[:2])),
+        sqrt(position[2]),
+        sqrt(max(velocity[:2])),
+        sqrt(velocity[2]),
+        sqrt(report.attitude_variance_rad2[2]),
+        report.resets & 0xFF,
+    )
 
 
 def _request(autopilot: Autopilot, velocity_level_m_s: Vec3, yaw_rate_rad_s: float) -> None:

@@ -14,6 +14,7 @@ from framerunner.flying.display import MomentLines, moment_table
 from framerunner.recording.events import Crossed, Recorded, time_of_event
 from framerunner.terminal import say
 from offboard.app import Moment
+from sitl.pacing.pacer import Pacer
 from sitl.video import VideoServer
 
 _REFRESH_S = 0.1
@@ -76,9 +77,14 @@ async def replay(recorded: Recorded, speed: float, video: VideoServer | None) ->
         say(f"video: {video.url}  (stream: {video.url}video)")
     try:
         with ReplayDisplay(recorded.title) as display:
-            pace = _Pace(speed)
+            pacer: Pacer | None = None
             for event in recorded.events():
-                await pace.wait_for(time_of_event(event))
+                wait_s = 0.0
+                if speed > 0.0:
+                    time_us, now_s = time_of_event(event), monotonic()
+                    pacer = pacer or Pacer(speed, now_s, time_us)
+                    wait_s = pacer.wait_s(now_s, time_us)
+                await asyncio.sleep(wait_s if wait_s > _AHEAD_S else 0.0)  # always, so that Ctrl-C is handled
                 if isinstance(event, Moment):
                     display.see(event)
                 elif isinstance(event, Crossed):
@@ -88,21 +94,3 @@ async def replay(recorded: Recorded, speed: float, video: VideoServer | None) ->
     finally:
         if video is not None:
             await video.close()
-
-
-class _Pace:
-    """Keeps the ratio of vehicle time to wall time."""
-
-    def __init__(self, speed: float) -> None:
-        self._speed = speed
-        self._first: tuple[int, float] | None = None
-
-    async def wait_for(self, time_us: int) -> None:
-        """Wait until a vehicle time is due; always yields, so that Ctrl-C is handled."""
-        if self._first is None:
-            self._first = (time_us, monotonic())
-        ahead_s = 0.0
-        if self._speed > 0.0:
-            first_us, started_s = self._first
-            ahead_s = (time_us - first_us) / 1e6 / self._speed - (monotonic() - started_s)
-        await asyncio.sleep(ahead_s if ahead_s > _AHEAD_S else 0.0)

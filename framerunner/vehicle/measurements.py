@@ -32,6 +32,12 @@ class ImuSample:
     angular_rate_frd_rad_s: Vec3
     specific_force_frd_m_s2: Vec3
 
+    def less(self, gyro_bias_frd_rad_s: Vec3, accel_bias_frd_m_s2: Vec3) -> ImuSample:
+        """The sample without biases."""
+        (p, q, r), (x, y, z) = self.angular_rate_frd_rad_s, self.specific_force_frd_m_s2
+        (bp, bq, br), (bx, by, bz) = gyro_bias_frd_rad_s, accel_bias_frd_m_s2
+        return ImuSample(self.time_us, self.period_us, (p - bp, q - bq, r - br), (x - bx, y - by, z - bz))
+
 
 @dataclass(frozen=True, slots=True)
 class MagnetometerSample:

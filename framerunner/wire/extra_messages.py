@@ -9,22 +9,10 @@ import struct
 from pathlib import Path
 from typing import Any
 
+from pymavlink.generator.mavgen_python import mavfmt
 from pymavlink.generator.mavparse import MAVXML, PROTOCOL_2_0
 
 _DEFINITIONS = Path(__file__).with_name("extra_messages.xml")
-_FORMATS = {
-    "char": "c",
-    "int8_t": "b",
-    "uint8_t": "B",
-    "int16_t": "h",
-    "uint16_t": "H",
-    "int32_t": "i",
-    "uint32_t": "I",
-    "int64_t": "q",
-    "uint64_t": "Q",
-    "float": "f",
-    "double": "d",
-}
 
 
 def add_to(dialect: Any) -> None:  # noqa: ANN401 - a module that was made by pymavlink
@@ -87,16 +75,10 @@ def _message_class(definition: Any, dialect: Any) -> Any:  # noqa: ANN401
         "lengths": [1 if field.type == "char" else max(1, field.array_length) for field in ordered],
         "array_lengths": [field.array_length for field in ordered],
         "crc_extra": definition.crc_extra,
-        "unpacker": struct.Struct("<" + "".join(_format(field) for field in ordered)),
+        "unpacker": struct.Struct("<" + "".join(map(mavfmt, ordered))),
         "instance_field": None if instance is None else instance.name,
         "instance_offset": -1 if instance is None else instance.wire_offset,
     }
     for name, value in attributes.items():
         setattr(kind, name, value)
     return kind
-
-
-def _format(field: Any) -> str:  # noqa: ANN401
-    """Of a field with all its elements, as `struct` takes it."""
-    count = str(field.array_length) if field.array_length else ""
-    return count + ("s" if field.type == "char" else _FORMATS[field.type])

@@ -44,12 +44,12 @@ an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a pat
 `undo()`, `redo()` and a `layout` that follows; `place(places)` moves states and is undone likewise. A
 `TextChange` is {start, removed, inserted}; the changes of one edit follow each other, each made for the text
 after those before it. What cannot be applied raises `EditError` with one line, and nothing is changed; its
-`message.text(EDIT_SPANISH)` says it in Spanish.
+`message.text("es")` says it in Spanish.
 
 **Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
 advice), code, message, file, line, column, start, end, state, event, index, section, nodes.
-`problems_of` has them before they are put into words. `check_document(document, texts=SPANISH)` says them in
-Spanish; for several languages, `findings_of(document, reported_problems(document))` checks once.
+`problems_of` has them before they are put into words. `check_document(document, language="es")` says them
+in Spanish; for several languages, `findings_of(document, reported_problems(document))` checks once.
 
 **Catalogue**: `catalogue_of(document, pilot_class)`: `values` (name, type, text, unit, low,
 high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
@@ -76,7 +76,7 @@ from offboard.authoring.apply import Edited, EditSession, apply
 from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue, catalogue_of
 from offboard.authoring.diagram import Diagram, Edge, Node, diagram
 from offboard.authoring.document import Document
-from offboard.authoring.edit_texts import EDIT_SPANISH, EditError
+from offboard.authoring.edit_texts import EditError
 from offboard.authoring.edits import Edit, ReplaceText, StrictModel, TransitionPath, edit_schema, parse_edit
 from offboard.authoring.findings import (
     Finding,
@@ -101,17 +101,12 @@ from offboard.authoring.scxml_export import export_scxml
 from offboard.authoring.scxml_import import import_scxml
 from offboard.authoring.text import Positions, TextChange
 from offboard.authoring.xml_tree import XmlError
-from offboard.chart.mission_texts import ENGLISH
-from offboard.chart.spanish import SPANISH
 from offboard.mission import mermaid_of
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 __all__ = [
-    "EDIT_SPANISH",
-    "ENGLISH",
-    "SPANISH",
     "Catalogue",
     "Diagram",
     "DiagramLayout",

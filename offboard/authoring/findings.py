@@ -6,13 +6,13 @@ It is the checker of `framerunner mission check`; nothing is checked here.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from offboard.authoring.document import Document
 from offboard.authoring.outline import SECTIONS, Section, Span, StateOutline
 from offboard.authoring.references import instances
-from offboard.chart.mission_texts import ENGLISH, Message
+from offboard.chart.mission_texts import Language, Message
 from offboard.chart.problems import MissionError, MissionProblem, ProblemList, Severity
 from offboard.chart.spec import Event
 from offboard.mission import expand_and_check
@@ -56,23 +56,23 @@ class Finding:
 
 
 def check_document(
-    document: Document, pilot_class: type[Pilot] = Pilot, texts: Mapping[str, str] = ENGLISH
+    document: Document, pilot_class: type[Pilot] = Pilot, language: Language = "en"
 ) -> tuple[Finding, ...]:
     """The findings of a document, in the order of the text: all, or as many as a person reads, errors first.
 
     Args:
         document: any; also one that is no mission.
         pilot_class: whose names the mission uses.
-        texts: in which language; see `offboard.chart.mission_texts`.
+        language: of their words.
     """
-    return findings_of(document, reported_problems(document, pilot_class), texts)
+    return findings_of(document, reported_problems(document, pilot_class), language)
 
 
 def findings_of(
-    document: Document, problems: Iterable[MissionProblem], texts: Mapping[str, str] = ENGLISH
+    document: Document, problems: Iterable[MissionProblem], language: Language = "en"
 ) -> tuple[Finding, ...]:
     """The findings that problems of a document are, in the same order."""
-    return tuple(_finding(document, each, texts) for each in problems)
+    return tuple(_finding(document, each, language) for each in problems)
 
 
 def reported_problems(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[MissionProblem, ...]:
@@ -98,9 +98,11 @@ def _code(message: Message) -> str:
     return reason.code if message.code in _WITH_REASON and isinstance(reason, Message) else message.code
 
 
-def _finding(document: Document, found: MissionProblem, texts: Mapping[str, str]) -> Finding:
+def _finding(document: Document, found: MissionProblem, language: Language) -> Finding:
     place, message = found.place, found.message
-    plain = Finding(found.severity, _code(message), message.text(texts), place.file, place.line, place.column)
+    plain = Finding(
+        found.severity, _code(message), message.text(language), place.file, place.line, place.column
+    )
     if place.file != document.label or not place.line:
         return plain
     positions = document.positions

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Literal
 
 from framerunner.errors import UserError
 from framerunner.files.yaml_text import Place
-from offboard.chart.mission_texts import ENGLISH, Message, as_message
+from offboard.chart.mission_texts import Language, Message, as_message
 
 MAX_REPORTED = 50
 MAX_NOTED = 500
@@ -32,12 +32,12 @@ class MissionProblem:
     severity: Severity = "error"
 
     def __str__(self) -> str:
-        return self.line(ENGLISH)
+        return self.line()
 
-    def line(self, texts: Mapping[str, str]) -> str:
+    def line(self, language: Language = "en") -> str:
         """Place and words, by a table of texts."""
         kind = "" if self.severity == "error" else f"{self.severity}: "
-        line = f"{self.place}: {kind}{self.message.text(texts)}"
+        line = f"{self.place}: {kind}{self.message.text(language)}"
         # A file may hold anything; printed text of it must not move the terminal's cursor.
         return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from framerunner.geometry.axes import ArenaAlignment, Pose
 from offboard.drone import DroneState
 from offboard.link.dialect import Dialect
+from offboard.link.inertial import InertialFeed
 from offboard.link.telemetry import TelemetryFeed, TelemetrySample
 
 
@@ -14,6 +15,8 @@ def reported_state(
     alignment: ArenaAlignment,
     dialect: Dialect,
     missed: tuple[DroneState, ...] = (),
+    *,
+    inertial: InertialFeed | None = None,
 ) -> DroneState:
     """The state at a tick.
 
@@ -23,6 +26,7 @@ def reported_state(
         alignment: from the vehicle's local axes to the arena's.
         dialect: of the vehicle.
         missed: states at the ticks that were skipped before this one, oldest first.
+        inertial: for the IMU's samples since the state before; None: without them.
     """
     pose = alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
     camera_ned = sample.camera_attitude_ned
@@ -40,5 +44,7 @@ def reported_state(
         position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
         attitude_arena=alignment.attitude(sample.attitude_ned),
         camera_attitude_arena=None if camera_ned is None else alignment.attitude(camera_ned),
+        imu=() if inertial is None else inertial.take(sample.time_us),
+        accuracy=None if inertial is None else inertial.accuracy,
         missed=missed,
     )

@@ -168,7 +168,7 @@ class TickSource:
     async def before_arming(
         self,
         plugin: Any,  # noqa: ANN401
-        request_more: Callable[[Any], Awaitable[None]],
+        *request_more: Callable[[Any], Awaitable[None]],
     ) -> None:
         """Request rates and more, from MAVSDK's asyncio plugin.
 
@@ -176,7 +176,8 @@ class TickSource:
         """
         if self.exchange is None:
             await request_rates(self._feed, plugin, stands=self._clock is not None)
-            await request_more(plugin)
+            for request in request_more:
+                await request(plugin)
             return
         end_us = _next_multiple_us(self._number, ARM_US)
         while self._number * TICK_US < end_us and await self.next(TICK_LOST_S):

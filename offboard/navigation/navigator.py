@@ -7,6 +7,7 @@ the velocity to fly. An action keeps its goal and its path as long as it is call
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import dist, hypot
 
 from framerunner.geometry.vectors import Vec3
@@ -50,22 +51,30 @@ class Navigator:
         self._chosen_s = 0.0
         self._crossing: CrossingAttempt | None = None
         self._steps_back = 0
+        self._added_m_s: Vec3 = (0.0, 0.0, 0.0)  # to the command at the last tick
 
     def observe(
         self, state: DroneState, images: Sequence[Detections], sent: VelocityFluCommand | None = None
-    ) -> None:
+    ) -> DroneState:
         """Add the state of this tick and what was seen in the images since the last one.
 
         Args:
             state: of the drone.
             images: what each of them showed.
             sent: the command that it has had since the last tick; None if it had none, or it is not known.
+
+        Returns:
+            The drone's state as it is estimated now.
         """
+        state = self._world.observe(state, images)
+        if sent is not None:
+            sent = _plus(sent, [-v for v in self._added_m_s])
+        self._added_m_s = (0.0, 0.0, 0.0)
         self._flight.learn(state, sent)
         self._state = state
         if self._start_m is None:
             self._start_m = position_now(state)
-        self._world.observe(state, images)
+        return state
 
     def is_known(self, colour: str) -> bool:
         """The gate is on the map."""
@@ -121,6 +130,9 @@ class Navigator:
 
     def explore(self) -> VelocityFluCommand:
         """Fly to the view that shows most of what has not been seen."""
+        return self._compensated(self._explore())
+
+    def _explore(self) -> VelocityFluCommand:
         state, now_s = self._begin("explore")
         if self._goal is None or now_s - self._chosen_s >= EXPLORE_S:
             flight = self._flight
@@ -138,7 +150,7 @@ class Navigator:
         if self._goal is None or self._goal.position_m != goal_m:
             self._goal = Point(goal_m)
             self._flight.change()
-        return self._fly(self._goal)
+        return self._compensated(self._fly(self._goal))
 
     def step_back(self, colour: str) -> VelocityFluCommand:
         """Fly back from a gate, to one of its sides, facing it."""
@@ -151,10 +163,13 @@ class Navigator:
                 side = 1 if self._steps_back % 2 else -1
                 self._goal = self._places.aside(gate, here_m, side, self._world.obstacles())
             self._steps_back += 1
-        return self._fly(self._goal)
+        return self._compensated(self._fly(self._goal))
 
     def cross(self, colour: str) -> VelocityFluCommand:
         """Fly through a gate as the map has it now, and on towards what comes next."""
+        return self._compensated(self._cross(colour))
+
+    def _cross(self, colour: str) -> VelocityFluCommand:
         state, now_s = self._begin(f"cross {colour}")
         crossing = self._crossing
         if crossing is None or crossing.colour != colour or crossing.refusal:
@@ -191,6 +206,14 @@ class Navigator:
         if path is not None and path.crossings:
             crossing.aim(path.crossings[0])
         return command
+
+    def _compensated(self, command: VelocityFluCommand) -> VelocityFluCommand:
+        """What to command to a vehicle that is wrong about its velocity, so that it flies a command."""
+        added = self._world.velocity_error_flu_m_s
+        if not any(added):
+            return command
+        self._added_m_s = added
+        return _plus(command, added)
 
     def _begin(self, action: str) -> tuple[DroneState, float]:
         """Note which action is flown at this tick; a new one, or one after a gap, has no goal yet."""
@@ -235,3 +258,13 @@ class Navigator:
             viewpoint = self._world.next_viewpoint(behind.position_m, behind.yaw_rad or 0.0, from_here=False)
             crossing.after = Point(viewpoint.position_m, viewpoint.yaw_rad)
         return [crossing.after]
+
+
+def _plus(command: VelocityFluCommand, velocity_flu_m_s: Sequence[float]) -> VelocityFluCommand:
+    forward, left, up = velocity_flu_m_s
+    return replace(
+        command,
+        forward_m_s=command.forward_m_s + forward,
+        left_m_s=command.left_m_s + left,
+        up_m_s=command.up_m_s + up,
+    )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import acos, dist, hypot, remainder, tau
 from typing import Generic, TypeVar
 
-from framerunner.geometry.rotations import interpolated, multiply, yaw_of
+from framerunner.geometry.rotations import interpolated, multiply, quaternion_from_yaw, yaw_of
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
@@ -41,6 +41,21 @@ class DronePose:
     attitude_arena: Quaternion
     position_std_m: float = POSITION_STD_M
     attitude_std_rad: float = ATTITUDE_STD_RAD
+
+
+@dataclass(frozen=True, slots=True)
+class PoseCorrection:
+    """Of a reported pose.
+
+    Attributes:
+        position_m: of the drone's centre.
+        turn_rad: to be added to the heading.
+        std_m: of the place in an image, relative to others.
+    """
+
+    position_m: Vec3
+    turn_rad: float
+    std_m: float
 
 
 class PoseChange:
@@ -110,18 +125,35 @@ class PoseHistory:
         if state.camera_attitude_arena is not None:
             self._camera_attitudes.add(state.time_us, state.camera_attitude_arena)
 
-    def at(self, time_us: int) -> DronePose | None:
-        """The pose at a vehicle time; None if the states around it are missing."""
-        position = self._position_at(time_us)
+    def at(self, time_us: int, correction: PoseCorrection | None = None) -> DronePose | None:
+        """The pose at a vehicle time; None if the states around it are missing.
+
+        Args:
+            time_us: vehicle time.
+            correction: of the reported pose; None: it is taken as reported.
+        """
         attitude = self._attitude_at(self._attitudes, time_us)
-        if position is None or attitude is None:
+        if attitude is None:
             return None
-        (place_m, place_std_m), camera, looking = position, self._camera, attitude
+        if correction is None:
+            position = self._position_at(time_us)
+            if position is None:
+                return None
+            return self._pose(time_us, position, attitude, 0.0)
+        return self._pose(time_us, (correction.position_m, correction.std_m), attitude, correction.turn_rad)
+
+    def _pose(
+        self, time_us: int, position: tuple[Vec3, float], attitude: tuple[Quaternion, float], turn_rad: float
+    ) -> DronePose | None:
+        (place_m, place_std_m), camera = position, self._camera
+        if turn_rad:
+            attitude = turned_by(turn_rad, attitude[0]), attitude[1]
+        looking = attitude
         if camera is not None and camera.on_gimbal:
             turned = self._attitude_at(self._camera_attitudes, time_us)
             if turned is None:
                 return None
-            looking = turned
+            looking = turned_by(turn_rad, turned[0]) if turn_rad else turned[0], turned[1]
         elif camera is not None and camera.mounting is not None:
             looking = multiply(attitude[0], camera.mounting), attitude[1]
         if camera is not None and looking is not attitude:
@@ -177,3 +209,8 @@ class PoseHistory:
 def _angle_rad(a: Quaternion, b: Quaternion) -> float:
     """The angle between two attitudes."""
     return 2.0 * acos(min(1.0, abs(sum(p * q for p, q in zip(a, b, strict=True)))))
+
+
+def turned_by(turn_rad: float, attitude: Quaternion) -> Quaternion:
+    """An attitude, turned about the vertical."""
+    return multiply(quaternion_from_yaw(turn_rad), attitude)

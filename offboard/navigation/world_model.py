@@ -16,10 +16,11 @@ from offboard.navigation.gates.gate_map import GateMap
 from offboard.navigation.goals import FlightStyle, Obstacles, PathGate
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
-from offboard.navigation.pose_history import DronePose, PoseHistory
+from offboard.navigation.pose_history import DronePose, PoseCorrection, PoseHistory
 from offboard.navigation.search.likelihood import Glimpses
 from offboard.navigation.seen_space import SeenSpace, ViewedSpace
 from offboard.navigation.view import GateEstimate, Surroundings
+from offboard.place.place import PlaceEstimator
 from scenarios.models import COLOURS
 from vision.types import Detections
 
@@ -39,6 +40,7 @@ class WorldModel:
         camera = self._camera = CameraModel.of(surroundings.camera)
         self._surroundings = surroundings
         self._history = PoseHistory(camera)
+        self._place = PlaceEstimator(camera)
         self._map = GateMap(camera, surroundings.arena)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
         self.seen_space = SeenSpace(camera, surroundings.arena)
@@ -49,14 +51,19 @@ class WorldModel:
         self._start_room_m = DRONE_RADIUS_M + style.bar_margin_m + START_SPARE_M
         self._image_us = -1
         self._waiting: deque[Detections] = deque(maxlen=IMAGES_WAITING)
+        self._known: dict[str, GateEstimate] = {}  # by colour
         self._gates: tuple[PathGate, ...] | None = None  # that a path must keep clear of; None: not made yet
 
-    def observe(self, state: DroneState, images: Sequence[Detections]) -> None:
+    def observe(self, state: DroneState, images: Sequence[Detections]) -> DroneState:
         """Add the state of a tick and what was seen in the images since the last one.
 
         Images that are repeated or have no time are ignored. One that is newer than the state waits for the
         state after it; one from a time of which no states are known is lost.
+
+        Returns:
+            The state now, by all that is known.
         """
+        self._place.add(state)
         if self._start_m is None:
             self._start_m = (state.x, state.y, state.z)
         for earlier in state.missed:
@@ -69,15 +76,44 @@ class WorldModel:
         waiting = self._waiting
         read_us = state.time_us - round(0.5e6 * self._camera.readout_s)  # images are read out by now
         while waiting and (image_us := waiting[0].time_us) is not None and image_us <= read_us:
-            pose = self._history.at(image_us)
+            is_there = self._place.advance(image_us)
+            correction = self._place.correction(image_us)
+            pose = self._history.at(image_us, correction)
             image = waiting.popleft()
             if pose is not None:
-                self._use(image, pose)
+                self._use(image, pose, correction if is_there else None)
+        self._place.advance()
+        if self._place.estimates:
+            self._know()
+        return self._place.state(state)
 
-    def _use(self, image: Detections, pose: DronePose) -> None:
+    def _know(self) -> None:
+        """Note what is known of each gate now, relative to the drone."""
+        best = [estimate for estimate in map(self._map.best, COLOURS) if estimate is not None]
+        known = {estimate.colour: self._place.known(estimate) for estimate in best}
+        if known != self._known:
+            self._known, self._gates = known, None
+
+    @property
+    def velocity_error_flu_m_s(self) -> Vec3:
+        """See `PlaceEstimator.velocity_error_flu_m_s`."""
+        return self._place.velocity_error_flu_m_s
+
+    def _use(self, image: Detections, pose: DronePose, correction: PoseCorrection | None) -> None:
+        """Use an image.
+
+        Args:
+            image: what it showed.
+            pose: of the drone when it was exposed.
+            correction: of that pose, if the image can correct the drone's place.
+        """
         position_m, attitude = pose.position_m, pose.attitude_arena
         self._gates = None
-        self._map.observe(image, pose, self._poses_of_rows(image, pose))
+        poses = self._poses_of_rows(image, pose)
+        self._map.observe(image, pose, poses)
+        if correction is not None:
+            poses = [pose] * len(image.frames) if poses is None else poses
+            self._place.see(image.frames, poses, correction, self._map)
         self._obstacle_map.update(position_m, attitude, image.obstacle_edges)
         self.seen_space.update(position_m, attitude, image.obstacle_edges)
         self._explorer.coverage.update(position_m, attitude, image.obstacle_edges)
@@ -95,18 +131,23 @@ class WorldModel:
         for sighting in image.frames:
             rows = [corner.down_px for corner in sighting.corners if corner is not None]
             after_s = self._camera.read_after_s(sum(rows) / len(rows)) if rows else 0.0
-            at = self._history.at(pose.time_us + round(1e6 * after_s))
+            at_us = pose.time_us + round(1e6 * after_s)
+            at = self._history.at(at_us, self._place.correction(at_us))
             poses.append(pose if at is None else replace(at, time_us=pose.time_us))
         return poses
 
     def gate(self, colour: str) -> GateEstimate | None:
         """The gate of a colour; None if it is not on the map."""
-        return self._map.best(colour)
+        known = self._map.best(colour)
+        return known if known is None else self._known.get(colour, known)
 
     @property
     def gates(self) -> tuple[GateEstimate, ...]:
         """All gates on the map."""
-        return self._map.gates
+        return tuple(
+            self.gate(gate.colour) or gate if gate is self._map.best(gate.colour) else gate
+            for gate in self._map.gates
+        )
 
     def gate_of(self, gate: GateEstimate) -> PathGate:
         """A gate as a path crosses it: in the arena, also while it seems to be outside, seen from afar."""
@@ -125,7 +166,7 @@ class WorldModel:
         """All that a path must keep clear of; of each colour of the task only the gate known best."""
         if self._gates is None:
             seen = [gate for gate in self._map.gates if gate.colour not in COLOURS]
-            seen += [best for best in map(self._map.best, COLOURS) if best is not None]
+            seen += [best for best in map(self.gate, COLOURS) if best is not None]
             self._gates = tuple(map(self.gate_of, seen))
         return Obstacles(self._gates, self._columns_m(), self._surroundings.base)
 
@@ -134,7 +175,7 @@ class WorldModel:
         return self._explorer.next_viewpoint(
             position_m,
             yaw_rad,
-            [gate.position_m for gate in self._map.gates],
+            [gate.position_m for gate in self.gates],
             self._glimpses.lines(),
             self._columns_m(),
             from_here=from_here,

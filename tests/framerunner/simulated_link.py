@@ -334,7 +334,10 @@ class LinkedDrone(MavsdkDrone):
         )
         self._dialect = Px4Dialect(vehicle.offboard, action)
         self._telemetry = SimpleNamespace(
-            set_rate_attitude_euler=_refuse, set_rate_position_velocity_ned=_refuse
+            set_rate_attitude_euler=_refuse,
+            set_rate_imu=_refuse,
+            set_rate_odometry=_refuse,
+            set_rate_position_velocity_ned=_refuse,
         )
         self._feed.subscribe(vehicle.telemetry, vehicle.direct)
 

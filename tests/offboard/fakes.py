@@ -108,8 +108,8 @@ class KinematicDrone:
     async def close(self) -> None:
         self.calls.append("close")
 
-    def command(self, command: VelocityFluCommand) -> LimitedCommand:
-        limited = self.limits.limit(command, self.latest)
+    def command(self, command: VelocityFluCommand, at: DroneState | None = None) -> LimitedCommand:
+        limited = self.limits.limit(command, at or self.latest)
         self.commands.append(limited.command)
         self.command_now = limited.command
         return limited

@@ -114,7 +114,7 @@ async def test_only_missions_without_a_map_wait_until_telemetry_shows_the_motors
         patch.setattr(
             Navigator,
             "observe",
-            lambda nav, state, images, given: (sent.append(given), observe(nav, state, images, given)),
+            lambda nav, state, images, given: (sent.append(given), observe(nav, state, images, given))[1],
         )
         outcome = await fly_mission(drone, Blind(), plan.chart, limit_s=0.2, surroundings=plan.surroundings)
     assert (outcome.ended, outcome.pauses) == ("timed out", 0)

@@ -154,6 +154,7 @@ async def test_silence_has_the_drone_hold_in_time_and_neutral_sticks_go_on_until
             await asyncio.sleep(0.5)
 
 
+@pytest.mark.alone  # a browser that is kept waiting for half a second has the drone hold, as it must
 @pytest.mark.parametrize("flight", [2.0], indirect=True, ids=["twice real time"])
 async def test_keys_and_gamepad_fly_the_drone_to_where_they_point(flight):
     script = """

@@ -18,21 +18,6 @@ from tests.documents import blocks
 
 pytestmark = pytest.mark.realtime
 ROOT = Path(__file__).parents[2]
-MY_PROGRAM = """
-from pymavlink import mavutil
-
-
-def take_off(url):
-    drone = mavutil.mavlink_connection(url.replace("://", ":"))
-    drone.wait_heartbeat()
-    for command, values in (("COMPONENT_ARM_DISARM", [1, 0]), ("NAV_TAKEOFF", [0, 0])):
-        number = getattr(mavutil.mavlink, f"MAV_CMD_{command}")
-        rest = [0, 0, float("nan"), float("nan"), float("nan")]
-        drone.mav.command_long_send(drone.target_system, 1, number, 0, *values, *rest)
-        drone.recv_match(type="COMMAND_ACK", blocking=True, timeout=5)
-    while drone.recv_match(type="LOCAL_POSITION_NED", blocking=True, timeout=20).z > -1.2:
-        pass
-"""
 
 
 def pytest_here(folder, *arguments):
@@ -147,10 +132,9 @@ def test_the_simulator_of_the_document_is_there(capsys):
 
 
 def test_the_test_of_the_document_passes(tmp_path):
-    (tmp_path / "my_program.py").write_text(MY_PROGRAM, encoding="utf-8")
-    shown = blocks("api.md", "python")[2]
-    (tmp_path / "test_shown.py").write_text(f"import my_program\nimport pytest\n\n{shown}", encoding="utf-8")
-    output, code = pytest_here(tmp_path, "test_shown.py", "-p", "no:cacheprovider", "-o", "pythonpath=.")
+    (shown,) = blocks("ci.md", "python")
+    (tmp_path / "test_shown.py").write_text(shown, encoding="utf-8")
+    output, code = pytest_here(tmp_path, "test_shown.py", "-p", "no:cacheprovider")
     assert code == 0, output
 
 

@@ -15,7 +15,6 @@ from scenarios.result import (
     ResultError,
     Timing,
     json_schema,
-    spreadsheet_cell,
 )
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "result.schema.json"
@@ -162,23 +161,3 @@ def test_times_by_colour():
     report = RefereeReport.from_outside(LOCKSTEP)
     assert report.times_s == {"red": 20.5, "green": 40.25, "blue": 60.125}
     assert RefereeReport.from_outside({**LOCKSTEP, "crossing_times_s": [1.0]}).times_s == {}
-
-
-@pytest.mark.parametrize(
-    "before", ["", " ", "\t", "\r", "\n", "\u00a0", "\u3000", "\u200b", "\ufeff", "\u2066"]
-)
-def test_what_a_spreadsheet_takes_for_a_formula_is_marked(before):
-    for sign in "=+-@＝＋－＠﹦﹢﹣﹫":
-        assert spreadsheet_cell(f"{before}{sign}cmd|'/c calc'!A1") == f"'{before}{sign}cmd|'/c calc'!A1"
-
-
-@pytest.mark.parametrize(
-    "text", ["", "calm-17", "a=1", "no frame: 3 - 2", "red.turning", "'=1", "¡hola!", "  "]
-)
-def test_other_texts_are_unchanged(text):
-    assert spreadsheet_cell(text) == text
-
-
-def test_a_cell_that_begins_behind_a_semicolon_or_in_a_new_line_counts():
-    assert spreadsheet_cell("a; =1;b\n+2;-") == "a;' =1;b\n'+2;'-"
-    assert spreadsheet_cell("\tx") == "'\tx"

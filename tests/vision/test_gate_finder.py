@@ -12,8 +12,10 @@ from scenarios.imaging.effects import CameraEffects, Hall, LensDistortion, Patch
 from scenarios.models import Base, Gate, Pole, Scenario
 from scenarios.models import Camera as ScenarioCamera
 from sitl.camera import SimulatedCamera
+from vision.bar_edges import find_edges
 from vision.calibration.model import Calibration, CalibrationError
 from vision.detectors import new_detector
+from vision.patch import ImagePatch
 from vision.types import Detections, GateSighting
 
 GATE = Gate(colour="green", x_m=0, y_m=0, z_m=1.5, yaw_rad=0.4)
@@ -193,3 +195,10 @@ def test_a_gate_before_a_poster_of_its_colour_is_found(up_m):
     image = SimulatedCamera(scenario).render((0.9, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0))
     whole = [sighting for sighting in FIND(image, None).frames if sighting.whole and sighting.poses]
     assert whole[0].poses[0].position_flu_m == pytest.approx((1.1, 0.0, 0.0), abs=0.03)
+
+
+def test_a_bar_that_is_expected_wider_than_the_image_is_looked_for_in_the_image_only():
+    patch = ImagePatch(np.zeros((40, 60), np.uint8), (30.0, 20.0), (160.0, 120.0))
+    a, b, c, d = (-10.0, -5.0), (10.0, -5.0), (10.0, 5.0), (-10.0, 5.0)
+    edges = find_edges(patch, ((a, b), (b, c), (c, d), (d, a)), [(1e9, 1e9)] * 4)
+    assert not edges.outer_ok.any()

@@ -11,7 +11,7 @@ from math import atan2, hypot, isfinite, isnan, nan, radians, remainder, tau
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.gimbal.device import CAPABILITIES, device_flags
 from firmware_py.mavlink.gimbal.model import GIMBAL_COMPONENT_ID, GimbalDevice, GimbalTarget
-from firmware_py.mavlink.service import Service, VehicleCommand
+from firmware_py.mavlink.service import AutopilotService, VehicleCommand
 from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from framerunner.geometry.rotations import euler_from_quaternion, normalized, yaw_of
@@ -35,12 +35,11 @@ _CAN_POINT_AT_PLACES = mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBA
 _MIN_DISTANCE_M = 0.1  # nearer to a region the gimbal stays
 
 
-class GimbalManager(Service):
+class GimbalManager(AutopilotService):
     """Owns the gimbal: who controls it, and where it points."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange, gimbal: GimbalDevice) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._gimbal = gimbal
         self._primary = self._secondary = _NOBODY
         self._region_ned_m: Vec3 | None = None

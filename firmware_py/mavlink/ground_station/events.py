@@ -26,7 +26,7 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     HealthComponent,
     event_of,
 )
-from firmware_py.mavlink.service import Service, VehicleCommand
+from firmware_py.mavlink.service import AutopilotService, VehicleCommand
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import StatusText
 from framerunner.wire.dialect import Message, boot_ms, mavlink
@@ -127,12 +127,11 @@ def _check(reason: str, intended: FlightMode) -> ArmingCheck:
     return ArmingCheck(kind, HealthComponent.SYSTEM, ALL_MODES)
 
 
-class EventService(Service):
+class EventService(AutopilotService):
     """Sends events, on all links."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._sequence = _FIRST_SEQUENCE
         self._sequence_due_us = 0
         self._recent: deque[tuple[int, Message]] = deque(maxlen=_KEPT)

@@ -22,7 +22,7 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     enums,
     navigation_mode_groups,
 )
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.service import AutopilotService
 from firmware_py.parameters import DECLARATIONS, Parameter, Parameters
 from framerunner.wire.dialect import Message, boot_ms, mavlink
 from framerunner.wire.exchange import Exchange
@@ -159,12 +159,11 @@ def _event(kind: EventKind) -> dict[str, object]:
     return described
 
 
-class MetadataService(Service):
+class MetadataService(AutopilotService):
     """Sends the address of the general file, which has the addresses of the others."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self.replies = {
             mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA: self._component_metadata,
             mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION: self._component_information,

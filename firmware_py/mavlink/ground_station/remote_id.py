@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import atan2, degrees, hypot
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.service import AutopilotService
 from firmware_py.status import LandedState, VehicleStatus
 from framerunner.wire.dialect import BROADCAST, Message, degrees_e7, mavlink, whole
 from framerunner.wire.exchange import Exchange
@@ -23,12 +23,11 @@ _HOUR_S = 3600.0
 _EPOCH_2019_S = 1_546_300_800
 
 
-class RemoteIdService(Service):
+class RemoteIdService(AutopilotService):
     """Sends the messages."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self.sources = {
             mavlink.MAVLINK_MSG_ID_OPEN_DRONE_ID_BASIC_ID: self._basic_id,
             mavlink.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION: self._location,

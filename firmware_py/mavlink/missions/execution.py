@@ -7,7 +7,7 @@ from math import isfinite
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.missions.item_messages import mission_current
-from firmware_py.mavlink.service import MissionCommandHandler, Service, VehicleCommand
+from firmware_py.mavlink.service import AutopilotService, MissionCommandHandler, VehicleCommand
 from firmware_py.missions.actions import REGIONS
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.status import CommandResult, FlightMode
@@ -30,7 +30,7 @@ _GIMBALS = frozenset(  # every mission of MAVSDK contains them; without a gimbal
 )
 
 
-class MissionExecution(Service):
+class MissionExecution(AutopilotService):
     """Checks missions when they change, starts them, reports their progress and passes on their commands.
 
     Args:
@@ -45,8 +45,7 @@ class MissionExecution(Service):
         device_commands: Mapping[int, MissionCommandHandler],
         look_at: Callable[[Vec3 | None], None],
     ) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._device_commands = device_commands
         self._look_at = look_at
         self._version = 0  # of the mission

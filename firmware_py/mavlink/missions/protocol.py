@@ -25,7 +25,7 @@ from firmware_py.mavlink.missions.item_messages import (
     mission_count,
     read_item,
 )
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.service import AutopilotService
 from firmware_py.missions.geofence import fence_fault
 from firmware_py.missions.items import MissionItem, PlanType
 from firmware_py.missions.store import StoredPlan
@@ -90,12 +90,11 @@ class _Outcome:
     opaque_id: int  # of the new plan
 
 
-class MissionService(Service):
+class MissionService(AutopilotService):
     """Missions, fences and rally points over MAVLink; one upload at a time on all links together."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange, execution: MissionExecution) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._execution = execution
         self._store = autopilot.missions
         self._upload: _Upload | None = None

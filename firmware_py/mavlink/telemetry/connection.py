@@ -11,7 +11,7 @@ it is set at boot or by the same message.
 from __future__ import annotations
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.service import AutopilotService
 from firmware_py.mavlink.time_sync import Clocks
 from firmware_py.status import NAVIGATION_STATES, FlightMode, VehicleStatus
 from framerunner.wire.dialect import BROADCAST, Message, boot_ms, mavlink
@@ -110,12 +110,11 @@ def _available_mode(number: int, mode: FlightMode) -> Message:
     )
 
 
-class ConnectionService(Service):
+class ConnectionService(AutopilotService):
     """Sends what the vehicle is and its state, notes ground stations, and answers about time and signing."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange, clocks: Clocks) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._clocks = clocks
         self.handlers = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._receive_heartbeat,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from math import degrees, hypot, isfinite, isnan, nan
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.service import AutopilotService
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode
@@ -284,12 +284,11 @@ MOTION: dict[int, AutopilotSource] = {
 }
 
 
-class HomeAndOriginService(Service):
+class HomeAndOriginService(AutopilotService):
     """HOME_POSITION, GPS_GLOBAL_ORIGIN and SET_GPS_GLOBAL_ORIGIN."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._sent_origin: GeodeticPoint | None = None
         self._sent_home: GeodeticPoint | None = None
         self.handlers = {mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._set_origin}

@@ -31,13 +31,14 @@ def _highres_imu(report: EstimatorReport) -> Message | None:
     imu, pressure = latest.imu, latest.barometer
     if imu is None:
         return None
+    imu = imu.less(report.gyro_bias_frd_rad_s, report.accel_bias_frd_m_s2)
     fields = _IMU_FIELDS
     fields |= _MAGNETOMETER_FIELDS if latest.magnetometer is not None else 0
     fields |= _BAROMETER_FIELDS if pressure is not None else 0
     return mavlink.MAVLink_highres_imu_message(
         imu.time_us,
-        *_difference(imu.specific_force_frd_m_s2, report.accel_bias_frd_m_s2),
-        *_difference(imu.angular_rate_frd_rad_s, report.gyro_bias_frd_rad_s),
+        *imu.specific_force_frd_m_s2,
+        *imu.angular_rate_frd_rad_s,
         *_field(latest.magnetometer),
         0.0 if pressure is None else pressure.pressure_pa / 100.0,
         0.0,
@@ -164,10 +165,6 @@ def wind_cov(autopilot: Autopilot) -> Message | None:
         nan,
         nan,
     )
-
-
-def _difference(a: Vec3, b: Vec3) -> Vec3:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 def _field(sample: MagnetometerSample | None) -> Vec3:

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.service import AutopilotService
 from firmware_py.types import StatusText
 from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.exchange import Exchange
@@ -20,7 +20,7 @@ _KEPT = 8
 _STALE_US = 5_000_000
 
 
-class StatusTextService(Service):
+class StatusTextService(AutopilotService):
     """Sends the autopilot's texts.
 
     Args:
@@ -35,8 +35,7 @@ class StatusTextService(Service):
         send_event: Callable[[StatusText], bool],
         log: Callable[[int, StatusText], None] | None = None,
     ) -> None:
-        self._autopilot = autopilot
-        self._exchange = exchange
+        super().__init__(autopilot, exchange)
         self._send_event = send_event
         self._log = log
         self._last_id = 0

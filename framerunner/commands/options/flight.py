@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from framerunner.commands import within
 from framerunner.commands.options.rules import OptionRule
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ Response = Annotated[
 ]
 CameraDelay = Annotated[
     float | None,
+    within(0.0, 0.5),
     Parameter(
         help="age in s of an image that arrives without a time stamp; by default that of the calibration, "
         "else 0.1"

@@ -27,7 +27,6 @@ from typing_extensions import TypedDict
 
 from framerunner.editing.documents.open_document import OpenDocument
 from offboard.authoring import (
-    SPANISH,
     Catalogue,
     Diagram,
     Finding,
@@ -232,7 +231,7 @@ def _state(opened: OpenDocument) -> dict[str, object]:
         "layout": places_message(opened),
     }
     if opened.speaks_spanish:
-        state["spanish"] = [each.message.text(SPANISH) for each in problems]
+        state["spanish"] = [each.message.text("es") for each in problems]
     return state
 
 

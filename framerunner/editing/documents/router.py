@@ -30,11 +30,12 @@ from framerunner.editing.documents.document_messages import (
 )
 from framerunner.editing.documents.open_document import OpenDocument
 from framerunner.editing.documents.session import EditorSession, SharedDocument
-from framerunner.editing.words import Language, Said, SaidError, language_of, reason, say
+from framerunner.editing.words import Said, SaidError, language_of, reason
 from framerunner.errors import UserError
 from framerunner.monitor.access import Visitor
 from framerunner.monitor.channel import REFUSED_CODE, Channel, ChannelEndError, ChannelTerms, refuse
 from offboard.authoring import TextChange, export_scxml, import_scxml, mermaid_of, parse_edit
+from offboard.chart.mission_texts import Language
 from offboard.mission import list_missions
 
 _Text = Annotated[str, Body(max_length=100)]
@@ -65,7 +66,7 @@ class DocumentsRouter:
         def demand(request: Request, file: str | None = None) -> Visitor:
             visitor = who(request)
             if not (visitor.may_learn if file is None else visitor.may_edit(file)):
-                raise HTTPException(403, say(_refusal(visitor), language_of(request)))
+                raise HTTPException(403, _refusal(visitor).text(language_of(request)))
             return visitor
 
         _add_files(router, session, demand)
@@ -80,7 +81,7 @@ class DocumentsRouter:
             language = language_of(websocket)
             visitor = who(websocket)
             if not visitor.may_edit(file):
-                await refuse(websocket, say(_refusal(visitor), language))
+                await refuse(websocket, _refusal(visitor).text(language))
                 return
             try:
                 shared = await session.open(file, package_only=not visitor.may_teach)
@@ -195,7 +196,7 @@ class _Window(Channel[PageMessage, Mapping[str, object]]):
 
         async def take(message: PageMessage) -> None:
             if not may_edit():
-                raise ChannelEndError(REFUSED_CODE, say(Said("access.edit"), self.language))
+                raise ChannelEndError(REFUSED_CODE, Said("access.edit").text(self.language))
             await asyncio.shield(self._take(message))  # what has begun is carried out, whatever the page does
 
         def left() -> None:
@@ -206,7 +207,7 @@ class _Window(Channel[PageMessage, Mapping[str, object]]):
 
     def warn(self, what: Said) -> None:
         """Tell the person something."""
-        self.put(_json({"kind": "status", "warning": say(what, self.language)}))
+        self.put(_json({"kind": "status", "warning": what.text(self.language)}))
 
     def _first(self) -> str:
         """The whole document. A new page is told of what is not saved; one that was here knows."""

@@ -15,8 +15,9 @@ from typing import Protocol, TypeVar
 from weakref import WeakValueDictionary
 
 from framerunner.editing.documents.open_document import OpenDocument, write_problem
-from framerunner.editing.words import Language, Said, SaidError
+from framerunner.editing.words import Said, SaidError
 from framerunner.files.text_file import make_file, read_text, resolved_in_folder
+from offboard.chart.mission_texts import Language
 from offboard.mission import installed_mission, new_mission
 from offboard.pilot import Pilot
 

@@ -95,13 +95,7 @@ def _reading_routes(service: CompetitionService) -> APIRouter:
 
     @routes.get("/state")
     async def state() -> Response:
-        view = StateView(
-            board=await service.board(),
-            running=service.running,
-            problem=service.problem,
-            scenarios=service.scenarios,
-        )
-        return json_response(view)
+        return json_response(StateView.of(service, board=await service.board()))
 
     @routes.get("/teams")
     async def teams() -> Response:
@@ -123,17 +117,9 @@ def _reading_routes(service: CompetitionService) -> APIRouter:
     @routes.get("/ranking")
     async def ranking(round: str = "") -> Response:  # noqa: A002 - its name in the address
         board = await service.board()
-        view = RankingStateView(
-            version=board.version,
-            ranking=_of_round(board.rankings, round),
-            rounds=tuple(ranking.round for ranking in board.rankings),
-            rule=board.rule,
-            called=board.called,
-            queue=board.queue,
-            running=service.running,
-            problem=service.problem,
-        )
-        return json_response(view)
+        rounds = tuple(ranking.round for ranking in board.rankings)
+        chosen = _of_round(board.rankings, round)
+        return json_response(RankingStateView.of(board, service, ranking=chosen, rounds=rounds))
 
     @routes.get("/ranking.csv")
     async def ranking_as_csv(round: str = "") -> Response:  # noqa: A002

@@ -86,7 +86,7 @@ def read_board(
         version=version,
         round=present,
         rule=rule_view,
-        teams=tuple(TeamView.model_validate(team) for team in teams.values()),
+        teams=tuple(TeamView.of(team) for team in teams.values()),
         called=_call_view(session, teams),
         last_call=_last_call_view(session, teams),
         queue=QueueView(number=calls.queue_number(session), teams=queue),
@@ -282,42 +282,26 @@ def _try_view(
     countable: frozenset[str] | None,
 ) -> TryView:
     row, report = judged.row, judged.report
-    return TryView(
-        id=row.id,
+    return TryView.of(
+        row,
         attempt=attempt,
-        round=row.round,
         team=row.team_id,
         team_name=_name(teams, row.team_id),
-        scenario=row.scenario,
-        drone_id=row.drone_id,
         frames=tuple(row.frames.split()),
-        state=row.state,
         judged=judged.counts,
         barrier=_barrier(judged, teams, countable),
         verdict="" if report is None else report.verdict,
         reason="" if report is None else from_wire(report.reason, 500),
-        source=row.source,
-        final=row.final,
         referee=_result_view(judged.referee, rule),
         result=_result_view(judged.result, rule),
         corrected_by=judged.correction.who if judged.correction is not None else "",
         judgements=judged.judgements,
-        started=row.started,
-        ended=row.ended,
     )
 
 
 def _result_view(result: TryScore, rule: Rule) -> ResultView:
-    return ResultView(
-        crossed=result.crossed,
-        missing=result.missing,
-        contacts=result.contacts,
-        penalty_s=result.penalty_s,
-        try_time_s=result.try_time_s,
-        total_s=result.try_time_s + result.penalty_s,
-        completed=result.completed,
-        counted_s=counted_cs(result, rule) / 100,
-    )
+    total_s = result.try_time_s + result.penalty_s
+    return ResultView.of(result, total_s=total_s, counted_s=counted_cs(result, rule) / 100)
 
 
 def _rival_view(others: Sequence[_Judged], rule: Rule) -> RivalView | None:
@@ -329,31 +313,14 @@ def _rival_view(others: Sequence[_Judged], rule: Rule) -> RivalView | None:
 
 
 def _judgement_view(entry: tables.Judgement, teams: Mapping[int, tables.Team]) -> JudgementView:
-    return JudgementView(
-        number=entry.number,
-        kind=entry.kind,
-        team_name=_name(teams, entry.team_id),
-        crossed=None if entry.crossed is None else tuple(entry.crossed.split()),
-        contacts=entry.contacts,
-        penalty_s=entry.penalty_s,
-        try_time_s=entry.try_time_s,
-        completed=entry.completed,
-        remarks=entry.remarks,
-        who=entry.who,
-        at=entry.at,
-    )
+    crossed = None if entry.crossed is None else tuple(entry.crossed.split())
+    return JudgementView.of(entry, team_name=_name(teams, entry.team_id), crossed=crossed)
 
 
 def _draw_view(draw: tables.Draw, argument: Callable[[str], str]) -> DrawView:
     names = tuple(name for name, _ in _drawn(draw))
-    return DrawView(
-        round=draw.round,
-        scenarios=names,
-        commands=tuple(f"framerunner fly {shlex.quote(argument(name))}" for name in names),
-        pool=tuple(draw.pool.splitlines()),
-        who=draw.who,
-        at=draw.at,
-    )
+    commands = tuple(f"framerunner fly {shlex.quote(argument(name))}" for name in names)
+    return DrawView.of(draw, scenarios=names, commands=commands, pool=tuple(draw.pool.splitlines()))
 
 
 def _call_view(session: Session, teams: Mapping[int, tables.Team]) -> CallView | None:
@@ -361,15 +328,8 @@ def _call_view(session: Session, teams: Mapping[int, tables.Team]) -> CallView |
     if row is None or row.team_id is None:
         return None
     flying = calls.flying_on(session, row)
-    return CallView(
-        id=row.id,
-        team=row.team_id,
-        team_name=_name(teams, row.team_id),
-        scenario=row.scenario,
-        attempt=flying.id if flying is not None else None,
-        who=row.who,
-        at=row.at,
-    )
+    attempt = flying.id if flying is not None else None
+    return CallView.of(row, team=row.team_id, team_name=_name(teams, row.team_id), attempt=attempt)
 
 
 def _last_call_view(session: Session, teams: Mapping[int, tables.Team]) -> LastCallView | None:

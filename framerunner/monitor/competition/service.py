@@ -98,26 +98,12 @@ class CompetitionService:
     @property
     def running(self) -> tuple[RunningView, ...]:
         """The tries that are being flown."""
-        views = []
-        for each in self._board.tries if self._board is not None else ():
-            if each.state == "running":
-                now = self._flying.get(each.id, each.referee)
-                views.append(
-                    RunningView(
-                        id=each.id,
-                        team=each.team,
-                        team_name=each.team_name,
-                        scenario=each.scenario,
-                        barrier=each.barrier,
-                        drone_id=each.drone_id,
-                        frames=each.frames,
-                        crossed=now.crossed,
-                        contacts=now.contacts,
-                        penalty_s=now.penalty_s,
-                        try_time_s=now.try_time_s,
-                    )
-                )
-        return tuple(views)
+        tries = self._board.tries if self._board is not None else ()
+        return tuple(
+            RunningView.of(each, self._flying.get(each.id, each.referee))
+            for each in tries
+            if each.state == "running"
+        )
 
     def subscribe(self, listener: Callable[[Message], None]) -> Callable[[], None]:
         """Notify a listener of changes.

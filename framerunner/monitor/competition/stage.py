@@ -70,10 +70,9 @@ def register(monitor: Monitor) -> None:
         wanted = {each.id for each in (last, interrupted, against, *best) if each is not None}
         reports = await service.read(lambda store: store.reports(wanted)) if wanted else {}
         cells = [cell for row in board.rankings[0].rows for cell in row.cells]
-        view = StageView(
+        view = StageView.of(
+            board,
             running=service.running,
-            called=board.called,
-            queue=board.queue,
             last=_flown_view(last, reports),
             interrupted=_flown_view(interrupted, reports),
             last_against=_flown_view(against, reports),
@@ -113,17 +112,9 @@ def _flown_view(each: TryView | None, reports: Mapping[int, RefereeReport | None
         return None
     result, report = each.result, reports.get(each.id)
     times_s = {} if report is None else report.times_s
-    return FlownView(
-        id=each.id,
-        drone_id=each.drone_id,
-        team_name=each.team_name,
-        scenario=each.scenario,
-        frames=each.frames,
-        crossed=result.crossed,
+    return FlownView.of(
+        each,
+        result,
         splits={colour: time_s for colour, time_s in times_s.items() if colour in result.crossed},
-        try_time_s=result.try_time_s,
-        penalty_s=result.penalty_s,
-        total_s=result.total_s,
-        completed=result.completed,
         verdict="corrected by a judge" if each.corrected_by else each.verdict,
     )

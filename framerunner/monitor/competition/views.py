@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
 from datetime import datetime
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from scenarios.result import spreadsheet_cell
+from framerunner.files.spreadsheet import csv_text
 
 Counting = Literal["best", "last"]
 
 
 class CompetitionView(BaseModel):
-    """Base of all views; they are made from rows and other objects, too."""
+    """Base of all views."""
 
-    model_config = ConfigDict(frozen=True, from_attributes=True)
+    model_config = ConfigDict(frozen=True)
+
+    @classmethod
+    def of(cls, *sources: object, **more: object) -> Self:
+        """A view of rows and other objects: each field as given, else of the first that has it."""
+        fields = {
+            name: getattr(each, name)
+            for each in reversed(sources)
+            for name in cls.model_fields
+            if name not in more and hasattr(each, name)
+        }
+        return cls.model_validate(fields | more)
 
 
 class TeamView(CompetitionView):
@@ -321,21 +329,3 @@ def _why_not(each: TryView, chosen: int | None, counting: Counting) -> str:
     if each.barrier or chosen is None:
         return each.barrier
     return f"try {chosen} is {'better' if counting == 'best' else 'later'}"
-
-
-def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table for a spreadsheet, whose texts it takes for no formulas."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")
-    writer.writerow([_safe(column) for column in columns])
-    writer.writerows([_safe(value) for value in row] for row in rows)
-    return text.getvalue()
-
-
-def _safe(value: object) -> str:
-    """A value as text that no spreadsheet takes for a formula."""
-    if isinstance(value, str):
-        return spreadsheet_cell(value)
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return "" if value is None else str(value)

@@ -61,6 +61,7 @@ class GateMap:
         self._lookalikes = Lookalikes()
         self.gates: tuple[GateEstimate, ...] = ()
         self._best: dict[str, GateEstimate] = {}  # by colour
+        self._best_tracks: dict[str, GateTrack] = {}
         self._largest_m = hypot(arena.length_x_m, arena.width_y_m)
         self._time_us = -1
         load_filters()
@@ -68,6 +69,11 @@ class GateMap:
     def best(self, colour: str) -> GateEstimate | None:
         """The gate of a colour; the one best known if there are several, None if there is none."""
         return self._best.get(colour)
+
+    def covariance(self, colour: str) -> Floats | None:
+        """That of x, y, z and yaw of the best gate of a colour, shape (4, 4)."""
+        track = self._best_tracks.get(colour)
+        return None if track is None else track.covariance
 
     def is_lookalike(self, colour: str, line: LineOfSight) -> bool:
         """Whether what is seen in a direction looks like a gate of a colour, and is known to be none."""
@@ -130,7 +136,7 @@ class GateMap:
         tracks = [track for track in self._tracks if track.is_inside(self._arena)]
         self.gates = tuple(track.estimate() for track in tracks)
         self._best = {}
-        best: dict[str, GateTrack] = {}
+        best = self._best_tracks = {}
         for track, estimate in zip(tracks, self.gates, strict=True):
             other = best.get(track.colour)
             if other is None or track.rank > other.rank:

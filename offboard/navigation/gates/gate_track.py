@@ -268,7 +268,7 @@ class GateTrack:
         """Use a view that fits; one from nearly the same place as the last adds nothing but belief."""
         self._saw(view)
         self._misfits.clear()
-        if not _is_moved(view, self._used) and view.time_us - self._used.time_us < NOVEL_US:
+        if not is_moved(view, self._used) and view.time_us - self._used.time_us < NOVEL_US:
             return
         self._used = view
         self.views += 1
@@ -286,7 +286,7 @@ class GateTrack:
         be from several places and agree, more of them for a gate that is well known.
         """
         misfits = self._misfits
-        if predicted(self.state, view) is None or (misfits and not _is_moved(view, misfits[-1])):
+        if predicted(self.state, view) is None or (misfits and not is_moved(view, misfits[-1])):
             return
         misfits.append(view)
         if len(misfits) < MISFITS + self.belief // MISFITS_PER_BELIEF:
@@ -340,10 +340,6 @@ class GateTrack:
         vx, vy, vz, v_yaw = self.covariance.diagonal().tolist()
         weights = [hypothesis.log_weight for hypothesis in self._hypotheses]
         ambiguous = any(weight > weights[0] - AMBIGUOUS for weight in weights[1:])
-        nx, ny = cos(yaw), sin(yaw)
-        shared = 2.0 * nx * ny * float(self.covariance[0, 1])
-        along, aside = nx * nx * vx + ny * ny * vy + shared, ny * ny * vx + nx * nx * vy - shared
-        exact = max(along / 4.0, aside, vz) <= CERTAIN_M**2 and v_yaw <= CERTAIN_RAD**2
         return GateEstimate(
             colour=self.colour,
             position_m=(x, y, z),
@@ -351,7 +347,7 @@ class GateTrack:
             position_std_m=(sqrt(vx), sqrt(vy), sqrt(vz)),
             yaw_std_rad=sqrt(v_yaw),
             ambiguous=ambiguous,
-            certain=exact and not ambiguous and self.views >= CERTAIN_VIEWS,
+            certain=not ambiguous and is_certain(yaw, self.covariance, self.views),
             views=self.views,
             seen_us=self.seen_us,
         )
@@ -374,6 +370,24 @@ class GateTrack:
         self._hypotheses = kept
 
 
+def is_certain(yaw_rad: float, covariance: Floats, views: int, factor: float = 1.0) -> bool:
+    """Whether a gate is known well enough to fly through.
+
+    Args:
+        yaw_rad: of its normal.
+        covariance: of x, y, z and yaw, shape (4, 4).
+        views: how many were used.
+        factor: by which standard deviations may be larger than usual.
+    """
+    vx, vy, vz, v_yaw = covariance.diagonal().tolist()
+    nx, ny = cos(yaw_rad), sin(yaw_rad)
+    shared = 2.0 * nx * ny * float(covariance[0, 1])
+    along, aside = nx * nx * vx + ny * ny * vy + shared, ny * ny * vx + nx * nx * vy - shared
+    square = factor * factor
+    exact = max(along / 4.0, aside, vz) <= square * CERTAIN_M**2 and v_yaw <= square * CERTAIN_RAD**2
+    return exact and views >= CERTAIN_VIEWS
+
+
 def _same(a: GateFilter, b: GateFilter) -> bool:
     away = (a.state - b.state).tolist()
     vx, vy, vz, v_yaw = (a.covariance + b.covariance).diagonal().tolist()
@@ -382,7 +396,7 @@ def _same(a: GateFilter, b: GateFilter) -> bool:
     )
 
 
-def _is_moved(view: GateView, last: GateView) -> bool:
+def is_moved(view: GateView, last: GateView) -> bool:
     """Whether a view's errors differ from those of an earlier one: edges fall on other parts of pixels."""
     if view.seen != last.seen:
         return True

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from framerunner.cli import run
-from framerunner.course.lessons import LANGUAGES, LessonError, find_lesson, load_lessons
+from framerunner.course.lessons import LessonError, find_lesson, load_lessons
 from framerunner.course.progress import CourseEvent, CourseProgress, LessonProgress
 from framerunner.errors import SettingError
 from framerunner.flying.lockstep import fly_lockstep
@@ -56,7 +56,7 @@ def test_a_lesson_is_found_by_number_and_name():
         find_lesson("9")
 
 
-@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("language", ["en", "es"])
 def test_a_lesson_is_begun_at_the_command_line(language, tmp_path, capsys):
     assert run(["course", "start", "1", "--out", str(tmp_path), "--language", language]) == 0
     told = capsys.readouterr().out

@@ -178,6 +178,11 @@ async def test_figures_are_those_that_were_sent(chromium, fake):
     await expect(figure(page, "verdict")).to_have_attribute("data-value", "clean")
     await expect(page.locator(".m-source")).to_have_text("judged by the simulator's truth, final")
 
+    for crossed, told in ((["red"], "all frames crossed, back to the base"), ([], "")):  # or an open field
+        shown = FIGURES | {"crossed": crossed, "next_colour": None}
+        await fake.say("status", drones=[status(figures=shown)])
+        await expect(figure(page, "next_colour")).to_have_text(told)
+
     await fake.say("status", drones=[status(figures=None)])
     await expect(figure(page, "try_time_s")).to_have_text("–")
     await expect(figure(page, "verdict")).to_have_text("not judged")

@@ -11,8 +11,7 @@ import pytest
 
 from offboard.authoring import Document, as_json, check_document, diagram
 from offboard.chart.conditions import Conditions
-from offboard.chart.mission_texts import ENGLISH
-from offboard.chart.spanish import SPANISH
+from offboard.chart.mission_texts import Message, texts_of
 from offboard.chart.vocabulary import Vocabulary
 from offboard.engine import MissionEngine
 from offboard.mission import MISSIONS, list_missions, load_mission
@@ -182,7 +181,7 @@ def test_a_text_that_is_no_yaml_is_a_finding_with_its_line():
 
 def test_findings_can_be_in_spanish():
     text = GOOD.replace("frame_seen", "goal_m < 1").replace("to: red", "to: rde", 1)
-    said = [each.message for each in check_document(Document.from_text(text), texts=SPANISH)]
+    said = [each.message for each in check_document(Document.from_text(text), language="es")]
     assert said == [
         "when 'goal_m < 1': goal_m es un lugar (x, y, z), no un número; lee distance_to_goal_m, o imu.x",
         "el destino 'rde' del estado 'rise' no es un estado; ¿quizá 'red'?",
@@ -193,8 +192,9 @@ def test_all_texts_are_there_in_both_languages():
     def names(text: str) -> set[str]:
         return {name for _, name, _, _ in Formatter().parse(text) if name}
 
-    assert set(SPANISH) == set(ENGLISH)
-    assert {code for code in ENGLISH if names(ENGLISH[code]) != names(SPANISH[code])} == set()
+    texts = texts_of(Message.table)
+    assert {code for code, text in texts.items() if set(text) != {"en", "es"}} == set()
+    assert {code for code, text in texts.items() if names(text["en"]) != names(text["es"])} == set()
 
 
 @pytest.mark.parametrize("name", list_missions())

@@ -124,7 +124,8 @@ export class Figures {
     }
     const next = figures?.next_colour ?? null;
     setAttribute(this.#next, "data-value", next);
-    setText(this.#next, !figures ? "" : next ? `next frame: ${next}` : `all frames crossed${figures.over ? "" : ", back to the base"}`);
+    const crossedAll = crossed.length ? `all frames crossed${figures?.over ? "" : ", back to the base"}` : "";
+    setText(this.#next, next ? `next frame: ${next}` : crossedAll); // an open field has none to cross
   }
 
   /** What has failed on purpose, and the autopilot's failsafe. @param {Live.Figures|null} figures */

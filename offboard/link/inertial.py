@@ -1,0 +1,100 @@
+"""The vehicle's IMU samples (HIGHRES_IMU), and how sure it is of its own estimate (ODOMETRY).
+
+Samples count only if they come so often that they are means without gaps: PX4 sends one in four by itself, of
+which no motion can be integrated.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import deque
+from math import sqrt
+from typing import Any
+
+from mavsdk.asyncio import MavsdkError
+
+from framerunner.geometry.axes import flip_vector
+from framerunner.geometry.vectors import Vec3
+from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
+from framerunner.wire.vehicle_telemetry import MessageOrder
+from offboard.drone import ImuInterval, ReportedAccuracy
+from offboard.link.direct import subscribe
+
+RATE_HZ = 250.0  # requested; PX4 has 200 samples a second by itself
+ACCURACY_HZ = 10.0
+LONGEST_US = 12_000  # between two samples that are means without gaps; now and then one is lost
+SAMPLES_KEPT = 1000  # until they are taken
+MOST_M_S2, MOST_RAD_S = 1000.0, 100.0  # beyond what IMUs of drones can measure
+_X, _Y, _Z, _YAW = 0, 6, 11, 20  # of ODOMETRY's pose_covariance and velocity_covariance
+
+
+class InertialFeed:
+    """Collects samples on MAVSDK's thread.
+
+    Attributes:
+        accuracy: the newest; None before the first.
+    """
+
+    def __init__(self) -> None:
+        self.accuracy: ReportedAccuracy | None = None
+        self._order, self._odometry_order = MessageOrder(), MessageOrder()
+        self._last_us: int | None = None
+        self._usual_us = 0.0  # between two samples
+        self._samples: deque[ImuInterval] = deque(maxlen=SAMPLES_KEPT)
+
+    def subscribe(self, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
+        """Subscribe to MAVSDK's synchronous plugin `mavlink_direct`."""
+        subscribe(direct, "HIGHRES_IMU", self._on_imu)
+        subscribe(direct, "ODOMETRY", self._on_odometry)
+
+    async def request(self, plugin: Any) -> None:  # noqa: ANN401
+        """Request both, by MAVSDK's asyncio `telemetry`; a vehicle that refuses is flown as it reports.
+
+        A vehicle that sends ODOMETRY already keeps its rate.
+        """
+        with contextlib.suppress(MavsdkError):
+            await plugin.set_rate_imu(RATE_HZ)
+        if self.accuracy is None:
+            with contextlib.suppress(MavsdkError):
+                await plugin.set_rate_odometry(ACCURACY_HZ)
+
+    def take(self, until_us: int) -> tuple[ImuInterval, ...]:
+        """The samples before a vehicle time since the last call, oldest first.
+
+        One of that time may arrive before or after the message that made the tick.
+        """
+        samples, taken = self._samples, []
+        while samples and samples[0].time_us < until_us:
+            taken.append(samples.popleft())
+        return tuple(taken) if 0.0 < self._usual_us <= LONGEST_US else ()
+
+    def _on_imu(self, message: Message) -> None:
+        if message.get_srcComponent() != AUTOPILOT_COMPONENT_ID or not self._order.is_next(message.time_usec):
+            return
+        last_us, self._last_us = self._last_us, message.time_usec
+        force = (message.xacc, message.yacc, message.zacc)
+        rate = (message.xgyro, message.ygyro, message.zgyro)
+        if last_us is None or not (_is_within(force, MOST_M_S2) and _is_within(rate, MOST_RAD_S)):
+            return
+        period_us = message.time_usec - last_us
+        usual_us = self._usual_us or period_us
+        self._usual_us = usual_us + 0.1 * (min(period_us, 10 * LONGEST_US) - usual_us)
+        self._samples.append(ImuInterval(message.time_usec, period_us, flip_vector(rate), flip_vector(force)))
+
+    def _on_odometry(self, message: Message) -> None:
+        is_autopilots = message.get_srcComponent() == AUTOPILOT_COMPONENT_ID
+        if not is_autopilots or message.frame_id != mavlink.MAV_FRAME_LOCAL_NED:
+            return
+        if not self._odometry_order.is_next(message.time_usec):
+            return
+        pose, velocity = message.pose_covariance, message.velocity_covariance
+        variances = (pose[_X], pose[_Y], pose[_Z], velocity[_X], velocity[_Y], velocity[_Z], pose[_YAW])
+        if not all(variance >= 0.0 for variance in variances):  # NaN: not known
+            return
+        x, y, z, vx, vy, vz, heading = map(sqrt, variances)
+        self.accuracy = ReportedAccuracy(max(x, y), z, max(vx, vy), vz, heading, message.reset_counter)
+
+
+def _is_within(values: Vec3, most: float) -> bool:
+    """Whether all are numbers of at most this size."""
+    return all(abs(value) <= most for value in values)

@@ -1,0 +1,272 @@
+"""Where the drone is: as its vehicle reports it while that knows, then as the filter estimates it.
+
+A vehicle with motion capture knows its place and its heading, and tells that by standard deviations that stay
+small. For one that does not, from its first state on or since it has lost its motion capture, the filter
+estimates the place, with the gates as landmarks.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from math import hypot, pi, radians, remainder, sqrt
+
+from framerunner.geometry.vectors import Vec3, turned
+from offboard.drone import DroneState, ReportedAccuracy
+from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.gates.gate_map import GateMap
+from offboard.navigation.gates.gate_measurement import GateView, view_of
+from offboard.navigation.pose_history import DronePose, PoseCorrection, turned_by
+from offboard.navigation.view import GateEstimate
+from offboard.place.inertial_track import InertialTrack
+from offboard.place.landmarks import GateLandmarks
+from offboard.place.measurements import Eye, height, position, stands, velocity
+from offboard.place.place_filter import POSITION, TURN, VELOCITY, PlaceFilter
+from vision.types import GateSighting
+
+# A place that is known no better than this, or this many times worse than at the start, is not known.
+SURE_M = 0.1
+SURE_FACTOR = 2.0
+ALWAYS_SURE_M = 0.01
+SURE_RAD = 0.02
+
+LATE_US = 300_000  # of images; the filter stays so far behind the present when none come
+SETTLING_US = 3_000_000  # after take-off, in which a vehicle corrects its heading
+
+STOOD_US = 300_000  # before the vehicle says that it has left the ground
+STANDS_M_S = 0.1  # reported by a vehicle that has left the ground and does not say so yet
+STANDS_STD = (0.003, 0.003, 0.01)  # metres, radians, metres a second
+
+# The vehicle's errors are slow: those of reports in so long are one error. The noise of each report is larger
+# by that, as if they were independent.
+ERROR_S = 2.0
+LEAST_POSITION_STD_M = 0.005
+LEAST_VELOCITY_STD_M_S = 0.03
+LEAST_HEIGHT_STD_M = 0.05
+
+RESET_TURN_RAD = radians(3.0)
+BLIND_M = 0.1  # of the reported way in a gap of the IMU's samples, per root of a second
+BLIND_M_S = 0.3  # of the velocity after it
+
+IMAGE_STD_M = 0.001
+
+
+class PlaceEstimator:
+    """Estimates the drone's place from its states, and from the gates that images show.
+
+    Args:
+        camera: of the drone.
+    """
+
+    def __init__(self, camera: CameraModel) -> None:
+        self._camera = camera
+        self._track = InertialTrack()
+        self._filter: PlaceFilter | None = None
+        self._reports: deque[tuple[int, DroneState]] = deque()
+        self._last: DroneState | None = None
+        self._start: DroneState | None = None
+        self._first_std_m: float | None = None
+        self._left_us: int | None = None  # when the drone left the ground
+        self._landmarks = GateLandmarks()
+        self._fused_us = 0
+
+    @property
+    def estimates(self) -> bool:
+        """Whether the filter is used; else the vehicle's reports are."""
+        return self._filter is not None
+
+    def add(self, state: DroneState) -> None:
+        """Take in a state as the vehicle reports it; call it once a tick, before images are used."""
+        track, last, place = self._track, self._last, self._filter
+        if place is not None and last is not None and track.is_interrupted(state.imu, state.time_us):
+            self.advance(last.time_us)
+            self._bridge(place, last, state)
+            self._last = state
+        if not state.imu:
+            return
+        if self._start is None:
+            self._start = state
+        continued = track.add(state.imu, state.time_us, state.attitude_arena)
+        position_us = state.time_us - round(state.position_age_s * 1e6)
+        if not state.landed and self._left_us is None:
+            self._left_us = state.time_us
+        if self._filter is None and continued and not self._is_sure(state):
+            self._filter = PlaceFilter(position_us, (state.x, state.y, state.z), state.velocity_arena_m_s)
+        place = self._filter
+        if place is not None:
+            if last is not None and _resets(last) != _resets(state):
+                place.p[TURN, TURN] += RESET_TURN_RAD**2
+            for each in (*state.missed, state):
+                at_us = each.time_us - round(each.position_age_s * 1e6)
+                if not self._reports or at_us > self._reports[-1][0]:
+                    self._reports.append((at_us, each))
+        self._last = state
+
+    def _is_sure(self, state: DroneState) -> bool:
+        """Whether the vehicle knows its place and its heading, by what it tells."""
+        accuracy = state.accuracy
+        return accuracy is None or (self._knows_position(accuracy) and accuracy.heading_std_rad < SURE_RAD)
+
+    def _knows_position(self, accuracy: ReportedAccuracy) -> bool:
+        if self._first_std_m is None:
+            self._first_std_m = accuracy.position_std_m
+        return accuracy.position_std_m < min(SURE_M, max(ALWAYS_SURE_M, SURE_FACTOR * self._first_std_m))
+
+    def _bridge(self, place: PlaceFilter, last: DroneState, state: DroneState) -> None:
+        """Go on while the IMU's samples are missing: by how far the vehicle reports to have moved."""
+        gap_s = max(0.0, (state.time_us - place.time_us) * 1e-6)
+        x, y = turned(state.x - last.x, state.y - last.y, place.turn_rad)
+        place.displace(state.time_us, (x, y, state.z - last.z), BLIND_M * sqrt(gap_s), BLIND_M_S)
+        place.update(velocity(state.velocity_arena_m_s, BLIND_M_S, BLIND_M_S))
+        self._reports.clear()
+
+    def advance(self, time_us: int | None = None) -> bool:
+        """Bring the filter to the time of an image, or as far behind the present as images may be late.
+
+        Returns:
+            Whether it is there now: not if it is beyond that time already, or samples are missing.
+        """
+        place, last = self._filter, self._last
+        if place is None or last is None:
+            return False
+        at_us = last.time_us - LATE_US if time_us is None else time_us
+        reports = self._reports
+        while reports and reports[0][0] <= at_us:
+            report_us, report = reports.popleft()
+            if report_us >= place.time_us and self._predict(place, report_us):
+                self._use(place, report, report_us)
+        return self._predict(place, at_us)
+
+    def _predict(self, place: PlaceFilter, time_us: int) -> bool:
+        if time_us <= place.time_us:
+            return time_us == place.time_us
+        motion = self._track.between(place.time_us, time_us)
+        if motion is None:
+            return False
+        place.predict(motion, settling=self._is_settling(time_us))
+        place.time_us = time_us
+        return True
+
+    def _use(self, place: PlaceFilter, report: DroneState, time_us: int) -> None:
+        """Fuse what a state reports of a time."""
+        accuracy, start = report.accuracy, self._start
+        assert accuracy is not None, "without it there is no filter"
+        assert start is not None, "the filter begins with a state"
+        step_s = min(max((time_us - self._fused_us) * 1e-6, 0.01), 0.2)
+        self._fused_us = time_us
+        stood = self._left_us is None or time_us < self._left_us - STOOD_US
+        if stood and hypot(*report.velocity_arena_m_s) < STANDS_M_S:
+            turn_rad = remainder(start.yaw - report.yaw, 2 * pi)
+            place.update(stands((start.x, start.y, start.z), turn_rad, *STANDS_STD))
+            return
+        slow = sqrt(2.0 * ERROR_S / step_s)
+        level, climb = (
+            slow * max(std, LEAST_VELOCITY_STD_M_S)
+            for std in (accuracy.velocity_std_m_s, accuracy.climb_std_m_s)
+        )
+        place.update(velocity(report.velocity_arena_m_s, level, climb))
+        place.update(height(report.z, max(accuracy.height_std_m, LEAST_HEIGHT_STD_M)))
+        if self._knows_position(accuracy):
+            at_m = (report.x, report.y, report.z)
+            place.update(position(at_m, slow * max(accuracy.position_std_m, LEAST_POSITION_STD_M)))
+
+    def _is_settling(self, time_us: int) -> bool:
+        """Whether the vehicle may correct its heading now."""
+        return self._left_us is None or time_us - self._left_us < SETTLING_US
+
+    def _motion_at(self, time_us: int) -> tuple[Vec3, Vec3, float] | None:
+        """Position, velocity and turn at a time; None while the vehicle's reports are used."""
+        place = self._filter
+        if place is None:
+            return None
+        motion = self._track.between(place.time_us, time_us)
+        if motion is None:
+            x, y, z = place.x[VELOCITY].tolist()
+            step_s = (time_us - place.time_us) * 1e-6
+            px, py, pz = place.x[POSITION].tolist()
+            return (px + step_s * x, py + step_s * y, pz + step_s * z), (x, y, z), place.turn_rad
+        return *place.moved(motion), place.turned_rad(motion, settling=self._is_settling(time_us))
+
+    def correction(self, time_us: int) -> PoseCorrection | None:
+        """Of a pose at a time; None while the vehicle's reports are used."""
+        motion = self._motion_at(time_us)
+        return None if motion is None else PoseCorrection(motion[0], motion[2], IMAGE_STD_M)
+
+    def state(self, reported: DroneState) -> DroneState:
+        """The drone's state now."""
+        place, motion = self._filter, self._motion_at(reported.time_us)
+        if place is None or motion is None:
+            return reported
+        (x, y, z), velocity_m_s, turn_rad = motion
+        camera = reported.camera_attitude_arena
+        return replace(
+            reported,
+            x=x,
+            y=y,
+            z=z,
+            yaw=remainder(reported.yaw + turn_rad, 2 * pi),
+            velocity_arena_m_s=velocity_m_s,
+            position_age_s=0.0,
+            attitude_arena=turned_by(turn_rad, reported.attitude_arena),
+            camera_attitude_arena=None if camera is None else turned_by(turn_rad, camera),
+            position_std_m=place.position_std_m(reported.time_us),
+        )
+
+    @property
+    def velocity_error_flu_m_s(self) -> Vec3:
+        """By what the reported velocity is wrong, in level axes turned with the yaw.
+
+        A vehicle that flies a commanded velocity flies that much less.
+        """
+        place, state = self._filter, self._last
+        if place is None or state is None:
+            return (0.0, 0.0, 0.0)
+        motion = self._motion_at(state.time_us - round(state.position_age_s * 1e6))
+        assert motion is not None, "there is a filter"
+        (x, y, z), (_, velocity_m_s, turn_rad) = state.velocity_arena_m_s, motion
+        ahead, left = turned(x, y, -state.yaw)
+        true_ahead, true_left = turned(velocity_m_s[0], velocity_m_s[1], -state.yaw - turn_rad)
+        return (ahead - true_ahead, left - true_left, z - velocity_m_s[2])
+
+    def see(
+        self,
+        sightings: Sequence[GateSighting],
+        poses: Sequence[DronePose],
+        at: PoseCorrection,
+        gates: GateMap,
+    ) -> None:
+        """Use the gates in an image, to whose time the filter was brought, after the map has used them.
+
+        Args:
+            sightings: in the image.
+            poses: corrected, of the drone when each was read out.
+            at: the correction of these poses.
+            gates: the map.
+        """
+        place = self._filter
+        if place is None:
+            return
+        by_colour: dict[str, list[tuple[GateView, Eye]]] = {}
+        for sighting, pose in zip(sightings, poses, strict=True):
+            view = view_of(sighting, self._camera, pose)
+            if view is not None:
+                by_colour.setdefault(sighting.colour, []).append((view, self._eye(pose, at)))
+        self._landmarks.see(place, by_colour, gates)
+
+    def _eye(self, pose: DronePose, at: PoseCorrection) -> Eye:
+        """The carrier of a corrected pose, without the correction."""
+        x, y, z = (a - b for a, b in zip(pose.position_m, at.position_m, strict=True))
+        return Eye(
+            self._camera,
+            turned_by(-at.turn_rad, pose.attitude_arena),
+            (*turned(x, y, -at.turn_rad), z),
+        )
+
+    def known(self, estimate: GateEstimate) -> GateEstimate:
+        """A gate of the map, the best of its colour, as the filter has it: exact relative to the drone."""
+        return estimate if self._filter is None else self._landmarks.known(self._filter, estimate)
+
+
+def _resets(state: DroneState) -> int:
+    return 0 if state.accuracy is None else state.accuracy.resets

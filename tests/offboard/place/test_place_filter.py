@@ -1,0 +1,161 @@
+"""The filter of the place: its derivatives, its covariance, and the IMU's integral."""
+
+from math import cos, sin
+
+import numpy as np
+import pytest
+
+from framerunner.geometry.rotations import quaternion_from_euler, rotated_by_rate, rotation, to_body
+from offboard.drone import ImuInterval
+from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.gates.gate_measurement import GateView
+from offboard.place.inertial_track import GRAVITY_M_S2, InertialTrack
+from offboard.place.measurements import Eye, corners, height, position, stands, velocity
+from offboard.place.place_filter import OWN, TURN, PlaceFilter
+from scenarios.models import Camera
+
+CAMERA = CameraModel.of(Camera())
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+EYE = Eye(CAMERA, quaternion_from_euler(0.1, -0.05, 0.4), (0.02, -0.01, 0.03))
+STATE = np.array((0.1, -0.3, 1.2, 0.05, 0.5, -0.2, 0.1, 0.02, -0.01, 0.03, 2.1, 0.9, 1.4, 0.7))
+
+
+def tilted(time_s):
+    """Attitude and rate of a body that rolls, pitches and turns."""
+    return (0.6 * cos(3 * time_s), 0.4 * sin(2 * time_s), 0.8)
+
+
+def samples(seconds, acceleration, step_us=4_000):
+    """The attitude at each end, the IMU's means over each step, for an acceleration in the arena."""
+    attitude, found = quaternion_from_euler(0.1, 0.05, 0.3), []
+    for end_us in range(step_us, round(seconds * 1e6) + 1, step_us):
+        rate = tilted((end_us - step_us / 2) * 1e-6)
+        middle = rotation(rotated_by_rate(attitude, rate, step_us * 5e-7))
+        ax, ay, az = acceleration((end_us - step_us / 2) * 1e-6)
+        force = to_body(middle, ax, ay, az + GRAVITY_M_S2)
+        attitude = rotated_by_rate(attitude, rate, step_us * 1e-6)
+        found.append((ImuInterval(end_us, step_us, rate, force), attitude))
+    return found
+
+
+def test_the_track_integrates_motion_between_any_two_times():
+    track = InertialTrack()
+    assert not track.add((), 0, quaternion_from_euler(0.1, 0.05, 0.3))
+    pending = []
+    for sample, attitude in samples(2.0, lambda t: (cos(t), -0.5, 0.3 * t)):
+        pending.append(sample)
+        if sample.time_us % 20_000 == 0:
+            assert track.add(tuple(pending), sample.time_us, attitude)
+            pending = []
+    start_s, end_s = 0.3137, 1.8721
+    motion = track.between(round(start_s * 1e6), round(end_s * 1e6))
+    step_s = end_s - start_s
+    gained = (sin(end_s) - sin(start_s), -0.5 * step_s, 0.15 * (end_s**2 - start_s**2))
+    assert motion.velocity_m_s == pytest.approx(gained, abs=2e-4)
+    moved = (
+        cos(start_s) - cos(end_s) - sin(start_s) * step_s,
+        -0.25 * step_s**2,
+        0.05 * (end_s**3 - start_s**3) - 0.15 * start_s**2 * step_s,
+    )
+    assert motion.position_m == pytest.approx(moved, abs=2e-4)
+    assert motion.turn_rad == pytest.approx(0.0, abs=1e-3)
+    assert track.between(round(end_s * 1e6), 2_200_000) is None  # beyond the samples
+
+
+def test_a_heading_that_the_gyroscope_does_not_confirm_is_a_turn_of_the_reports():
+    track = InertialTrack()
+    track.add((), 0, LEVEL)
+    for tick in range(1, 11):
+        rest = tuple(
+            ImuInterval(tick * 50_000 - late, 10_000, (0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY_M_S2))
+            for late in range(40_000, -1, -10_000)
+        )
+        track.add(rest, tick * 50_000, quaternion_from_euler(0.0, 0.0, 0.004 * tick))
+    motion = track.between(0, 500_000)
+    assert motion.turn_rad == pytest.approx(-0.04, abs=1e-9)
+    place = PlaceFilter(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    place.predict(motion, settling=True)
+    assert -0.04 <= place.turn_rad < -0.038  # the gyroscope is believed while the vehicle corrects itself
+
+
+def test_a_gap_in_the_samples_begins_the_track_anew():
+    track = InertialTrack()
+    one = ImuInterval(50_000, 50_000, (0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY_M_S2))
+    later = ImuInterval(700_000, 4_000, (0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY_M_S2))
+    track.add((), 0, LEVEL)
+    assert track.add((one,), 50_000, LEVEL)
+    assert not track.add((later,), 700_000, LEVEL)
+    assert track.between(50_000, 700_000) is None
+
+
+def view(seen=(True, True, True, True)):
+    count = 2 * sum(seen)
+    return GateView(
+        colour="red",
+        whole=all(seen),
+        time_us=0,
+        camera=CAMERA.pose((0.0, 0.0, 1.0), LEVEL),
+        focal_px=CAMERA.focal_px,
+        seen=seen,
+        corners_px=np.zeros(count),
+        noise_px2=np.eye(count),
+        position_var_m2=0.0,
+    )
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        velocity((0.6, -0.1, 0.2), 0.1, 0.05),
+        height(1.3, 0.05),
+        position((0.2, 0.1, 1.0), 0.01),
+        stands((0.2, 0.1, 1.0), 0.1, 0.01, 0.01, 0.01),
+        corners(view(), EYE, OWN, 0.0),
+        corners(view((True, False, False, True)), EYE, OWN, 0.0),
+    ],
+)
+def test_the_derivatives_of_a_measurement_are_those_of_its_residual(model):
+    at = model(STATE)
+    for index in range(len(STATE)):
+        step = np.zeros(len(STATE))
+        step[index] = 1e-6
+        slope = (model(STATE + step).residual - model(STATE - step).residual) / 2e-6
+        assert -slope == pytest.approx(at.jacobian[:, index], abs=2e-4 * max(1.0, np.abs(slope).max()))
+
+
+def test_the_prediction_has_the_derivatives_of_its_motion():
+    track = InertialTrack()
+    track.add((), 0, quaternion_from_euler(0.1, 0.05, 0.3))
+    for sample, attitude in samples(0.2, lambda t: (0.8, -0.5, 0.3)):
+        track.add((sample,), sample.time_us, attitude)
+    motion = track.between(0, 200_000)
+
+    def after(state):
+        place = PlaceFilter(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        place.x = state.copy()
+        place.predict(motion)
+        return place.x
+
+    place = PlaceFilter(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    place.x = STATE[:OWN].copy()
+    spread = 1e3  # so that the noise is small beside it
+    place.p = spread * np.eye(OWN)
+    place.predict(motion)
+    slopes = np.array(
+        [(after(STATE[:OWN] + step) - after(STATE[:OWN] - step)) / 2e-6 for step in 1e-6 * np.eye(OWN)]
+    ).T
+    assert place.p / spread == pytest.approx(slopes @ slopes.T, abs=1e-4)
+
+
+def test_a_gate_is_known_as_well_from_the_drone_as_it_was_seen_however_far_that_has_drifted():
+    place = PlaceFilter(0, (1.0, 2.0, 1.5), (0.0, 0.0, 0.0), position_std_m=0.5)
+    place.p[TURN, TURN] = 0.1**2
+    seen = np.diag((0.02, 0.01, 0.01, 0.03)) ** 2
+    place.add_gate("red", np.array((3.0, 1.0, 1.2, 0.3)), seen)
+    place.add_gate("blue", np.array((-3.0, 1.0, 1.2, 1.3)), seen)
+    assert place.gate_from_drone("red") == pytest.approx(seen, abs=1e-9)
+    assert place.p[OWN, OWN] > 0.25  # in the arena it is as uncertain as the drone
+    place.drop_gate("red")
+    assert place.gate("red") is None
+    assert place.gate("blue").tolist() == [-3.0, 1.0, 1.2, 1.3]
+    assert place.gate_from_drone("blue") == pytest.approx(seen, abs=1e-9)
