@@ -19,11 +19,11 @@ from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path
 from offboard.response.estimate import LevelComing, ResponseEstimate, YawAhead
 from offboard.response.rate_response import Coming
-from offboard.response.tilt_loop import STEP_S
+from offboard.response.tilt_loop import HALF_S, STEP_S
 
-OFFSET_GAIN_PER_S2 = 7.0  # an offset in plan is closed within half a second, without swinging
-VELOCITY_GAIN_PER_S = 4.5
-SOON_S = 0.2  # a vehicle that is later closes it more slowly
+OFFSET_GAIN_PER_S2 = 10.0  # an offset in plan is closed within half a second, without swinging
+VELOCITY_GAIN_PER_S = 6.0
+SOON_S = 0.15  # a vehicle that is later closes it more slowly
 MAX_OFFSET_M = 0.3  # a larger one is closed at the speed of this one
 CLIMB_GAIN_PER_S = (1.6, 3.5)  # an offset in height is closed at least and at most at this rate,
 CLIMB_DAMPING = 0.5  # share of a wrong velocity upwards
@@ -65,7 +65,7 @@ class PathFollower:
         self.error_m = 0.0
         self._limits = limits
         self._path: Path | None = None
-        self._clock = PathClock(self.estimate.loop.dead_steps * STEP_S)
+        self._clock = PathClock(self.estimate.loop.dead_halves * HALF_S)
         self._last_s: float | None = None
         self._observed_s: float | None = None  # vehicle time of the state last taken in
         self._sent: VelocityFluCommand | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import exp, hypot, pi, remainder
@@ -12,17 +13,20 @@ from offboard.response.level_motion import LevelMotion
 from offboard.response.rate_response import RateResponse
 from offboard.response.tilt_loop import (
     GRAVITY_M_S2,
+    HALF_S,
     MAX_TILT_RAD,
     STEP_S,
     Plan,
     TiltLoop,
     TiltLoopEstimate,
+    body_rates,
     tilts_of,
 )
 
 TAKE_OFF_STEPS = 12  # after which the thrust is that of flight
 KNOWN_STEPS = 60  # of learning, until the model is as good as it must be near gates
 _SETTLE_STEPS = 3  # in which a first lag of commands is overcome
+_SETTLE_HALVES = 2 * (_SETTLE_STEPS - 1)
 _MAX_STEPS = 8  # after a longer gap everything but the estimate begins again
 _SAME_LAG_S = 0.1  # lags that differ less are the same for planning
 _REGULAR_S = 0.012  # by which a step may be longer or shorter, to learn from it
@@ -58,7 +62,7 @@ class LevelComing:
         velocity_m_s: then, arena axes.
         yaw_rad: then.
         held_m_s: velocity that the vehicle's loop will use, level axes.
-        integrals_m: of the vehicle's loop.
+        integrals_m: of the vehicle's loop, without the next command.
     """
 
     time_s: float
@@ -141,7 +145,7 @@ class ResponseEstimate:
     def _summarise(self) -> None:
         """Note what planning needs, if it has changed."""
         loop, now = self._tilt_loop.loop, self.response
-        late_s = loop.dead_steps * STEP_S + loop.lag_s
+        late_s = loop.dead_halves * HALF_S + loop.lag_s
         level_lag_s = loop.lag_s + 1.0 / (GRAVITY_M_S2 * max(loop.velocity, loop.command))
         known = self._tilt_loop.updates >= KNOWN_STEPS
         same = abs(level_lag_s - now.level_lag_s) < _SAME_LAG_S and self.climb.lag_s == now.climb_lag_s
@@ -153,36 +157,37 @@ class ResponseEstimate:
         tilt_loop, motion, up_m_s2 = self._tilt_loop, self.motion, self._up_m_s2
         loop, turn_rad_s, trims = tilt_loop.loop, tilt_loop.turn_rad_s, tilt_loop.trims_rad
         integrals, tilts, velocity = tilt_loop.integrals_m, self._tilts, motion.velocity_m_s
-        velocities = tilt_loop.velocities_m_s or [turned(*velocity, -state.yaw)]
-        now = len(velocities) - 1 - loop.inner_steps  # the velocity that acts now is from there to the next
+        velocities = _halves(tilt_loop.velocities_m_s or [turned(*velocity, -state.yaw)])
+        now = len(velocities) - 1 - loop.inner_halves
         age_s = state.position_age_s
         x = 0.5 * age_s * (velocity[0] + state.velocity_arena_m_s[0])
         y = 0.5 * age_s * (velocity[1] + state.velocity_arena_m_s[1])
-        steps = loop.dead_steps + (_SETTLE_STEPS - 1 if loop.lag_s else 0)
+        halves = loop.dead_halves + (_SETTLE_HALVES if loop.lag_s else 0)
         yaw = yaw_ahead(0.0)
-        for step in range(1, steps + 1):
-            before, yaw = yaw, yaw_ahead(step * STEP_S)
-            ahead = tilts
-            if step < steps:
-                command = tilt_loop.coming_m_s(min(step, loop.dead_steps - 1), before)
-                held = _mean(velocities, now + step)
-                demands = [
-                    loop.demand(axis, command[axis], held, integrals[axis], turn_rad_s) + trims[axis]
-                    for axis in (0, 1)
-                ]
-                ahead = (loop.followed(tilts[0], demands[0]), loop.followed(tilts[1], demands[1]))
+        for half in range(-1, halves):
+            command = tilt_loop.coming_m_s(max((loop.dead_halves - half) // 2, 1), yaw)
+            held = velocities[max(now + half + 1, 0)]
+            before = integrals
+            if half < halves - 1:
                 integrals = (
-                    integrals[0] + STEP_S * (command[0] - held[0]),
-                    integrals[1] + STEP_S * (command[1] - held[1]),
+                    before[0] + HALF_S * (command[0] - held[0]),
+                    before[1] + HALF_S * (command[1] - held[1]),
                 )
+            if half < 0:  # the integrals are known by then
+                continue
+            demands = (
+                loop.demand(0, command[0], held, before[0], turn_rad_s) + trims[0],
+                loop.demand(1, command[1], held, before[1], turn_rad_s) + trims[1],
+            )
+            ahead = loop.followed(tilts, demands, turn_rad_s)
             middle = (0.5 * (tilts[0] + ahead[0]), 0.5 * (tilts[1] + ahead[1]))
-            ax, ay = motion.acceleration(middle, 0.5 * (before + yaw), velocity, up_m_s2)
-            x += STEP_S * (velocity[0] + 0.5 * STEP_S * ax)
-            y += STEP_S * (velocity[1] + 0.5 * STEP_S * ay)
-            velocity, tilts = (velocity[0] + STEP_S * ax, velocity[1] + STEP_S * ay), ahead
+            yaw_before, yaw = yaw, yaw_ahead((half + 1) * HALF_S)
+            ax, ay = motion.acceleration(middle, 0.5 * (yaw_before + yaw), velocity, up_m_s2)
+            x += HALF_S * (velocity[0] + 0.5 * HALF_S * ax)
+            y += HALF_S * (velocity[1] + 0.5 * HALF_S * ay)
+            velocity, tilts = (velocity[0] + HALF_S * ax, velocity[1] + HALF_S * ay), ahead
             velocities.append(turned(*velocity, -yaw))
-        held = _mean(velocities, now + steps)
-        return LevelComing(steps * STEP_S, (x, y), velocity, yaw, held, integrals)
+        return LevelComing(halves * HALF_S, (x, y), velocity, yaw, held, integrals)
 
     def command_for(
         self, tilts_rad: Plan, rates_rad_s: Plan, turn_rad_s: float, coming: LevelComing, yaw_ahead: YawAhead
@@ -196,14 +201,17 @@ class ResponseEstimate:
             coming: of `predict`.
             yaw_ahead: the same.
         """
-        tilt_loop, size = self._tilt_loop, hypot(*tilts_rad)
-        loop, scale = tilt_loop.loop, MAX_TILT_RAD / size if size > MAX_TILT_RAD else 1.0
-        trims = tilt_loop.trims_rad
+        tilt_loop = self._tilt_loop
+        loop, trims = tilt_loop.loop, tilt_loop.trims_rad
+        rates = body_rates(tilts_rad, rates_rad_s, turn_rad_s)
+        demands = [tilt + loop.lead(rate) for tilt, rate in zip(tilts_rad, rates, strict=True)]
+        size = hypot(*demands)
+        scale = MAX_TILT_RAD / size if size > MAX_TILT_RAD else 1.0
         asked = []
         for axis in (0, 1):
-            demand = scale * tilts_rad[axis] + loop.lead(rates_rad_s[axis]) - trims[axis]
+            demand = scale * demands[axis] - trims[axis]
             rest = loop.demand(axis, 0.0, coming.held_m_s, coming.integrals_m[axis], turn_rad_s)
-            asked.append((demand - rest) / (loop.command + 0.5 * STEP_S * loop.integral))
+            asked.append((demand - rest) / (loop.command + HALF_S * loop.integral))
         x, y = asked
         if not loop.lag_s:
             return x, y
@@ -215,7 +223,9 @@ class ResponseEstimate:
         return (x, y) if loop.turning else turned(x, y, -yaw_ahead(0.0))
 
 
-def _mean(velocities: list[Plan], at: int) -> Plan:
-    """Of a velocity and the next one."""
-    a, b = velocities[max(at, 0)], velocities[min(max(at + 1, 0), len(velocities) - 1)]
-    return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])
+def _halves(velocities: list[Plan]) -> list[Plan]:
+    """Those between velocities, too."""
+    halves = velocities[:1]
+    for (x0, y0), (x1, y1) in itertools.pairwise(velocities):
+        halves += [(0.5 * (x0 + x1), 0.5 * (y0 + y1)), (x1, y1)]
+    return halves
