@@ -22,7 +22,7 @@ VIEW_NEAR_M = 0.25  # half a gate's width, with a margin
 PRESENT_SHARE = 1.15
 """Of the crossing speed: a drone that is faster at the start of a path brakes to this before an opening."""
 LOOK_AGAIN_M = 1.0
-UNKNOWN_LATE = 0.6
+UNKNOWN_LATE = 0.3
 """So gently, from 0 to 1, a vehicle is flown at least whose response is not known yet."""
 LATE_S = (0.2, 0.7)
 """A vehicle that answers sooner is not flown gently, and one that answers later not more gently."""

@@ -24,7 +24,7 @@ from offboard.response.tilt_loop import (
 )
 
 TAKE_OFF_STEPS = 12  # after which the thrust is that of flight
-KNOWN_STEPS = 60  # of learning, until the model is as good as it must be near gates
+KNOWN_STEPS = 25
 _SETTLE_STEPS = 3  # in which a first lag of commands is overcome
 _SETTLE_HALVES = 2 * (_SETTLE_STEPS - 1)
 _MAX_STEPS = 8  # after a longer gap everything but the estimate begins again
