@@ -57,6 +57,9 @@ _MEMORY = 1.0 - STEP_S / 20.0  # of log likelihoods
 _BETTER = 6.0  # by which a log likelihood must be better than the chosen one
 _HOPELESS = 25.0  # by which it is so much worse that the candidate is dropped
 _CHOOSE_STEPS = 5
+_TRIMS = (_COEFFICIENTS, _COEFFICIENTS + 1)
+_HELD_RAD = 0.01  # by which trims may change in a step at a limit
+_WANDER_OF_REST = 0.1  # share of what is unexplained by which a trim may change in a step
 _REST_S = 0.4  # time constant of what the model leaves unexplained, which is taken to go on
 _OUTLIER = 3.0  # standard deviations; a tilt that is farther off counts less
 _LEAST_COMMAND = 0.1
@@ -309,7 +312,10 @@ class TiltLoopEstimate:
         rows = self._rows(rates, yaw_rad, turn_rad_s)
         loop = self.loop
         demand_rad = hypot(tilts[0] + loop.lead(rates[0]), tilts[1] + loop.lead(rates[1]))
-        if not learns or demand_rad > MAX_TILT_RAD or max(map(abs, rates)) > MAX_RATE_RAD_S:
+        if demand_rad > MAX_TILT_RAD or max(map(abs, rates)) > MAX_RATE_RAD_S:
+            self._p[:, _TRIMS, _TRIMS] += _HELD_RAD**2  # integrals may be held at limits
+            return
+        if not learns:
             return
         self._learn(rows, tilts, rates)
         self._loop = None
@@ -355,6 +361,7 @@ class TiltLoopEstimate:
         """Update all filters, and the candidates' log likelihoods."""
         x, p = self._x, self._p
         p[:, range(_STATES), range(_STATES)] += _WANDER
+        p[:, _TRIMS, _TRIMS] += np.square(_WANDER_OF_REST * np.array(self._rest_rad))
         self._scores *= _MEMORY
         for axis, (row, tilt, rate) in enumerate(zip(rows, tilts, rates, strict=True)):
             noise = (_NOISE_RAD + _NOISE_OF_RATE_S * abs(rate)) ** 2
