@@ -106,7 +106,7 @@ def measure(plan: FlightPlan) -> Parts:
     flight_s, wall_s, simulated_s = fly(plan, images, poses)
     searched, camera = len(poses), SimulatedCamera(scenario)
     render_s = best(lambda: [camera.render(*pose) for pose in poses], 1) / len(poses)
-    detect = plan_detector(plan, rendered=True)
+    detect = plan_detector(plan)
     detect_s = best(lambda: [detect(image, 0) for image in images], 1) / len(images)
     mission = plan.chart
     return Parts(

@@ -20,14 +20,12 @@ class ImuInterval:
     """Means of an IMU's samples over an interval, less the biases that the vehicle has estimated.
 
     Attributes:
-        time_us: vehicle time of its end.
-        period_us: its length; intervals follow each other without gaps unless samples were lost.
+        time_us: vehicle time of its end; it began at the end of the one before, also if samples were lost.
         angular_rate_flu_rad_s: of the body.
         specific_force_flu_m_s2: likewise; at rest (0, 0, g).
     """
 
     time_us: int
-    period_us: int
     angular_rate_flu_rad_s: Vec3
     specific_force_flu_m_s2: Vec3
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from framerunner.files.extensions import extension_names, find_extension
 from framerunner.files.text_file import TextError, TextFault, read_text
 from framerunner.files.yaml_text import Place
+from framerunner.geometry.gate_shape import GateShape
 from offboard.chart.check import check
 from offboard.chart.mission_texts import Message
 from offboard.chart.problems import (
@@ -64,6 +65,7 @@ class Mission:
         mission_class: by which limits it flies.
         vision: how it sees gates.
         detector: name of another package's detector that finds them; empty: the vision's own.
+        gate: shape of gates of which the scenario tells nothing; None: that of the frame challenge.
         remarks: the checker's warnings and advice.
     """
 
@@ -75,6 +77,7 @@ class Mission:
     mission_class: MissionClass = "contest"
     vision: Vision = "boxes"
     detector: str = ""
+    gate: GateShape | None = None
     remarks: tuple[MissionProblem, ...] = field(default=(), repr=False)
 
     def __getstate__(self) -> dict[str, object]:
@@ -194,6 +197,7 @@ def _checked(written: MissionFile, path: Path, pilot: PilotSource | None, open_b
         mission_class=spec.mission_class or "contest",
         vision=spec.vision or "boxes",
         detector=spec.detector,
+        gate=spec.gate,
         remarks=problems.all,
     )
     mission.new_pilot()  # now, so that an error in the pilot is raised now

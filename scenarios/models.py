@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from framerunner.errors import UserError
 from framerunner.files.yaml_file import refusal
 from framerunner.geometry.axes import flip_quaternion
+from framerunner.geometry.gate_shape import BAR_LIMITS_M, PAPER_GATE, SIZE_LIMITS_M, GateShape
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
@@ -96,17 +97,26 @@ class StartPose(Part):
     yaw_rad: Radians = Field(0.0, description="heading, counter-clockwise from x")
 
 
+_Size = Annotated[float, Field(ge=SIZE_LIMITS_M[0], le=SIZE_LIMITS_M[1])]
+_Bar = Annotated[float, Field(ge=BAR_LIMITS_M[0], le=BAR_LIMITS_M[1])]
+
+
 class UprightGate(Part):
     """An upright rectangular frame floating in the arena; its normal is its local x axis."""
+
+    often_unused: ClassVar = ("depth_m",)
 
     colour: str
     x_m: Metres = Field(description="centre of the opening")
     y_m: Metres = Field(description="centre of the opening")
     z_m: float = Field(ge=0.01, le=100, description="centre of the opening above the floor")
     yaw_rad: Radians = Field(0.0, description="heading of its normal, counter-clockwise from x")
-    outer_width_m: float = Field(0.42, ge=0.01, le=10, description="horizontal, bars included")
-    outer_height_m: float = Field(0.22, ge=0.01, le=10, description="vertical, bars included")
-    bar_m: float = Field(0.02, ge=0.001, le=1, description="edge of the square bars")
+    outer_width_m: _Size = Field(PAPER_GATE.outer_width_m, description="horizontal, bars included")
+    outer_height_m: _Size = Field(PAPER_GATE.outer_height_m, description="vertical, bars included")
+    bar_m: _Bar = Field(PAPER_GATE.bar_m, description="width of the bars, seen from the front")
+    depth_m: _Bar | None = Field(
+        None, description="thickness of the bars, along the normal; by default bar_m"
+    )
 
     @property
     def position_arena_m(self) -> Vec3:
@@ -114,14 +124,20 @@ class UprightGate(Part):
         return (self.x_m, self.y_m, self.z_m)
 
     @property
+    def shape(self) -> GateShape:
+        """Its sizes."""
+        depth_m = self.bar_m if self.depth_m is None else self.depth_m
+        return GateShape(self.outer_width_m, self.outer_height_m, self.bar_m, depth_m)
+
+    @property
     def opening_m(self) -> tuple[float, float]:
         """Clear width and height between the bars."""
-        return (self.outer_width_m - 2 * self.bar_m, self.outer_height_m - 2 * self.bar_m)
+        return self.shape.opening_m
 
     @property
     def hull(self) -> Solid:
         """The box around it, its opening included."""
-        half_m = (self.bar_m / 2, self.outer_width_m / 2, self.outer_height_m / 2)
+        half_m = (self.shape.depth_m / 2, *self.shape.half_m)
         return Solid(self.colour, self.position_arena_m, self.yaw_rad, half_m)
 
     @model_validator(mode="after")
@@ -419,6 +435,11 @@ class Scenario(Part):
     def all_gates(self) -> tuple[UprightGate, ...]:
         """Gates and decoys."""
         return (*self.frames, *self.decoys)
+
+    @property
+    def gate_shapes(self) -> dict[str, GateShape]:
+        """The shape of each colour; of several decoys of one colour, that of the first."""
+        return {gate.colour: gate.shape for gate in reversed(self.all_gates)}
 
     @property
     def prisms(self) -> tuple[Solid, ...]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from framerunner.geometry.gate_shape import PAPER_GATE
 from scenarios.air import MAX_TURBULENCE_M_S, MAX_WIND_M_S, Wind, check_gusts
 from scenarios.faults.declaration import MAX_TIME_S, Fault, FaultPart
 from scenarios.imaging.effects import (
@@ -34,7 +35,7 @@ _ALL_ROUND_RAD = Range(low=-3.141, high=3.141)
 _QUARTER_RAD = 1.57
 _QUAD = 4
 _BORDERS = 3  # every third patch is nothing but a border, in the proportions of a gate
-_GATE_SHAPE = 0.22 / 0.42
+_GATE_SHAPE = PAPER_GATE.outer_height_m / PAPER_GATE.outer_width_m
 _SLANT_RAD = Range(low=-0.3, high=0.3)
 
 _WindSpeed = Annotated[Range, within(0.0, MAX_WIND_M_S)]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import asdict
 from math import ceil, cos, dist, sin
 from pathlib import Path
 
@@ -30,6 +31,7 @@ from scenarios.random_numbers import (
     random_stream,
 )
 from scenarios.random_obstacles import RandomObstacles, add_obstacles
+from scenarios.random_shapes import RandomShapes, RandomView
 
 _STEP_M = 0.05  # between the points of a way that are checked
 
@@ -126,11 +128,15 @@ class Level(Part):
         description="how near each other and the arena's border frames are; layout.apart_m then counts from "
         "the base only",
     )
+    shapes: RandomShapes | None = Field(None, description="of the frames; by default the challenge's")
     obstacles: RandomObstacles | None = Field(None, description="what else is in the arena")
     wind: RandomWind | None = Field(None, description="how the air moves; by default it is still")
     faults: RandomFault | None = Field(None, description="what fails; by default nothing")
     camera: RandomEffects | None = Field(
         None, description="what the camera does to images; by default they are ideal"
+    )
+    view: RandomView | None = Field(
+        None, description="size and mounting of the camera; by default the challenge's"
     )
     light: RandomLight | None = Field(None, description="where light comes from; by default the challenge's")
     clutter: RandomClutter | None = Field(
@@ -177,6 +183,7 @@ def random_scenario(level: Level, seed: int) -> Scenario:
     """
     yaw_rad = level.layout.start_yaw_rad.draw_value(random_stream(seed, "layout.start_yaw"))
     base, gates = _draw_layout(level, seed)
+    effects = None if level.camera is None else level.camera.draw(seed)
     scenario = Scenario(
         name=f"{level.name}-{seed}",
         description=f"Random scenario of level {level.name}, seed {seed}.",
@@ -185,7 +192,7 @@ def random_scenario(level: Level, seed: int) -> Scenario:
         frames=gates,
         wind=Wind() if level.wind is None else level.wind.draw(seed),
         faults=() if level.faults is None else (level.faults.draw(seed),),
-        camera=Camera(effects=None if level.camera is None else level.camera.draw(seed)),
+        camera=Camera(effects=effects) if level.view is None else level.view.draw(seed, effects),
         light=Light() if level.light is None else level.light.draw(seed),
         hall=None if level.clutter is None else level.clutter.hall,
         patches=() if level.clutter is None else level.clutter.draw(seed),
@@ -200,6 +207,7 @@ def _draw_layout(level: Level, seed: int) -> tuple[Base, tuple[Gate, ...]]:
     All are drawn again when two are too near: redrawing only the last one would favour some layouts.
     """
     layout, closeness = level.layout, level.closeness
+    shapes = None if level.shapes is None else level.shapes.draw(seed)
     stream, heights = random_stream(seed, "layout.places"), random_stream(seed, "layout.frame_heights")
     yaws = random_stream(seed, "layout.frame_yaws")
     count = 1 + len(COLOURS)
@@ -218,6 +226,9 @@ def _draw_layout(level: Level, seed: int) -> tuple[Base, tuple[Gate, ...]]:
             continue
         base_m, *gates_m = [(x / STEPS_PER_UNIT, y / STEPS_PER_UNIT) for x, y in places]
         centres_m = [(x_m, y_m, layout.frame_z_m.draw_value(heights)) for x_m, y_m in gates_m]
+        if level.shapes is not None and shapes is not None:
+            places_m = zip(centres_m, shapes, strict=True)
+            centres_m = [(x, y, level.shapes.height_of(shape, z)) for (x, y, z), shape in places_m]
         if closeness is not None and not closeness.allows(centres_m):
             continue
         base = Base(x_m=base_m[0], y_m=base_m[1])
@@ -225,6 +236,9 @@ def _draw_layout(level: Level, seed: int) -> tuple[Base, tuple[Gate, ...]]:
             Gate(colour=colour, x_m=x_m, y_m=y_m, z_m=z_m, yaw_rad=layout.frame_yaw_rad.draw_value(yaws))
             for colour, (x_m, y_m, z_m) in zip(COLOURS, centres_m, strict=True)
         )
+        if shapes is not None:
+            shaped = zip(gates, shapes, strict=True)
+            gates = tuple(gate.model_copy(update=asdict(shape)) for gate, shape in shaped)
         if closeness is None or closeness.leaves_ways(base, gates):
             return base, gates
     room = " × ".join(f"{span.high - span.low:g}" for span in (layout.x_m, layout.y_m))

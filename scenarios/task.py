@@ -8,6 +8,7 @@ from typing import Self
 
 from pydantic import Field
 
+from framerunner.geometry.gate_shape import GateShape
 from scenarios.goals import Goal
 from scenarios.models import COLOURS, Arena, Base, Camera, Colour, Origin, Scenario, ScenarioName, StartPose
 from scenarios.part import Part
@@ -24,6 +25,7 @@ class Task(Part):
     base: Base
     start: StartPose
     colours: tuple[Colour, ...] = Field(description="of the frames to cross, in order")
+    shapes: dict[str, GateShape] = Field({}, description="of the frames of each colour, decoys' too")
     camera: Camera
     try_limit_s: float
     airframe: str
@@ -42,7 +44,8 @@ class Task(Part):
         shared = {name: getattr(scenario, name) for name in cls.model_fields.keys() & Scenario.model_fields}
         colours = tuple(colour for colour in COLOURS if colour in present)
         shown = scenario if show_layout else None
-        return cls(**shared, colours=colours, layout_mark=layout_mark(scenario), scenario=shown)
+        shapes, mark = scenario.gate_shapes, layout_mark(scenario)
+        return cls(**shared, colours=colours, shapes=shapes, layout_mark=mark, scenario=shown)
 
 
 def layout_mark(scenario: Scenario) -> str:

@@ -1,8 +1,9 @@
 """The drone's camera: `SimulatedCamera` makes images, `CameraFeed` takes them in simulated time.
 
-Without effects an image is what `Painter` paints. With them, it paints a canvas of twice the resolution, at
-several times of the exposure if the image moves much, and lens and sensor make the image of that
-(`sitl/optics`). The time of an image is the middle of its exposure and of its read-out.
+`Painter` paints a canvas of twice the resolution. Without effects a pixel of the image is the mean of four of
+it. With them, it is painted at several times of the exposure if the image moves much, and lens and sensor
+make the image of that (`sitl/optics`). The time of an image is the middle of its exposure and of its
+read-out.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.models import Scenario, TrueState
 from sitl.camera_projection import Pinhole
-from sitl.optics.painter import MARGIN_PX, Image, Painter
+from sitl.optics.painter import MARGIN_PX, Image, Painter, reduced
 from sitl.optics.sensor import SCALE, LensMap, SensorChain
 
 FIRST_EXPOSURE_US = 36_000
@@ -65,15 +66,18 @@ class SimulatedCamera:
         angles_rad = settings.mounting_frd_rad
         self._mounting = mounting_flu(angles_rad) if any(angles_rad) else None
         if effects is None:
-            width, height = settings.width_px + 2 * MARGIN_PX, settings.height_px + 2 * MARGIN_PX
-            pinhole = Pinhole(width, height, settings.focal_px, settings.near_m, settings.far_m)
+            width_px, height_px = (
+                SCALE * (px + 2 * MARGIN_PX) for px in (settings.width_px, settings.height_px)
+            )
+            focal_px = SCALE * settings.focal_px
         else:
             self._lens = lens = LensMap(settings)
             self._sensor = SensorChain(settings, seed)
             # Of the read-out while as many rows are read as the canvas has.
             self._readout_s = effects.readout_s * lens.height_px / (SCALE * settings.height_px)
-            self._canvas = np.empty((lens.height_px, lens.width_px, 3), np.uint8)  # painted again and again
-            pinhole = Pinhole(lens.width_px, lens.height_px, lens.focal_px, settings.near_m, settings.far_m)
+            width_px, height_px, focal_px = lens.width_px, lens.height_px, lens.focal_px
+        self._canvas = np.empty((height_px, width_px, 3), np.uint8)  # painted again and again
+        pinhole = Pinhole(width_px, height_px, focal_px, settings.near_m, settings.far_m)
         self._pinhole = pinhole
         self._painter = Painter(scenario, pinhole)
 
@@ -118,7 +122,8 @@ class SimulatedCamera:
         if self._effects is None:
             attitude = _unit(attitude_arena)
             eye, rotation = self._seen_from(position_arena_m, attitude)
-            return self._painter.paint(eye, rotation, drones, time_us=motion.time_us)[_INSIDE]
+            self._painter.paint(eye, rotation, drones, time_us=motion.time_us, canvas=self._canvas)
+            return reduced(self._canvas, SCALE)[_INSIDE]
         light = self._exposed(position_arena_m, attitude_arena, drones, motion)
         return self._sensor.develop(light, motion.time_us)
 

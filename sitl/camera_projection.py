@@ -19,10 +19,12 @@ import numpy.typing as npt
 from framerunner.geometry.rotations import RotationRows
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
-from sitl.camera_scene import Bgr, Face
+from sitl.camera_scene import WALL, Bgr, Face
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
+Ints64 = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
 Point = tuple[float, float]
 Window = tuple[float, float, float, float]  # left, top, right, bottom
 
@@ -31,6 +33,12 @@ SUBPIXELS = float(1 << SHIFT)
 _BITS = 2.0 ** np.arange(10)
 _CUT_BITS = 0b00111101  # beyond the near plane or the window
 _MOST_ROLLED = 2.0  # heights of the canvas: what is farther above or below it moves with this row
+_FINE_PX = 20_000  # what is painted finely has no more pixels than this
+_SAME_M = 1e-6  # edges nearer than this are the same
+_LEAST_TURN = 1e-3  # twice the area of a corner's triangle, so that edges in line do not divide by zero
+_LEAST_WIDTH = (
+    0.62  # pixels: with this, polygons of all widths below one are as wide as they should be on average
+)
 _FARTHEST = 2.0**24  # sixteenths of a pixel, well within OpenCV's whole numbers of 32 bits
 
 
@@ -78,9 +86,15 @@ class MeshFace:
 
 
 class Mesh:
-    """The faces of a scene, in the order given, ready to be projected."""
+    """The faces of a scene, in the order given, ready to be projected.
 
-    def __init__(self, faces: Sequence[Face], pinhole: Pinhole) -> None:
+    Args:
+        faces: all of them.
+        parts: numbers of the first faces of the things that are painted finely if they are small.
+        pinhole: the camera.
+    """
+
+    def __init__(self, faces: Sequence[Face], parts: Sequence[int], pinhole: Pinhole) -> None:
         stops = np.cumsum([len(face.corners_arena_m) for face in faces]).tolist()
         starts = [0, *stops[:-1]]
         self.faces = tuple(
@@ -89,6 +103,16 @@ class Mesh:
         corners = np.concatenate([face.corners_arena_m for face in faces])
         self._corners = np.vstack([corners.T, np.ones(len(corners))])
         self._starts = np.array(starts)
+        # What is before the first part is a part, too, and is never painted finely.
+        self._parts = np.array([0, *parts])
+        self._part_starts = self._starts[self._parts]
+        self._part_sizes = np.diff(self._part_starts, append=len(corners))
+        ends = np.array(stops) - 1
+        self._next = np.arange(1, len(corners) + 1)  # of every corner the one after it, round its face
+        self._next[ends] = starts
+        self._last = np.arange(-1, len(corners) - 1)  # and the one before it
+        self._last[starts] = ends
+        self._beside = self._neighbours(faces, corners)
         self._normals = np.array([face.normal_arena for face in faces])
         self._offsets = np.array([np.dot(face.normal_arena, face.corners_arena_m[0]) for face in faces])
         self._pinhole = pinhole
@@ -115,13 +139,64 @@ class Mesh:
         # Ten borders are ten bits of one number a corner.
         outside = (_BITS @ (projected[3:] < 0.0)).astype(np.uint16)
         hidden = np.bitwise_and.reduceat(outside, self._starts)
-        seen = (self._normals @ eye_arena_m > self._offsets) & (hidden == 0)
+        facing = self._normals @ eye_arena_m > self._offsets
+        seen = facing & (hidden == 0)
         crossing = np.bitwise_or.reduceat(outside, self._starts) & _CUT_BITS
         flat = projected[:2] / np.maximum(projected[2], near_m)
         np.maximum(flat, -_FARTHEST, out=flat)
         np.minimum(flat, _FARTHEST, out=flat)
-        pixels = np.rint(flat, out=flat).T.astype(np.int32, order="C")
-        return Projection(projected, pixels, seen.tobytes(), crossing.tolist(), near_m, self._window)
+        views = self._views(flat, np.bitwise_or.reduceat(crossing, self._parts) != 0)
+        scale, left, top = (np.repeat(values, self._part_sizes) for values in views[[4, 0, 1]])
+        flat *= scale
+        flat += 0.5 * SUBPIXELS * (scale - 1.0) - SUBPIXELS * scale * np.array((left, top))
+        moved = ~np.append(facing, False).take(self._beside)
+        inset, is_wide = _inset(flat, self._next, self._last, self._starts, moved)
+        seen &= is_wide | (crossing != 0)
+        pixels = np.rint(inset, out=inset).T.astype(np.int32, order="C")
+        return Projection(
+            projected, pixels, seen.tobytes(), crossing.tolist(), near_m, self._window, views.T.tolist()
+        )
+
+    def _neighbours(self, faces: Sequence[Face], corners: Floats) -> Ints64:
+        """For the edge after each corner the face of its part along whose edge it is, or a number beyond all.
+
+        Of the floor's faces only the walls have such edges: the others lie on each other.
+        """
+        ends = corners[self._next]
+        of_face = np.repeat(np.arange(len(faces)), np.diff(self._starts, append=len(corners)))
+        beside = np.full(len(corners), len(faces))
+        for start, size in zip(self._part_starts.tolist(), self._part_sizes.tolist(), strict=True):
+            part = np.arange(start, start + size)
+            if start == 0:
+                part = part[[faces[k].name == WALL for k in of_face[part]]]
+            if not len(part):
+                continue
+            is_along = of_face[part][:, None] != of_face[part]
+            for points in (corners[part], ends[part]):
+                is_along &= _distances(points, corners[part], ends[part]) < _SAME_M
+            beside[part] = np.where(is_along.any(axis=1), of_face[part][is_along.argmax(axis=1)], len(faces))
+        return beside
+
+    def _views(self, flat: Floats, is_cut: Flags) -> Ints:
+        """Where each part is painted: left, top, right and bottom of the canvas, and how much finer, (5, n).
+
+        Args:
+            flat: where all corners are on the canvas, sixteenths of a pixel, shape (2, m).
+            is_cut: whether a part has faces that must be cut, shape (n,).
+        """
+        size_px = np.array([[self._pinhole.width_px], [self._pinhole.height_px]])
+        low = np.minimum.reduceat(flat, self._part_starts, axis=1) / SUBPIXELS
+        high = np.maximum.reduceat(flat, self._part_starts, axis=1) / SUBPIXELS
+        first = np.maximum(np.floor(low) - 1.0, 0.0)
+        end = np.minimum(np.ceil(high) + 2.0, size_px)
+        wide, tall = np.maximum(end - first, 0.0)
+        area = wide * tall
+        scale = np.where(area * 4 <= _FINE_PX, np.where(area * 16 <= _FINE_PX, 4, 2), 1)
+        scale[is_cut] = 1
+        scale[0] = 1
+        views = np.array([*first, *end, scale])
+        views[:2, scale == 1] = 0.0
+        return views.astype(np.int32)
 
     def _rolled(self, projected: Floats, drift: Floats) -> Floats:
         """What is projected, each corner at the time at which its row is read out.
@@ -143,11 +218,14 @@ class Projection:
     """All faces seen from one pose of the camera; u and v in sixteenths of a pixel."""
 
     corners: Floats  # columns (u w, v w, w, ...), one for every corner
-    pixels: Ints  # (u, v) of every corner, shape (n, 2); wrong where cuts are needed
+    pixels: Ints  # (u, v) of every corner in the view of its part, shape (n, 2); wrong where cuts are needed
     seen: bytes  # per face, 1 if it faces the eye and is not wholly outside the view
     to_cut: list[int]  # per face, not 0 if it must be cut
     near_m: float  # depth of the near plane
     window: Window
+    views: list[
+        list[int]
+    ]  # per part left, top, right and bottom on the canvas, and how much finer it is painted
 
     def outline(self, face: MeshFace) -> Ints | None:
         """Corners of a seen face in sixteenths of a pixel, shape (k, 2); None if it is cut away."""
@@ -155,9 +233,68 @@ class Projection:
             return self.pixels[face.start : face.stop]
         points = _clip_near(self.corners[:3, face.start : face.stop].T.tolist(), self.near_m)
         points = _clip_window(points, self.window)
-        if len(points) < 3:
-            return None
-        return np.array([(round(u), round(v)) for u, v in points], np.int32)
+        return None if len(points) < 3 else inset_outline(np.array(points))
+
+
+def inset_outline(points: Floats) -> Ints | None:
+    """What OpenCV is given to paint a convex polygon where it is; None if it is too narrow.
+
+    Args:
+        points: its corners in sixteenths of a pixel, shape (k, 2).
+    """
+    following = np.roll(np.arange(len(points)), -1)
+    moved = np.ones(len(points), np.bool_)
+    inset, is_wide = _inset(points.T, following, np.argsort(following), np.zeros(1, np.intp), moved)
+    return np.rint(inset).T.astype(np.int32, order="C") if is_wide[0] else None
+
+
+def _distances(points: Floats, starts: Floats, ends: Floats) -> Floats:
+    """From every point to every line segment, metres, shape (points, segments)."""
+    along = ends - starts
+    beyond = points[:, None] - starts
+    share = (beyond * along).sum(axis=-1) / np.maximum((along * along).sum(axis=-1), 1e-12)
+    apart: Floats = np.linalg.norm(beyond - np.clip(share, 0.0, 1.0)[..., None] * along, axis=-1)
+    return apart
+
+
+def _inset(
+    flat: Floats, following: Ints64, last: Ints64, starts: Ints64, moved: Flags
+) -> tuple[Floats, Flags]:
+    """Move the edges of convex polygons inwards by as much as OpenCV paints beyond them.
+
+    `cv2.fillConvexPoly` paints the pixels nearest to an edge, too, in every column (row, if the edge is
+    steep): half a pixel beyond it. Moved by that, pixels are painted whose centres are inside. Edges between
+    two faces that are seen are not moved: as OpenCV rounds where an edge begins, there would be gaps.
+    Polygons narrower than a pixel may have no inside; they stay as they are, or are left out, so that they
+    are as wide as they should be on average.
+
+    Args:
+        flat: corners in sixteenths of a pixel, shape (2, n).
+        following: of every corner the number of the next one.
+        last: and of the one before.
+        starts: number of each polygon's first corner.
+        moved: which edges are moved, by the corner where they begin.
+
+    Returns:
+        The corners, and which polygons are to be painted.
+    """
+    along = flat.take(following, 1) - flat
+    before = along.take(last, 1)
+    sizes = np.abs(along)
+    reach = np.maximum(sizes[0], sizes[1])
+    turn = np.abs(before[0] * along[1] - before[1] * along[0])
+    away = reach * moved
+    inset = away.take(last) * along - away * before
+    inset *= 0.5 * SUBPIXELS / np.maximum(turn, _LEAST_TURN)
+    inset += flat
+    kept = (inset.take(following, 1) - inset) * along
+    narrow = np.minimum.reduceat(kept[0] + kept[1], starts) <= 0.0
+    if not narrow.any():
+        return inset, ~narrow
+    of_face = np.repeat(narrow, np.diff(starts, append=flat.shape[1]))
+    twice_area = np.abs(np.add.reduceat(flat[0] * along[1] - flat[1] * along[0], starts))
+    width = twice_area / np.maximum(np.add.reduceat(reach, starts), 1e-9)
+    return np.where(of_face, flat, inset), ~narrow | (width > _LEAST_WIDTH * SUBPIXELS)
 
 
 def _borders(pinhole: Pinhole, window: Window) -> Floats:
@@ -244,5 +381,7 @@ def drone_outlines(
         points = np.array([u / depth_m, v / depth_m]).T
         if np.abs(points).max() < limit:
             hull = cv2.convexHull(points.astype(np.float32)).reshape(-1, 2)
-            seen.append((drone, np.rint(hull).astype(np.int32)))
+            outline = inset_outline(hull.astype(np.float64))
+            if outline is not None:
+                seen.append((drone, outline))
     return seen

@@ -26,8 +26,14 @@ from sitl.streaming.streams import video_streams
 from sitl.video import DroneVideo
 from sitl.world import CONTROL_PERIOD_US
 
-_REQUESTED_US = MappingProxyType({mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20_000})
-"""What the program that grants time will request: before that, too, positions are those of lockstep."""
+_REQUESTED_US = MappingProxyType(
+    {
+        mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: CONTROL_PERIOD_US,
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20_000,
+        mavlink.MAVLINK_MSG_ID_ODOMETRY: 100_000,
+    }
+)
+"""What the program that grants time will request: before that, too, it gets what it gets in lockstep."""
 _REPEAT_S = 0.1  # wall time; while time stands before the first grant, the app finds the drone by that
 
 

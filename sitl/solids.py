@@ -29,14 +29,14 @@ class Touch:
 
 def gate_solids(gate: UprightGate) -> tuple[Solid, ...]:
     """The four bars of a gate: top, bottom, left, right (left and right between the others)."""
-    half_bar = gate.bar_m / 2
-    half_width, half_height = gate.outer_width_m / 2, gate.outer_height_m / 2
+    half_bar, half_depth = gate.bar_m / 2, gate.shape.depth_m / 2
+    half_width, half_height = gate.shape.half_m
     level = half_height - half_bar
     side = half_width - half_bar
     left_y, left_x = cos(gate.yaw_rad) * side, -sin(gate.yaw_rad) * side
     x, y, z = gate.position_arena_m
-    horizontal: Vec3 = (half_bar, half_width, half_bar)
-    upright: Vec3 = (half_bar, half_bar, half_height - gate.bar_m)
+    horizontal: Vec3 = (half_depth, half_width, half_bar)
+    upright: Vec3 = (half_depth, half_bar, half_height - gate.bar_m)
     return (
         Solid(gate.colour, (x, y, z + level), gate.yaw_rad, horizontal),
         Solid(gate.colour, (x, y, z - level), gate.yaw_rad, horizontal),

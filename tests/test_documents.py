@@ -22,6 +22,7 @@ import yaml
 import framerunner
 from framerunner.camera_calibration.calibration_file import load_calibration
 from framerunner.cli import build_app, run
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.vehicle.airframe import load_airframe
 from offboard.mission import load_mission, new_mission
 from offboard.navigation.camera_model import CameraModel
@@ -49,7 +50,7 @@ def names_of_the_map():
         time_us=0, position_age_s=0.0, x=-3.0, y=-3.0, z=1.0, velocity_arena_m_s=(0.0, 0.0, 0.0)
     )
     state.attitude_arena, state.camera_attitude_arena = level, None
-    classes = (CameraModel, Explorer, GateMap, ObstacleMap, PoseHistory)
+    classes = (CameraModel, Explorer, GateMap, GateShapes, ObstacleMap, PoseHistory)
     return {
         **{each.__name__: each for each in classes},
         "scenario": scenario,
@@ -59,7 +60,7 @@ def names_of_the_map():
         "attitude": level,
         "yaw_rad": 0.0,
         "positions": [],
-        "glimpses": Glimpses(CameraModel.of(scenario.camera)),
+        "glimpses": Glimpses(CameraModel.of(scenario.camera), GateShapes()),
         "obstacle_map": ObstacleMap(CameraModel.of(scenario.camera), scenario.arena),
     }
 
@@ -209,11 +210,11 @@ KINDS = {
     "devices.md": [read_scenario],
     "faults.md": [read_scenario],
     "flight-files.md": [read_options],
-    "missions.md": [read_mission, read_with_omissions, read_transitions],
+    "missions.md": [read_mission, read_mission, read_with_omissions, read_transitions],
     "real-drone.md": [read_whole_scenario],
     "scenarios.md": [
         read_whole_scenario,
-        *[read_scenario] * 3,
+        *[read_scenario] * 4,
         read_airframe,
         read_scenario,
         read_scenario,

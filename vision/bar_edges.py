@@ -8,15 +8,18 @@ from math import ceil, floor, hypot, sqrt
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import GateShape
 from vision.calibration.lens import Lens
-from vision.gate_model import BAR_M, GATE_HEIGHT_M, GATE_WIDTH_M, Floats, Point, Segment, Sides
+from vision.gate_model import Floats, Point, Segment, Sides
 from vision.patch import BACKGROUND, OWN, ImagePatch, Labels
 
 Flags = npt.NDArray[np.bool_]
+Places = npt.NDArray[np.intp]
 
 _NO_SIDE = ((0.0, 0.0), (0.0, 0.0))
 
 _OUTSIDE_PX, _INSIDE_PX = 3, 2  # how far from a first estimate of a side its outer edge is looked for
+_OUTWARD = np.array([-2, -1, 0, 1])  # pixels looked at around the end of a bar, from outside
 _MAX_SAMPLES = 40  # per side
 _SLACK_PX, _SLACK_SHARE = 2.5, 1.5  # a bar may look wider than expected by this or this share of its half
 
@@ -27,7 +30,7 @@ class BarEdges:
 
     A side that is nearer to a column than to a row of the image is steep. It is measured in rows t, the
     others in columns t. What is measured there counts towards the opening: the column (row if not steep)
-    times `inward`, half-way between pixel centres.
+    times `inward`.
 
     Attributes:
         steep: per side.
@@ -114,9 +117,10 @@ def find_edges(patch: ImagePatch, sides: Sides, half_px: Widths) -> BarEdges:
     offsets = np.arange(-_OUTSIDE_PX, ceil(widest) + 2)
     index = base[..., None] + across[..., None] * offsets
     around = labels.reshape(-1).take(index, mode="clip").reshape(-1, len(offsets))
-    outer, outer_ok, inner, inner_ok = (
+    first, end, outer_ok, inner_ok = (
         run.reshape(t.shape) for run in _runs(around, half.reshape(-1), slack.reshape(-1))
     )
+    outer, inner = _half_filled(patch.excess, base, across, first, end)
     column, row = patch.origin
     t -= np.where(is_steep, row, column)
     from_here = inward * (u - np.where(is_steep, column, row))
@@ -189,33 +193,34 @@ class _Plan:
 _NOWHERE = _Plan(False, (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def expected_widths(sides: Sides, spread_px: float) -> Widths:
+def expected_widths(sides: Sides, shape: GateShape) -> Widths:
     """What half the widths of the bars should be, by the size of the outline.
 
     The upright sides tell the scale at their distance. A square bar that is turned looks wider.
 
     Args:
         sides: first estimates of the outer edges.
-        spread_px: how much larger than its true outline a region is painted on each side.
+        shape: of the gate.
     """
+    width_m, height_m = shape.outer_width_m, shape.outer_height_m
     top, right, bottom, left = (None if side is None else _length(side) for side in sides)
     height_right, height_left = right or left, left or right
     if height_right is None or height_left is None:  # as if seen from the front
         width = max(top or 0.0, bottom or 0.0)
-        height_right = height_left = width * GATE_HEIGHT_M / GATE_WIDTH_M
+        height_right = height_left = width * height_m / width_m
     cosine = 0.7
     if top is not None and bottom is not None:
-        seen = (top + bottom) / (height_right + height_left) * GATE_HEIGHT_M / GATE_WIDTH_M
+        seen = (top + bottom) / (height_right + height_left) * height_m / width_m
         cosine = min(1.0, seen)
     turned = cosine + sqrt(1.0 - cosine * cosine)
-    share = BAR_M / GATE_HEIGHT_M / 2.0
+    share = shape.bar_m / height_m / 2.0
     at_right, at_left = share * max(height_right, 2.0), share * max(height_left, 2.0)
     level = 1.15  # seen from somewhat above or below
     return [
-        (level * at_left + spread_px, level * at_right + spread_px),
-        (turned * at_right + spread_px,) * 2,
-        (level * at_right + spread_px, level * at_left + spread_px),
-        (turned * at_left + spread_px,) * 2,
+        (level * at_left, level * at_right),
+        (turned * at_right,) * 2,
+        (level * at_right, level * at_left),
+        (turned * at_left,) * 2,
     ]
 
 
@@ -280,12 +285,12 @@ def _plan(side: Segment, half_px: tuple[float, float], start: Point, end: Point,
     return _Plan(steep, (inward, slope, first, step, count, u_first, slant * half_first, slant * growth))
 
 
-def _runs(around: Labels, half: Floats, slack: Floats) -> tuple[Floats, Flags, Floats, Flags]:
+def _runs(around: Labels, half: Floats, slack: Floats) -> tuple[Places, Places, Flags, Flags]:
     """The run of own pixels that is met first from outside, in each row of samples.
 
     Returns:
-        Outer edge, whether it is a real edge, inner edge, whether that is real; edges in pixels from the
-        estimate, half-way between pixel centres.
+        The first pixel of it and the first one after it, from the estimate; whether its outer edge is a real
+        one, and its inner edge.
     """
     inside = around == OWN
     rows = np.arange(len(around))
@@ -303,5 +308,33 @@ def _runs(around: Labels, half: Floats, slack: Floats) -> tuple[Floats, Flags, F
     inner_ok = (
         hit & after[rows, end] & (around[rows, end] == BACKGROUND) & (end - first <= 2.0 * half + slack)
     )
-    shift = -_OUTSIDE_PX - 0.5
-    return first + shift, hit, end + shift, inner_ok
+    return first - _OUTSIDE_PX, end - _OUTSIDE_PX, hit, inner_ok
+
+
+def _half_filled(
+    excess: npt.NDArray[np.int16], base: Places, across: Places, first: Places, end: Places
+) -> tuple[Floats, Floats]:
+    """Outer and inner edges of runs of pixels, by how far the pixels at their ends are filled.
+
+    A pixel whose excess is between that of the bar and that of what is beside it is filled by that share.
+    """
+    flat = excess.reshape(-1)
+    last, stride = end - 1, across[..., None]
+    at_first = flat.take((base + across * first)[..., None] + stride * _OUTWARD, mode="clip")
+    at_last = flat.take((base + across * last)[..., None] - stride * _OUTWARD, mode="clip")
+    is_wide = last > first
+    return first + 0.5 - _filled(at_first, is_wide), last - 0.5 + _filled(at_last, is_wide)
+
+
+def _filled(excess: npt.NDArray[np.int16], is_wide: Flags) -> Floats:
+    """How many of the pixels before, at and after a run's end are filled, less the last of these.
+
+    Args:
+        excess: of two pixels beside the run and two of it, shape (..., 4).
+        is_wide: the run has more than one pixel.
+    """
+    farther, beside, edge, within = np.moveaxis(excess.astype(np.float64), -1, 0)
+    ground = np.minimum(farther, beside)
+    full = np.where(is_wide, np.maximum(edge, within), edge)
+    share: Floats = (beside + edge - 2.0 * ground) / np.maximum(full - ground, 1.0)
+    return share

@@ -1,7 +1,7 @@
 """The axes of a gate's bars in an image, as straight lines fitted to the bars' edges.
 
 The bars are square rods. Seen from anywhere, the middle of a rod's image is nearly the image of its axis, and
-a blur, a threshold or pixels painted too large widen both its edges alike. So each side of a gate is
+a blur or an image's brightness curve moves both its edges alike. So each side of a gate is
 measured as the middle of its bar; the four axes are a rectangle in the gate's middle plane. Where only the
 outer edge is seen (the opening is too small in the image, or hidden), half the bar's width is added to it.
 """
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vision.bar_edges import BarEdges, Flags
-from vision.gate_model import GATE_HEIGHT_M, GATE_WIDTH_M, Floats
+from vision.gate_model import Floats, GateModel
 
 _QUANTISATION = 1.0 / 12.0  # variance of a rounded number
 _LEAST_VARIANCE = 4e-4
@@ -63,14 +63,14 @@ class Meeting(NamedTuple):
     std_y: float
 
 
-def fit_lines(edges: BarEdges, focal_px: float, offsets: Floats | None = None) -> BarLines:
+def fit_lines(edges: BarEdges, model: GateModel, offsets: Floats | None = None) -> BarLines:
     """Fit the axes of a gate's bars; None where nothing of a bar is seen.
 
     Args:
         edges: of the bars.
-        focal_px: focal length.
-        offsets: what `frame_model.bar_offsets` says of these edges, at the first and last place of each side
-            and with the spread of the pixels, if a pose is known; else the edges are taken to be symmetric.
+        model: of the gate.
+        offsets: what `GateModel.bar_offsets` says of these edges, at the first and last place of each
+            side, if a pose is known; else the edges are taken to be symmetric.
     """
     both = edges.outer_ok & edges.inner_ok
     axis, half_px = _axis(edges, both, offsets)
@@ -109,7 +109,7 @@ def fit_lines(edges: BarEdges, focal_px: float, offsets: Floats | None = None) -
                 open=boths / planned,
             )
         )
-    _balance(lines, focal_px)
+    _balance(lines, model)
     return lines
 
 
@@ -202,8 +202,9 @@ def _variances(
     return var_at, 12.0 * (noise + 1.5 * slanted) / (independent * lever * lever)
 
 
-def _balance(lines: BarLines, focal_px: float) -> None:
+def _balance(lines: BarLines, model: GateModel) -> None:
     """Draw the slopes of opposite sides together as far as perspective cannot part them: far gates."""
+    width_m, height_m = model.shape.outer_width_m, model.shape.outer_height_m
     for one, other in ((0, 2), (3, 1)):
         a, b = lines[one], lines[other]
         if a is None or b is None or a.steep != b.steep:
@@ -213,8 +214,8 @@ def _balance(lines: BarLines, focal_px: float) -> None:
         long_px = max(a.last - a.first, b.last - b.first) + 2.0
         # The gate's ends differ in depth by no more than its width (height for the upright bars), and its
         # distance is to the focal length as its size to its image.
-        height_px, deep_m = (apart_px, GATE_WIDTH_M) if one == 0 else (long_px, 0.6 * GATE_HEIGHT_M)
-        parted_px = 0.5 * deep_m * apart_px * height_px / (GATE_HEIGHT_M * focal_px)
+        height_px, deep_m = (apart_px, width_m) if one == 0 else (long_px, 0.6 * height_m)
+        parted_px = 0.5 * deep_m * apart_px * height_px / (height_m * model.focal_px)
         prior = (2.0 * parted_px / long_px) ** 2
         share = 1.0 / (prior + a.var_slope + b.var_slope)
         gain = (a.slope - b.slope) * share

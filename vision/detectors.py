@@ -9,11 +9,12 @@ from typing import Any, get_args
 
 from framerunner.errors import UserError
 from framerunner.files.extensions import extension_names, find_extension
+from framerunner.geometry.gate_shape import GateShapes
 from vision.calibration.colours import correct_colours
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.detector import detect
-from vision.gate_finder import PAINTED_SPREAD_PX, SMOOTH_SPREAD_PX, GateFinder
+from vision.gate_finder import GateFinder
 from vision.types import Detections, Image, Vision
 
 OWN_DETECTORS: tuple[Vision, ...] = get_args(Vision)
@@ -32,18 +33,16 @@ def new_detector(
     kind: Vision,
     *,
     focal_px: float | None = None,
-    rendered: bool = False,
-    smooth: bool = False,
     calibration: Calibration | None = None,
+    shapes: GateShapes | None = None,
 ) -> Detector:
     """Make a detector.
 
     Args:
         kind: "boxes": the paper's, one bounding box per colour; "frames": by shape, with poses.
         focal_px: focal length of the camera; "boxes" takes the paper's if it is None.
-        rendered: the images are the simulator's, not a real camera's.
-        smooth: the simulator's with camera effects, which paint half as far beyond a true outline.
         calibration: of the camera; its focal length is used, and "frames" gives pixels of an ideal camera.
+        shapes: of the gates of each colour; None: all have that of the frame challenge.
 
     Returns:
         A function of an image and its vehicle time. It raises `CalibrationError` if the image's shape is not
@@ -56,17 +55,14 @@ def new_detector(
         focal_px = calibration.fx_px
         if (matrix := calibration.colour_matrix) is not None:
             plain = calibration.model_copy(update={"colour_matrix": None})
-            detector = new_detector(kind, rendered=rendered, smooth=smooth, calibration=plain)
+            detector = new_detector(kind, calibration=plain, shapes=shapes)
             return lambda image, time_us: detector(correct_colours(image, matrix), time_us)
     if kind == "boxes":
-        return partial(detect, focal_px=focal_px)
+        return partial(detect, focal_px=focal_px, shapes=shapes or GateShapes())
     if focal_px is None:
         raise ValueError("focal_px: the detector of frames needs the camera's focal length")
-    spread_px = 0.0
-    if rendered:
-        spread_px = SMOOTH_SPREAD_PX if smooth else PAINTED_SPREAD_PX
     lens = None if calibration is None or calibration.is_ideal else Lens(calibration)
-    return GateFinder(focal_px, spread_px, lens).find
+    return GateFinder(focal_px, lens, shapes).find
 
 
 def others_detector(made_by: str | DetectorMaker, calibration: Calibration) -> Detector:

@@ -10,11 +10,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import GateShapes
 from vision.calibration.lens import Lens, straight_box
-from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
+from vision.colour_regions import OBSTACLE, PRIMARIES, SECONDARIES, ColourMask, find_colours
 from vision.detector import measure
 from vision.gate_fit import FittedGate, fit_gate
-from vision.gate_model import Sides
+from vision.gate_model import GateModel, Sides
 from vision.outer_sides import outer_sides, sides_by_opening
 from vision.patch import ImagePatch, cut_patch
 from vision.types import (
@@ -31,12 +32,6 @@ _Plane = npt.NDArray[np.uint8]
 _Contour = npt.NDArray[np.int32]
 _Box = tuple[int, int, int, int]
 
-PAINTED_SPREAD_PX = 0.5
-"""How much larger than true the simulator paints on each side: a border is on the nearest pixels."""
-
-SMOOTH_SPREAD_PX = 0.25
-"""The same with camera effects, which are painted at twice the resolution."""
-
 _OBSTACLE_STEP = 8
 _MIN_RUN_PX = 3
 _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are upright
@@ -47,19 +42,19 @@ _OPENING_PX = 12  # a region smaller than this is not looked at for an opening
 
 
 class GateFinder:
-    """Finds gates of known size by colour and shape.
+    """Finds gates of known sizes by colour and shape.
 
     Args:
         focal_px: focal length of the camera; its optical axis is in the middle of the image.
-        spread_px: how much larger than true a region looks on each side: `PAINTED_SPREAD_PX` for images of
-            the simulator, 0 for those of a real camera.
         lens: of a camera that is not ideal; it has the same focal length. What is found is then in pixels of
             an ideal camera.
+        shapes: of the gates of each colour; None: all have that of the frame challenge.
     """
 
-    def __init__(self, focal_px: float, spread_px: float = 0.0, lens: Lens | None = None) -> None:
+    def __init__(self, focal_px: float, lens: Lens | None = None, shapes: GateShapes | None = None) -> None:
         self._focal_px = focal_px
-        self._spread_px = spread_px
+        known = shapes or GateShapes()
+        self._models = {colour: GateModel(known.of(colour), focal_px) for colour in PRIMARIES + SECONDARIES}
         self._lens = lens
 
     def find(self, image: Image, time_us: int | None = None) -> Detections:
@@ -112,18 +107,22 @@ class GateFinder:
         found: list[tuple[_Box, GateSighting]] = []
         for group in _groups(mask, others):
             sighting = self._sighting(mask, others, np.concatenate(group))
+            if (sighting is None or not sighting[1].whole) and len(group) > 1:
+                # What is joined may be two things: a gate, and mixed colours at an obstacle's edge.
+                each = [self._sighting(mask, others, fragment) for fragment in group]
+                alone = [one for one in each if one is not None and (sighting is None or one[1].whole)]
+                if alone:
+                    found += alone
+                    continue
             if sighting is not None:
                 found.append(sighting)
-            elif len(group) > 1:
-                alone = (self._sighting(mask, others, fragment) for fragment in group)
-                found += [one for one in alone if one is not None]
         if not found:
             return [], NOT_SEEN
         height, width = mask.mask.shape
         box, largest = max(found, key=lambda one: one[0][2] * one[0][3])
         numbers = measure(
             box[1] + 1, box[1] + box[3], box[0] + 1, box[0] + box[2],
-            width_px=width, height_px=height, focal_px=self._focal_px,
+            width_px=width, height_px=height, focal_px=self._focal_px, shape=self._models[mask.colour].shape,
         )  # fmt: skip
         if self._lens is not None:
             numbers = straight_box(numbers, self._lens)
@@ -142,20 +141,23 @@ class GateFinder:
         candidates = outer_sides(points, width, height, self._lens)
         if not candidates:
             return None
-        patch = cut_patch(mask, others, box, self._lens)
-        best = self._best_fit(patch, candidates)
+        patch, model = cut_patch(mask, others, box, self._lens), self._models[mask.colour]
+        best = self._best_fit(patch, candidates, model)
         if best is None and min(box[2:]) >= _OPENING_PX:
             # Something of its colour behind it may spoil its outline, but not that of its opening.
-            best = self._best_fit(patch, sides_by_opening(mask.mask, box, self._lens))
+            openings = sides_by_opening(mask.mask, box, model.shape, self._lens)
+            best = self._best_fit(patch, openings, model)
         return (
             None if best is None else (box, GateSighting(mask.colour, best.corners, best.whole, best.poses))
         )
 
-    def _best_fit(self, patch: ImagePatch, candidates: Sequence[Sides]) -> FittedGate | None:
+    def _best_fit(
+        self, patch: ImagePatch, candidates: Sequence[Sides], model: GateModel
+    ) -> FittedGate | None:
         """The likeliest gate of several first estimates."""
         best: FittedGate | None = None
         for sides in candidates:
-            fitted = fit_gate(patch, sides, self._focal_px, self._spread_px)
+            fitted = fit_gate(patch, sides, model)
             if fitted is not None and (
                 best is None or (fitted.whole, -fitted.cost) > (best.whole, -best.cost)
             ):

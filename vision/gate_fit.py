@@ -13,20 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from framerunner.geometry.gate_shape import GateShape
 from vision.bar_edges import BarEdges, Widths, expected_widths, find_edges
 from vision.bar_lines import BarLine, BarLines, Meeting, fit_lines, meeting
 from vision.calibration.lens import Lens
-from vision.gate_model import (
-    AXES_CORNERS,
-    GATE_HEIGHT_M,
-    GATE_WIDTH_M,
-    OUTER_CORNERS,
-    Floats,
-    ModelPose,
-    Point,
-    Sides,
-    bar_offsets,
-)
+from vision.gate_model import Floats, GateModel, ModelPose, Point, Sides
 from vision.gate_pose import as_seen, find_poses, poses_of_three
 from vision.patch import ImagePatch
 from vision.types import GateCorner, GatePose
@@ -67,21 +58,20 @@ class FittedGate(NamedTuple):
     cost: float
 
 
-def fit_gate(patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float) -> FittedGate | None:
+def fit_gate(patch: ImagePatch, sides: Sides, model: GateModel) -> FittedGate | None:
     """Fit a gate to a region; None if the region is no gate and no sure part of one.
 
     Args:
         patch: the region.
         sides: first estimates of its outer edges, pixels from the optical axis, from pixel centre to centre.
-        focal_px: focal length.
-        spread_px: how much larger than its true outline a region is painted on each side.
+        model: of the gate.
     """
     if patch.has_foreign and _least_length(sides) >= _CLEAR_PX:
         # It may be behind what is beside it, or in front of that: then four whole bars are seen.
-        fitted = _fit_any(patch.in_front(), sides, focal_px, spread_px)
+        fitted = _fit_any(patch.in_front(), sides, model)
         if fitted is not None and fitted.whole:
             return fitted
-    return _fit_any(patch, sides, focal_px, spread_px)
+    return _fit_any(patch, sides, model)
 
 
 def _least_length(sides: Sides) -> float:
@@ -91,34 +81,32 @@ def _least_length(sides: Sides) -> float:
     )
 
 
-def _fit_any(patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float) -> FittedGate | None:
-    lines, meetings, poses = _fit(patch, sides, focal_px, spread_px)
+def _fit_any(patch: ImagePatch, sides: Sides, model: GateModel) -> FittedGate | None:
+    lines, meetings, poses = _fit(patch, sides, model)
     known = [(met.x, met.y) for met in meetings if met is not None]
     if len(known) == 4:
-        if poses and not _has_bars(lines, known, poses[0], focal_px, spread_px):
+        if poses and not _has_bars(lines, known, poses[0], model):
             return None
         support = patch.support(known, known[1:] + known[:1])
         if max(support.empty) <= _MAX_EMPTY:
             if patch.is_filled(known):
                 return None
             whole = min(support.own) >= _WHOLE
-            corners = _outer_corners(meetings, poses[0], focal_px, whole) if poses else None
+            corners = _outer_corners(meetings, poses[0], model, whole) if poses else None
             return None if corners is None else _fitted(corners, whole, poses, meetings)
         a, b, c, d = (
             side if empty <= _MAX_EMPTY else None for side, empty in zip(sides, support.empty, strict=True)
         )
-        lines, meetings, poses = _fit(patch, (a, b, c, d), focal_px, spread_px)
-    corners = _outer_corners(meetings, poses[0], focal_px, False) if poses else None
+        lines, meetings, poses = _fit(patch, (a, b, c, d), model)
+    corners = _outer_corners(meetings, poses[0], model, False) if poses else None
     if corners is None:
         if not patch.may_be_cut:
             return None  # nothing explains why no more is seen of it
-        corners = _corners_without_pose(patch, lines, spread_px)
+        corners = _corners_without_pose(patch, lines)
     return _fitted(corners, False, poses, meetings) if any(corners) else None
 
 
-def _has_bars(
-    lines: BarLines, axes_corners: Sequence[Point], pose: ModelPose, focal_px: float, spread_px: float
-) -> bool:
+def _has_bars(lines: BarLines, axes_corners: Sequence[Point], pose: ModelPose, model: GateModel) -> bool:
     """Whether there is an opening where it is large enough to be seen, and the bars are as wide as a gate's.
 
     Posters and drawn rectangles are not. The limits let through all gates of some thousand images, rendered
@@ -136,10 +124,10 @@ def _has_bars(
         return True
     spans = np.array([(line.first, line.last) for line in known])
     inward = np.array([line.inward for line in known])
-    offsets = bar_offsets(pose, tuple(line.steep for line in known), inward, spans, focal_px)
+    offsets = model.bar_offsets(pose, tuple(line.steep for line in known), inward, spans)
     if offsets is None:
         return True
-    half_px = 0.5 * (offsets[:, 1] - offsets[:, 0]).mean(axis=1)[clear] + spread_px
+    half_px = 0.5 * (offsets[:, 1] - offsets[:, 0]).mean(axis=1)[clear]
     wider_px = float(np.mean([known[k].half_px for k in clear]) - half_px.mean())
     expected_px = float(half_px.mean())
     most_px, least_px = (limit + share * expected_px for limit, share in (_TOO_WIDE, _TOO_THIN))
@@ -155,25 +143,21 @@ def _fitted(corners: Corners, whole: bool, poses: list[ModelPose], meetings: _Me
     return FittedGate(corners, whole, tuple(map(as_seen, poses)), min(costs, default=inf))
 
 
-def _fit(
-    patch: ImagePatch, sides: Sides, focal_px: float, spread_px: float
-) -> tuple[BarLines, _Meetings, list[ModelPose]]:
+def _fit(patch: ImagePatch, sides: Sides, model: GateModel) -> tuple[BarLines, _Meetings, list[ModelPose]]:
     """The axes of the sides, where they meet (sides k - 1 and k) and the poses that follow."""
-    edges = find_edges(patch, sides, expected_widths(sides, spread_px))
-    lines, meetings, poses = _lines_and_poses(patch, edges, None, (), focal_px)
+    edges = find_edges(patch, sides, expected_widths(sides, model.shape))
+    lines, meetings, poses = _lines_and_poses(patch, edges, None, (), model)
     if all(line is not None and line.open > _CLEAR_OPEN and line.half_px < _THIN_PX for line in lines):
         # So far away that the middle of a bar's image is its axis.
         return lines, meetings, _explaining(poses, meetings)
     for _ in range(2):
         if not poses:
             break
-        offsets = bar_offsets(poses[0], edges.steep, edges.inward, edges.spans, focal_px)
+        offsets = model.bar_offsets(poses[0], edges.steep, edges.inward, edges.spans)
         if offsets is None:
             break
-        offsets[:, 0] -= spread_px
-        offsets[:, 1] += spread_px
         wider = _wider(edges, offsets)
-        lines, meetings, poses = _lines_and_poses(patch, edges, offsets, poses, focal_px)
+        lines, meetings, poses = _lines_and_poses(patch, edges, offsets, poses, model)
         if wider is None or not poses:
             break
         edges = find_edges(patch, sides, wider)  # a side that is cut looked like one of a smaller gate
@@ -204,25 +188,25 @@ def _wider(edges: BarEdges, offsets: Floats) -> Widths | None:
 
 
 def _lines_and_poses(
-    patch: ImagePatch, edges: BarEdges, offsets: Floats | None, guesses: Sequence[ModelPose], focal_px: float
+    patch: ImagePatch, edges: BarEdges, offsets: Floats | None, guesses: Sequence[ModelPose], model: GateModel
 ) -> tuple[BarLines, _Meetings, list[ModelPose]]:
-    lines = [line if _is_sure(line) else None for line in fit_lines(edges, focal_px, offsets)]
+    lines = [line if _is_sure(line) else None for line in fit_lines(edges, model, offsets)]
     meetings = [meeting(lines[k - 1], lines[k]) for k in range(4)]
     if patch.lens is not None and patch.lens.readout_s > 0.0:
-        meetings = _sheared(meetings, patch.lens)
-    return lines, meetings, _poses(patch, lines, meetings, guesses, focal_px)
+        meetings = _sheared(meetings, patch.lens, model.shape)
+    return lines, meetings, _poses(patch, lines, meetings, guesses, model)
 
 
-def _sheared(meetings: _Meetings, lens: Lens) -> _Meetings:
+def _sheared(meetings: _Meetings, lens: Lens, shape: GateShape) -> _Meetings:
     """Where lines meet, with what a rolling shutter may shear from the first to the last row of a gate."""
     known = [met for met in meetings if met is not None]
     if len(known) < 2:
         return meetings
     rights, downs = [met.x for met in known], [met.y for met in known]
     rows = max(downs) - min(downs)
-    width_px = max(max(rights) - min(rights), rows * GATE_WIDTH_M / GATE_HEIGHT_M)
+    width_px = max(max(rights) - min(rights), rows * shape.outer_width_m / shape.outer_height_m)
     # Turning moves all of it alike; flying moves what is near, and widens it.
-    nearer_px = _FLYING_M_S * width_px * width_px / (2.0 * GATE_WIDTH_M * lens.focal_px)
+    nearer_px = _FLYING_M_S * width_px * width_px / (2.0 * shape.outer_width_m * lens.focal_px)
     px = lens.readout_s * rows / lens.size_px[1] * (_TURNING_RAD_S * lens.focal_px + nearer_px)
     return [
         None if met is None else met._replace(std_x=hypot(met.std_x, px), std_y=hypot(met.std_y, px))
@@ -236,21 +220,21 @@ def _is_sure(line: BarLine | None) -> bool:
 
 
 def _poses(
-    patch: ImagePatch, lines: BarLines, meetings: _Meetings, guesses: Sequence[ModelPose], focal_px: float
+    patch: ImagePatch, lines: BarLines, meetings: _Meetings, guesses: Sequence[ModelPose], model: GateModel
 ) -> list[ModelPose]:
     """The poses that explain four or three lines."""
     known = [met for met in meetings if met is not None]
     if len(known) == 4:
         limit = _ROUGH * _max_error_px(meetings)
-        return find_poses([(met.x, met.y) for met in known], focal_px, limit)
+        return find_poses([(met.x, met.y) for met in known], model, limit)
     if len(known) != 2 or sum(line is not None for line in lines) != 3:
         return []
     missing = lines.index(None)
     forms = [None if line is None else line.normal_form() for line in lines]
     corners = [None if met is None else (met.x, met.y) for met in meetings]
     weights = [_weights(lines[k], meetings[k], meetings[(k + 1) % 4]) for k in range(4)]
-    poses = poses_of_three(forms, corners, weights, focal_px, guesses)
-    return [pose for pose in poses if _explains(patch, pose, missing, focal_px)]
+    poses = poses_of_three(forms, corners, weights, model, guesses)
+    return [pose for pose in poses if _explains(patch, pose, missing, model)]
 
 
 def _weights(line: BarLine | None, start: Meeting | None, end: Meeting | None) -> tuple[float, float]:
@@ -264,9 +248,9 @@ def _weights(line: BarLine | None, start: Meeting | None, end: Meeting | None) -
     return (1.0 / sqrt(one), 1.0 / sqrt(other))
 
 
-def _explains(patch: ImagePatch, pose: ModelPose, missing: int, focal_px: float) -> bool:
+def _explains(patch: ImagePatch, pose: ModelPose, missing: int, model: GateModel) -> bool:
     """Whether a pose has the bars where they are seen, and the missing one where it cannot be seen."""
-    corners = pose.project(AXES_CORNERS, focal_px)
+    corners = pose.project(model.axes_corners, model.focal_px)
     if corners is None:
         return False
     places: list[Point] = [(x, y) for x, y in corners.tolist()]
@@ -274,9 +258,12 @@ def _explains(patch: ImagePatch, pose: ModelPose, missing: int, focal_px: float)
     return max(support.empty) <= _MAX_EMPTY and support.own[missing] <= _MAX_OWN_UNSEEN
 
 
-def _outer_corners(meetings: _Meetings, pose: ModelPose, focal_px: float, whole: bool) -> Corners | None:
+def _outer_corners(meetings: _Meetings, pose: ModelPose, model: GateModel, whole: bool) -> Corners | None:
     """The corners of the outline in the gate's middle plane, from those of the bars' axes."""
-    outer, axes = pose.project(OUTER_CORNERS, focal_px), pose.project(AXES_CORNERS, focal_px)
+    outer, axes = (
+        pose.project(model.outer_corners, model.focal_px),
+        pose.project(model.axes_corners, model.focal_px),
+    )
     if outer is None or axes is None:
         return None
     beyond = (outer - axes).tolist()
@@ -299,7 +286,7 @@ def _facing(pose: ModelPose) -> float:
     return abs(float(pose.rotation[:, 2] @ pose.shift_m)) / hypot(*pose.shift_m.tolist())
 
 
-def _corners_without_pose(patch: ImagePatch, lines: BarLines, spread_px: float) -> Corners:
+def _corners_without_pose(patch: ImagePatch, lines: BarLines) -> Corners:
     """Corners of the outline if too little of a gate is seen for a pose: where two bars are seen to meet.
 
     They are half a bar outside the axes. A bar's depth is seen beside its width, how much of it depends on
@@ -317,7 +304,7 @@ def _corners_without_pose(patch: ImagePatch, lines: BarLines, spread_px: float) 
         middles = [_point(bar) for bar in bars]
         if min(patch.support([(met.x, met.y)] * 2, middles).own) < _WHOLE:
             continue
-        outer = meeting(_moved_outward(before, spread_px), _moved_outward(after, spread_px))
+        outer = meeting(_moved_outward(before), _moved_outward(after))
         found[k] = None if outer is None else _corner(outer, 0.0, 0.0, False)
     return _corners(found)
 
@@ -327,11 +314,10 @@ def _point(line: BarLine) -> tuple[float, float]:
     return (line.at, line.along) if line.steep else (line.along, line.at)
 
 
-def _moved_outward(line: BarLine, spread_px: float) -> BarLine:
+def _moved_outward(line: BarLine) -> BarLine:
     """From the axis of a bar to its outer edge in the gate's middle plane."""
-    half_px = max(line.half_px - spread_px, 0.0)
-    at = line.at - line.inward * _WIDTH_SHARE * half_px
-    return line._replace(at=at, var_at=line.var_at + (_WIDTH_SHARE_STD * half_px) ** 2)
+    at = line.at - line.inward * _WIDTH_SHARE * line.half_px
+    return line._replace(at=at, var_at=line.var_at + (_WIDTH_SHARE_STD * line.half_px) ** 2)
 
 
 def _corner(met: Meeting, right_px: float, down_px: float, whole: bool) -> GateCorner | None:

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from framerunner.geometry.vectors import Vec3
-from vision.gate_model import AXES_CORNERS, AXES_HEIGHT_M, AXES_WIDTH_M, Floats, ModelPose, Point
+from vision.gate_model import Floats, GateModel, ModelPose, Point
 from vision.types import GatePose
 
 _NEAREST_M = 0.03
@@ -29,25 +29,24 @@ _MAX_TURN_ERROR = 0.25  # the same for its angle about the upright axis, radians
 _MAX_DEVIATIONS = 3.0
 _SAME_COSINE = 0.9995
 _FLAT = 1e-9  # area of an image, in units of the focal length squared, of which no pose is found
-_MODEL = tuple((x, y) for x, y, _ in AXES_CORNERS.tolist())
 
 _Rows = tuple[Vec3, Vec3, Vec3]
 
 
-def find_poses(axes_corners: Sequence[Point], focal_px: float, max_error_px: float) -> list[ModelPose]:
+def find_poses(axes_corners: Sequence[Point], model: GateModel, max_error_px: float) -> list[ModelPose]:
     """Find the poses of a gate.
 
     Args:
         axes_corners: where the axes of its bars meet, upper left, upper right, lower right, lower left:
             pixels right of and below the optical axis.
-        focal_px: focal length.
+        model: of the gate.
         max_error_px: poses that explain the corners worse than this (root mean square) are left out.
 
     Returns:
         None, one or two, the better one first.
     """
-    image = [(x / focal_px, y / focal_px) for x, y in axes_corners]
-    poses = [_pose(rotation, image, focal_px) for rotation in _rotations(image)]
+    image = [(x / model.focal_px, y / model.focal_px) for x, y in axes_corners]
+    poses = [_pose(rotation, image, model) for rotation in _rotations(image, model.axes_m)]
     found = [pose for pose in poses if pose is not None and pose.error_px <= max_error_px]
     return sorted(found, key=lambda pose: pose.error_px)
 
@@ -61,11 +60,12 @@ def as_seen(pose: ModelPose) -> GatePose:
     return GatePose((z, -x, -y), (ahead, -right, -down), pose.error_px)
 
 
-def _rotations(image: list[Point]) -> list[_Rows]:
+def _rotations(image: list[Point], axes_m: tuple[float, float]) -> list[_Rows]:
     """The two rotations, by rows, with which a small part of the gate's middle looks as it does.
 
     Args:
         image: the four corners, in units of the focal length.
+        axes_m: width and height of the gate, between the axes of its bars.
     """
     # The projective map from the unit square to the image (P. Heckbert, "Fundamentals of texture mapping and
     # image warping", 1989).
@@ -81,7 +81,7 @@ def _rotations(image: list[Point]) -> list[_Rows]:
         return []
     # The image of the middle, and how it changes with the place on the gate, for each metre.
     p, q = (0.5 * (along[0] + down[0]) + x0) / depth, (0.5 * (along[1] + down[1]) + y0) / depth
-    per_x, per_y = 1.0 / (depth * AXES_WIDTH_M), 1.0 / (depth * AXES_HEIGHT_M)
+    per_x, per_y = 1.0 / (depth * axes_m[0]), 1.0 / (depth * axes_m[1])
     j00, j01 = (along[0] - p * g) * per_x, (down[0] - p * h) * per_y
     j10, j11 = (along[1] - q * g) * per_x, (down[1] - q * h) * per_y
     # The same in axes that are turned so that the middle is straight ahead.
@@ -120,12 +120,12 @@ def _turned(turn: _Rows, first: Vec3, second: Vec3) -> _Rows:
     return (x, y, z)
 
 
-def _pose(rotation: _Rows, image: list[Point], focal_px: float) -> ModelPose | None:
+def _pose(rotation: _Rows, image: list[Point], model: GateModel) -> ModelPose | None:
     """The pose with a rotation: the shift that fits the corners best, by linear least squares."""
     (r00, r01, _), (r10, r11, _), (r20, r21, _) = rotation
     if r11 < _MIN_UPRIGHT:
         return None
-    points = [(r00 * x + r01 * y, r10 * x + r11 * y, r20 * x + r21 * y) for x, y in _MODEL]
+    points = [(r00 * x + r01 * y, r10 * x + r11 * y, r20 * x + r21 * y) for x, y in model.axes_places]
     # For each corner shift_x - u shift_z = u z - x, and likewise for y.
     sum_u, sum_v, sum_squares, sum_x, sum_y, sum_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for (u, v), (x, y, z) in zip(image, points, strict=True):
@@ -143,14 +143,14 @@ def _pose(rotation: _Rows, image: list[Point], focal_px: float) -> ModelPose | N
             return None
         square += ((x + shift_x) / depth - u) ** 2 + ((y + shift_y) / depth - v) ** 2
     shift = np.array((shift_x, shift_y, shift_z))
-    return ModelPose(np.array(rotation), shift, focal_px * sqrt(square / 4.0))
+    return ModelPose(np.array(rotation), shift, model.focal_px * sqrt(square / 4.0))
 
 
 def poses_of_three(
     lines: Sequence[tuple[float, float, float] | None],
     corners: Sequence[Point | None],
     weights: Sequence[tuple[float, float]],
-    focal_px: float,
+    model: GateModel,
     guesses: Sequence[ModelPose] = (),
 ) -> list[ModelPose]:
     """Find the poses of a gate of which one side is not seen.
@@ -160,7 +160,7 @@ def poses_of_three(
             None.
         corners: where the axes meet; two are None.
         weights: of each line at its first and its second corner, 1/px.
-        focal_px: focal length.
+        model: of the gate.
         guesses: poses near to which the answers are, if they are known.
 
     Returns:
@@ -174,29 +174,30 @@ def poses_of_three(
         return []
     rows = [(k, end) for k in range(4) if k != missing for end in (0, 1)]
     normals = np.array([lines[k] for k, _ in rows])
-    points = AXES_CORNERS[[(k + end) % 4 for k, end in rows]]
+    points = model.axes_corners[[(k + end) % 4 for k, end in rows]]
     scale = np.array([weights[k][end] for k, end in rows])
     found: list[ModelPose] = []
-    for guess in guesses or [_first_guess(opposite, one, other, turn, focal_px) for turn in (-0.8, 0.8)]:
-        pose = _refined(guess, points, normals, scale, focal_px)
+    for guess in guesses or [_first_guess(opposite, one, other, turn, model) for turn in (-0.8, 0.8)]:
+        pose = _refined(guess, points, normals, scale, model.focal_px)
         if pose is not None and all(_differ(pose, known) for known in found):
             found.append(pose)
     return sorted(found, key=lambda pose: -abs(float(pose.rotation[2, 2])))
 
 
-def _first_guess(side: int, one: Point, other: Point, turn: float, focal_px: float) -> ModelPose:
+def _first_guess(side: int, one: Point, other: Point, turn: float, model: GateModel) -> ModelPose:
     """A pose turned about the upright axis by a given angle that puts one side about where it is seen."""
     dx, dy = other[0] - one[0], other[1] - one[1]
     upright = side % 2 == 1
-    length_m = AXES_HEIGHT_M if upright else AXES_WIDTH_M * cos(turn)
+    (width_m, height_m), focal_px = model.axes_m, model.focal_px
+    length_m = height_m if upright else width_m * cos(turn)
     depth_m = length_m * focal_px / max(hypot(dx, dy), 1.0)
     # The direction in which this side goes in the model, turned to the one in which it is seen.
     roll = atan2(dy, dx) - (0.0, pi / 2, pi, -pi / 2)[side]
     about_y, about_z = np.array([0.0, turn, 0.0]), np.array([0.0, 0.0, roll])
     rotation = cv2.Rodrigues(about_z)[0] @ cv2.Rodrigues(about_y)[0]
     middle = np.array([one[0] + other[0], one[1] + other[1], 2.0 * focal_px]) * (0.5 * depth_m / focal_px)
-    model = 0.5 * (AXES_CORNERS[side] + AXES_CORNERS[(side + 1) % 4])
-    return ModelPose(rotation, middle - rotation @ model, 0.0)
+    seen = 0.5 * (model.axes_corners[side] + model.axes_corners[(side + 1) % 4])
+    return ModelPose(rotation, middle - rotation @ seen, 0.0)
 
 
 def _refined(

@@ -14,8 +14,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import GateShape
 from vision.calibration.lens import Lens
-from vision.gate_model import BAR_M, GATE_HEIGHT_M, GATE_WIDTH_M, Point, Segment, Sides
+from vision.gate_model import Point, Segment, Sides
 from vision.patch import Box
 
 _MIN_COLUMNS, _MIN_ROWS = 2, 4  # between the centres of the outermost pixels
@@ -76,12 +77,15 @@ def outer_sides(
     return [sides for sides in answers if sides is not None]
 
 
-def sides_by_opening(mask: npt.NDArray[np.uint8], box: Box, lens: Lens | None = None) -> list[Sides]:
+def sides_by_opening(
+    mask: npt.NDArray[np.uint8], box: Box, shape: GateShape, lens: Lens | None = None
+) -> list[Sides]:
     """First estimates of a gate's outer edges by its opening: the holes of a region together.
 
     Args:
         mask: pixels of its colour, of the whole image.
         box: column, row, columns and rows around the region.
+        shape: of the gate.
         lens: of a camera that is not ideal.
     """
     column, row, columns, rows = box
@@ -98,16 +102,16 @@ def sides_by_opening(mask: npt.NDArray[np.uint8], box: Box, lens: Lens | None = 
     hole = np.concatenate(large).astype(np.int32)
     height, width = mask.shape
     return [
-        _around(sides)
+        _around(sides, shape)
         for sides in outer_sides(hole, width, height, lens)
         if all(side is not None for side in sides)
     ]
 
 
-def _around(opening: Sides) -> Sides:
+def _around(opening: Sides, shape: GateShape) -> Sides:
     """The outer edges around an opening: its corners, moved by a bar's width along both its sides."""
     corners = [side[0] for side in opening if side is not None]
-    across, down = (2.0 * BAR_M / (size_m - 2.0 * BAR_M) for size_m in (GATE_WIDTH_M, GATE_HEIGHT_M))
+    across, down = (2.0 * shape.bar_m / size_m for size_m in shape.opening_m)
     moved: list[Point] = []
     for k, (x, y) in enumerate(corners):
         # Corner k is where side k - 1 ends and side k begins; 0 and 2 of the sides are the long ones.

@@ -33,12 +33,14 @@ class ImagePatch:
 
     Attributes:
         labels: its pixels.
+        excess: how far the region's colour exceeds the others in each of them, see `ColourMask.excess`.
         origin: column and row of it where the optical axis is; whole numbers are pixel centres.
         reach_px: from the optical axis to the right and to the lower edge of the whole image.
         lens: of a camera that is not ideal: then `origin` and `reach_px` are from the image's middle.
     """
 
     labels: Labels
+    excess: npt.NDArray[np.int16]
     origin: Point
     reach_px: Point
     lens: Lens | None = None
@@ -119,9 +121,13 @@ def cut_patch(
     x1, y1 = min(column + columns + margin, width), min(row + rows + margin, height)
     inside = labels[y0 - row + margin : y1 - row + margin, x0 - column + margin : x1 - column + margin]
     np.bitwise_and(mask.mask[y0:y1, x0:x1], OWN, out=inside)
+    excess = np.zeros(labels.shape, np.int16)
+    excess[y0 - row + margin : y1 - row + margin, x0 - column + margin : x1 - column + margin] = mask.excess(
+        (x0, y0, x1 - x0, y1 - y0)
+    )
     for other in others:
         left, top, wide, high = other.box
         if left < x1 and top < y1 and left + wide > x0 and top + high > y0:
             inside |= other.mask[y0:y1, x0:x1] & FOREIGN
     origin = ((width - 1) / 2 - column + margin, (height - 1) / 2 - row + margin)
-    return ImagePatch(labels, origin, (width / 2, height / 2), lens)
+    return ImagePatch(labels, excess, origin, (width / 2, height / 2), lens)

@@ -20,7 +20,6 @@ from framerunner.wire.dialect import Message, mavlink
 from framerunner.wire.session.client import VehicleClient
 from framerunner.wire.session.record import Record
 from framerunner.wire.session.session import pose_rates
-from framerunner.wire.simulator_api import SimulatorApi
 from offboard.drone import DroneError
 from offboard.link.telemetry import least_lag
 from vision.calibration.sightings import MotionReport
@@ -29,7 +28,6 @@ from vision.sources import open_source
 from vision.types import CameraFrame, Detections
 
 if TYPE_CHECKING:
-    from scenarios.task import Task
     from vision.calibration.model import Calibration
 
 _FIND_S = 10.0
@@ -57,17 +55,14 @@ class Watched(Record):
         ended: the drone is watched no longer; a thread uses the link until then.
     """
 
-    def __init__(self, calibration: Calibration, task: Task | None) -> None:
+    def __init__(self, calibration: Calibration) -> None:
         super().__init__(heartbeat="companion")
         self.rates = pose_rates(_WANTED_HZ, _ENOUGH, _MEASURED_S, time.monotonic(), _MAX_REQUESTS)
         self.ended = False
         self.reports: list[MotionReport] = []
         self.images: list[Detections] = []
         self.stamped = False
-        smooth = task is not None and task.camera.effects is not None
-        self._detect = new_detector(
-            "frames", calibration=calibration, rendered=task is not None, smooth=smooth
-        )
+        self._detect = new_detector("frames", calibration=calibration)
         self._lag_s: float | None = None
 
     def take(self, message: Message, now_s: float) -> bool:
@@ -100,24 +95,6 @@ class Watched(Record):
             self.images.append(self._detect(frame.image, time_us))
 
 
-async def _rendered_task(camera_url: str) -> Task | None:
-    """The task whose images a URL serves, if it is that of a simulator or a virtual camera."""
-    import aiohttp
-    from pydantic import ValidationError
-
-    from scenarios.task import Task
-
-    api = SimulatorApi.of_video(camera_url)
-    if api is None or api.video_url != camera_url:
-        return None
-    limit = aiohttp.ClientTimeout(total=2.0)
-    try:
-        async with aiohttp.ClientSession() as session, session.get(api.scenario_url, timeout=limit) as answer:
-            return Task.model_validate_json(await answer.read()) if answer.status == 200 else None
-    except (aiohttp.ClientError, TimeoutError, ValidationError):
-        return None
-
-
 async def measure_live(
     drone_url: str,
     camera_url: str,
@@ -146,7 +123,7 @@ async def measure_live(
         LinkError: the link cannot be opened or has failed.
         DroneError: no vehicle is heard, or it has restarted.
     """
-    watched = Watched(calibration, await _rendered_task(camera_url))
+    watched = Watched(calibration)
     with closing(open_link(drone_url)) as link:
         client = VehicleClient(link, watched, time.monotonic)
         reader = asyncio.create_task(asyncio.to_thread(client.run, inf, "", lambda: watched.ended))

@@ -15,6 +15,7 @@ from framerunner.camera_calibration.calibration_file import load_calibration, sa
 from framerunner.camera_calibration.camera_delay import CAMERA_DELAY_S
 from framerunner.errors import SettingError
 from framerunner.flying.detector import true_calibration
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.rotations import MAX_MOUNTING_RAD
 from framerunner.geometry.vectors import Vec3
 from framerunner.recording.events import RecordedImage
@@ -76,6 +77,7 @@ def search_mounting(
     position_flu_m: Vec3,
     *,
     stamped: bool,
+    shapes: GateShapes | None = None,
 ) -> MountingSearch:
     """Find the mounting from images and states of a flight.
 
@@ -85,10 +87,11 @@ def search_mounting(
         calibration: of the camera.
         position_flu_m: of the camera from the drone's centre, as measured by hand.
         stamped: whether images have the time of their exposure; else it is that of their arrival.
+        shapes: of the gates of each colour; None: all have that of the frame challenge.
     """
     motion, delay_s = PoseSpline(reports), 0.0 if stamped else CAMERA_DELAY_S
     half_height_px = calibration.height_px / 2
-    seen = sightings_of(images, motion, half_height_px, calibration.readout_s, delay_s)
+    seen = sightings_of(images, motion, half_height_px, calibration.readout_s, delay_s, shapes=shapes)
     known = Values((0.0, 0.0, 0.0), position_flu_m, delay_s)
     fit = fit_mounting(seen, motion, calibration.fx_px, known)
     movement = movement_of(seen, motion, fit)
@@ -217,8 +220,8 @@ def measure_recorded(
         simulated = result is not None and result.judged_by == "truth"
         scenario = RunFiles(folder).load_scenario()
         known = _calibration(calibration, scenario if simulated else None)
-        smooth = scenario is not None and scenario.camera.effects is not None
-        detect = new_detector("frames", calibration=known, rendered=simulated, smooth=smooth)
+        shapes = None if scenario is None else GateShapes(scenario.gate_shapes)
+        detect = new_detector("frames", calibration=known, shapes=shapes)
         images: list[Detections] = []
         reports: list[MotionReport] = []
         with Console(stderr=True).status("looking for frames in the recorded images"):
@@ -229,7 +232,7 @@ def measure_recorded(
                     reports += [_report_of(state) for state in (*event.state.missed, event.state)]
     place_m = place_of(known, position_flu_m, scenario)
     with Console(stderr=True).status("fitting"):
-        search = search_mounting(images, reports, known, place_m, stamped=simulated)
+        search = search_mounting(images, reports, known, place_m, stamped=simulated, shapes=shapes)
     return search, known, simulated
 
 

@@ -9,12 +9,11 @@ from vision.calibration.model import Calibration
 from vision.detectors import Detector, DetectorMaker, new_detector, others_detector
 
 
-def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
+def plan_detector(plan: FlightPlan) -> Detector:
     """Make the detector of a plan; without a mission, the paper's.
 
     Args:
         plan: its scenario has the camera, and it may have a calibration and a detector of its own.
-        rendered: the images are the simulator's, not a real camera's.
 
     Raises:
         DetectorError, ExtensionError: a detector of others cannot be made.
@@ -23,13 +22,9 @@ def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
     if others is not None:
         return others_detector(others, plan.calibration or true_calibration(plan.scenario.camera))
     if plan.mission is None or plan.mission.vision == "boxes":
-        return new_detector("boxes")  # with the paper's focal length
-    return new_detector(
-        plan.mission.vision,
-        calibration=plan.calibration or true_calibration(plan.scenario.camera),
-        rendered=rendered,
-        smooth=plan.scenario.camera.effects is not None,
-    )
+        return new_detector("boxes", shapes=plan.gate_shapes)  # with the paper's focal length
+    calibration = plan.calibration or true_calibration(plan.scenario.camera)
+    return new_detector(plan.mission.vision, calibration=calibration, shapes=plan.gate_shapes)
 
 
 def others_of(plan: FlightPlan) -> str | DetectorMaker | None:

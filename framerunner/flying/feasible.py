@@ -13,7 +13,7 @@ from offboard.navigation.goals import FlightStyle, Motion, Obstacles, PathGate, 
 from offboard.navigation.path import Path
 from offboard.navigation.planning import plan as plan_path
 from scenarios.bound import ordered_gates
-from scenarios.models import MissionClass
+from scenarios.models import MissionClass, UprightGate
 
 AROUND_S = 0.1
 """What a try takes besides its path: from the motors' start to the first command, and at the end."""
@@ -54,8 +54,8 @@ def feasible_path(plan: FlightPlan, mission_class: MissionClass) -> Path | Refus
     """
     scenario = plan.layout
     x_m, y_m, z_m, yaw_rad = plan.start_pose
-    gates = tuple(PathGate(gate.position_arena_m, gate.yaw_rad) for gate in ordered_gates(scenario))
-    decoys = tuple(PathGate(decoy.position_arena_m, decoy.yaw_rad) for decoy in scenario.decoys)
+    gates = tuple(map(_path_gate, ordered_gates(scenario)))
+    decoys = tuple(map(_path_gate, scenario.decoys))
     ceiling_m = scenario.arena.height_m
     solids = [solid for pole in scenario.poles for solid in pole.solids(ceiling_m)]
     solids += [solid for wall in scenario.walls for solid in wall.solids(ceiling_m)]
@@ -69,6 +69,10 @@ def feasible_path(plan: FlightPlan, mission_class: MissionClass) -> Path | Refus
         arena=scenario.arena,
         style=_style(plan, mission_class),
     )
+
+
+def _path_gate(gate: UprightGate) -> PathGate:
+    return PathGate(gate.position_arena_m, gate.yaw_rad, gate.shape)
 
 
 def _style(plan: FlightPlan, mission_class: MissionClass) -> FlightStyle:

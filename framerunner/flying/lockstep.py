@@ -111,7 +111,7 @@ class LockstepVehicle:
         observers: Sequence[TruthObserver] = (),
     ) -> None:
         self.simulation = Simulation(plan.scenario, plan.airframe, plan.seed or 0)
-        detector = plan_detector(plan, rendered=True)
+        detector = plan_detector(plan)
         feed = new_feed(plan.scenario, self.simulation.faults, plan.seed or 0)
         self.perception = LockstepPerception(
             plan.scenario, on_image, detector, feed, remembers=others_of(plan) is not None

@@ -14,10 +14,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncGenerator, Callable, Sequence
 from dataclasses import dataclass
-from math import degrees, pi, radians, sqrt
+from math import degrees, pi, radians
 from struct import Struct
 
 from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.telemetry.motion import odometry
 from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
@@ -37,6 +38,7 @@ from offboard.drone import (
 )
 from offboard.limits import STILL, VelocityLimits
 from offboard.link.gimbal import GimbalAttitude
+from offboard.link.inertial import reported_accuracy
 from scenarios.models import TrueState
 from sitl.faults.link import LinkFault, Way
 from sitl.payload.gimbal import SimulatedGimbal
@@ -49,6 +51,8 @@ POSITION_US = 20_000
 one before it."""
 POSITION_PHASE_US = 16_000
 """Off the ticks' grid, for the same reason as the camera's exposures."""
+ACCURACY_US = 100_000
+"""Between two messages of the errors of the vehicle's estimate, which have the positions' phase."""
 GIMBAL_US = 100_000
 """Between two messages of a gimbal, which come after the attitude of the same time."""
 TELEMETRY_DELAY_US = 4_000
@@ -79,6 +83,7 @@ class _Received:
     position_ned_m: Vec3 = (0.0, 0.0, 0.0)
     velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
     landed: bool = True
+    accuracy: ReportedAccuracy | None = None
 
     def update(self, autopilot: Autopilot, now_us: int) -> None:
         """Receive what is sent now; a position only if the vehicle knows its own."""
@@ -88,6 +93,12 @@ class _Received:
             self.position_ned_m = single(state.position_ned_m)
             self.velocity_ned_m_s = single(state.velocity_ned_m_s)
             self.position_us = now_us
+
+    def update_accuracy(self, autopilot: Autopilot) -> None:
+        """Receive an ODOMETRY."""
+        message = odometry(autopilot)
+        if message is not None:
+            self.accuracy = reported_accuracy(message) or self.accuracy
 
 
 class LockstepDrone:
@@ -131,6 +142,7 @@ class LockstepDrone:
         self._alignment: ArenaAlignment | None = None
         self._heartbeat_us = 0
         self._position_us = POSITION_PHASE_US
+        self._accuracy_us = POSITION_PHASE_US
         self._received = _Received()
         self._gimbal_us = 0 if simulation.gimbal is not None else _NEVER_US
         self._gimbal_attitude: GimbalAttitude | None = None
@@ -346,6 +358,10 @@ class LockstepDrone:
             self._position_us += POSITION_US
             if not self._link.loses():
                 self._received.update(self._autopilot, now_us)
+                if now_us >= self._accuracy_us and self._imu_us >= 0:  # else nobody uses it
+                    self._received.update_accuracy(self._autopilot)
+            if now_us >= self._accuracy_us:
+                self._accuracy_us += ACCURACY_US
 
     def _pass(self, limit_us: int, until: Callable[[], bool] = lambda: False) -> bool:
         """Let time pass until a condition holds; False if it does not within the limit."""
@@ -373,8 +389,9 @@ class LockstepDrone:
         camera_attitude = None
         if self._gimbal_attitude is not None:
             camera_attitude = alignment.attitude(self._gimbal_attitude.ned(yaw_rad))
-        imu = tuple(self._imu)
-        self._imu.clear()
+        imu, self._imu = self._imu, []
+        if imu and imu[-1].time_us >= state.time_us:  # one of the tick's own time belongs to the next
+            self._imu.append(imu.pop())
         return DroneState(
             state.time_us,
             *pose.position_m,
@@ -387,8 +404,8 @@ class LockstepDrone:
             (state.time_us - self._received.position_us) * 1e-6,
             alignment.attitude(quaternion_from_euler(roll_rad, pitch_rad, yaw_rad)),
             camera_attitude,
-            imu=imu,
-            accuracy=_accuracy(self._autopilot) if self._imu_us >= 0 else None,
+            imu=tuple(imu),
+            accuracy=self._received.accuracy,
         )
 
 
@@ -396,23 +413,8 @@ def _received_imu(sample: ImuSample) -> ImuInterval:
     """A sample as HIGHRES_IMU carries it, at the rate of the autopilot's ticks."""
     return ImuInterval(
         sample.time_us,
-        sample.period_us,
         flip_vector(single(sample.angular_rate_frd_rad_s)),
         flip_vector(single(sample.specific_force_frd_m_s2)),
-    )
-
-
-def _accuracy(autopilot: Autopilot) -> ReportedAccuracy:
-    """What ODOMETRY tells of errors and jumps of the estimate."""
-    report = autopilot.estimator.report()
-    position, velocity = report.position_variance_m2, report.velocity_variance_m2_s2
-    return ReportedAccuracy(
-        sqrt(max(position[:2])),
-        sqrt(position[2]),
-        sqrt(max(velocity[:2])),
-        sqrt(velocity[2]),
-        sqrt(report.attitude_variance_rad2[2]),
-        report.resets & 0xFF,
     )
 
 

@@ -42,6 +42,7 @@ def _frame(gate: GateEstimate) -> MappedFrame:
         certain=gate.certain,
         ambiguous=gate.ambiguous,
         views=gate.views,
+        size=(round(gate.shape.outer_width_m, _MM), round(gate.shape.outer_height_m, _MM)),
     )
 
 

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
 from framerunner.flying.response import ResponseDelay
+from framerunner.geometry.gate_shape import PAPER_GATE, GateShapes
 from framerunner.vehicle.airframe import Airframe, load_airframe
 from offboard.limits import CONTEST, Box, Caps, CommandLimits, VelocityLimits, flight_box
 from offboard.navigation.view import Surroundings
@@ -95,12 +96,13 @@ class FlightPlan:
     @property
     def surroundings(self) -> Surroundings:
         """What a navigator knows before the flight: all but the layout."""
-        layout, camera = self.layout, self.camera
-        if not layout.frames:
-            return Surroundings(layout.arena, layout.base, camera)
-        gate = layout.frames[0]  # all are of one size, which the rules tell
-        size_m = (gate.outer_width_m, gate.outer_height_m)
-        return Surroundings(layout.arena, layout.base, camera, size_m, gate.bar_m)
+        return Surroundings(self.layout.arena, self.layout.base, self.camera, self.gate_shapes)
+
+    @property
+    def gate_shapes(self) -> GateShapes:
+        """The shapes that the drone is told: the scenario's; of colours that it has not, the mission's."""
+        other = None if self.mission is None else self.mission.gate
+        return GateShapes(self.scenario.gate_shapes, other or PAPER_GATE)
 
     @property
     def camera(self) -> Camera:

@@ -69,11 +69,6 @@ class _Endpoints:
     sitl: SitlProcess | None = None  # the simulator that was started here
     shared_with: str | None = None  # URL of the monitor, if it receives the drone only through this program
 
-    @property
-    def has_camera_of_simulator(self) -> bool:
-        """Whether the camera's images are those of the simulator at `api`, if there is one."""
-        return self.api is not None and self.camera_url == self.api.video_url
-
 
 async def fly_in_real_time(
     plan: FlightPlan,
@@ -132,7 +127,7 @@ class _RealTimeFlight:
         self._drone = self._new_drone(safety, system_id, guard)
         self._drone.use_companion(companion)
         camera = await self._open_camera(reporter)
-        perception = self._new_perception(judge, camera)
+        perception = self._new_perception(camera)
         display = FlightDisplay(plan.title, plan.limit_s, records.recorder, judge)
         flown = await fly(
             plan,
@@ -308,16 +303,13 @@ class _RealTimeFlight:
         self._stack.callback(camera.close)
         return camera
 
-    def _new_perception(self, judge: Judge, camera: RecordingCamera) -> CameraPerception:
+    def _new_perception(self, camera: RecordingCamera) -> CameraPerception:
         """What the mission sees through the camera."""
         from framerunner.flying.detector import plan_detector
-        from framerunner.flying.judges import TruthJudge
         from offboard.perception import CameraPerception
 
         sitl = self._vehicle.sitl
-        rendered = isinstance(judge, TruthJudge) and self._vehicle.has_camera_of_simulator
-        detector = plan_detector(self._plan, rendered=rendered)
-        perception = CameraPerception(camera, detector, patient=sitl is not None)
+        perception = CameraPerception(camera, plan_detector(self._plan), patient=sitl is not None)
         perception.assume_times(self._drone.vehicle_time_us, self._settings.camera_delay.age_s)
         if sitl is not None:
             sitl.clock.wait_for_images_of(perception)

@@ -155,6 +155,7 @@ class MappedFrame(TypedDict):
     certain: bool
     ambiguous: bool
     views: int
+    size: tuple[float, float] | None
 
 
 class Map(TypedDict):

@@ -17,6 +17,7 @@ from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.writer import MCAP0_MAGIC
 
+from framerunner.geometry.gate_shape import GateShape
 from framerunner.geometry.rotations import quaternion_from_yaw
 from framerunner.geometry.vectors import Vec3
 from framerunner.recording.events import Crossed, Event, RecordedImage, RecordingError
@@ -216,7 +217,7 @@ def _drone_state(time_us: int, message: Json) -> DroneState:
 
 
 def _gate_estimate(message: Json) -> GateEstimate:
-    """An unknown standard deviation is infinite."""
+    """An unknown standard deviation is infinite; older recordings have no shapes."""
     std = message.get("position_std_m")
     return GateEstimate(
         str(message["colour"]),
@@ -228,6 +229,7 @@ def _gate_estimate(message: Json) -> GateEstimate:
         bool(message["certain"]),
         int(message["views"]),
         _time_us(message["seen"]),
+        GateShape(**message.get("shape", {})),
     )
 
 

@@ -193,9 +193,7 @@ class FlightRecording:
         last, self._navigation = self._navigation, view
         if (view.gates, view.goal) != (last.gates, last.goal):
             self._write(schemas.MAP, time_us, recording_messages.gate_map(view, time_us))
-            self._write(
-                schemas.MAP_SCENE, time_us, recording_messages.map_scene(view, self._scenario, time_us)
-            )
+            self._write(schemas.MAP_SCENE, time_us, recording_messages.map_scene(view, time_us))
         if view.path_m != last.path_m:
             self._write(schemas.PATH, time_us, recording_messages.path(view, time_us))
 

@@ -51,7 +51,6 @@ _CLEAR = {"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0}
 _LABEL = {"r": 1.0, "g": 1.0, "b": 1.0, "a": 1.0}
 _INFO = 2
 _FLOOR_M = 0.01
-_GATE_SIZE_M = (0.42, 0.22)  # outer width and height of one that is no part of the scenario
 _DASHES_A_LEG = 4
 _MAX_TEXT = 80  # characters of a goal
 
@@ -249,6 +248,7 @@ def _mapped_gate(gate: GateEstimate) -> Message:
         "certain": gate.certain,
         "views": gate.views,
         "seen": time_of(gate.seen_us),
+        "shape": asdict(gate.shape),
     }
     if all(map(isfinite, gate.position_std_m)):
         message["position_std_m"] = _vector(gate.position_std_m)
@@ -264,27 +264,19 @@ def path(view: NavigationView, time_us: int) -> Message:
     return {"timestamp": time_of(time_us), "frame_id": ARENA, "poses": poses}
 
 
-def map_scene(view: NavigationView, scenario: Scenario, time_us: int) -> Message:
+def map_scene(view: NavigationView, time_us: int) -> Message:
     """The map as a drawing: outlines, dashed until certain, with ellipsoids of two standard deviations."""
-    sizes_m: dict[str, tuple[float, float]] = {
-        gate.colour: (gate.outer_width_m, gate.outer_height_m) for gate in scenario.frames
-    }
     entities = [
-        _entity(
-            time_us,
-            f"{number} {gate.colour}",
-            ARENA,
-            **_drawn_estimate(gate, sizes_m.get(gate.colour, _GATE_SIZE_M)),
-        )
+        _entity(time_us, f"{number} {gate.colour}", ARENA, **_drawn_estimate(gate))
         for number, gate in enumerate(view.gates)
         if has_place(gate)
     ]
     return {"deletions": [{"timestamp": time_of(time_us), "type": 1, "id": ""}], "entities": entities}
 
 
-def _drawn_estimate(gate: GateEstimate, size_m: tuple[float, float]) -> dict[str, list[Message]]:
+def _drawn_estimate(gate: GateEstimate) -> dict[str, list[Message]]:
     colour = RGBA.get(gate.colour, _OTHER)
-    half_width, half_height = size_m[0] / 2, size_m[1] / 2
+    half_width, half_height = gate.shape.half_m
     c, s = cos(gate.yaw_rad), sin(gate.yaw_rad)
     x, y, z = gate.position_m
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]

@@ -202,7 +202,7 @@ _VALUE = _object(
 
 _MAPPED_GATE = _object(
     "framerunner.MappedFrame",
-    optional=("position_std_m", "yaw_std_rad"),
+    optional=("position_std_m", "yaw_std_rad", "shape"),
     colour=_STRING,
     position_arena_m=_VECTOR_3,
     yaw_rad=_field("number", "heading of its normal, counter-clockwise from the arena's x"),
@@ -212,6 +212,13 @@ _MAPPED_GATE = _object(
     certain=_field("boolean", "known well enough to fly through"),
     views=_field("integer", "how many images have been used"),
     seen=_TIME,
+    shape=_object(
+        "framerunner.FrameShape",
+        outer_width_m=_field("number", "horizontal, bars included"),
+        outer_height_m=_field("number", "vertical, bars included"),
+        bar_m=_field("number", "width of the bars, seen from the front"),
+        depth_m=_field("number", "thickness of the bars, along the normal"),
+    ),
 )
 
 _OWN = (

@@ -56,7 +56,6 @@ STATE_COLOURS = (
 DASHES: tuple[_Dash, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (4, 1, 1, 1)))
 
 _OTHER_GATE = "#7a7a7a"  # an estimated one that is no part of the task
-_GATE_SIZE_M = (0.42, 0.22)  # outer width and height of a gate that the scenario does not have
 _AROUND = 1.35  # an estimate's outline is so much larger: around the true gate where it is right
 _ESTIMATE_DASH = (0, (3, 1.5))
 _INK = "#262626"
@@ -102,7 +101,7 @@ def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) ->
     times_s = {} if result is None else result.times_s
     _draw_top(top, scenario, {gate.colour: _crossing_label(gate, times_s) for gate in scenario.frames})
     _draw_side(side, scenario)
-    _draw_estimates(top, side, scenario, track.estimates)
+    _draw_estimates(top, side, track.estimates)
     spent_s = track.seconds_in_state()
     styles = {
         kind: (STATE_COLOURS[i % len(STATE_COLOURS)], DASHES[i // len(STATE_COLOURS) % len(DASHES)])
@@ -246,17 +245,14 @@ def _draw_side(axes: Axes, scenario: Scenario) -> None:
             axes.add_patch(outline)
 
 
-def _draw_estimates(top: Axes, side: Axes, scenario: Scenario, estimates: Sequence[GateEstimate]) -> None:
+def _draw_estimates(top: Axes, side: Axes, estimates: Sequence[GateEstimate]) -> None:
     """Draw gates as the navigator knew them: outlines around the true ones, ellipses of two deviations."""
-    sizes_m: dict[str, tuple[float, float]] = {
-        gate.colour: (gate.outer_width_m, gate.outer_height_m) for gate in scenario.all_gates
-    }
     for gate in estimates:
         x, y, z = gate.position_m
         if not all(map(isfinite, (x, y, z, gate.yaw_rad))):
             continue
         colour = GATE_COLOURS.get(gate.colour, _OTHER_GATE)
-        width, height = (_AROUND * size for size in sizes_m.get(gate.colour, _GATE_SIZE_M))
+        width, height = (_AROUND * size for size in (gate.shape.outer_width_m, gate.shape.outer_height_m))
         style: dict[str, Any] = {"fill": False, "ec": colour, "lw": 0.9, "ls": _ESTIMATE_DASH, "zorder": 7}
         c, s = cos(gate.yaw_rad), sin(gate.yaw_rad)
         corners = [(-0.2, -0.5), (0.2, -0.5), (0.2, 0.5), (-0.2, 0.5)]

@@ -63,14 +63,13 @@ def evaluate_vision(settings: VisionSettings) -> None:
         DetectorError, ExtensionError: the detector of others cannot be used.
     """
     _make_folder(settings.out)
-    # Blurred images are not painted on the nearest pixels any more, but their bars are as wide.
-    scores, examples = detect_all(_shown(settings), rendered=True, others=settings.detector)
+    scores, examples = detect_all(_shown(settings), settings.detector)
     print_scores(scores, settings.title)
     report = settings.out / REPORT
     report.write_text(json.dumps(finite(_as_json(settings, scores), 5), indent=1), encoding="utf-8")
     from framerunner.vision_evaluation.picture import save_picture
 
-    save_picture(scores, examples, settings.title, settings.out / PICTURE, rendered=True)
+    save_picture(scores, examples, settings.title, settings.out / PICTURE)
     print(f"written to {report} and {PICTURE}")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import atan2, cos, degrees, pi, radians, sin
 
 import cv2
@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.flying.detector import true_calibration
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.rotations import mounting_flu, quaternion_from_euler, rotation, rotation_rows
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Quaternion, Vec3
@@ -72,7 +73,7 @@ class LabelledImage:
     attitude_arena: Quaternion
     calibration: Calibration
     gates: tuple[GateLabel, ...]
-    smooth: bool = False  # painted with camera effects
+    shapes: GateShapes = field(default_factory=GateShapes)  # that a drone is told
 
     @property
     def focal_px(self) -> float:
@@ -98,7 +99,7 @@ def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbanc
         image = _disturbed(painted, disturbance, noise)
         labels = scene.labels(position, attitude)
         yield LabelledImage(
-            image, scene.scenario.name, position, attitude, scene.calibration, labels, scene.smooth
+            image, scene.scenario.name, position, attitude, scene.calibration, labels, scene.shapes
         )
 
 
@@ -107,9 +108,9 @@ class _LabelledScene:
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         self.scenario = scenario
+        self.shapes = GateShapes(scenario.gate_shapes)
         self.camera = SimulatedCamera(scenario, seed)
         self.calibration = true_calibration(scenario.camera)
-        self.smooth = scenario.camera.effects is not None
         self._lens = None if self.calibration.is_ideal else Lens(self.calibration)
         others = [scenario.base.solid, *scenario.prisms]
         self._solids = [*(gate.hull for gate in scenario.all_gates), *others]
@@ -127,7 +128,7 @@ class _LabelledScene:
 
     def draw_motion(self, stream: np.random.Generator) -> ExposureMotion:
         """When the image is taken, and how the drone moves then: as in a contest flight."""
-        if not self.smooth:
+        if self.scenario.camera.effects is None:
             return STILL
         time_us = int(stream.uniform(0.0, _LAST_S) * 1e6)
         vx, vy, vz = (float(value) for value in stream.uniform(-_MAX_SPEED_M_S, _MAX_SPEED_M_S, 3))

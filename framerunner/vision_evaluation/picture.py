@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 
 from framerunner.runs.plots import save_figure
 from framerunner.vision_evaluation.labelled_images import LabelledImage
-from framerunner.vision_evaluation.scores import ErrorRow, Scores, detector_of
+from framerunner.vision_evaluation.scores import ErrorRow, Scores
+from vision.detectors import new_detector
 
 _STYLES = {"boxes": ("#ee7733", "--", "boxes (the paper's)"), "frames": ("#332288", "-", "frames")}
 _CURVES: tuple[tuple[str, Callable[[ErrorRow], float | None]], ...] = (
@@ -26,9 +27,7 @@ _CURVES: tuple[tuple[str, Callable[[ErrorRow], float | None]], ...] = (
 _EXAMPLES = 3
 
 
-def save_picture(
-    scores: Scores, examples: Sequence[LabelledImage], title: str, path: Path, *, rendered: bool
-) -> None:
+def save_picture(scores: Scores, examples: Sequence[LabelledImage], title: str, path: Path) -> None:
     """Draw it to a file.
 
     Raises:
@@ -46,7 +45,7 @@ def save_picture(
         row[0].set_ylim(top=105)
     axes[0][0].legend(frameon=False, loc="lower left")
     for axis, example in zip(axes[2], _telling(examples), strict=False):
-        _draw_image(axis, example, rendered=rendered)
+        _draw_image(axis, example)
     save_figure(figure, path)
 
 
@@ -83,13 +82,13 @@ def _content(labelled: LabelledImage) -> float:
     return sum(1.0 + 1.0 / label.distance_m for label in labelled.gates if label.whole)
 
 
-def _draw_image(axes: Axes, labelled: LabelledImage, *, rendered: bool) -> None:
+def _draw_image(axes: Axes, labelled: LabelledImage) -> None:
     """An image, the corners found with three standard deviations, and the poses' centres."""
     image = labelled.image
     height, width = image.shape[:2]
     reach = (-width / 2, width / 2, height / 2, -height / 2)
     axes.imshow(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), extent=reach, interpolation="nearest")
-    found = detector_of(labelled, "frames", rendered=rendered)(image, None)
+    found = new_detector("frames", calibration=labelled.calibration)(image, None)
     for sighting in found.frames:
         for corner in sighting.corners:
             if corner is not None:

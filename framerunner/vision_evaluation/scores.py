@@ -10,6 +10,7 @@ from math import acos, asin, degrees, hypot, inf, isfinite, sqrt
 
 import numpy as np
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3
 from framerunner.vision_evaluation.labelled_images import GateLabel, LabelledImage
 from vision.calibration.model import Calibration
@@ -115,7 +116,7 @@ class ErrorRow:
 
 
 def detect_all(
-    labelled: Iterable[LabelledImage], *, rendered: bool, others: str | DetectorMaker | None = None
+    labelled: Iterable[LabelledImage], others: str | DetectorMaker | None = None
 ) -> tuple[Scores, list[LabelledImage]]:
     """Run our detectors over images, and one of others if it is given; also give back the first images.
 
@@ -125,11 +126,12 @@ def detect_all(
     scores = Scores()
     first: list[LabelledImage] = []
     detectors: dict[str, Detector] = {}
-    calibration: Calibration | None = None
+    camera: tuple[Calibration, GateShapes] | None = None
     for one in labelled:
-        if calibration != one.calibration:
-            calibration = one.calibration
-            detectors = {k: detector_of(one, k, rendered=rendered) for k in KINDS}
+        calibration = one.calibration
+        if camera != (calibration, one.shapes):
+            camera = (calibration, one.shapes)
+            detectors = {k: new_detector(k, calibration=calibration, shapes=one.shapes) for k in KINDS}
             if others is not None:
                 detectors[detector_name(others)] = others_detector(others, calibration)
             for detector in detectors.values():
@@ -139,11 +141,6 @@ def detect_all(
             first.append(one)
     scores.leave_out_unused()
     return scores, first
-
-
-def detector_of(labelled: LabelledImage, kind: Vision, *, rendered: bool) -> Detector:
-    """The detector for the camera of an image."""
-    return new_detector(kind, calibration=labelled.calibration, rendered=rendered, smooth=labelled.smooth)
 
 
 def rows_by(

@@ -32,6 +32,7 @@ TimeUs = Annotated[int, Field(ge=0, le=2**53)]
 _Seconds = Annotated[float, BeforeValidator(lambda value: nan if value is None else value)]
 _Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 _Deviation = Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)]
+_Size = Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)]
 _Radians = Annotated[float, Field(ge=-7, le=7, allow_inf_nan=False)]
 _Point = tuple[_Metres, _Metres, _Metres]
 _Text = Annotated[str, Field(max_length=80)]
@@ -145,7 +146,10 @@ class GuardsDocument:
 
 @dataclass(frozen=True, slots=True)
 class MappedFrame:
-    """A frame as estimated, in arena axes; a standard deviation that is not known is None."""
+    """A frame as estimated, in arena axes; a standard deviation that is not known is None.
+
+    `size` is its outer width and height; older apps do not tell it.
+    """
 
     colour: _Text
     p: _Point
@@ -155,6 +159,7 @@ class MappedFrame:
     certain: bool = False
     ambiguous: bool = False
     views: Annotated[int, Field(ge=0, le=2**31)] = 0
+    size: tuple[_Size, _Size] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,13 +8,14 @@ not share is written so:
 - a superstate's transitions and `during` are written at each of its states, because in SCXML a state that
   takes an event keeps it from the states around it;
 - an action is a `<script>` that calls the primitive, or an `<assign>`; expressions are Python's;
-- description, class, vision and detector are attributes of the namespace `NAMESPACE`.
+- description, class, vision, detector and gate (its four sizes) are attributes of the namespace `NAMESPACE`.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import astuple
 from xml.etree import ElementTree as ET
 
 from offboard.chart.spec import RESUME, Action, Leaf, MissionFile, State, leaves
@@ -37,6 +38,7 @@ def export_scxml(mission: MissionFile) -> str:
         "class": mission.mission_class,
         "vision": mission.vision,
         "detector": mission.detector,
+        "gate": "" if mission.gate is None else " ".join(f"{size:g}" for size in astuple(mission.gate)),
     }
     for key, value in own.items():
         if value:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import ast
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
+from framerunner.geometry.gate_shape import GateShape
 from offboard.authoring.edit_texts import EditError
 from offboard.authoring.scxml_export import NAMESPACE, SCXML, TICK
 from offboard.authoring.xml_tree import Element, XmlError, parse_xml
@@ -95,6 +96,9 @@ class _Importer:
             text = " ".join(root.attributes.get(f"{NAMESPACE} {key}", "").split())
             if text:
                 value[key] = text
+        sizes_m = root.attributes.get(f"{NAMESPACE} gate", "").split()
+        if sizes_m:
+            value["gate"] = dict(zip((each.name for each in fields(GateShape)), sizes_m, strict=False))
         initial = self._initial(root, states, "")
         variables = self._variables(children)
         written = {state.path: self._state(state) for state in states}

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import ast
 import re
+from math import nan
 from pathlib import Path
 from typing import TypeVar, get_args
 
 from framerunner.files.yaml_text import ListNode, MapNode, Node, Place, Scalar
+from framerunner.geometry.gate_shape import BAR_LIMITS_M, PAPER_GATE, SIZE_LIMITS_M, GateShape
 from offboard.chart.mission_texts import Message
 from offboard.chart.problems import ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, MissionFile, State, Transition
@@ -18,7 +20,7 @@ from vision.types import Vision
 Choice = TypeVar("Choice", bound=str)
 
 MISSION_KEYS = (
-    *("name", "description", "class", "vision", "detector", "extends"),
+    *("name", "description", "class", "vision", "detector", "gate", "extends"),
     *("initial", "variables", "templates", "states"),
 )
 _CLASSES: tuple[MissionClass, ...] = get_args(MissionClass)
@@ -40,6 +42,13 @@ _SYNONYMS = {
     **dict.fromkeys(("first", "start"), "initial"),
 }
 MAX_CONSTANT_CHARACTERS = 500
+_GATE_LIMITS_M = {
+    "outer_width_m": SIZE_LIMITS_M,
+    "outer_height_m": SIZE_LIMITS_M,
+    "bar_m": BAR_LIMITS_M,
+    "depth_m": BAR_LIMITS_M,
+}
+_EXAMPLES = {"variables": "  start_x: 0", "gate": "  outer_width_m: 0.42"}
 _NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
 _MISSION_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}\Z")  # as a scenario's: folders are named by it
 _SETTING = re.compile(r"[a-z][\w.]*\Z")
@@ -91,6 +100,7 @@ class _Reader:
             vision=self._choice(root, "vision", _VISIONS),
             detector=self._text(root, "detector"),
             detector_place=_value_place(root, "detector"),
+            gate=self._gate(root),
             extends=self._text(root, "extends"),
             initial=self._text(root, "initial"),
             initial_place=_value_place(root, "initial"),
@@ -108,12 +118,12 @@ class _Reader:
                 message = Message("key.beside", name=name, key=key)
                 if number:
                     message = Message("key.beside_under", name=name, key=key, under=names[number - 1])
-                self._problems.add(self._key_place(parent.items[key], name), message)
+                self._problems.add(_key_place(parent.items[key], name), message)
                 return {}
         return {name: self._state(name, node, allowed, parent.items[key]) for name, node in children.items()}
 
     def _state(self, name: str, node: Node, keys: tuple[str, ...], around: Node) -> State:
-        place = self._key_place(around, name)
+        place = _key_place(around, name)
         if isinstance(node, Scalar) and not node.text:  # "end:" with nothing below
             node = MapNode(node.place, {}, {})
         if not isinstance(node, MapNode):
@@ -202,7 +212,7 @@ class _Reader:
         variables = self._children(root, "variables")
         for name, node in variables.items():
             if isinstance(node, MapNode):
-                place = self._key_place(root.items["variables"], name)
+                place = _key_place(root.items["variables"], name)
                 self._problems.add(place, Message("variable.state", name=name))
                 return {}
         return variables
@@ -226,6 +236,32 @@ class _Reader:
             self._problems.add(node.place, what)
         return value
 
+    def _gate(self, root: MapNode) -> GateShape | None:
+        """The shape of the gates; None if the mission has none. A depth is that of the bars' width."""
+        node = root.items.get("gate")
+        if not isinstance(node, MapNode):
+            self._children(root, "gate")
+            return None
+        self._check_keys(node, tuple(_GATE_LIMITS_M), Message("what.gate"))
+        sizes_m: dict[str, float] = {}
+        for key, (low, high) in _GATE_LIMITS_M.items():
+            if key in node.items:
+                text = self._text(node, key)
+                try:
+                    size_m = float(text)
+                except ValueError:
+                    size_m = nan
+                if not low <= size_m <= high:
+                    message = Message("gate.size", key=key, text=cut(text, 30), low=low, high=high)
+                    self._problems.add(node.items[key].place, message)
+                    return None
+                sizes_m[key] = size_m
+        sizes_m.setdefault("depth_m", sizes_m.get("bar_m", PAPER_GATE.depth_m))
+        shape = GateShape(**sizes_m)
+        if min(shape.opening_m) <= 0.0:
+            self._problems.add(_value_place(node, "bar_m"), Message("gate.opening", bar=shape.bar_m))
+        return shape
+
     def _mission_name(self, root: MapNode, path: Path) -> str:
         """The name in the file or, without one, the file's own name in the form of a mission's."""
         name = self._text(root, "name")
@@ -243,7 +279,7 @@ class _Reader:
             return {}
         if not isinstance(child, MapNode):
             if not (isinstance(child, Scalar) and not child.text):
-                example = "  start_x: 0" if key == "variables" else f"  {key[:-1]}_1:"
+                example = _EXAMPLES.get(key, f"  {key[:-1]}_1:")
                 self._problems.add(node.keys[key], Message("key.names_below", key=key, example=example))
             return {}
         for name, place in child.keys.items():
@@ -262,10 +298,6 @@ class _Reader:
         example = "- when: ..." if key == "transitions" else "- hover"
         self._problems.add(child.place, Message("key.list", key=key, example=example))
         return ()
-
-    @staticmethod
-    def _key_place(node: Node, key: str) -> Place:
-        return node.keys[key] if isinstance(node, MapNode) and key in node.keys else node.place
 
     def _text(self, node: MapNode, key: str) -> str:
         child = node.items.get(key)
@@ -322,6 +354,11 @@ class _Reader:
         if advice is nothing:
             advice = Message("key.listed", names=", ".join(allowed))
         self._problems.add(node.keys[key], Message("key.unknown", what=what, key=cut(key, 30), advice=advice))
+
+
+def _key_place(node: Node, key: str) -> Place:
+    """Where a key stands; without it, where its node begins."""
+    return node.keys[key] if isinstance(node, MapNode) and key in node.keys else node.place
 
 
 def _value_place(node: MapNode, key: str) -> Place:

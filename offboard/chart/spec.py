@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Literal
 
 from framerunner.files.yaml_text import Place
+from framerunner.geometry.gate_shape import GateShape
 from offboard.chart.mission_texts import Message
 from offboard.chart.problems import NOWHERE, ProblemList, cut, did_you_mean, mission_error
 from scenarios.models import MissionClass
@@ -104,6 +105,7 @@ class MissionFile:
     vision: Vision | None = None  # None: not given
     detector: str = ""  # of another package, instead of the vision's own
     detector_place: Place = NOWHERE
+    gate: GateShape | None = None  # of colours of which the scenario tells nothing; None: not given
     extends: str = ""
     initial: str = ""
     initial_place: Place = NOWHERE
@@ -205,6 +207,7 @@ def _merge(base: MissionFile, top: MissionFile) -> MissionFile:
         vision=top.vision or base.vision,
         detector=top.detector or base.detector,
         detector_place=top.detector_place if top.detector else base.detector_place,
+        gate=top.gate or base.gate,
         variables={**base.variables, **top.variables},
         templates={**base.templates, **top.templates},
         states=kept + tuple(replaced.values()),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 from collections import deque
 from math import sqrt
+from struct import Struct
 from typing import Any
 
 from mavsdk.asyncio import MavsdkError
@@ -25,6 +26,7 @@ ACCURACY_HZ = 10.0
 LONGEST_US = 12_000  # between two samples that are means without gaps; now and then one is lost
 SAMPLES_KEPT = 1000  # until they are taken
 MOST_M_S2, MOST_RAD_S = 1000.0, 100.0  # beyond what IMUs of drones can measure
+_ON_WIRE = Struct("<7f")  # a message that was not sent has double precision
 _X, _Y, _Z, _YAW = 0, 6, 11, 20  # of ODOMETRY's pose_covariance and velocity_covariance
 
 
@@ -72,6 +74,8 @@ class InertialFeed:
         if message.get_srcComponent() != AUTOPILOT_COMPONENT_ID or not self._order.is_next(message.time_usec):
             return
         last_us, self._last_us = self._last_us, message.time_usec
+        if last_us == message.time_usec:  # sent again by a vehicle whose time stands
+            return
         force = (message.xacc, message.yacc, message.zacc)
         rate = (message.xgyro, message.ygyro, message.zgyro)
         if last_us is None or not (_is_within(force, MOST_M_S2) and _is_within(rate, MOST_RAD_S)):
@@ -79,7 +83,7 @@ class InertialFeed:
         period_us = message.time_usec - last_us
         usual_us = self._usual_us or period_us
         self._usual_us = usual_us + 0.1 * (min(period_us, 10 * LONGEST_US) - usual_us)
-        self._samples.append(ImuInterval(message.time_usec, period_us, flip_vector(rate), flip_vector(force)))
+        self._samples.append(ImuInterval(message.time_usec, flip_vector(rate), flip_vector(force)))
 
     def _on_odometry(self, message: Message) -> None:
         is_autopilots = message.get_srcComponent() == AUTOPILOT_COMPONENT_ID
@@ -87,12 +91,17 @@ class InertialFeed:
             return
         if not self._odometry_order.is_next(message.time_usec):
             return
-        pose, velocity = message.pose_covariance, message.velocity_covariance
-        variances = (pose[_X], pose[_Y], pose[_Z], velocity[_X], velocity[_Y], velocity[_Z], pose[_YAW])
-        if not all(variance >= 0.0 for variance in variances):  # NaN: not known
-            return
-        x, y, z, vx, vy, vz, heading = map(sqrt, variances)
-        self.accuracy = ReportedAccuracy(max(x, y), z, max(vx, vy), vz, heading, message.reset_counter)
+        self.accuracy = reported_accuracy(message) or self.accuracy
+
+
+def reported_accuracy(odometry: Message) -> ReportedAccuracy | None:
+    """What an ODOMETRY tells of the errors and jumps of the vehicle's estimate; None if it does not."""
+    pose, velocity = odometry.pose_covariance, odometry.velocity_covariance
+    variances = (pose[_X], pose[_Y], pose[_Z], velocity[_X], velocity[_Y], velocity[_Z], pose[_YAW])
+    if not all(variance >= 0.0 for variance in variances):  # NaN: not known
+        return None
+    x, y, z, vx, vy, vz, heading = map(sqrt, _ON_WIRE.unpack(_ON_WIRE.pack(*variances)))
+    return ReportedAccuracy(max(x, y), z, max(vx, vy), vz, heading, odometry.reset_counter)
 
 
 def _is_within(values: Vec3, most: float) -> bool:

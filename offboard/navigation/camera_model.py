@@ -13,11 +13,15 @@ from typing import Final, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import PAPER_GATE, GateShape
 from framerunner.geometry.rotations import Rotation, mounting_flu, rotation, to_body, to_world
 from framerunner.geometry.vectors import Quaternion, Vec3
 from scenarios.models import Camera
 
 NEAREST_M = 0.05  # points nearer than this are not projected
+LEAST_REACH, MOST_REACH = 0.4, 2.0
+WHOLE_SPARE = 1.2  # how much farther than needed a gate is looked at
+_CHALLENGE_FOCAL_PX = Camera().width_px / 2 / tan(Camera().horizontal_fov_rad / 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +56,24 @@ class CameraModel:
         angles_rad = camera.mounting_frd_rad
         mounting = mounting_flu(angles_rad) if any(angles_rad) else None
         return cls(focal_px, half_width_px, half_height_px, place, readout_s, gimbal is not None, mounting)
+
+    def reach(self, shape: GateShape) -> float:
+        """How much farther away a gate is recognised than the challenge's is by the challenge's camera.
+
+        What counts is how large its sides and its bars are in the image.
+        """
+        sizes = (
+            shape.outer_width_m / PAPER_GATE.outer_width_m,
+            shape.outer_height_m / PAPER_GATE.outer_height_m,
+            shape.bar_m / PAPER_GATE.bar_m,
+        )
+        return min(max(min(sizes) * self.focal_px / _CHALLENGE_FOCAL_PX, LEAST_REACH), MOST_REACH)
+
+    def whole_from_m(self, shape: GateShape) -> float:
+        """From how far a gate is wholly in the image, seen straight from before it."""
+        half_width_m, half_height_m = shape.half_m
+        slope = max(half_width_m / self.half_width_px, half_height_m / self.half_height_px)
+        return WHOLE_SPARE * slope * self.focal_px + self.position_flu_m[0]
 
     def read_after_s(self, down_px: float) -> float:
         """How long after the time of an image a row is read out; before it if negative."""

@@ -8,6 +8,7 @@ from math import cos, dist, hypot, inf, pi, remainder, sin
 from framerunner.geometry.vectors import Vec3, turned
 from offboard.navigation.goals import Point
 from offboard.navigation.path import Crossing, Path
+from offboard.navigation.planner.clearance import deeper_m, room_share
 from offboard.navigation.view import GateEstimate
 
 COMMIT_M = 0.3  # before the opening; from there the path is not planned again
@@ -64,10 +65,10 @@ class CrossingAttempt:
         if crossing != self._aim:
             self._aim, self._along_m = crossing, -inf
 
-    def move(self, position_m: Vec3, opening_m: tuple[float, float], now_s: float) -> None:
-        """Note where the drone is now; `opening_m` are the opening's width and height."""
+    def move(self, position_m: Vec3, now_s: float) -> None:
+        """Note where the drone is now."""
         if self._aim is not None:
-            self._move(self._aim, position_m, opening_m, now_s)
+            self._move(self._aim, position_m, now_s)
         near = -SETTLED_M < self._along_m < 0.0
         if now_s - self.began_s > MAX_CROSSING_S + (MORE_NEAR_S if near else 0.0):
             self._refuse(f"not through it within {MAX_CROSSING_S:g} s")
@@ -76,16 +77,18 @@ class CrossingAttempt:
         elif now_s - self._there_since_s > MAX_STUCK_S:
             self._refuse(f"stuck for {MAX_STUCK_S:g} s")
 
-    def _move(self, aim: Crossing, position_m: Vec3, opening_m: tuple[float, float], now_s: float) -> None:
+    def _move(self, aim: Crossing, position_m: Vec3, now_s: float) -> None:
         (x, y, z), heading = aim.gate.centre_m, aim.heading_rad
         dx, dy, dz = position_m[0] - x, position_m[1] - y, position_m[2] - z
         along_m, left_m = turned(dx, dy, -heading)
         if along_m >= 0.0 > self._along_m > -inf and not self.passed:
+            opening_m = aim.gate.shape.opening_m
             self.passed = abs(left_m) < opening_m[0] / 2 and abs(dz) < opening_m[1] / 2
             self._refuse(f"passed its plane {hypot(left_m, dz):.2f} m from its centre")
             self._passed_s = now_s
         self._along_m, self._across_m = along_m, hypot(left_m, dz)
-        self.cleared = self.passed and (along_m > CLEAR_M or now_s - self._passed_s > MAX_CLEARING_S)
+        clear_m = CLEAR_M + deeper_m(aim.gate.shape)
+        self.cleared = self.passed and (along_m > clear_m or now_s - self._passed_s > MAX_CLEARING_S)
 
     def _refuse(self, why: str) -> None:
         """Note why the attempt cannot go on; nothing can be refused behind the opening."""
@@ -111,7 +114,11 @@ class CrossingAttempt:
     @property
     def is_committed(self) -> bool:
         """The drone is straight before the opening, too near to plan again, or beyond it."""
-        return self.passed or (-COMMIT_M < self._along_m < 0.0 and self._across_m < COMMIT_ACROSS_M)
+        if self._aim is None:
+            return False
+        shape = self._aim.gate.shape
+        near = -COMMIT_M - deeper_m(shape) < self._along_m < 0.0
+        return self.passed or (near and self._across_m < COMMIT_ACROSS_M * room_share(shape))
 
     def is_settled(self, estimate: GateEstimate) -> bool:
         """The drone is near, and the path leads through the opening as it is known now."""
@@ -119,7 +126,8 @@ class CrossingAttempt:
             return False
         gate = self._aim.gate
         turned_rad = abs(remainder(gate.yaw_rad - estimate.yaw_rad, pi))
-        return dist(gate.centre_m, estimate.position_m) < SETTLED_MOVE_M and turned_rad < SETTLED_TURN_RAD
+        moved_m = SETTLED_MOVE_M * room_share(gate.shape)
+        return dist(gate.centre_m, estimate.position_m) < moved_m and turned_rad < SETTLED_TURN_RAD
 
     @property
     def looks(self) -> bool:

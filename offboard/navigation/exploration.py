@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from framerunner.geometry.axes import Pose
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import FlightStyle
@@ -68,17 +69,25 @@ class Explorer:
         camera: the drone's camera.
         arena: where the gates are.
         pace: of the flight to viewpoints.
+        shapes: of the gates; None: all have that of the frame challenge.
 
     Attributes:
         coverage: what has been seen so far.
     """
 
-    def __init__(self, camera: CameraModel, arena: Arena, pace: Pace | None = None) -> None:
+    def __init__(
+        self,
+        camera: CameraModel,
+        arena: Arena,
+        pace: Pace | None = None,
+        shapes: GateShapes | None = None,
+    ) -> None:
         self._pace = pace or Pace()
-        self.coverage = Coverage(camera, arena)
-        self._visibility = GateVisibility(camera)
+        shapes = shapes or GateShapes()
+        self.coverage = Coverage(camera, arena, shapes)
+        self._visibility = GateVisibility(camera, shapes)
         self._blocks = self.coverage.grid.blocks()
-        self._table = view_table(camera, arena)
+        self._table = view_table(camera, arena, self._visibility.reach)
         self._likelihood = Likelihood(self._blocks)
         self._visits = np.zeros((len(self._table.places_m), len(YAWS)))
         self._last: Pose | None = None
@@ -209,7 +218,8 @@ class Explorer:
                 shown &= clear[sample > _SAMPLES / 2]
             in_view = np.flatnonzero(shown)
             way, block = np.divmod(in_view, x_m.size)
-            qualities = view_qualities(dx.ravel()[in_view], dy.ravel()[in_view], dz.ravel()[in_view])
+            dx, dy, dz = (each.ravel()[in_view] for each in (dx, dy, dz))
+            qualities = view_qualities(dx, dy, dz, self._visibility.reach)
             before = np.take(best_view, in_view, axis=1)
             after = np.maximum(before, qualities)
             best_view[:, in_view] = after

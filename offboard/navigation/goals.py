@@ -6,19 +6,17 @@ from dataclasses import dataclass, fields, replace
 from math import inf, isfinite
 from typing import Any
 
+from framerunner.geometry.gate_shape import PAPER_GATE, GateShape
 from framerunner.geometry.vectors import Vec3
 from offboard.limits import CommandLimits
 from offboard.response.estimate import Response
-from scenarios.models import Base, Gate
+from scenarios.models import Base
 
-GATE_WIDTH_M: float = Gate.model_fields["outer_width_m"].default  # of all gates, bars included
-GATE_HEIGHT_M: float = Gate.model_fields["outer_height_m"].default
-FRAME_THICKNESS_M = 0.02
 HEADROOM = 0.92
 """Share of a limit that a path uses; the rest is for corrections."""
 BOLD_HEADROOM = 0.98
 """Likewise of level speed in class open: where it counts, in openings, the drone flies more slowly."""
-VIEW_NEAR_M = 0.25  # half a gate's width, with a margin
+VIEW_MARGIN_M = 0.04  # beside a gate that is in view
 PRESENT_SHARE = 1.15
 """Of the crossing speed: a drone that is faster at the start of a path brakes to this before an opening."""
 LOOK_AGAIN_M = 1.0
@@ -36,10 +34,12 @@ class PathGate:
     Attributes:
         centre_m: of the opening, arena axes.
         yaw_rad: heading of its normal; it may be crossed from either side.
+        shape: its sizes.
     """
 
     centre_m: Vec3
     yaw_rad: float
+    shape: GateShape = PAPER_GATE
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,9 +167,10 @@ class FlightStyle:
             look_braking_m=self.look_braking_m + (LOOK_BRAKING_M - self.look_braking_m) * late,
         )
 
-    def look_limit_rad(self, distance_m: float) -> float:
+    def look_limit_rad(self, distance_m: float, shape: GateShape) -> float:
         """By how much the heading may differ from a gate's direction, seen from a distance in plan."""
-        return min(max(self.view_half_rad - VIEW_NEAR_M / max(distance_m, 0.01), 0.0), self.look_offset_rad)
+        half_m = shape.outer_width_m / 2 + VIEW_MARGIN_M
+        return min(max(self.view_half_rad - half_m / max(distance_m, 0.01), 0.0), self.look_offset_rad)
 
 
 CONTEST = FlightStyle()

@@ -13,6 +13,7 @@ from math import dist, hypot
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityFluCommand
 from offboard.limits import CONTEST, CommandLimits
+from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.crossing_attempt import CrossingAttempt
 from offboard.navigation.goals import Goal, Point, style_of
 from offboard.navigation.path_flight import STILL, PathFlight, position_now
@@ -37,9 +38,8 @@ class Navigator:
     """The world model, the path, and the action that is flown. All positions are in arena axes."""
 
     def __init__(self, surroundings: Surroundings, limits: CommandLimits = CONTEST) -> None:
-        width_m, height_m = surroundings.gate_m
-        self._opening_m = (width_m - 2 * surroundings.bar_m, height_m - 2 * surroundings.bar_m)
         self._style = style_of(limits)
+        self._camera = CameraModel.of(surroundings.camera)
         self._world = WorldModel(surroundings, self._style)
         self._flight = PathFlight(surroundings.arena, self._style, limits)
         self._places = LookingPlaces(surroundings.arena, self._style)
@@ -174,7 +174,7 @@ class Navigator:
         crossing = self._crossing
         if crossing is None or crossing.colour != colour or crossing.refusal:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)
-        crossing.move(position_now(state), self._opening_m, now_s)
+        crossing.move(position_now(state), now_s)
         estimate = self._world.gate(colour)
         goes_on = crossing.is_committed or (estimate is not None and crossing.is_settled(estimate))
         if goes_on and crossing.is_on(self._flight.path):
@@ -188,11 +188,13 @@ class Navigator:
         looked = crossing.looks
         gate = self._world.gate_of(estimate)
         distance_m = dist(gate.centre_m, position_now(state))  # not to where it seems to be outside the arena
-        near_m = self._style.look_again_m + self._style.look_braking_m
+        farther_m = max(self._camera.whole_from_m(estimate.shape) - self._style.look_again_m, 0.0)
+        near_m = self._style.look_again_m + self._style.look_braking_m + farther_m
         if crossing.must_look(estimate, distance_m, near_m, now_s) != looked:
             self._flight.change()
         if crossing.looks:
-            place = self._places.before(estimate, position_now(state), self._world.obstacles())
+            here_m, obstacles = position_now(state), self._world.obstacles()
+            place = self._places.before(estimate, here_m, obstacles, farther_m)
             command = self._fly(place)
             if crossing.must_stop and crossing.is_on(self._flight.path):  # no path to the place yet
                 self._flight.leave()

@@ -220,12 +220,15 @@ def _near(places_m: Sequence[Vec3], obstacles: Obstacles, style: FlightStyle) ->
     """The gates and columns that may be in the way of some of these places, and perhaps some more."""
     first = places_m[0]
     span_m = max(dist(first, place_m) for place_m in places_m)
-    gate_m = span_m + gate_reach_m(style)
     column_m = span_m + DRONE_RADIUS_M + style.bar_margin_m
     x, y, _ = first
     return replace(
         obstacles,
-        gates=tuple(gate for gate in obstacles.gates if dist(first, gate.centre_m) < gate_m),
+        gates=tuple(
+            gate
+            for gate in obstacles.gates
+            if dist(first, gate.centre_m) < span_m + gate_reach_m(gate.shape, style)
+        ),
         columns_m=tuple(
             column
             for column in obstacles.columns_m
@@ -312,12 +315,12 @@ def _stretches(route: list[Pass], found: list[Steps]) -> list[Stretch]:
     stretches: list[Stretch] = []
     for (_, after), steps in zip(pairwise(route), found, strict=True):
         goal = after.goal
-        look = np.array(goal.centre_m) if isinstance(goal, PathGate) else None
+        look = goal if isinstance(goal, PathGate) else None
         stretches += [Stretch(step.leg, goal, False, after.yaw_rad, look) for step in steps or ()]
         if not isinstance(goal, PathGate):
             continue
         if after.begun:
-            stretches[-1] = replace(stretches[-1], crosses=True, look_m=None)
+            stretches[-1] = replace(stretches[-1], crosses=True, look=None)
         else:
             stretches.append(Stretch(_through(after), goal, True, after.yaw_rad, None))
     return stretches

@@ -12,11 +12,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import COLUMN_PX, CameraModel, CameraPose, FloorPoints
 from offboard.navigation.obstacle_map import floor_cells
 from offboard.navigation.pose_history import PoseChange
-from scenarios.models import Arena, Base
+from scenarios.models import COLOURS, Arena, Base
 from vision.types import ObstacleEdge
 
 Bools = npt.NDArray[np.bool_]
@@ -184,8 +185,9 @@ class ViewedSpace:
         needed: there may be gates that are not on the map; else all places are as good as viewed.
     """
 
-    def __init__(self, camera: CameraModel, base: Base) -> None:
+    def __init__(self, camera: CameraModel, base: Base, shapes: GateShapes) -> None:
         self._base = base
+        self._viewed_m = _VIEWED_M * min(camera.reach(shapes.of(colour)) for colour in COLOURS)
         self._right = camera.half_width_px / camera.focal_px
         self._up = camera.half_height_px / camera.focal_px
         self._positions: Doubles = np.zeros((_KEPT, 3))
@@ -236,7 +238,7 @@ class ViewedSpace:
         ahead, left, up = np.moveaxis(np.einsum("pvi,vij->pvj", offsets, axes), 2, 0)
         shown = (np.abs(left) < ahead * self._right) & (np.abs(up) + _ABOVE_M < ahead * self._up)
         flown = (np.abs(offsets) < _FLOWN_M).all(axis=2)
-        viewed: Bools = (flown | (shown & (ahead < _VIEWED_M))).any(axis=1)
+        viewed: Bools = (flown | (shown & (ahead < self._viewed_m))).any(axis=1)
         for excused in self._excused:
             viewed |= np.linalg.norm(places_m - np.array(excused), axis=1) < _NEAR_M
         return viewed

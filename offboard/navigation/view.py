@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from framerunner.geometry.gate_shape import PAPER_GATE, GateShape, GateShapes
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.goals import GATE_HEIGHT_M, GATE_WIDTH_M
 from scenarios.models import Arena, Base, Camera
 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """The arena, the base and the drone's camera; nothing about the gates but their size."""
+    """The arena, the base and the drone's camera; nothing about the gates but their shapes."""
 
     arena: Arena
     base: Base
     camera: Camera
-    gate_m: tuple[float, float] = (GATE_WIDTH_M, GATE_HEIGHT_M)  # outer width and height of each gate
-    bar_m: float = 0.02  # thickness of its bars
+    shapes: GateShapes = field(default_factory=GateShapes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +33,7 @@ class GateEstimate:
         certain: known well enough to fly through.
         views: how many images have been used.
         seen_us: vehicle time of the last one.
+        shape: its sizes, which are known before.
     """
 
     colour: str
@@ -45,6 +45,7 @@ class GateEstimate:
     certain: bool
     views: int
     seen_us: int
+    shape: GateShape = PAPER_GATE
 
 
 @dataclass(frozen=True, slots=True)

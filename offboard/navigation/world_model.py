@@ -40,13 +40,13 @@ class WorldModel:
         camera = self._camera = CameraModel.of(surroundings.camera)
         self._surroundings = surroundings
         self._history = PoseHistory(camera)
-        self._place = PlaceEstimator(camera)
-        self._map = GateMap(camera, surroundings.arena)
+        self._place = PlaceEstimator(camera, surroundings.shapes)
+        self._map = GateMap(camera, surroundings.arena, surroundings.shapes)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
         self.seen_space = SeenSpace(camera, surroundings.arena)
-        self.viewed_space = ViewedSpace(camera, surroundings.base)
-        self._glimpses = Glimpses(camera)
-        self._explorer = Explorer(camera, surroundings.arena, Pace.of(style))
+        self.viewed_space = ViewedSpace(camera, surroundings.base, surroundings.shapes)
+        self._glimpses = Glimpses(camera, surroundings.shapes)
+        self._explorer = Explorer(camera, surroundings.arena, Pace.of(style), surroundings.shapes)
         self._start_m: Vec3 | None = None
         self._start_room_m = DRONE_RADIUS_M + style.bar_margin_m + START_SPARE_M
         self._image_us = -1
@@ -152,7 +152,7 @@ class WorldModel:
     def gate_of(self, gate: GateEstimate) -> PathGate:
         """A gate as a path crosses it: in the arena, also while it seems to be outside, seen from afar."""
         arena = self._surroundings.arena
-        half_m = self._surroundings.gate_m[1] / 2
+        half_m = gate.shape.outer_height_m / 2
         x_m, y_m = arena.length_x_m / 2, arena.width_y_m / 2
         x, y, z = gate.position_m
         inside = (
@@ -160,7 +160,7 @@ class WorldModel:
             min(max(y, -y_m), y_m),
             min(max(z, half_m), arena.height_m - half_m),
         )
-        return PathGate(inside, gate.yaw_rad)
+        return PathGate(inside, gate.yaw_rad, gate.shape)
 
     def obstacles(self) -> Obstacles:
         """All that a path must keep clear of; of each colour of the task only the gate known best."""

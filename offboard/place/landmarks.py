@@ -143,7 +143,7 @@ class GateLandmarks:
         """Whether a gate is certain: one that was stays so for a while when the drone does not see it."""
         colour = estimate.colour
         factor = STAYS_CERTAIN if colour in self._certain else 1.0
-        if not estimate.ambiguous and is_certain(yaw_rad, covariance, estimate.views, factor):
+        if not estimate.ambiguous and is_certain(yaw_rad, covariance, estimate.shape, estimate.views, factor):
             self._certain.add(colour)
             return True
         self._certain.discard(colour)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot, pi, radians, remainder, sqrt
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import DroneState, ReportedAccuracy
 from offboard.navigation.camera_model import CameraModel
@@ -59,8 +60,8 @@ class PlaceEstimator:
         camera: of the drone.
     """
 
-    def __init__(self, camera: CameraModel) -> None:
-        self._camera = camera
+    def __init__(self, camera: CameraModel, shapes: GateShapes) -> None:
+        self._camera, self._shapes = camera, shapes
         self._track = InertialTrack()
         self._filter: PlaceFilter | None = None
         self._reports: deque[tuple[int, DroneState]] = deque()
@@ -77,7 +78,14 @@ class PlaceEstimator:
         return self._filter is not None
 
     def add(self, state: DroneState) -> None:
-        """Take in a state as the vehicle reports it; call it once a tick, before images are used."""
+        """Take in a state as the vehicle reports it; call it once a tick, before images are used.
+
+        All begins when the vehicle is armed: how much of its telemetry has come before is a matter of chance.
+        """
+        if self._start is None:
+            self._start = state
+        if self._last is None and not state.armed:
+            return
         track, last, place = self._track, self._last, self._filter
         if place is not None and last is not None and track.is_interrupted(state.imu, state.time_us):
             self.advance(last.time_us)
@@ -85,8 +93,6 @@ class PlaceEstimator:
             self._last = state
         if not state.imu:
             return
-        if self._start is None:
-            self._start = state
         continued = track.add(state.imu, state.time_us, state.attitude_arena)
         position_us = state.time_us - round(state.position_age_s * 1e6)
         if not state.landed and self._left_us is None:
@@ -249,7 +255,7 @@ class PlaceEstimator:
             return
         by_colour: dict[str, list[tuple[GateView, Eye]]] = {}
         for sighting, pose in zip(sightings, poses, strict=True):
-            view = view_of(sighting, self._camera, pose)
+            view = view_of(sighting, self._shapes.of(sighting.colour), self._camera, pose)
             if view is not None:
                 by_colour.setdefault(sighting.colour, []).append((view, self._eye(pose, at)))
         self._landmarks.see(place, by_colour, gates)

@@ -12,7 +12,7 @@ import numpy as np
 from framerunner.geometry.vectors import Vec3
 from scenarios.imaging.effects import Hall, Patch, PatchColour, Surface
 from scenarios.models import Arena, Light, Scenario
-from sitl.camera_scene import Bgr, Face, Floats, lit
+from sitl.camera_scene import WALL, Bgr, Face, Floats, lit
 
 HALL_BGR: Bgr = (196, 204, 206)
 CEILING_BGR: Bgr = (226, 228, 228)
@@ -100,4 +100,4 @@ def _rectangle(x: float, y: float, half_x: float, half_y: float) -> Floats:
 def _face(axes: _Axes, flat: Floats, colour: Bgr, light: Light, lift_m: float = 0.0) -> Face:
     origin, across, up, normal = (np.array(axis) for axis in axes)
     corners = origin + flat[:, :1] * across + flat[:, 1:] * up + lift_m * normal
-    return Face(corners, axes[3], lit(colour, axes[3], light), "hall")
+    return Face(corners, axes[3], lit(colour, axes[3], light), WALL)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from math import hypot
 
 import cv2
@@ -59,6 +60,7 @@ class _Lit:
     mesh: Mesh
     floor: tuple[MeshFace, ...]  # and the hall's walls: in the order of painting, before all else
     solid: tuple[MeshFace, ...]  # in the order of the tree's faces
+    part: list[int]  # of each of these, its number among the mesh's parts
 
 
 class Painter:
@@ -111,14 +113,13 @@ class Painter:
         projection = lit.mesh.project(eye_arena_m, rotation, drift)
         seen = projection.seen
         _paint(canvas, projection, [face for face in lit.floor if seen[face.index]])
-        solid, first = lit.solid, len(lit.floor)
         order = lit.tree.back_to_front(eye_arena_m)
         painted = 0
         for behind, outline in self._place_drones(drones, eye_arena_m, rotation) if drones else ():
-            _paint(canvas, projection, [solid[i] for i in order[painted:behind] if seen[first + i]])
+            _paint_solids(canvas, projection, lit, order[painted:behind])
             cv2.fillConvexPoly(canvas, outline, DRONE_BGR, cv2.LINE_8, SHIFT)
             painted = behind
-        _paint(canvas, projection, [solid[i] for i in order[painted:] if seen[first + i]])
+        _paint_solids(canvas, projection, lit, order[painted:])
         return canvas
 
     def _light(self, time_us: int) -> _Lit:
@@ -128,8 +129,10 @@ class Painter:
         tree = PaintTree(scene.bodies)
         walls, on_floor = hall_faces(self._scenario, light)
         floor = (*walls, scene.tatami, *scene.mats, *scene.shadows, *on_floor)
-        mesh = Mesh([*floor, *tree.faces], self._pinhole)
-        return _Lit(tree, mesh, mesh.faces[: len(floor)], mesh.faces[len(floor) :])
+        mesh = Mesh([*floor, *tree.faces], [len(floor) + first for first in tree.parts], self._pinhole)
+        sizes = np.diff(tree.parts, append=len(tree.faces))
+        part = np.repeat(np.arange(1, len(sizes) + 1), sizes).tolist()
+        return _Lit(tree, mesh, mesh.faces[: len(floor)], mesh.faces[len(floor) :], part)
 
     def _place_drones(
         self, drones: Sequence[Solid], eye: Vec3, rotation: RotationRows
@@ -148,7 +151,7 @@ class Painter:
         fwd_z, left_z, up_z = rotation[2]
         # A pixel's ray goes down where fwd_z - left_z (u - cu)/f - up_z (v - cv)/f is negative.
         a, b = left_z / focal, up_z / focal
-        c = -(fwd_z + a * cu + b * cv)
+        c = -(fwd_z + a * cu + b * cv) - 0.5 * max(abs(a), abs(b))  # OpenCV paints the nearest pixels, too
         band = _HAZE_BAND * hypot(left_z, up_z)
         starts = (c + 3.0 * band, c + 2.0 * band, c + band, c)  # a band is where a u + b v + start >= 0
         bands = self._upright_bands(a, b, starts) or self._tilted_bands(a, b, starts)
@@ -186,6 +189,36 @@ class Painter:
                 points = clip_half_plane(points, -a, -b, overlap - starts[i + 1])
             bands.append(np.rint(SUBPIXELS * np.array(points).reshape(-1, 2)).astype(np.int32))
         return bands
+
+
+def _paint_solids(canvas: Image, projection: Projection, lit: _Lit, order: Sequence[int]) -> None:
+    """Paint faces of the tree in their order; small things finely, as thin bars need it."""
+    seen, first = projection.seen, len(lit.floor)
+    for part, indices in groupby(order, lit.part.__getitem__):
+        faces = [lit.solid[i] for i in indices if seen[first + i]]
+        if not faces:
+            continue
+        left, top, right, bottom, scale = projection.views[part]
+        if scale == 1:
+            _paint(canvas, projection, faces)
+            continue
+        view = canvas[top:bottom, left:right]
+        size = (scale * (right - left), scale * (bottom - top))
+        fine = cv2.resize(view, size, interpolation=cv2.INTER_NEAREST)
+        _paint(fine, projection, faces)
+        view[...] = reduced(fine, scale)
+
+
+def reduced(image: Image, scale: int) -> Image:
+    """The mean of scale by scale pixels for each pixel of a new image; the scale is a power of two."""
+    while scale > 1:
+        height, width = image.shape[:2]
+        # Twice by two is several times as fast as by four.
+        image = np.asarray(
+            cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA), np.uint8
+        )
+        scale //= 2
+    return image
 
 
 def _paint(canvas: Image, projection: Projection, faces: Iterable[MeshFace]) -> None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from math import hypot, inf, nan, sqrt
+from math import floor, hypot, inf, nan, sqrt
 
 from framerunner.geometry.rotations import rotation, to_body
 from framerunner.vehicle.measurements import FlowSample, RangeSample
+from scenarios.random_numbers import random_stream
 from sitl.sensors.noise import SamplingTimes, normal_numbers, normal_vector
 from sitl.sensors.specs import OpticalFlowSpec, RangeFinderSpec
 from sitl.sensors.truth import TrueMotion
 
 _MIN_DOWN = 0.1  # cosine of the steepest angle to a surface that is measured, 84 degrees
+_SQUARES = 64  # in each direction, until the pattern of what reflects repeats itself
 
 
 def distance_down_m(motion: TrueMotion) -> float:
@@ -77,6 +79,8 @@ class OpticalFlow:
         self._flow_rad = self._gyro_rad = (0.0, 0.0)
         self._integration_us = 0
         self._usable = True
+        stream = random_stream(seed, "sensors.optical_flow.shiny")
+        self._shiny = (stream.random((_SQUARES, _SQUARES)) < spec.shiny_share).tolist()
 
     def sample(self, motion: TrueMotion) -> FlowSample | None:
         """Integrate the flow of this tick; the sum since the sample before, if one is due."""
@@ -109,7 +113,7 @@ class OpticalFlow:
         gyro = self._gyro_rad
         self._gyro_rad = (gyro[0] + forward_rad_s * period_s, gyro[1] + right_rad_s * period_s)
         distance_m = distance_down_m(motion)
-        if spec.min_distance_m <= distance_m <= spec.max_distance_m:
+        if spec.min_distance_m <= distance_m <= spec.max_distance_m and not self._is_shiny(motion):
             forward_m_s, right_m_s, _ = to_body(rotation(motion.attitude), *motion.velocity_ned_m_s)
             forward_rad_s -= right_m_s / distance_m
             right_rad_s += forward_m_s / distance_m
@@ -120,6 +124,12 @@ class OpticalFlow:
         flow = self._flow_rad
         self._flow_rad = (flow[0] + forward_rad_s * period_s, flow[1] + right_rad_s * period_s)
         self._integration_us += motion.period_us
+
+    def _is_shiny(self, motion: TrueMotion) -> bool:
+        """Whether the floor straight below reflects."""
+        north_m, east_m, _ = motion.position_ned_m
+        size_m = self._spec.shiny_size_m
+        return bool(self._shiny[floor(north_m / size_m) % _SQUARES][floor(east_m / size_m) % _SQUARES])
 
     def _reset(self) -> None:
         self._flow_rad = self._gyro_rad = (0.0, 0.0)

@@ -128,6 +128,10 @@ class OpticalFlowSpec(Part):
     max_distance_m: float = Field(ge=0.01, le=1000, description="to the ground; farther, the quality is 0")
     max_flow_rad_s: float = Field(ge=0.01, le=100, description="faster, the quality is 0")
     quality: int = Field(ge=1, le=255, description="of a usable sample")
+    shiny_share: float = Field(
+        0.0, ge=0, le=1, description="of the floor, which reflects there; over it the quality is 0"
+    )
+    shiny_size_m: float = Field(0.5, ge=0.05, le=100, description="side of each square that reflects")
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:

@@ -11,11 +11,15 @@ from textwrap import dedent
 
 import pytest
 
+from framerunner.flying.plan import FlightPlan
+from framerunner.geometry.gate_shape import GateShape
+from offboard.authoring import Document, export_scxml, import_scxml
 from offboard.drone import VelocityFluCommand
 from offboard.engine import MissionEngine, MissionRunError
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import MissionError, list_missions, load_mission, mermaid
 from offboard.pilot import Imu, Pilot
+from scenarios.models import Gate, Scenario
 from vision.types import Detections
 
 MINIMAL = dedent("""\
@@ -68,6 +72,18 @@ def test_class_and_vision_are_inherited_and_have_defaults(tmp_path):
     assert (replaced.mission_class, replaced.vision) == ("contest", "frames")
 
 
+def test_the_scenario_tells_the_shape_of_its_gates_and_the_mission_that_of_others(tmp_path):
+    text = "gate: {outer_width_m: 0.8, outer_height_m: 0.5, bar_m: 0.03}\n"
+    (tmp_path / "base.yaml").write_text(f"{text}{MINIMAL}", encoding="utf-8")
+    mission = load(tmp_path, "extends: base.yaml\n")
+    assert mission.gate == GateShape(0.8, 0.5, 0.03, 0.03)
+    assert Document.from_text(import_scxml(export_scxml(mission.spec).encode())).chart.gate == mission.gate
+    red = Gate(colour="red", x_m=0, y_m=0, z_m=1, outer_width_m=1.2)
+    shapes = FlightPlan(Scenario(name="one", frames=(red,)), mission).surroundings.shapes
+    assert (shapes.of("red"), shapes.of("green")) == (red.shape, mission.gate)
+    assert load(tmp_path, MINIMAL).gate is None
+
+
 @pytest.mark.parametrize(
     ("line", "expected"),
     [
@@ -76,6 +92,19 @@ def test_class_and_vision_are_inherited_and_have_defaults(tmp_path):
         ("class:", "m.yaml:1:7: unknown class ''; it is contest or open"),
         ("vision: box", "m.yaml:1:9: unknown vision 'box'; did you mean 'boxes'?"),
         ("vision: [frames]", "m.yaml:1:1: 'vision' must be one line of text"),
+        ("gate: 0.42", "m.yaml:1:1: 'gate' needs names below it, such as '  outer_width_m: 0.42'"),
+        (
+            "gate: {outer_width_m: wide}",
+            "m.yaml:1:23: outer_width_m of 'gate' is 'wide'; write metres, from 0.01 to 10",
+        ),
+        (
+            "gate: {bar_m: 0.2}",
+            "m.yaml:1:15: bar_m 0.2 of 'gate' leaves no opening; make it thinner or the frame larger",
+        ),
+        (
+            "gate: {outer_with_m: 0.5}",
+            "m.yaml:1:8: a mission's 'gate' has no 'outer_with_m'; did you mean 'outer_width_m'?",
+        ),
     ],
 )
 def test_an_unknown_class_or_vision_is_one_problem(tmp_path, line, expected):

@@ -128,6 +128,25 @@ def events(recording):
 
 
 @pytest.mark.alone
+def test_a_drone_that_estimates_its_place_flies_as_in_lockstep_too(tmp_path):
+    instance = free_instance()
+    options = ("--instance", str(instance), "--speed", "3", "--record", "--sensors", "flow")
+    with disturbed(instance, busy=3, viewers=0), program(tmp_path, "fly", "test-case-1", *options) as flight:
+        assert flight.process.wait(300.0) in (0, 1), flight.err + flight.out  # it may miss the base
+    (run,) = (tmp_path / "runs").iterdir()
+    scenario = load_scenario("test-case-1").model_copy(update={"sensors": "flow"})
+    plan = FlightPlan(scenario, load_mission("explorer"))
+    path = tmp_path / "lockstep.mcap"
+    with FlightRecording(path, plan.scenario, plan.chart, None) as recording:
+        flown = fly_lockstep(plan, observers=(recording.see,))
+        recording.finish(flown.result, flown.track.time_s)
+    ticks, wanted_ticks = (events(each)[0] for each in (run, path))
+    assert len(ticks) == len(wanted_ticks) > 400
+    for tick, wanted in zip(ticks, wanted_ticks, strict=True):
+        assert tick == wanted, f"at {wanted.state.time_us} us"
+
+
+@pytest.mark.alone
 def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
     folder, lockstep = busy_flight[0], lockstep_flight[0]
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))

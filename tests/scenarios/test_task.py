@@ -1,6 +1,7 @@
 """What an app may know of a scenario."""
 
 import json
+from dataclasses import asdict
 
 from scenarios.loader import load_scenario
 from scenarios.task import Task
@@ -22,6 +23,7 @@ def test_a_task_has_no_number_of_the_layout():
     told = json.loads(Task.of(scenario).model_dump_json())
     assert len(places) > 10 and not places & numbers(told)
     assert told["colours"] == ["red", "green", "blue"] and told["try_limit_s"] == 180.0
+    assert told["shapes"]["red"] == asdict(scenario.frames[0].shape)
     assert Task.of(scenario, show_layout=True).scenario == scenario
 
 

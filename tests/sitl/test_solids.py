@@ -41,6 +41,13 @@ def test_bars_enclose_the_opening():
     assert [bar.centre_arena_m[1] for bar in bars[2:]] == pytest.approx([2.0, 2.0])
 
 
+def test_bars_are_as_deep_as_they_should_be():
+    gate = Gate(colour="red", x_m=0, y_m=0, z_m=1, outer_width_m=1.0, bar_m=0.1, depth_m=0.01)
+    top, _, left, _ = gate_solids(gate.model_copy(update={"outer_height_m": 0.6}))
+    assert top.half_extents_m == pytest.approx((0.005, 0.5, 0.05))
+    assert left.half_extents_m == pytest.approx((0.005, 0.05, 0.2))
+
+
 @given(st.floats(-0.06, 0.06), st.floats(-0.06, 0.06), st.floats(-pi, pi))
 def test_a_centred_drone_fits_through(y, z, yaw):
     gate = Gate(colour="green", x_m=0, y_m=0, z_m=1, yaw_rad=yaw)

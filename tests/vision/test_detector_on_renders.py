@@ -43,9 +43,11 @@ def outline(distance: float, turn: float) -> tuple[float, float]:
 def test_distance_straight_ahead(distance: float) -> None:
     _, height = outline(distance, 0.0)
     found = seen(*look(distance))
-    nearest, farthest = (0.23 * 160 / (height + pixels) for pixels in (1.0, -1.0))
+    # The paper counts one row less than the box has, and a row that is filled by less than a fifth to a half,
+    # depending on the light, is not of the gate.
+    nearest, farthest = (0.23 * 160 / (height + pixels) for pixels in (1.0, -2.0))
     assert nearest <= found.d <= farthest
-    # What the paper's constants (0.23 for 0.22 m) make of the truth: right within 8 % and that pixel.
+    # What the paper's constants (0.23 for 0.22 m) make of the truth: right within 8 % and these pixels.
     assert nearest < distance * 1.08
     assert farthest > distance * 0.95
 

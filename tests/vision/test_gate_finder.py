@@ -1,15 +1,17 @@
 """The gate finder on painted images of known geometry."""
 
+from dataclasses import asdict
 from math import atan2, cos, degrees, hypot, radians, sin
 
 import cv2
 import numpy as np
 import pytest
 
+from framerunner.geometry.gate_shape import GateShape, GateShapes
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.vectors import Quaternion, Vec3
 from scenarios.imaging.effects import CameraEffects, Hall, LensDistortion, Patch
-from scenarios.models import Base, Gate, Pole, Scenario
+from scenarios.models import Base, Decoy, Gate, Pole, Scenario
 from scenarios.models import Camera as ScenarioCamera
 from sitl.camera import SimulatedCamera
 from vision.bar_edges import find_edges
@@ -21,7 +23,7 @@ from vision.types import Detections, GateSighting
 GATE = Gate(colour="green", x_m=0, y_m=0, z_m=1.5, yaw_rad=0.4)
 SCENARIO = Scenario(name="one", frames=(GATE,), base=Base(x_m=4.5, y_m=4.5))
 CAMERA = SimulatedCamera(SCENARIO)
-FIND = new_detector("frames", focal_px=CAMERA.focal_px, rendered=True)
+FIND = new_detector("frames", focal_px=CAMERA.focal_px)
 
 
 def look(
@@ -64,6 +66,30 @@ def test_the_signed_angle_says_where_to_fly(turn: float) -> None:
     assert found.green.seen
     assert found.time_us == 7
     assert not found.red.seen
+
+
+@pytest.mark.parametrize(
+    ("shape", "distance"),
+    [
+        (GateShape(0.5, 0.5, 0.02, 0.02), 2.5),
+        (GateShape(1.5, 0.8, 0.06, 0.06), 4.0),
+        (GateShape(0.6, 1.1, 0.05, 0.01), 3.0),
+        (GateShape(0.35, 0.2, 0.01, 0.03), 1.2),
+    ],
+)
+def test_gates_of_other_shapes_have_their_corners_and_poses(shape: GateShape, distance: float) -> None:
+    gate = GATE.model_copy(update=asdict(shape))
+    decoy = Decoy(colour="cyan", x_m=-3.0, y_m=4.0, z_m=1.5, outer_width_m=0.8)
+    scenario = SCENARIO.model_copy(update={"frames": (gate,), "decoys": (decoy,)})
+    shapes = GateShapes(scenario.gate_shapes)
+    find = new_detector("frames", focal_px=CAMERA.focal_px, shapes=shapes)
+    image = SimulatedCamera(scenario).render(*look(distance, 0.5))
+    sighting = only(find(image, 7))
+    assert sighting.whole
+    places = [pose.position_flu_m for pose in sighting.poses]
+    assert min(abs(hypot(*place) / distance - 1.0) for place in places) < 0.015
+    box = new_detector("boxes", focal_px=CAMERA.focal_px, shapes=shapes)(image, 7).green
+    assert box.d == pytest.approx(distance, rel=0.12)  # the paper's formula: it takes the nearer upright bar
 
 
 def test_a_gate_behind_is_not_seen() -> None:
@@ -157,10 +183,10 @@ def test_a_calibrated_camera_gives_corners_and_poses_of_an_ideal_one(distance_m,
         (0.0, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0)
     )
     calibration = Calibration.ideal(320, 240, camera.focal_px, BARREL.coefficients)
-    find = new_detector("frames", calibration=calibration, rendered=True, smooth=True)
+    find = new_detector("frames", calibration=calibration)
     (sighting,) = find(image, None).frames
     assert sighting.poses[0].position_flu_m == pytest.approx((x, y, 0.0), abs=0.015 * distance_m)
-    ideal = new_detector("frames", focal_px=camera.focal_px, rendered=True, smooth=True)
+    ideal = new_detector("frames", focal_px=camera.focal_px)
     blind = ideal(image, None).frames
     if distance_m < 1.0:  # without the calibration it is no gate, or elsewhere
         assert (
@@ -198,7 +224,9 @@ def test_a_gate_before_a_poster_of_its_colour_is_found(up_m):
 
 
 def test_a_bar_that_is_expected_wider_than_the_image_is_looked_for_in_the_image_only():
-    patch = ImagePatch(np.zeros((40, 60), np.uint8), (30.0, 20.0), (160.0, 120.0))
+    patch = ImagePatch(
+        np.zeros((40, 60), np.uint8), np.zeros((40, 60), np.int16), (30.0, 20.0), (160.0, 120.0)
+    )
     a, b, c, d = (-10.0, -5.0), (10.0, -5.0), (10.0, 5.0), (-10.0, 5.0)
     edges = find_edges(patch, ((a, b), (b, c), (c, d), (d, a)), [(1e9, 1e9)] * 4)
     assert not edges.outer_ok.any()

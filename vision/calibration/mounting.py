@@ -38,7 +38,6 @@ from vision.calibration.sightings import (
     gates_among,
     mounting_matrix,
 )
-from vision.gate_model import GATE_HEIGHT_M, GATE_WIDTH_M
 
 _PLACE_STD_M = 0.02
 """Of the camera's place on the drone, measured with a ruler."""
@@ -66,8 +65,8 @@ _OF_A_KNOT = 3  # of how far the drone is from where its estimator has it: x, y,
 _KNOT_S = 3.0  # between two of them; in between it is interpolated
 _STEP = 1e-4  # of numerical differences, rad and s
 
-_SIDEWAYS_M = np.array([-1.0, 1.0, 1.0, -1.0]) * GATE_WIDTH_M / 2.0
-_UPWARDS_M = np.array([1.0, 1.0, -1.0, -1.0]) * GATE_HEIGHT_M / 2.0
+_SIDEWAYS = np.array([-1.0, 1.0, 1.0, -1.0])
+_UPWARDS = np.array([1.0, 1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -237,7 +236,8 @@ class _BundleAdjustment:
         The second has shape (n, 4, 3, 7).
         """
         gates = self._gates(at)[self._numbers]
-        across, up = self._sides[:, None] * _SIDEWAYS_M, np.broadcast_to(_UPWARDS_M, (len(gates), 4))
+        half_width_m, half_height_m = self._seen.half_m.T[..., None]
+        across, up = self._sides[:, None] * (_SIDEWAYS * half_width_m), _UPWARDS * half_height_m
         c, s = np.cos(gates[:, 3:4]), np.sin(gates[:, 3:4])
         roll, lean, size = gates[:, 4:5], gates[:, 5:6], np.exp(gates[:, 6:7])
         along, ahead, above = size * (across - roll * up), size * lean * up, size * (up + roll * across)

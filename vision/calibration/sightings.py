@@ -15,6 +15,7 @@ import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation, Slerp
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.rotations import mounting_flu, rotation, rotation_rows
 from framerunner.geometry.vectors import Quaternion, Vec3
 from vision.types import Detections, GateSighting
@@ -155,6 +156,7 @@ class Sightings:
         corners_s: when the row of each corner was read, seconds of the motion, shape (n, 4).
         positions_flu_m: of the gates' centres from the camera, forward, left, up, shape (n, 3).
         normals_flu: of the gates, by the better and the other pose; NaN if there is none, shape (n, 2, 3).
+        half_m: half the outer widths and heights of the gates, shape (n, 2).
     """
 
     colours: npt.NDArray[np.str_]
@@ -163,6 +165,7 @@ class Sightings:
     corners_s: Floats
     positions_flu_m: Floats
     normals_flu: Floats
+    half_m: Floats
 
     def __len__(self) -> int:
         return len(self.colours)
@@ -182,6 +185,7 @@ class Sightings:
             self.corners_s[index],
             self.positions_flu_m[index],
             self.normals_flu[index],
+            self.half_m[index],
         )
 
 
@@ -191,6 +195,8 @@ def sightings_of(
     half_height_px: float,
     readout_s: float,
     delay_s: float = 0.0,
+    *,
+    shapes: GateShapes | None = None,
 ) -> Sightings:
     """The gates in images that differ and at whose times the drone's pose is known.
 
@@ -200,7 +206,9 @@ def sightings_of(
         half_height_px: from the image's middle to its upper and lower edges.
         readout_s: of a rolling shutter, from the first to the last row; an image's time is the middle.
         delay_s: by which images are about older than their times.
+        shapes: of the gates of each colour; None: all have that of the frame challenge.
     """
+    known = shapes or GateShapes()
     timed = sorted(
         (image for image in images if image.time_us is not None), key=lambda each: each.time_us or 0
     )
@@ -224,7 +232,8 @@ def sightings_of(
     share = np.clip(np.nan_to_num(corners[:, :, 1]) / (2.0 * half_height_px), -0.5, 0.5)
     read_s = np.array([time_s for time_s, _ in pairs]).reshape(-1, 1) + readout_s * share
     colours = np.array([gate.colour for _, gate in pairs], dtype=np.str_)
-    return Sightings(colours, corners, std, read_s, places, normals)
+    half_m = np.array([known.of(gate.colour).half_m for _, gate in pairs]).reshape(-1, 2)
+    return Sightings(colours, corners, std, read_s, places, normals, half_m)
 
 
 def _useful(image: Detections) -> list[GateSighting]:

@@ -10,16 +10,9 @@ from math import cos, hypot, sin
 
 import numpy as np
 
+from framerunner.geometry.gate_shape import PAPER_GATE, GateShapes
 from offboard.navigation.camera_model import CameraModel, CameraPose
-from offboard.navigation.gates.gate_measurement import (
-    HALF_HEIGHT_M,
-    HALF_WIDTH_M,
-    Floats,
-    GateView,
-    Prior,
-    solutions,
-    view_of,
-)
+from offboard.navigation.gates.gate_measurement import Floats, GateView, Prior, solutions, view_of
 from offboard.navigation.gates.gate_track import CHI_SQUARED, Fit, GateTrack, load_filters
 from offboard.navigation.gates.lookalikes import Lookalikes
 from offboard.navigation.pose_history import DronePose
@@ -28,6 +21,7 @@ from offboard.navigation.view import GateEstimate
 from scenarios.models import Arena
 from vision.types import Detections, ObstacleEdge
 
+# All sizes are those of the challenge's gate.
 # A gate that is nearer, less oblique and farther inside the image than this is found in all but few images.
 SURELY_FOUND_M = 5.0
 SURELY_FOUND_COSINE = 0.5
@@ -48,14 +42,16 @@ class GateMap:
     Args:
         camera: of the drone.
         arena: gates are in it.
+        shapes: of the gates of each colour.
 
     Attributes:
         gates: all that were seen, of every colour, in the order in which they were found.
     """
 
-    def __init__(self, camera: CameraModel, arena: Arena) -> None:
+    def __init__(self, camera: CameraModel, arena: Arena, shapes: GateShapes) -> None:
         self._camera = camera
         self._arena = arena
+        self._shapes = shapes
         self._prior = Prior.of(arena)
         self._tracks: list[GateTrack] = []
         self._lookalikes = Lookalikes()
@@ -98,7 +94,10 @@ class GateMap:
         if poses is None:
             poses = [pose] * len(detections.frames)
         sightings = zip(detections.frames, poses, strict=True)
-        seen = [view_of(sighting, self._camera, at) for sighting, at in sightings]
+        seen = [
+            view_of(sighting, self._shapes.of(sighting.colour), self._camera, at)
+            for sighting, at in sightings
+        ]
         views = [view for view in seen if view is not None]
         for view in self._match(views, unseen):
             if not self._lookalikes.shows(view):
@@ -186,7 +185,7 @@ class GateMap:
         corners = view.corners_px.reshape(-1, 2)
         right, down = corners.mean(axis=0).tolist()
         distance_m = hypot(*(a - b for a, b in zip(view.camera.position_m, (x, y, z), strict=True)))
-        near_px = max(NEAR_PX, NEAR_SHARE * 2.0 * HALF_WIDTH_M * view.focal_px / distance_m)
+        near_px = max(NEAR_PX, NEAR_SHARE * view.shape.outer_width_m * view.focal_px / distance_m)
         return hypot(right - centre[0], down - centre[1]) <= near_px
 
     def _should_be_seen(
@@ -197,9 +196,12 @@ class GateMap:
         x, y, _, yaw = track.state.tolist()
         distance_m = _distance_m(track, camera)
         facing = abs((at[0] - x) * cos(yaw) + (at[1] - y) * sin(yaw))
-        if distance_m > SURELY_FOUND_M or facing < SURELY_FOUND_COSINE * distance_m:
+        if (
+            distance_m > SURELY_FOUND_M * self._camera.reach(track.shape)
+            or facing < SURELY_FOUND_COSINE * distance_m
+        ):
             return False
-        outline = self._outline(track.state, camera)
+        outline = self._outline(track, camera)
         if outline is None or not all(
             self._camera.contains(right, down, SURELY_FOUND_MARGIN_PX)
             for right, down in ((outline[0], outline[1]), (outline[2], outline[3]))
@@ -207,17 +209,18 @@ class GateMap:
             return False
         for other in self._tracks:
             if other is not track and _distance_m(other, camera) < distance_m:
-                before = self._outline(other.state, camera)
+                before = self._outline(other, camera)
                 if before is None or _overlap(outline, before):
                     return False
         return not any(self._hides(edge, outline, distance_m, camera) for edge in obstacles)
 
-    def _outline(self, state: Floats, camera: CameraPose) -> tuple[float, float, float, float] | None:
+    def _outline(self, track: GateTrack, camera: CameraPose) -> tuple[float, float, float, float] | None:
         """The box around a gate in the image: left, top, right, bottom; None if not before the camera."""
-        x, y, z, yaw = state.tolist()
-        sx, sy = -sin(yaw) * HALF_WIDTH_M, cos(yaw) * HALF_WIDTH_M
+        x, y, z, yaw = track.state.tolist()
+        half_width_m, half_height_m = track.shape.half_m
+        sx, sy = -sin(yaw) * half_width_m, cos(yaw) * half_width_m
         corners = [
-            self._camera.project(camera, (x + side * sx, y + side * sy, z + up * HALF_HEIGHT_M))
+            self._camera.project(camera, (x + side * sx, y + side * sy, z + up * half_height_m))
             for side in (-1.0, 1.0)
             for up in (-1.0, 1.0)
         ]
@@ -278,6 +281,9 @@ def _are_one(a: GateTrack, b: GateTrack) -> bool:
         return False
     x, y, z, _ = (a.state - b.state).tolist()
     away_m = hypot(x, y, z)
-    if away_m >= DUPLICATE_CERTAIN_M:
+    larger = max(a.shape.outer_width_m / PAPER_GATE.outer_width_m, 1.0)
+    if away_m >= DUPLICATE_CERTAIN_M * larger:
         return False
-    return away_m < DUPLICATE_M or any(one.estimate().certain and not one.is_doubted for one in (a, b))
+    return away_m < DUPLICATE_M * larger or any(
+        one.estimate().certain and not one.is_doubted for one in (a, b)
+    )

@@ -14,23 +14,16 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import GateShape
 from offboard.navigation.camera_model import NEAREST_M, CameraModel, CameraPose
-from offboard.navigation.goals import GATE_HEIGHT_M, GATE_WIDTH_M
 from offboard.navigation.pose_history import DronePose
 from scenarios.models import Arena
 from vision.types import GateCorner, GateSighting
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 
-HALF_WIDTH_M = GATE_WIDTH_M / 2
-HALF_HEIGHT_M = GATE_HEIGHT_M / 2
-# To the right and up: upper left, upper right, lower right, lower left as seen.
-_CORNERS_M = (
-    (-HALF_WIDTH_M, HALF_HEIGHT_M),
-    (HALF_WIDTH_M, HALF_HEIGHT_M),
-    (HALF_WIDTH_M, -HALF_HEIGHT_M),
-    (-HALF_WIDTH_M, -HALF_HEIGHT_M),
-)
+# To the right and up, halves of a gate: upper left, upper right, lower right, lower left as seen.
+_CORNERS = ((-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))
 
 EDGE_ON = 0.1  # sine of the angle to the gate's plane below which its outline says little
 PIXEL_STD_PX = 0.1  # added to what the finder of gates states: its edges' errors are not all independent
@@ -49,6 +42,7 @@ class GateView:
 
     Attributes:
         colour: of the gate.
+        shape: its sizes.
         whole: nothing of it is hidden.
         time_us: vehicle time of the image.
         camera: where it was taken.
@@ -60,6 +54,7 @@ class GateView:
     """
 
     colour: str
+    shape: GateShape
     whole: bool
     time_us: int
     camera: CameraPose
@@ -87,8 +82,8 @@ class Solution:
     log_weight: float
 
 
-def view_of(sighting: GateSighting, model: CameraModel, pose: DronePose) -> GateView | None:
-    """A sighting as a measurement; None if no corner is seen."""
+def view_of(sighting: GateSighting, shape: GateShape, model: CameraModel, pose: DronePose) -> GateView | None:
+    """A sighting of a gate of known shape as a measurement; None if no corner is seen."""
     seen = [corner for corner in sighting.corners if corner is not None]
     if not seen:
         return None
@@ -100,6 +95,7 @@ def view_of(sighting: GateSighting, model: CameraModel, pose: DronePose) -> Gate
     camera = model.pose(pose.position_m, pose.attitude_arena)
     return GateView(
         colour=sighting.colour,
+        shape=shape,
         whole=sighting.whole,
         time_us=pose.time_us,
         camera=camera,
@@ -142,12 +138,14 @@ def predicted(state: Floats, view: GateView) -> tuple[Floats, Floats, Floats] | 
     if ahead < EDGE_ON * hypot(dx, dy, dz):
         return None
     m = camera.rotation
+    half_width_m, half_height_m = view.shape.half_m
     numbers: list[float] = []
     curvature: list[float] = []
     rows: list[tuple[float, float, float, float]] = []
-    for seen, (across, up) in zip(view.seen, _CORNERS_M, strict=True):
+    for seen, (right, high) in zip(view.seen, _CORNERS, strict=True):
         if not seen:
             continue
+        across, up = right * half_width_m, high * half_height_m
         px, py, pz = -across * ny - dx, across * nx - dy, up - dz
         forward = m[0] * px + m[3] * py + m[6] * pz
         if forward < NEAREST_M:
@@ -213,7 +211,7 @@ def _starts(view: GateView) -> list[Floats]:
     heights = [low[1] - high[1] for high, low in upright_edges(view)]
     if not heights or min(heights) < 0.5:
         return []
-    forward = view.focal_px * 2.0 * HALF_HEIGHT_M / (sum(heights) / len(heights))
+    forward = view.focal_px * view.shape.outer_height_m / (sum(heights) / len(heights))
     right, down = view.corners_px.reshape(-1, 2).mean(axis=0).tolist()
     left, up = -right * forward / view.focal_px, -down * forward / view.focal_px
     m, at = view.camera.rotation, view.camera.position_m

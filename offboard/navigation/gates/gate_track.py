@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from framerunner.geometry.gate_shape import GateShape
 from offboard.navigation.gates.gate_measurement import (
     Floats,
     GateView,
@@ -20,6 +21,7 @@ from offboard.navigation.gates.gate_measurement import (
     predicted,
     solutions,
 )
+from offboard.navigation.planner.clearance import room_share
 from offboard.navigation.view import GateEstimate
 from scenarios.models import Arena
 
@@ -181,7 +183,7 @@ SAME_YAW_RAD = 0.06  # hypotheses nearer than this, or than half their standard 
 SAME_M = 0.1
 
 # Certain: 95 % of the errors to the side and in height within 1.5 cm, of the yaw within 2 degrees. Along the
-# normal, where a drone flies through anyway, twice as much is allowed.
+# normal, where a drone flies through anyway, twice as much is allowed; in a narrower opening less.
 CERTAIN_M = 0.015 / 1.96
 CERTAIN_RAD = 0.035 / 1.96
 CERTAIN_VIEWS = 3
@@ -212,6 +214,7 @@ class GateTrack:
 
     Attributes:
         colour: of the gate.
+        shape: its sizes.
         belief: twice the images that showed it, minus those that should have; negative: there is none.
         missed: images in a row that should have shown it.
         time_us: vehicle time of the last prediction.
@@ -220,7 +223,7 @@ class GateTrack:
     """
 
     def __init__(self, found: list[Solution], view: GateView) -> None:
-        self.colour = view.colour
+        self.colour, self.shape = view.colour, view.shape
         self.belief, self.missed, self.views = SEEN_BELIEF, 0, 1
         self.time_us = self.seen_us = view.time_us
         self._hypotheses = [GateFilter(solution) for solution in found]
@@ -347,9 +350,10 @@ class GateTrack:
             position_std_m=(sqrt(vx), sqrt(vy), sqrt(vz)),
             yaw_std_rad=sqrt(v_yaw),
             ambiguous=ambiguous,
-            certain=not ambiguous and is_certain(yaw, self.covariance, self.views),
+            certain=not ambiguous and is_certain(yaw, self.covariance, self.shape, self.views),
             views=self.views,
             seen_us=self.seen_us,
+            shape=self.shape,
         )
 
     def _saw(self, view: GateView) -> None:
@@ -370,12 +374,13 @@ class GateTrack:
         self._hypotheses = kept
 
 
-def is_certain(yaw_rad: float, covariance: Floats, views: int, factor: float = 1.0) -> bool:
+def is_certain(yaw_rad: float, covariance: Floats, shape: GateShape, views: int, factor: float = 1.0) -> bool:
     """Whether a gate is known well enough to fly through.
 
     Args:
         yaw_rad: of its normal.
         covariance: of x, y, z and yaw, shape (4, 4).
+        shape: the smaller its opening, the better it must be known.
         views: how many were used.
         factor: by which standard deviations may be larger than usual.
     """
@@ -384,7 +389,8 @@ def is_certain(yaw_rad: float, covariance: Floats, views: int, factor: float = 1
     shared = 2.0 * nx * ny * float(covariance[0, 1])
     along, aside = nx * nx * vx + ny * ny * vy + shared, ny * ny * vx + nx * nx * vy - shared
     square = factor * factor
-    exact = max(along / 4.0, aside, vz) <= square * CERTAIN_M**2 and v_yaw <= square * CERTAIN_RAD**2
+    certain_m = CERTAIN_M * room_share(shape)
+    exact = max(along / 4.0, aside, vz) <= square * certain_m**2 and v_yaw <= square * CERTAIN_RAD**2
     return exact and views >= CERTAIN_VIEWS
 
 

@@ -15,13 +15,7 @@ import numpy.typing as npt
 
 from framerunner.geometry.rotations import to_world
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.gates.gate_measurement import (
-    HALF_HEIGHT_M,
-    HALF_WIDTH_M,
-    Floats,
-    GateView,
-    upright_edges,
-)
+from offboard.navigation.gates.gate_measurement import Floats, GateView, upright_edges
 
 Mask: TypeAlias = npt.NDArray[np.bool_]
 
@@ -50,12 +44,14 @@ class Lookalike:
         colour: of the gate.
         place_m: its centre, arena axes, shape (3,).
         size: times that of a gate.
+        half_width_m: of it.
         seemed_m: where gates would have been that look like its sightings, shape (n, 3).
     """
 
     colour: str
     place_m: Floats
     size: float
+    half_width_m: float
     seemed_m: Floats
 
     def agrees_with(self, sighting: _Sightings) -> bool:
@@ -66,11 +62,6 @@ class Lookalike:
         margin_m = AGREES * hypot(std * away_m, place_std_m) + self.half_width_m
         nearer_m = abs(away_m - self.size * float(sighting.away_m[0]))
         return nearer_m < margin_m and self.is_at(sighting.eyes_m[0], (x, y, z))
-
-    @property
-    def half_width_m(self) -> float:
-        """Of it."""
-        return self.size * HALF_WIDTH_M
 
     def is_at(self, eye_m: Vec3 | Floats, direction: Vec3) -> bool:
         """Whether a line of sight meets it."""
@@ -102,7 +93,9 @@ class Lookalikes:
             return None
         place_m, size, chosen = thing
         self._sightings[view.colour] = sightings.some(~chosen)
-        lookalike = Lookalike(view.colour, place_m, size, sightings.some(chosen).seemed_m())
+        half_width_m = size * view.shape.half_m[0]
+        seemed_m = sightings.some(chosen).seemed_m()
+        lookalike = Lookalike(view.colour, place_m, size, half_width_m, seemed_m)
         self._found.append(lookalike)
         return lookalike
 
@@ -170,7 +163,7 @@ def _sighting_of(view: GateView) -> _Sightings | None:
     rays = np.array([ray(*place_px) for place_px in view.corners_px.reshape(-1, 2).tolist()])
     middle = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).sum(axis=0)
     middle /= np.linalg.norm(middle)
-    away_m = 2.0 * HALF_HEIGHT_M / length / hypot(middle[0], middle[1])
+    away_m = view.shape.outer_height_m / length / hypot(middle[0], middle[1])
     std = hypot(EDGE_STD, EDGE_STD_PX / (length * focal_px))
     return _Sightings(
         np.array((view.camera.position_m,)),

@@ -7,15 +7,9 @@ from math import cos, hypot, sin
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import PAPER_GATE, GateShape
 from framerunner.geometry.vectors import Vec3
-from offboard.navigation.goals import (
-    FRAME_THICKNESS_M,
-    GATE_HEIGHT_M,
-    GATE_WIDTH_M,
-    FlightStyle,
-    Obstacles,
-    PathGate,
-)
+from offboard.navigation.goals import FlightStyle, Obstacles, PathGate
 from offboard.navigation.planner.legs import Array
 from scenarios.models import Arena
 
@@ -24,6 +18,7 @@ DRONE_HALF_LENGTH_M = 0.125
 DRONE_HALF_HEIGHT_M = 0.0225
 TILTED_M = 0.05  # how much farther down and up its box reaches while it tilts in a turn
 SAME_GATE_M = 0.4  # two gates whose centres are nearer are the same
+LEAST_ROOM_SHARE = 0.4  # for which tolerances are made smaller in openings
 MIDDLE_M = 0.01  # a drone that is nearer to an opening's middle plane may leave it on either side
 
 _SPARE_M = 0.03  # how much farther than needed a detour passes
@@ -50,8 +45,10 @@ class Clearance:
         self.high_m: Array = np.array([x_m, y_m, arena.height_m - margin_m])
         level_m = DRONE_RADIUS_M + style.bar_margin_m
         upright_m = DRONE_HALF_HEIGHT_M + TILTED_M + style.bar_margin_m
-        half_m = _gate_half_m(style)
-        rows = [(*gate.centre_m, cos(gate.yaw_rad), sin(gate.yaw_rad), *half_m) for gate in obstacles.gates]
+        rows = [
+            (*gate.centre_m, cos(gate.yaw_rad), sin(gate.yaw_rad), *_gate_half_m(gate.shape, style))
+            for gate in obstacles.gates
+        ]
         self.base = -1
         if obstacles.base is not None:
             base, side_m = obstacles.base, obstacles.base.edge_m / 2 + level_m
@@ -60,6 +57,9 @@ class Clearance:
                 (base.x_m, base.y_m, base.top_m / 2, 1.0, 0.0, side_m, side_m, base.top_m / 2 + upright_m)
             )
         self.boxes = len(rows)
+        self._openings_m: Array = np.array(
+            [(DRONE_HALF_LENGTH_M + gate.shape.depth_m / 2, *gate.shape.half_m) for gate in obstacles.gates]
+        ).reshape(-1, 3)
         self._rows: Array = np.array(rows).reshape(-1, 8)
         self._columns: Array = np.array(obstacles.columns_m).reshape(-1, 3)
         self.columns = len(self._columns)
@@ -156,8 +156,7 @@ class Clearance:
         """
         gates = self.boxes - (self.base >= 0)
         offsets = self.offsets(point_m[None])[0, :gates]
-        half_m = (DRONE_HALF_LENGTH_M + FRAME_THICKNESS_M / 2, GATE_WIDTH_M / 2, GATE_HEIGHT_M / 2)
-        inside = (np.abs(offsets) < half_m).all(axis=1)
+        inside = (np.abs(offsets) < self._openings_m).all(axis=1)
         if not inside.any():
             return None
         gate = int(inside.argmax())
@@ -200,17 +199,30 @@ class Clearance:
         return [(point_m + move, level) for move in moves]
 
 
-def gate_reach_m(style: FlightStyle) -> float:
+def room_share(shape: GateShape) -> float:
+    """How much room the drone has in an opening, as a share of that in the challenge's; at most 1."""
+    return min(max(_room_m(shape) / _room_m(PAPER_GATE), LEAST_ROOM_SHARE), 1.0)
+
+
+def _room_m(shape: GateShape) -> float:
+    """From the drone's box in the middle of an opening to the bars."""
+    width_m, height_m = shape.opening_m
+    return min(width_m / 2 - DRONE_HALF_LENGTH_M, height_m / 2 - DRONE_HALF_HEIGHT_M)
+
+
+def deeper_m(shape: GateShape) -> float:
+    """By how much farther from its middle a gate's bars reach, along its normal, than the challenge's."""
+    return max((shape.depth_m - PAPER_GATE.depth_m) / 2, 0.0)
+
+
+def gate_reach_m(shape: GateShape, style: FlightStyle) -> float:
     """How far from its centre an enlarged gate reaches."""
-    return hypot(*_gate_half_m(style))
+    return hypot(*_gate_half_m(shape, style))
 
 
-def _gate_half_m(style: FlightStyle) -> Vec3:
+def _gate_half_m(shape: GateShape, style: FlightStyle) -> Vec3:
     """Half the size of an enlarged gate: thickness, width and height."""
     level_m = DRONE_RADIUS_M + style.bar_margin_m
     upright_m = DRONE_HALF_HEIGHT_M + TILTED_M + style.bar_margin_m
-    return (
-        FRAME_THICKNESS_M / 2 + level_m,
-        GATE_WIDTH_M / 2 + level_m,
-        GATE_HEIGHT_M / 2 + upright_m,
-    )
+    half_width_m, half_height_m = shape.half_m
+    return (shape.depth_m / 2 + level_m, half_width_m + level_m, half_height_m + upright_m)

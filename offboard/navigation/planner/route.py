@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from offboard.navigation.goals import PRESENT_SHARE, FlightStyle, Goal, Motion, PathGate, Point, Refusal
 from offboard.navigation.path import Crossing
-from offboard.navigation.planner.clearance import Clearance
+from offboard.navigation.planner.clearance import Clearance, deeper_m, room_share
 from offboard.navigation.planner.legs import Array, Connector, Ends
 
 SPEED_SHARES = (1.0, 0.7, 0.4)  # of the crossing speed, to choose from
@@ -86,6 +86,8 @@ class _Opening:
     yaw_rad: float
     before_m: float  # room before it
     after_m: float
+    deeper_m: float  # see `deeper_m`: all straight flight is so much longer
+    across_m: float  # how near its axis the drone must be
 
 
 class RouteFinder:
@@ -189,8 +191,13 @@ class RouteFinder:
             for side in (0, 1):
                 row = 2 * index + side
                 before_m, after_m = float(rooms[index, 1 - side]), float(rooms[index, side])
-                if min(before_m, after_m) >= LEAST_STRAIGHT_M:
-                    sides.append(_Opening(centres[row], normals[row], float(yaws[row]), before_m, after_m))
+                deeper = deeper_m(gates[index].shape)
+                if min(before_m, after_m) >= LEAST_STRAIGHT_M + deeper:
+                    across_m = LATE_ACROSS_M * room_share(gates[index].shape)
+                    yaw = float(yaws[row])
+                    sides.append(
+                        _Opening(centres[row], normals[row], yaw, before_m, after_m, deeper, across_m)
+                    )
             found.append(sides)
         return found
 
@@ -204,8 +211,8 @@ class RouteFinder:
             centre, normal = opening.centre_m, opening.normal
             same_way = _same_way(gate, opening.yaw_rad, previous)
             cost_s = SWITCH_S if same_way is False else 0.0
-            straight_m = min(opening.before_m, style.straight_before_m)
-            exit_m = min(opening.after_m, style.straight_after_m)
+            straight_m = min(opening.before_m, style.straight_before_m + opening.deeper_m)
+            exit_m = min(opening.after_m, style.straight_after_m + opening.deeper_m)
             room_m = min(opening.before_m - straight_m, opening.after_m - exit_m)
             ways = [(-straight_m, speed) for speed in self._speeds(room_m)]
             if start is not None:
@@ -217,8 +224,9 @@ class RouteFinder:
                 for at_m in _late_entries(start, opening, exit_m, begun=bool(same_way)):
                     speeds = (present,) if at_m >= exit_m else (style.crossing_speed_m_s, min(present, most))
                     ways += [(at_m, min(speed, top)) for speed in speeds]
+            turned_m = TURNED_BEFORE_M + opening.deeper_m
             for at_m, speed in ways:
-                times = (exit_m - at_m) / speed, max(-TURNED_BEFORE_M - at_m, 0.0) / speed
+                times = (exit_m - at_m) / speed, max(-turned_m - at_m, 0.0) / speed
                 ends = centre + at_m * normal, centre + exit_m * normal, speed * normal
                 rows.append((*ends, (opening.yaw_rad, *times, cost_s)))
         if not rows:
@@ -253,7 +261,7 @@ def _leaving_exit(start: Motion, opening: _Opening, exit_m: float) -> float:
     """Where the straight flight ends; farther for a start that is just leaving, and not to turn back."""
     along_m = float((np.array(start.position_m) - opening.centre_m) @ opening.normal)
     speed = float(np.array(start.velocity_m_s) @ opening.normal)
-    leaving = speed > 0.1 and -LATE_STRAIGHT_M < along_m < exit_m + LEAVING_M
+    leaving = speed > 0.1 and -LATE_STRAIGHT_M - opening.deeper_m < along_m < exit_m + LEAVING_M
     return max(exit_m, along_m + 0.03 + LEAVING_S * speed) if leaving else exit_m
 
 
@@ -273,14 +281,16 @@ def _late_entries(start: Motion, opening: _Opening, exit_m: float, *, begun: boo
         return []
     across_m = hypot(offset[0] - along_m * normal[0], offset[1] - along_m * normal[1])
     beside_m = max(across_m, abs(float(offset[2])))
-    if along_m > -LATE_STRAIGHT_M:
-        return [exit_m] if beside_m < LATE_ACROSS_M else []
+    latest_m = -LATE_STRAIGHT_M - opening.deeper_m
+    if along_m > latest_m:
+        return [exit_m] if beside_m < opening.across_m else []
     speed = float(velocity @ normal)
     aside = float(np.linalg.norm(velocity - speed * normal))
-    to_go_m = -LATE_STRAIGHT_M - along_m
-    if beside_m > LATE_ACROSS_M + 0.25 * to_go_m or aside > 0.1 + 0.5 * max(speed, 0.0):
+    to_go_m = latest_m - along_m
+    if beside_m > opening.across_m + 0.25 * to_go_m or aside > 0.1 + 0.5 * max(speed, 0.0):
         return []
-    entries = [entry for entry in LATE_ENTRIES_M if entry > along_m + LATE_ROOM_M]
-    if beside_m < LATE_ACROSS_M and to_go_m < LATE_ROOM_M:
+    late_m = (entry - opening.deeper_m for entry in LATE_ENTRIES_M)
+    entries = [entry for entry in late_m if entry > along_m + LATE_ROOM_M]
+    if beside_m < opening.across_m and to_go_m < LATE_ROOM_M:
         entries.append(exit_m)
     return entries

@@ -145,14 +145,14 @@ class Stretch:
         goal: the goal at its end, or the gate that it leads through.
         crosses: it is the straight flight through the gate's opening.
         yaw_rad: the heading at its end; NaN if it is free.
-        look_m: where to look on the way; None for the heading of the leg's axes.
+        look: the gate to look at on the way; None for the heading of the leg's axes.
     """
 
     leg: Leg
     goal: Goal | None
     crosses: bool
     yaw_rad: float
-    look_m: Array | None
+    look: PathGate | None
 
 
 @dataclass(slots=True, eq=False)
@@ -293,16 +293,15 @@ def _wanted_headings(
     motions = zip(samples.positions_m.tolist(), samples.velocities_m_s.tolist(), strict=True)
     # Plain numbers, once for each stretch: the heading of its axes, and where to look.
     axes = [atan2(stretch.leg.turn[1], stretch.leg.turn[0]) for stretch in stretches]
-    looks = [None if stretch.look_m is None else stretch.look_m.tolist() for stretch in stretches]
     for ((x, y, _), (vx, vy, _)), number in zip(motions, samples.stretches.tolist(), strict=True):
-        stretch, heading, look = stretches[number], axes[number], looks[number]
+        stretch, heading = stretches[number], axes[number]
         if stretch.crosses:
             wanted.append(stretch.yaw_rad)
             continue
-        if look is None:
+        if (look := stretch.look) is None:
             wanted.append(heading if isnan(stretch.yaw_rad) else stretch.yaw_rad)
             continue
-        dx, dy = look[0] - x, look[1] - y
+        dx, dy = look.centre_m[0] - x, look.centre_m[1] - y
         away = hypot(dx, dy)
         bearing = atan2(dy, dx)
         if hypot(vx, vy) > COURSE_M_S:
@@ -310,7 +309,7 @@ def _wanted_headings(
             heading = course + clamped(
                 remainder(heading - course, 2 * pi), style.course_offset_rad, style.course_offset_rad
             )
-        limit = style.look_limit_rad(away)
+        limit = style.look_limit_rad(away, look.shape)
         if limit > 0.0:
             bearing += clamped(remainder(heading - bearing, 2 * pi), limit, limit)
         wanted.append(bearing)

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import COLUMN_PX, CameraModel, CameraPose, FloorPoints
 from offboard.navigation.pose_history import PoseChange
@@ -35,10 +36,10 @@ class Coverage:
         grid: the cells.
     """
 
-    def __init__(self, camera: CameraModel, arena: Arena) -> None:
+    def __init__(self, camera: CameraModel, arena: Arena, shapes: GateShapes) -> None:
         self.grid = SearchGrid.of(arena)
         self._camera = camera
-        self._visibility = GateVisibility(camera)
+        self._visibility = GateVisibility(camera, shapes)
         self._centres = self.grid.centres()
         self._seen = np.zeros((HEADINGS, self._centres[0].size), dtype=np.float32)
         self._change = PoseChange(_MOVED_M, _TURNED_RAD)
@@ -80,7 +81,7 @@ class Coverage:
             clear = self._clear(pose, obstacle_edges, dx_m, dy_m, dz_m)
             in_view, dx_m, dy_m, dz_m = in_view[clear], dx_m[clear], dy_m[clear], dz_m[clear]
         self._seen *= np.float32(_FADE)
-        qualities = view_qualities(dx_m, dy_m, dz_m)
+        qualities = view_qualities(dx_m, dy_m, dz_m, self._visibility.reach)
         self._seen[:, in_view] = np.maximum(np.take(self._seen, in_view, axis=1), qualities)
 
     def blocks(self) -> Floats:

@@ -14,10 +14,10 @@ from typing import Final, Self
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.goals import GATE_HEIGHT_M, GATE_WIDTH_M
-from scenarios.models import Arena
+from scenarios.models import COLOURS, Arena
 
 Floats = npt.NDArray[np.float32]
 Bools = npt.NDArray[np.bool_]
@@ -88,36 +88,48 @@ def block_means(cells: Floats) -> Floats:
 
 
 class GateVisibility:
-    """How well a camera would recognise a gate, by the gate's place in the camera's axes."""
+    """How well a camera would recognise a gate, by the gate's place in the camera's axes.
 
-    def __init__(self, camera: CameraModel) -> None:
+    Args:
+        camera: of the drone.
+        shapes: of the gates; all are in view where the widest and the highest would be.
+
+    Attributes:
+        reach: see `CameraModel.reach`, for the gate that is recognised from the least distance.
+    """
+
+    def __init__(self, camera: CameraModel, shapes: GateShapes) -> None:
+        widths_m, heights_m = zip(*(shapes.of(colour).half_m for colour in COLOURS), strict=True)
+        self._half_width_m, self._half_height_m = max(widths_m), max(heights_m)
+        self.reach = min(camera.reach(shapes.of(colour)) for colour in COLOURS)
         self._right = np.float32(camera.half_width_px / camera.focal_px)
         self._up = np.float32(camera.half_height_px / camera.focal_px)
 
     def in_view(self, ahead: Floats, left: Floats, up: Floats, margin_m: float) -> Bools:
         """Whether a gate is wholly in the image, with a margin to its edges; metres in the camera's axes."""
-        side = np.abs(left) + np.float32(GATE_WIDTH_M / 2 + margin_m)
-        height = np.abs(up) + np.float32(GATE_HEIGHT_M / 2 + margin_m)
+        side = np.abs(left) + np.float32(self._half_width_m + margin_m)
+        height = np.abs(up) + np.float32(self._half_height_m + margin_m)
         seen: Bools = (side <= ahead * self._right) & (height <= ahead * self._up)
         return seen
 
 
-def view_qualities(dx_m: Floats, dy_m: Floats, dz_m: Floats) -> Floats:
+def view_qualities(dx_m: Floats, dy_m: Floats, dz_m: Floats, reach: float) -> Floats:
     """How surely a gate is recognised that is wholly in view, 0 to `BEST_QUALITY`, for each heading.
 
-    It falls with the distance beyond 3 m and with the angle of the line of sight to the gate's normal
-    beyond 50 degrees, to nothing at 75 degrees.
+    It falls with the distance beyond 3 m, times `reach`, and with the angle of the line of sight to the
+    gate's normal beyond 50 degrees, to nothing at 75 degrees.
 
     Args:
         dx_m: from the camera to the gate, arena axes, any shape.
         dy_m: likewise.
         dz_m: likewise.
+        reach: of the camera, see `CameraModel.reach`.
 
     Returns:
         Shape (HEADINGS, *shape): for a normal that is turned by index / HEADINGS of half a turn.
     """
     distance_m = np.maximum(np.sqrt(dx_m * dx_m + dy_m * dy_m + dz_m * dz_m), np.float32(0.1))
-    by_distance = _falling(distance_m, _NEAR, _FAR, _TOO_FAR)
+    by_distance = _falling(distance_m / np.float32(reach), _NEAR, _FAR, _TOO_FAR)
     normals = _NORMALS.reshape(2, HEADINGS, *(1 for _ in dx_m.shape))
     facing = normals[0] * (dx_m / distance_m) + normals[1] * (dy_m / distance_m)
     qualities = _falling(np.abs(facing, out=facing), _OPEN, _NARROW, _EDGE_ON)
@@ -156,9 +168,9 @@ _TABLES_KEPT: Final = 4  # of 5 MB each
 
 
 @lru_cache(_TABLES_KEPT)
-def view_table(camera: CameraModel, arena: Arena) -> ViewTable:
-    """The table of a camera and an arena; it never changes, so that all flights share it."""
-    return ViewTable(camera, arena, SearchGrid.of(arena).blocks())
+def view_table(camera: CameraModel, arena: Arena, reach: float) -> ViewTable:
+    """The table of a camera with its reach and an arena; it never changes, so that all flights share it."""
+    return ViewTable(camera, arena, SearchGrid.of(arena).blocks(), reach)
 
 
 class ViewTable:
@@ -170,7 +182,7 @@ class ViewTable:
         grounds_m: x and y of the places, shape (places / heights, 2).
     """
 
-    def __init__(self, camera: CameraModel, arena: Arena, blocks: SearchGrid) -> None:
+    def __init__(self, camera: CameraModel, arena: Arena, blocks: SearchGrid, reach: float) -> None:
         self.heights_m = _heights_m(arena)
         self._axes_m = (_along(arena.length_x_m), _along(arena.width_y_m), self.heights_m)
         self.places_m = np.array(list(product(*self._axes_m)))
@@ -183,7 +195,7 @@ class ViewTable:
         plan_2 = dx_m * dx_m + dy_m * dy_m
         steepest = np.float32(0.9 * camera.half_height_px / camera.focal_px)
         reached = (dz_m * dz_m <= plan_2 * steepest * steepest) & (plan_2 >= np.float32(_NEAREST_M**2))
-        self._qualities = view_qualities(dx_m, dy_m, dz_m) * reached
+        self._qualities = view_qualities(dx_m, dy_m, dz_m, reach) * reached
         bearings = _pseudo_angle(dx_m, dy_m)
         rows = np.arange(len(bearings))[:, None] * bearings.shape[1]
         self._order: Indices = np.argsort(bearings, axis=1, kind="stable") + rows  # of the flat array

@@ -12,10 +12,10 @@ from typing import Final
 
 import numpy as np
 
+from framerunner.geometry.gate_shape import GateShape, GateShapes
 from framerunner.geometry.rotations import to_world
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.goals import GATE_HEIGHT_M, GATE_WIDTH_M
 from offboard.navigation.search.gate_visibility import HEADINGS, Bools, Floats, SearchGrid
 from vision.types import Detection, Detections
 
@@ -37,8 +37,9 @@ class LineOfSight:
 class Glimpses:
     """Remembers the last line of sight to each gate of the task that is not on the map."""
 
-    def __init__(self, camera: CameraModel) -> None:
+    def __init__(self, camera: CameraModel, shapes: GateShapes) -> None:
         self._camera = camera
+        self._shapes = shapes
         self._images = 0
         self._lines: dict[str, tuple[int, LineOfSight]] = {}
 
@@ -65,7 +66,7 @@ class Glimpses:
             if colour in known:
                 self._lines.pop(colour, None)
             elif box.seen:
-                line = self._line(position_m, attitude_arena, box)
+                line = self._line(position_m, attitude_arena, box, self._shapes.of(colour))
                 if not is_lookalike(colour, line):
                     self._lines[colour] = (self._images, line)
 
@@ -73,14 +74,16 @@ class Glimpses:
         """The lines of sight to gates that are not known, the oldest glimpses left out."""
         return tuple(line for image, line in self._lines.values() if self._images - image <= _KEPT_IMAGES)
 
-    def _line(self, position_m: Vec3, attitude_arena: Quaternion, box: Detection) -> LineOfSight:
+    def _line(
+        self, position_m: Vec3, attitude_arena: Quaternion, box: Detection, shape: GateShape
+    ) -> LineOfSight:
         """Through the middle of what was seen; at most as far as a gate looks that small."""
         focal_px = self._camera.focal_px
         pose = self._camera.pose(position_m, attitude_arena)
         left, up = -(box.e + box.w) / 2 / focal_px, (box.n + box.s) / 2 / focal_px
         x, y, z = to_world(pose.rotation, 1.0, left, up)
         length = hypot(x, y, z)
-        size = max((box.n - box.s) / GATE_HEIGHT_M, (box.e - box.w) / GATE_WIDTH_M, 1.0)
+        size = max((box.n - box.s) / shape.outer_height_m, (box.e - box.w) / shape.outer_width_m, 1.0)
         farthest_m = _SPARE * focal_px / size + _SPARE_M
         return LineOfSight(pose.position_m, (x / length, y / length, z / length), farthest_m=farthest_m)
 

@@ -35,16 +35,16 @@ class LookingPlaces:
         self._arena = arena
         self._style = style
 
-    def before(self, gate: GateEstimate, here_m: Vec3, obstacles: Obstacles) -> Point:
+    def before(self, gate: GateEstimate, here_m: Vec3, obstacles: Obstacles, farther_m: float = 0.0) -> Point:
         """On a gate's normal; if its yaw is not known, on the line to it.
 
-        On the drone's side, if there is room.
+        On the drone's side, if there is room; from a gate that is large, so much farther.
         """
         bearing = _bearing(gate, here_m)
         if not gate.ambiguous:
             normal = gate.yaw_rad
             bearing = normal if cos(bearing - normal) > 0.0 else normal + pi
-        before_m = [away_m for away_m in BEFORE_M if away_m <= self._style.look_again_m]
+        before_m = [away_m + farther_m for away_m in BEFORE_M if away_m <= self._style.look_again_m]
         places = [(away_m, bearing + aside) for aside, away_m in product(BEFORE_ASIDE_RAD, before_m)]
         return self._facing(gate, places, 0.0, obstacles)
 

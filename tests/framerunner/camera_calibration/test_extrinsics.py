@@ -85,7 +85,7 @@ def test_a_recorded_flight_gives_the_mounting(tmp_path: Path, capsys: pytest.Cap
 def search(*, missing: tuple[str, ...] = (), pitch_rad: float = 0.1, rms_px: float = 0.4) -> MountingSearch:
     """A mounting that was found, its images 0.093 s late."""
     nothing = np.empty(0)
-    seen = Sightings(nothing.astype(str), nothing, nothing, nothing, nothing, nothing)
+    seen = Sightings(nothing.astype(str), nothing, nothing, nothing, nothing, nothing, nothing)
     found = Values((0.03, pitch_rad, -0.05), (0.08, 0.0, 0.0), 0.093)
     std = Values((0.001, 0.001, 0.002), (0.002, 0.003, 0.02), 0.001)
     fit = MountingFit(found, std, seen, nothing.astype(int), nothing.reshape(0, 3), rms_px)
@@ -125,7 +125,7 @@ def test_the_navigator_sees_gates_where_they_are_with_a_turned_camera() -> None:
     gate = scenario.frames[0]
     at, attitude = (gate.x_m - 2.0, gate.y_m + 0.3, gate.z_m + 0.2), quaternion_from_euler(0.1, -0.05, 0.1)
     image = SimulatedCamera(scenario).render(at, attitude)
-    detect = new_detector("frames", focal_px=scenario.camera.focal_px, rendered=True)
+    detect = new_detector("frames", focal_px=scenario.camera.focal_px)
     (sighting,) = [each for each in detect(image, 0).frames if each.colour == gate.colour]
     model = CameraModel.of(scenario.camera)
     history = PoseHistory(model)
@@ -168,7 +168,7 @@ def test_a_camera_that_looks_back_or_has_a_gimbal_is_refused() -> None:
 def test_a_live_drone_is_only_watched() -> None:
     """Its telemetry has axes north, east, down; images without times get those of their arrival."""
     calibration = Calibration.ideal(320, 240, FOCAL_PX)
-    watched = Watched(calibration, None)
+    watched = Watched(calibration)
     codec = mavlink.MAVLink(None, srcSystem=7, srcComponent=AUTOPILOT_COMPONENT_ID)
 
     def received(message: object) -> object:

@@ -225,7 +225,7 @@ def test_the_navigator_s_map_is_sent_twice_a_second_when_it_has_changed():
         "frames": [
             {
                 **{"colour": "red", "p": [3.0, 2.0, 2.0], "yaw": 0.5, "std": [0.02, 0.01, 0.03]},
-                **{"yaw_std": 0.1, "certain": True, "ambiguous": False, "views": 12},
+                **{"yaw_std": 0.1, "certain": True, "ambiguous": False, "views": 12, "size": [0.42, 0.22]},
             }
         ],
         "path": [[0.0, 0.0, 1.0], [3.0, 2.0, 2.0]],

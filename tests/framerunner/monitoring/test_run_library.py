@@ -174,7 +174,7 @@ def test_detections_and_images_have_their_times(recording, library, flown):
     assert image.shape == (240, 320, 3)
     n, s, e, w, _, _ = seen["boxes"]["red"]
     box = image[round(120 - n) : round(120 - s), round(160 + w) : round(160 + e)].astype(int)
-    assert (box @ [-1, -1, 2] > 200).any()
+    assert (box @ [-1, -1, 2] > 100).any()  # a far bar fills a part of its pixels only
 
 
 def test_a_real_time_flight_is_read_from_its_log_and_video(tmp_path):

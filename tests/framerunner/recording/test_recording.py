@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
+from framerunner.geometry.gate_shape import GateShape
 from framerunner.recording.events import Crossed, RecordedImage, RecordingError
 from framerunner.recording.mcap_reader import McapRecording
 from framerunner.recording.mcap_writer import FlightRecording
@@ -182,7 +183,8 @@ def test_crossings_have_the_vehicle_time_at_which_they_were_flown(tmp_path):
 
 def test_the_map_and_the_path_are_written_when_they_change_and_read_back(tmp_path):
     sure = GateEstimate("red", (3, 2, 2), 0.5, (0.02, 0.01, 0.03), 0.1, False, True, 12, 2_950_000)
-    guessed = GateEstimate("yellow", (1, 0, 1), -1.5, (0.4, 0.5, 0.1), inf, True, False, 1, 2_900_000)
+    shape = GateShape(0.8, 0.5, 0.03, 0.01)
+    guessed = GateEstimate("yellow", (1, 0, 1), -1.5, (0.4, 0.5, 0.1), inf, True, False, 1, 2_900_000, shape)
     views = [
         None,
         NavigationView(goal="explore"),
@@ -211,11 +213,12 @@ def test_the_map_and_the_path_are_written_when_they_change_and_read_back(tmp_pat
 
 def test_the_drawn_map_has_dashed_outlines_until_a_gate_is_certain():
     sure = GateEstimate("red", (3, 2, 2), 0.0, (0.02, 0.01, 0.03), 0.1, False, True, 12, 0)
-    unsure = GateEstimate("green", (1, 1, 1), pi / 2, (inf, 0.1, 0.1), 0.1, False, False, 1, 0)
+    wide = GateShape(outer_width_m=1.0)
+    unsure = GateEstimate("green", (1, 1, 1), pi / 2, (inf, 0.1, 0.1), 0.1, False, False, 1, 0, wide)
     lost = GateEstimate("blue", (nan, 1, 1), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 1, 0)
     view = NavigationView((sure, unsure, lost))
     assert [each["colour"] for each in gate_map(view, 0)["frames"]] == ["red", "green"]
-    drawn = map_scene(view, load_scenario("test-case-1"), 0)
+    drawn = map_scene(view, 0)
     assert [each["type"] for each in drawn["deletions"]] == [1]
     red, green = drawn["entities"]
     assert [len(each["lines"][0]["points"]) for each in (red, green)] == [8, 32]
@@ -225,7 +228,7 @@ def test_the_drawn_map_has_dashed_outlines_until_a_gate_is_certain():
     edges = [point["y"] for point in red["lines"][0]["points"]]
     assert (min(edges), max(edges)) == pytest.approx((2 - 0.21, 2 + 0.21))
     across = [point["x"] for point in green["lines"][0]["points"]]
-    assert (min(across), max(across)) == pytest.approx((1 - 0.21, 1 + 0.21))
+    assert (min(across), max(across)) == pytest.approx((1 - 0.5, 1 + 0.5))
 
 
 def test_what_is_not_known_is_left_out():

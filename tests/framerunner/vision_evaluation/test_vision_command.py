@@ -50,7 +50,7 @@ def test_gates_of_crowded_scenes_are_found_where_they_are(disturbance):
     find = None
     found = whole = 0
     for labelled in labelled_images(load_level("crowded"), 60, 40, disturbance):
-        find = find or new_detector("frames", focal_px=labelled.focal_px, rendered=True)
+        find = find or new_detector("frames", focal_px=labelled.focal_px)
         sightings = find(labelled.image, None).frames
         for label in labelled.gates:
             if label.whole and label.distance_m < 4 and label.angle_deg < 70:

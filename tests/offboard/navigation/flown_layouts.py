@@ -52,7 +52,9 @@ class Layout:
     def of(cls, scenario: Scenario) -> Layout:
         """A scenario's layout."""
         gates = sorted(scenario.frames, key=lambda gate: COLOURS.index(gate.colour))
-        return cls(scenario, tuple(PathGate(gate.position_arena_m, gate.yaw_rad) for gate in gates))
+        return cls(
+            scenario, tuple(PathGate(gate.position_arena_m, gate.yaw_rad, gate.shape) for gate in gates)
+        )
 
     @property
     def goals(self) -> list[Goal]:
@@ -68,7 +70,9 @@ class Layout:
     @property
     def obstacles(self) -> Obstacles:
         """All of them, with the gates."""
-        decoys = tuple(PathGate(decoy.position_arena_m, decoy.yaw_rad) for decoy in self.scenario.decoys)
+        decoys = tuple(
+            PathGate(decoy.position_arena_m, decoy.yaw_rad, decoy.shape) for decoy in self.scenario.decoys
+        )
         return Obstacles((*self.gates, *decoys), self.columns_m, self.scenario.base)
 
     @property
@@ -140,8 +144,9 @@ def crossed(path: Sampled, gates: tuple[PathGate, ...]) -> list[int]:
     found: list[tuple[int, int]] = []
     for number, gate in enumerate(gates):
         along, across, up = path.offsets(gate).T
+        width_m, height_m = gate.shape.opening_m
         for index in np.flatnonzero(np.diff(np.sign(along)) != 0):
-            if abs(across[index]) < 0.19 and abs(up[index]) < 0.09:
+            if abs(across[index]) < width_m / 2 and abs(up[index]) < height_m / 2:
                 found.append((int(index), number))
     return [number for _, number in sorted(found)]
 

@@ -7,6 +7,7 @@ from math import cos, pi, sin
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.rotations import multiply, normalized, quaternion_from_euler
 from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
@@ -73,7 +74,7 @@ class Flight:
     """A drone that shows gates to a map, an image every 100 ms, with the wobble of a real flight."""
 
     def __init__(self, seed: int = 0) -> None:
-        self.map = GateMap(CAMERA, Arena())
+        self.map = GateMap(CAMERA, Arena(), GateShapes())
         self.random = np.random.default_rng(seed)
         self.time_us = 0
 

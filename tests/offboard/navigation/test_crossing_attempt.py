@@ -1,11 +1,11 @@
 """Why an attempt to cross a gate is given up."""
 
+from framerunner.geometry.gate_shape import PAPER_GATE, GateShape
 from offboard.navigation.crossing_attempt import CrossingAttempt
 from offboard.navigation.goals import PathGate
 from offboard.navigation.path import Crossing
 from offboard.navigation.view import GateEstimate
 
-OPENING_M = (0.38, 0.18)
 UNSURE = GateEstimate("red", (2.0, 0.0, 1.0), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 3, 0)
 
 
@@ -28,26 +28,35 @@ def test_each_reason_is_said():
         assert unsure.must_look(UNSURE, 1.4, 1.5, now_s)
     assert unsure.refusal == "still not certain after 4 s before it"
     slow = attempt()
-    slow.move((0.0, 0.0, 1.0), OPENING_M, 26.0)
+    slow.move((0.0, 0.0, 1.0), 26.0)
     assert slow.refusal == "not through it within 25 s"
     near = attempt()
     near.aim(Crossing(PathGate((2.0, 0.0, 1.0), 0.0), 0.0, 1.0))
-    near.move((1.5, 0.0, 1.0), OPENING_M, 26.0)
+    near.move((1.5, 0.0, 1.0), 26.0)
     assert near.refusal == ""
-    near.move((1.5, 0.0, 1.0), OPENING_M, 36.0)
+    near.move((1.5, 0.0, 1.0), 36.0)
     assert near.refusal == "not through it within 25 s"
     stuck = attempt()
     for tick in range(13):
-        stuck.move((0.2 * tick % 0.3, 0.0, 1.0), OPENING_M, 0.5 * tick)
+        stuck.move((0.2 * tick % 0.3, 0.0, 1.0), 0.5 * tick)
         assert stuck.refusal == ""
-    stuck.move((0.1, 0.0, 1.0), OPENING_M, 6.5)
+    stuck.move((0.1, 0.0, 1.0), 6.5)
     assert stuck.refusal == "stuck for 6 s"
 
 
-def test_a_miss_is_refused_and_a_passage_is_not():
-    for left_m, refusal in ((0.3, "passed its plane 0.30 m from its centre"), (0.05, "")):
+def test_the_drone_must_be_nearer_to_the_axis_of_a_narrow_opening_before_it_commits():
+    for shape, committed in ((PAPER_GATE, True), (GateShape(0.31, 0.2, 0.01, 0.01), False)):
         crossing = attempt()
-        crossing.aim(Crossing(PathGate((2.0, 0.0, 1.0), 0.0), 0.0, 1.0))
+        crossing.aim(Crossing(PathGate((2.0, 0.0, 1.0), 0.0, shape), 0.0, 1.0))
+        crossing.move((1.75, 0.04, 1.0), 1.0)
+        assert crossing.is_committed is committed
+
+
+def test_a_miss_is_refused_and_a_passage_is_not():
+    missed, wide = "passed its plane 0.30 m from its centre", GateShape(outer_width_m=0.8)
+    for left_m, shape, refusal in ((0.3, PAPER_GATE, missed), (0.05, PAPER_GATE, ""), (0.3, wide, "")):
+        crossing = attempt()
+        crossing.aim(Crossing(PathGate((2.0, 0.0, 1.0), 0.0, shape), 0.0, 1.0))
         for x_m in (1.9, 2.1):
-            crossing.move((x_m, left_m, 1.0), OPENING_M, 1.0)
+            crossing.move((x_m, left_m, 1.0), 1.0)
         assert (crossing.refusal, crossing.passed) == (refusal, not refusal)

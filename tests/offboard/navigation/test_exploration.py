@@ -8,6 +8,7 @@ from math import cos, hypot, pi, radians, remainder, sin, tau
 import pytest
 
 from framerunner.geometry.axes import Pose
+from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.rotations import quaternion_from_yaw
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.exploration import Explorer
@@ -188,7 +189,7 @@ def test_a_wall_is_not_looked_through_but_flown_round():
 
 
 def test_a_gate_that_was_glimpsed_draws_a_line_of_sight_until_it_is_known():
-    glimpses = Glimpses(CAMERA)
+    glimpses = Glimpses(CAMERA, GateShapes())
     box = Detection(n=20.0, s=9.0, e=-138.0, w=-159.0)  # as high as a gate 3.2 m away
     level = quaternion_from_yaw(0.0)
     seen = ((0.0, 0.0, 1.0), level, Detections(red=box), ())

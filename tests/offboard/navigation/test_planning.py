@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from framerunner.geometry.gate_shape import GateShape
 from framerunner.geometry.vectors import Vec3
 from offboard.navigation.goals import CONTEST, Motion, Obstacles, PathGate, Point, Refusal
 from offboard.navigation.path import Path
@@ -131,6 +132,21 @@ def test_a_way_round_columns_does_not_lead_through_the_gate_at_its_corner(height
     path = plan(Motion((0.0, 0.0, 1.0)), goals, obstacles=obstacles, arena=Arena(), style=CONTEST)
     assert isinstance(path, Path)
     assert Clearance(obstacles, Arena(), CONTEST).depths(Sampled(path).positions).max() < 0.03
+
+
+def test_a_larger_gate_is_passed_farther_away_and_its_opening_is_flown_through():
+    wide = PathGate((2.0, 0.0, 1.0), 0.0, GateShape(1.4, 0.9, 0.1, 0.2))
+    beside, goal = Point((4.0, 0.0, 1.6)), Point((4.0, 0.0, 1.0))
+    for goals, places in (([beside], []), ([wide, goal], [0])):
+        start = Motion((0.0, 0.3, 1.5))
+        path = plan(start, goals, obstacles=Obstacles((wide,)), arena=Arena(), style=CONTEST)
+        assert isinstance(path, Path)
+        flown = Sampled(path)
+        assert crossed(flown, (wide,)) == places
+        if not places:
+            near = np.abs(flown.positions[:, 0] - 2.0) < 0.1
+            away_m = np.abs(flown.positions[near] - np.array(wide.centre_m))
+            assert ((away_m[:, 1] > 0.7 + 0.2) | (away_m[:, 2] > 0.45 + 0.1)).all()
 
 
 def test_what_cannot_be_reached_is_refused():

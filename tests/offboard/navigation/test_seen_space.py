@@ -7,6 +7,7 @@ from math import atan2, cos, dist, hypot, pi, sin
 
 import pytest
 
+from framerunner.geometry.gate_shape import GateShape, GateShapes
 from framerunner.geometry.rotations import quaternion_from_yaw
 from offboard.drone import DroneState
 from offboard.limits import CONTEST as CONTEST_LIMITS
@@ -22,7 +23,7 @@ from tests.offboard.navigation.test_obstacle_map import edges_of
 CAMERA = CameraModel.of(Camera(position_flu_m=(0.0, 0.0, 0.0)))
 POSTS = [(3.0, 0.0, 0.2)]
 HERE = (0.0, 0.0, 1.0)
-VIEWED = ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0))  # without a view: nothing is asked of it
+VIEWED = ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0), GateShapes())  # without a view: nothing is asked of it
 
 
 def seen_from(position_m=HERE, yaw_rad=0.0, posts=POSTS):
@@ -51,6 +52,15 @@ def test_a_way_must_have_been_seen_once_an_obstacle_was():
 
 def test_before_an_obstacle_whose_foot_is_below_the_image_nothing_is_seen():
     assert not seen_from(posts=[(1.0, 0.0, 0.2)]).is_seen((0.5, 0.0, 1.0))
+
+
+def test_a_place_is_not_viewed_from_where_a_small_gate_there_would_not_be_recognised():
+    small = GateShapes(other=GateShape(0.3, 0.15, 0.01, 0.01))
+    for shapes, viewed in ((GateShapes(), True), (small, False)):
+        space = ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0), shapes)
+        space.update(CAMERA.pose(HERE, quaternion_from_yaw(0.0)))
+        assert space.is_viewed((1.5, 0.0, 1.0))
+        assert space.is_viewed((4.0, 0.0, 1.0)) is viewed
 
 
 def test_a_suspect_is_forgotten_when_it_is_seen_to_be_free():
@@ -189,7 +199,7 @@ def test_a_path_is_made_at_the_next_tick_if_it_does_not_fit_into_this_one(monkey
 
 def height_after_a_metre(gate: PathGate, *, needed: bool) -> float:
     """The height of a drone that flies to a gate as it is told, where it is a metre nearer."""
-    seen, viewed = SeenSpace(CAMERA, Arena()), ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0))
+    seen, viewed = SeenSpace(CAMERA, Arena()), ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0), GateShapes())
     flight = PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
     viewed.needed = needed
     state = DroneState(0, *HERE, yaw=0.0)
@@ -211,7 +221,10 @@ def test_before_a_steep_flight_to_a_gate_the_drone_climbs_until_the_way_is_in_vi
 
 def test_among_obstacles_a_drone_stops_on_its_path_and_looks_up_from_there():
     """Beside its path may be what it has not seen."""
-    seen, viewed = seen_from(posts=[(4.0, 3.0, 0.2)]), ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0))
+    seen, viewed = (
+        seen_from(posts=[(4.0, 3.0, 0.2)]),
+        ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0), GateShapes()),
+    )
     flight, gate = PathFlight(Arena(), CONTEST, CONTEST_LIMITS), PathGate((3.0, 0.0, 3.0), 0.0)
     state, looking_m_s = DroneState(0, *HERE, yaw=0.0), []
     for _ in range(60):

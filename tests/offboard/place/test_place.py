@@ -66,7 +66,7 @@ class Vehicle:
         force = to_body(rotation(at(middle_s)[2]), ax, ay, az + GRAVITY_M_S2)
         noise = 0.027 / (IMU_US * 1e-6) ** 0.5 * self.random.standard_normal(3)
         return ImuInterval(
-            time_us, IMU_US, (2e3 * x, 2e3 * y, 2e3 * z), tuple(np.array(force) + self.bias_m_s2 + noise)
+            time_us, (2e3 * x, 2e3 * y, 2e3 * z), tuple(np.array(force) + self.bias_m_s2 + noise)
         )
 
     def state(self, time_us):
@@ -89,6 +89,7 @@ class Vehicle:
             *(np.array(place) + self.drift_m).tolist(),
             remainder(yaw + self.turn_rad, 2 * pi),
             tuple(np.array((vx, vy, vz)) + wrong),
+            armed=True,
             landed=landed,
             attitude_arena=turned_left(self.turn_rad, attitude),
             imu=imu if self.sends_imu else (),

@@ -5,6 +5,7 @@ from math import cos, sin
 import numpy as np
 import pytest
 
+from framerunner.geometry.gate_shape import GateShape
 from framerunner.geometry.rotations import quaternion_from_euler, rotated_by_rate, rotation, to_body
 from offboard.drone import ImuInterval
 from offboard.navigation.camera_model import CameraModel
@@ -34,7 +35,7 @@ def samples(seconds, acceleration, step_us=4_000):
         ax, ay, az = acceleration((end_us - step_us / 2) * 1e-6)
         force = to_body(middle, ax, ay, az + GRAVITY_M_S2)
         attitude = rotated_by_rate(attitude, rate, step_us * 1e-6)
-        found.append((ImuInterval(end_us, step_us, rate, force), attitude))
+        found.append((ImuInterval(end_us, rate, force), attitude))
     return found
 
 
@@ -67,7 +68,7 @@ def test_a_heading_that_the_gyroscope_does_not_confirm_is_a_turn_of_the_reports(
     track.add((), 0, LEVEL)
     for tick in range(1, 11):
         rest = tuple(
-            ImuInterval(tick * 50_000 - late, 10_000, (0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY_M_S2))
+            ImuInterval(tick * 50_000 - late, (0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY_M_S2))
             for late in range(40_000, -1, -10_000)
         )
         track.add(rest, tick * 50_000, quaternion_from_euler(0.0, 0.0, 0.004 * tick))
@@ -80,8 +81,8 @@ def test_a_heading_that_the_gyroscope_does_not_confirm_is_a_turn_of_the_reports(
 
 def test_a_gap_in_the_samples_begins_the_track_anew():
     track = InertialTrack()
-    one = ImuInterval(50_000, 50_000, (0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY_M_S2))
-    later = ImuInterval(700_000, 4_000, (0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY_M_S2))
+    one = ImuInterval(50_000, (0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY_M_S2))
+    later = ImuInterval(700_000, (0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY_M_S2))
     track.add((), 0, LEVEL)
     assert track.add((one,), 50_000, LEVEL)
     assert not track.add((later,), 700_000, LEVEL)
@@ -92,6 +93,7 @@ def view(seen=(True, True, True, True)):
     count = 2 * sum(seen)
     return GateView(
         colour="red",
+        shape=GateShape(),
         whole=all(seen),
         time_us=0,
         camera=CAMERA.pose((0.0, 0.0, 1.0), LEVEL),

@@ -114,6 +114,16 @@ def test_a_flow_that_cannot_be_seen_has_no_quality(parts):
     assert flow_of(**parts).quality == 0
 
 
+def test_a_share_of_the_floor_reflects_in_squares_and_shows_no_flow():
+    spec = EACH_TICK.model_copy(update={"shiny_share": 0.1, "shiny_size_m": 0.5})
+    places = [(0.25 + 0.5 * north, 0.25 + 0.5 * east) for north in range(-32, 32) for east in range(-32, 32)]
+    seen = {at: flow_of(spec, position_ned_m=(*at, -1.0)).quality for at in places}
+    assert sum(quality == 0 for quality in seen.values()) / len(seen) == pytest.approx(0.1, abs=0.02)
+    assert {quality for quality in seen.values() if quality} == {spec.quality}
+    beside = flow_of(spec, position_ned_m=(places[0][0] + 0.2, places[0][1] - 0.2, -1.0))
+    assert beside.quality == seen[places[0]]
+
+
 def test_the_noise_of_flow_and_of_its_gyroscope():
     found = samples(OpticalFlow(SPEC.optical_flow, 1), 5000, 20_000)[1:]
     assert all(each.integration_us == TICK_US for each in found)  # here, a tick before each sample

@@ -48,6 +48,7 @@ def test_the_installed_suites_have_their_sensors():
         "external": common | {"external_pose"},
         "outdoor": common | {"magnetometer", "gps"},
         "flow": common | {"magnetometer", "optical_flow"},
+        "flow-cheap": common | {"magnetometer", "optical_flow"},
     }
     assert load_suite("ideal").ideal
     assert not load_suite("mocap").ideal

@@ -6,6 +6,7 @@ from math import cos, radians, sin
 
 import numpy as np
 
+from framerunner.geometry.gate_shape import PAPER_GATE
 from framerunner.geometry.rotations import quaternion_from_euler, rotation, rotation_rows
 from vision.calibration.sightings import (
     MotionReport,
@@ -15,7 +16,6 @@ from vision.calibration.sightings import (
     mounting_matrix,
     sightings_of,
 )
-from vision.gate_model import GATE_HEIGHT_M, GATE_WIDTH_M
 from vision.types import Detections, GateCorner, GatePose, GateSighting
 
 FOCAL_PX, HALF_WIDTH_PX, HALF_HEIGHT_PX = 160.0, 160.0, 120.0
@@ -90,7 +90,7 @@ def sighting(
     normal = np.array([cos(yaw), sin(yaw), 0.0])
     side = 1.0 if normal @ (eye - centre) > 0 else -1.0
     left = side * np.array([-sin(yaw), cos(yaw), 0.0])  # to the right as seen
-    half = np.array([GATE_WIDTH_M, GATE_HEIGHT_M]) / 2 * rectangle.size
+    half = np.array(PAPER_GATE.half_m) * rectangle.size
     signs = np.array([(-1, 1), (1, 1), (1, -1), (-1, -1)])
     corners = centre + signs[:, :1] * half[0] * left + signs[:, 1:] * half[1] * np.array([0.0, 0.0, 1.0])
     seen = (corners - eye) @ camera

@@ -79,7 +79,7 @@ export namespace Live {
   type Guards = { kind: "guards"; id: number; time_s: number; counts: Record<string, number>; guards: (GuardState)[]; values: (GuardValue)[] };
   type LinkStatus = { state: "live" | "stale" | "lost"; age_s: number; loss_percent: number | null; rate_hz: number | null };
   type Map = { kind: "map"; id: number; t: number; goal: string; frames: (MappedFrame)[]; path: ([number, number, number])[] };
-  type MappedFrame = { colour: string; p: [number, number, number]; yaw: number; std: [number, number, number] | null; yaw_std: number | null; certain: boolean; ambiguous: boolean; views: number };
+  type MappedFrame = { colour: string; p: [number, number, number]; yaw: number; std: [number, number, number] | null; yaw_std: number | null; certain: boolean; ambiguous: boolean; views: number; size: [number, number] | null };
   type MissionStatus = { name: string; state: string; seconds: number; transitions: number; paused: boolean; flying: boolean; finished: boolean; alive: boolean };
   type Notice = { kind: "notice"; id: number | null; level: "info" | "warning" | "error"; text: string };
   type Poses = { kind: "pose"; drones: (DronePose)[] };

@@ -141,7 +141,7 @@ def test_detections_distinguish_not_seen_and_not_known(view):
 
 
 MAPPED = {"colour": "red", "p": [3.0, 2.0, 2.0], "yaw": 0.5, "std": [0.02, 0.01, 0.03], "yaw_std": 0.1}
-MAPPED |= {"certain": True, "ambiguous": False, "views": 12}
+MAPPED |= {"certain": True, "ambiguous": False, "views": 12, "size": [1.2, 0.5]}
 
 
 def map_of(view, **content):
@@ -168,6 +168,7 @@ def test_the_map_of_another_mission_is_forgotten(view):
         {"frames": [{**MAPPED, "p": [0, None, 0]}]},
         {"frames": [{**MAPPED, "std": [-1, 0, 0]}]},
         {"frames": [{**MAPPED, "colour": "x" * 81}]},
+        {"frames": [{**MAPPED, "size": [0, 1]}]},
         {"frames": [MAPPED] * 51},
         {"path": [[0, 0, 0]] * 101},
         {"path": [[0, 0]]},

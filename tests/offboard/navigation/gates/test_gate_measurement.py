@@ -11,7 +11,7 @@ from framerunner.geometry.vectors import Vec3
 from offboard.navigation.gates.gate_measurement import GateView, Prior, predicted, solutions, view_of
 from offboard.navigation.gates.gate_track import half_turn
 from offboard.navigation.pose_history import DronePose
-from scenarios.models import Arena
+from scenarios.models import Arena, Gate
 from tests.offboard.navigation.sightings import CAMERA, corners_px, gate_at, sighting
 
 GATE = gate_at(0.3, -0.2, 1.5, 0.4)
@@ -27,12 +27,12 @@ PLACES: list[tuple[Vec3, float]] = [
 ]
 
 
-def view(place_m: Vec3, yaw_rad: float, noise: float = 0.0) -> GateView:
-    """What is seen of the gate from a place."""
+def view(place_m: Vec3, yaw_rad: float, noise: float = 0.0, gate: Gate = GATE) -> GateView:
+    """What is seen of a gate from a place."""
     attitude = quaternion_from_euler(0.04, 0.08, yaw_rad)
-    seen = sighting(GATE, place_m, attitude, np.random.default_rng(5), noise)
+    seen = sighting(gate, place_m, attitude, np.random.default_rng(5), noise)
     assert seen is not None
-    made = view_of(seen, CAMERA, DronePose(0, place_m, attitude))
+    made = view_of(seen, gate.shape, CAMERA, DronePose(0, place_m, attitude))
     assert made is not None
     return made
 
@@ -63,6 +63,14 @@ def test_jacobian_and_curvature_are_derivatives(place_m: Vec3, yaw_rad: float) -
     bent = (after[0] + before[0] - 2.0 * corners) / 1e-8
     # What perspective adds is left out; it is small.
     assert bent[0::2] == pytest.approx(curvature[0::2], abs=0.4 * np.abs(bent).max())
+
+
+def test_a_gate_of_another_shape_is_found_where_it_is() -> None:
+    wide = GATE.model_copy(update={"outer_width_m": 1.2, "outer_height_m": 0.5, "bar_m": 0.05})
+    place_m, yaw_rad = (3.0, 1.0, 1.6), pi + 0.45
+    best = solutions([view(place_m, yaw_rad, gate=wide)], Prior.of(Arena()))[0]
+    assert best.state[:3] == pytest.approx(STATE[:3], abs=0.02)
+    assert half_turn(best.state[3] - STATE[3]) == pytest.approx(0.0, abs=0.02)
 
 
 def test_one_of_the_solutions_of_one_image_is_right_and_likely() -> None:

@@ -8,6 +8,7 @@ import { GATE_COLOURS } from "../colours.js";
  * @property {number} yaw of its normal
  * @property {number[]|null} std standard deviations along x, y, z, metres; null: not known
  * @property {boolean} certain known well enough to fly through
+ * @property {number[]|null} [size] outer width and height, metres; not told by older apps
  */
 
 /**
@@ -20,7 +21,7 @@ import { GATE_COLOURS } from "../colours.js";
 export const SIGMAS = 2; // how many standard deviations an ellipse reaches
 export const PATH_COLOUR = "#b3007d";
 const OTHER_COLOUR = "#7a7a7a"; // of a gate that is no part of the task
-const OUTER_M = [0.42, 0.22]; // width and height of a gate that the scenario does not have
+const OUTER_M = [0.42, 0.22]; // width and height of a gate of which nobody tells them
 const AROUND = 1.35; // an outline is drawn so much larger, around the gate where the estimate is right
 export const NORMAL_M = 0.3; // how far the line along its normal goes, to each side
 const [LEAST_M, MOST_M] = [0.005, 4]; // half axes of an ellipsoid
@@ -47,7 +48,7 @@ export function colourOf(colour) {
  */
 export function halfSizeOf(gate, scenario) {
   const known = scenario?.frames.find((each) => each.colour === gate.colour);
-  const [width, height] = known ? [known.outer_width_m, known.outer_height_m] : OUTER_M;
+  const [width, height] = gate.size ?? (known ? [known.outer_width_m, known.outer_height_m] : OUTER_M);
   return [(AROUND * width) / 2, (height + (AROUND - 1) * width) / 2];
 }
 

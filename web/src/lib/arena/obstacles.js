@@ -24,6 +24,7 @@
  * @property {number} outer_width_m
  * @property {number} outer_height_m
  * @property {number} bar_m
+ * @property {number|null} [depth_m] along its normal; none: bar_m
  */
 
 /**

@@ -126,7 +126,7 @@ function baseBox({ x_m, y_m, edge_m, top_m }) {
  */
 function gateBars(gate, lift_m) {
   const bar = gate.bar_m / 2;
-  const [wide, high] = [gate.outer_width_m / 2, gate.outer_height_m / 2];
+  const [wide, high, deep] = [gate.outer_width_m / 2, gate.outer_height_m / 2, (gate.depth_m ?? gate.bar_m) / 2];
   const colour = channels(GATE_COLOURS[gate.colour]);
   const [c, s] = [Math.cos(gate.yaw_rad), Math.sin(gate.yaw_rad)];
   const parts = [
@@ -135,7 +135,7 @@ function gateBars(gate, lift_m) {
   ];
   return parts.map(([y, z, half_y, half_z]) => ({
     centre: [gate.x_m - s * y, gate.y_m + c * y, gate.z_m + lift_m + z],
-    half: [bar, half_y, half_z], yaw: gate.yaw_rad, colour, isPure: true,
+    half: [deep, half_y, half_z], yaw: gate.yaw_rad, colour, isPure: true,
   }));
 }
 
