@@ -36,7 +36,8 @@ STEP_S = 0.05
 HALF_S = 0.5 * STEP_S
 MAX_TILT_RAD = 0.48  # of a demand; beyond, a vehicle's limit may act
 MAX_RATE_RAD_S = 0.9  # likewise of the body
-DEAD_HALVES = (2, 3, 4, 5, 6, 7, 8, 9, 11, 13, 15, 17, 19, 22, 26)  # from a command to the demand that it makes
+DEAD_HALVES = (2, 3, 4, 5, 6, 7, 8, 9, 11, 13, 15, 17, 19, 22, 26)
+"""From a command to the demand that it makes."""
 LAGGED_DEAD_HALVES = (3, 5, 7, 9, 11, 13, 17, 21, 25)
 INNER_HALVES = (1, 2, 4)  # likewise from a velocity
 LAGS_S = (0.2, 0.4, 0.6, 0.9)
@@ -270,7 +271,7 @@ class TiltLoopEstimate:
         return x, y
 
     def coming_m_s(self, steps: int, yaw_rad: float) -> Plan:
-        """A command that was sent some steps ago, 1 or more, as it acts on the loop; level axes at a heading."""
+        """A command that was sent some steps ago, as it acts on the loop; level axes at a heading."""
         each = self._all[self._chosen]
         if not self._commands:
             return 0.0, 0.0
