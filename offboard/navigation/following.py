@@ -198,7 +198,7 @@ class PathFollower:
     ) -> VelocityFluCommand:
         """The command before its limits, and how fast the path's time goes on."""
         climb, turn = self.estimate.climb, self.estimate.turn
-        climbs, turns = climb.predict(), turn.predict()
+        climbs, turns = climb.predict(coming.along_m2_s2), turn.predict()
         level = self._motion(path, coming.time_s)
         offset_up_m = self._motion(path, climb.dead_s).position_m[2] - state.z - climbs.moved
         offset_up_m -= state.position_age_s * state.velocity_arena_m_s[2]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import exp, hypot, pi, remainder
+from math import cos, exp, hypot, pi, remainder, sin
 
 from framerunner.geometry.vectors import turned
 from offboard.drone import DroneState, VelocityFluCommand
@@ -63,6 +63,7 @@ class LevelComing:
         yaw_rad: then.
         held_m_s: velocity that the vehicle's loop will use, level axes.
         integrals_m: of the vehicle's loop, without the next command.
+        along_m2_s2: square of the speed along the thrust, with its sign.
     """
 
     time_s: float
@@ -71,6 +72,7 @@ class LevelComing:
     yaw_rad: float
     held_m_s: Plan
     integrals_m: Plan
+    along_m2_s2: float
 
 
 class ResponseEstimate:
@@ -129,7 +131,7 @@ class ResponseEstimate:
             return
         if steps == 0:
             return
-        step_s = now_s - last_s
+        step_s, up_m_s = now_s - last_s, state.velocity_arena_m_s[2]
         turn_rad_s = remainder(state.yaw - yaw, 2 * pi) / step_s
         chooses = not (near_gate and self.response.known)
         for _ in range(steps):
@@ -137,7 +139,9 @@ class ResponseEstimate:
             flies = self._airborne_steps > TAKE_OFF_STEPS
             learns = flies and steps == 1 and abs(step_s - STEP_S) < _REGULAR_S
             self._tilt_loop.update(state, level, sent, turn_rad_s, learns=learns, chooses=chooses)
-            self.climb.update(sent.up_m_s, state.velocity_arena_m_s[2], learns=flies, chooses=chooses)
+            self.climb.update(
+                sent.up_m_s, up_m_s, learns=flies, chooses=chooses, cause=_along(self._tilts, level, up_m_s)
+            )
             self.turn.update(sent.yaw_rate_rad_s, turn_rad_s, learns=flies, chooses=chooses)
         if chooses:
             self._summarise()
@@ -187,7 +191,8 @@ class ResponseEstimate:
             y += HALF_S * (velocity[1] + 0.5 * HALF_S * ay)
             velocity, tilts = (velocity[0] + HALF_S * ax, velocity[1] + HALF_S * ay), ahead
             velocities.append(turned(*velocity, -yaw))
-        return LevelComing(halves * HALF_S, (x, y), velocity, yaw, held, integrals)
+        along_m2_s2 = _along(tilts, velocities[-1], state.velocity_arena_m_s[2])
+        return LevelComing(halves * HALF_S, (x, y), velocity, yaw, held, integrals, along_m2_s2)
 
     def command_for(
         self, tilts_rad: Plan, rates_rad_s: Plan, turn_rad_s: float, coming: LevelComing, yaw_ahead: YawAhead
@@ -229,3 +234,10 @@ def _halves(velocities: list[Plan]) -> list[Plan]:
     for (x0, y0), (x1, y1) in itertools.pairwise(velocities):
         halves += [(0.5 * (x0 + x1), 0.5 * (y0 + y1)), (x1, y1)]
     return halves
+
+
+def _along(tilts_rad: Plan, level_m_s: Plan, up_m_s: float) -> float:
+    """The square of the speed along the thrust, with its sign, m^2/s^2: drag along it disturbs the climb."""
+    (forward, left), over = tilts_rad, cos(tilts_rad[1])
+    speed = over * (sin(forward) * level_m_s[0] + cos(forward) * up_m_s) + sin(left) * level_m_s[1]
+    return speed * abs(speed)

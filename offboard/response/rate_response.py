@@ -26,6 +26,9 @@ _MEMORY = 1.0 - STEP_S / 40.0
 _MIN_ENERGY = 0.2  # sum of squared changes (m/s, rad/s) that is evidence
 _BETTER = 0.7  # share of the present pair's error that another one must reach
 _DISTURBANCE_S = 0.2  # time constant of the estimate of what commands do not explain
+_WASHED_S = 0.4  # time constant with which a vehicle's integral takes over what a cause makes
+_CAUSE_PRIOR = 0.3  # standard deviation of the rate by a unit of the cause
+_CAUSE_NOISE = 0.07  # of the rate
 _LEAD = 0.7  # share by which its change is expected to go on: heights wander slowly
 
 
@@ -58,6 +61,7 @@ class RateResponse:
         self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])
         self._errors = np.zeros((len(DEAD_STEPS), len(LAGS_S)))
         self._energy = 0.0
+        self._by_cause, self._by_cause_variance = 0.0, _CAUSE_PRIOR**2
         self.restart()
 
     def restart(self) -> None:
@@ -67,8 +71,11 @@ class RateResponse:
         self._changes: deque[Array] = deque(maxlen=max(DEAD_STEPS) + 1)  # of the outputs, over the window
         self._measured: deque[float] = deque(maxlen=_WINDOW + 1)
         self._disturbance = self._disturbance_rate = 0.0
+        self._cause = self._slow_cause = 0.0
 
-    def update(self, command: float, measured: float, *, learns: bool, chooses: bool) -> None:
+    def update(
+        self, command: float, measured: float, *, learns: bool, chooses: bool, cause: float = 0.0
+    ) -> None:
         """Add a step.
 
         Args:
@@ -76,6 +83,7 @@ class RateResponse:
             measured: rate at its end.
             learns: the vehicle is in the air.
             chooses: another pair may be chosen.
+            cause: what disturbs the rate when it changes.
         """
         self._outputs = command + self._kept * (self._outputs - command)
         self._past.append(self._outputs)
@@ -89,7 +97,9 @@ class RateResponse:
             self._energy = _MEMORY * self._energy + STEP_S * change * change
             if chooses:
                 self._choose()
-        self._observe_disturbance(measured)
+        self._slow_cause += (1.0 - exp(-STEP_S / _WASHED_S)) * (cause - self._slow_cause)
+        self._cause = cause
+        self._observe_disturbance(measured, learns=learns)
 
     def _choose(self) -> None:
         """Take a pair that explains what was measured clearly better than the present one."""
@@ -99,22 +109,31 @@ class RateResponse:
             self._chosen = (dead, lag)
             self.dead_s, self.lag_s = DEAD_STEPS[dead] * STEP_S, LAGS_S[lag]
 
-    def _observe_disturbance(self, measured: float) -> None:
+    def _observe_disturbance(self, measured: float, *, learns: bool) -> None:
         """Filter what the commands do not explain of the rate now."""
         dead, lag = self._chosen
         made = float(self._past[max(len(self._past) - 1 - DEAD_STEPS[dead], 0)][lag])
-        share = 1.0 - exp(-STEP_S / _DISTURBANCE_S)
-        change = share * (measured - made - self._disturbance)
+        washed = self._cause - self._slow_cause
+        share, rest = 1.0 - exp(-STEP_S / _DISTURBANCE_S), measured - made - self._disturbance
+        rest -= self._by_cause * washed
+        if learns:  # a Kalman filter of one state
+            variance = self._by_cause_variance
+            gain = variance * washed / (washed * washed * variance + _CAUSE_NOISE**2)
+            self._by_cause += gain * rest
+            self._by_cause_variance = variance * (1.0 - gain * washed)
+        change = share * rest
         self._disturbance += change
         self._disturbance_rate += share * (change / STEP_S - self._disturbance_rate)
 
-    def predict(self) -> Coming:
-        """What the vehicle will do by the commands so far."""
+    def predict(self, cause: float | None = None) -> Coming:
+        """What the vehicle will do by the commands so far; the cause is that of then, by default that of now."""
         lag = self._chosen[1]
         made = [float(outputs[lag]) for outputs in list(self._past)[-DEAD_STEPS[self._chosen[0]] :]] or [0.0]
         ahead_s = self.dead_s + self.lag_s + _DISTURBANCE_S
+        by_cause = self._by_cause * ((self._cause if cause is None else cause) - self._slow_cause)
+        present = self._disturbance + by_cause
         return Coming(
-            sum(made) * STEP_S + self.dead_s * self._disturbance,
-            made[-1] + self._disturbance,
-            self._disturbance + ahead_s * _LEAD * self._disturbance_rate,
+            sum(made) * STEP_S + self.dead_s * present,
+            made[-1] + present,
+            present + ahead_s * _LEAD * self._disturbance_rate,
         )
