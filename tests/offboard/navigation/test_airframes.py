@@ -11,7 +11,7 @@ from benchmarks.airframes import drawn_airframe
 from framerunner.flying.lockstep import LockstepVehicle
 from framerunner.flying.plan import FlightPlan
 from framerunner.vehicle.airframe import Airframe, load_airframe
-from offboard.drone import DroneState
+from offboard.drone import DroneState, VelocityFluCommand
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import CONTEST, Goal, Motion, Point
 from offboard.navigation.path import Crossing, Path
@@ -20,6 +20,7 @@ from tests.offboard.navigation.flown_layouts import Layout, goals_left
 AIRFRAMES = [load_airframe(name) for name in ("abejorro", "racer-3in", "x500")]
 AIRFRAMES += [drawn_airframe(seed) for seed in (611, 612, 613)]
 LAYOUTS = (300, 301)
+TAKE_OFF_M = 0.4
 NEAR_M = 0.05  # of an opening's centre: contact begins at 0.065
 
 
@@ -45,6 +46,10 @@ def offsets(layout: Layout, airframe: Airframe) -> list[float]:
     base = layout.scenario.base
     goals: list[Goal] = [*layout.gates, Point((base.x_m, base.y_m, 1.5))]
     follower, state, found = PathFollower(), drone.next_state(), []
+    ground_m = state.z
+    while state.z < ground_m + TAKE_OFF_M:
+        drone.command(VelocityFluCommand(up_m_s=0.5))
+        state = drone.next_state()
     path = layout.plan(Motion((state.x, state.y, state.z), yaw_rad=state.yaw), goals)
     assert isinstance(path, Path)
     planned_s = began_s = state.time_us * 1e-6
