@@ -229,7 +229,10 @@ class PathFollower:
             rate_before_gate(path, self.progress_s, near_s, coming_m, GATE_TURN_M * abs(off.heading_rad)),
         )
         first_s, last_s = IN_GATE_S
-        in_gate = any(first_s < crossing.time_s - at_s < last_s for crossing in path.crossings)
+        in_gate = any(
+            crossing.time_s - at_s < last_s and crossing.time_s - self.progress_s > first_s
+            for crossing in path.crossings
+        )
         speed_m_s = hypot(*path.at(at_s).velocity_m_s)
         self._clock.change(rate, speed_m_s, step_s, in_gate=in_gate, brake_m_s2=brake_m_s2)
 
