@@ -126,7 +126,7 @@ class RateResponse:
         self._disturbance_rate += share * (change / STEP_S - self._disturbance_rate)
 
     def predict(self, cause: float | None = None) -> Coming:
-        """What the vehicle will do by the commands so far; the cause is that of then, by default that of now."""
+        """What the vehicle will do by the commands so far; the cause is that of then, else that of now."""
         lag = self._chosen[1]
         made = [float(outputs[lag]) for outputs in list(self._past)[-DEAD_STEPS[self._chosen[0]] :]] or [0.0]
         ahead_s = self.dead_s + self.lag_s + _DISTURBANCE_S
