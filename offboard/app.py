@@ -114,6 +114,8 @@ async def fly_mission(
         CameraLostError: the camera gives no image at the start.
     """
     engine = MissionEngine(mission, surroundings=surroundings, limits=limits)
+    if engine.has_navigator:
+        perception.expect_base(engine.expected_base)
     flight = _Flight(
         drone, perception, engine, limit_s, observer, limits=limits, before_tick=before_tick, safety=safety
     )

@@ -23,7 +23,7 @@ from offboard.observation import ChartNow, check_change, guards_now, read_values
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
 from offboard.pilot_file import PilotFile, in_words, is_interrupt, place_in
 from scenarios.models import COLOURS
-from vision.types import Detections
+from vision.types import BaseExpectation, Detections
 
 if TYPE_CHECKING:
     from offboard.navigation.navigator import Navigator
@@ -87,6 +87,10 @@ class MissionEngine:
     def image_period_s(self) -> float:
         """In which the mission needs one image; 0: it needs all of them."""
         return 0.0 if self._navigator is None else self._navigator.image_period_s
+
+    def expected_base(self, time_us: int) -> BaseExpectation | None:
+        """See `Navigator.expected_base`."""
+        return None if self._navigator is None else self._navigator.expected_base(time_us)
 
     @property
     def navigation(self) -> NavigationView | None:

@@ -10,6 +10,7 @@ from typing import Protocol
 
 from framerunner.errors import UserError
 from framerunner.wire.vehicle_telemetry import MessageOrder
+from vision.base.detector import BaseExpectations, expect_base
 from vision.detectors import Detector, new_detector
 from vision.types import CameraFrame, Detections
 
@@ -65,6 +66,9 @@ class Perception(Protocol):
 
         An image that is not processed still shows that the camera is alive.
         """
+
+    def expect_base(self, expected: BaseExpectations) -> None:
+        """Say where in an image the base is to be looked for."""
 
     async def close(self) -> None:
         """Release the camera."""
@@ -171,6 +175,10 @@ class CameraPerception:
     def space_images(self, period_s: float) -> None:
         """From now on process at most one image in this time, vehicle time; 0: all of them."""
         self._choice.period_s = period_s
+
+    def expect_base(self, expected: BaseExpectations) -> None:
+        """Say where in an image the base is to be looked for."""
+        expect_base(self._detector, expected)
 
     async def seen(self, image_us: int, limit_s: float) -> bool:
         """Wait until the image exposed at a vehicle time, or a later one, has been processed or left out.

@@ -81,6 +81,12 @@ class Base(Part):
     y_m: Metres = Field(0.0, description="centre")
     edge_m: float = Field(0.5, gt=0.1, le=10, description="edge of the square top")
     top_m: float = Field(0.51, ge=0.001, le=10, description="height of the top above the floor")
+    mark_share: float = Field(
+        0.7,
+        ge=0,
+        lt=1,
+        description="edge of the brighter square on its top, as a share of the top's; 0: none",
+    )
 
     @property
     def solid(self) -> Solid:

@@ -30,6 +30,7 @@ from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.models import Scenario, TrueState
 from sitl.camera_projection import Pinhole
+from sitl.optics.backdrop import Backdrop
 from sitl.optics.painter import MARGIN_PX, Image, Painter, reduced
 from sitl.optics.sensor import SCALE, LensMap, SensorChain
 
@@ -72,6 +73,7 @@ class SimulatedCamera:
             focal_px = SCALE * settings.focal_px
         else:
             self._lens = lens = LensMap(settings)
+            self._blur_px = effects.blur_px
             self._sensor = SensorChain(settings, seed)
             # Of the read-out while as many rows are read as the canvas has.
             self._readout_s = effects.readout_s * lens.height_px / (SCALE * settings.height_px)
@@ -94,6 +96,7 @@ class SimulatedCamera:
         motion: ExposureMotion = STILL,
         *,
         gimbal_arena: Quaternion | None = None,
+        backdrop: Backdrop | None = None,
     ) -> Image:
         """What the camera sees.
 
@@ -106,6 +109,7 @@ class SimulatedCamera:
             motion: of the drone, for blur and rolling shutter; its time is that of light and noise.
             gimbal_arena: attitude of a camera on a gimbal, forward-left-up to arena; its centre is the
                 camera's place on the drone. None: the camera is fixed to the drone.
+            backdrop: seen behind gates, base and obstacles, instead of floor, hall and sky.
 
         Returns:
             A new image, BGR, shape (height, width, 3), uint8; its rows need not follow each other in memory.
@@ -122,13 +126,21 @@ class SimulatedCamera:
         if self._effects is None:
             attitude = _unit(attitude_arena)
             eye, rotation = self._seen_from(position_arena_m, attitude)
-            self._painter.paint(eye, rotation, drones, time_us=motion.time_us, canvas=self._canvas)
-            return reduced(self._canvas, SCALE)[_INSIDE]
-        light = self._exposed(position_arena_m, attitude_arena, drones, motion)
+            canvas = self._canvas
+            self._painter.paint(
+                eye, rotation, drones, time_us=motion.time_us, canvas=canvas, backdrop=backdrop
+            )
+            return reduced(canvas, SCALE)[_INSIDE]
+        light = self._exposed(position_arena_m, attitude_arena, drones, motion, backdrop)
         return self._sensor.develop(light, motion.time_us)
 
     def _exposed(
-        self, position: Vec3, attitude: Quaternion, drones: Sequence[Solid], motion: ExposureMotion
+        self,
+        position: Vec3,
+        attitude: Quaternion,
+        drones: Sequence[Solid],
+        motion: ExposureMotion,
+        backdrop: Backdrop | None,
     ) -> Image:
         """The mean of what is seen behind the lens during the exposure."""
         drift = None
@@ -144,7 +156,13 @@ class SimulatedCamera:
             after_s = self._exposure_s * ((index + 0.5) / count - 0.5)
             eye, rotation = self._pose_at(position, attitude, motion, after_s)
             self._painter.paint(
-                eye, rotation, drones, time_us=motion.time_us, drift=drift, canvas=self._canvas
+                eye,
+                rotation,
+                drones,
+                time_us=motion.time_us,
+                drift=drift,
+                canvas=self._canvas,
+                backdrop=backdrop,
             )
             seen = self._lens.image(self._canvas)
             if mean is None:
@@ -152,6 +170,8 @@ class SimulatedCamera:
             else:
                 cv2.addWeighted(mean, index / (index + 1), seen, 1 / (index + 1), 0.0, dst=mean)
         assert mean is not None  # there is at least one exposure
+        if self._blur_px > 0.0:
+            mean = np.asarray(cv2.GaussianBlur(mean, (0, 0), self._blur_px), np.uint8)
         return mean
 
     @property

@@ -36,9 +36,8 @@ _MOST_ROLLED = 2.0  # heights of the canvas: what is farther above or below it m
 _FINE_PX = 20_000  # what is painted finely has no more pixels than this
 _SAME_M = 1e-6  # edges nearer than this are the same
 _LEAST_TURN = 1e-3  # twice the area of a corner's triangle, so that edges in line do not divide by zero
-_LEAST_WIDTH = (
-    0.62  # pixels: with this, polygons of all widths below one are as wide as they should be on average
-)
+_LEAST_WIDTH = 0.62
+"""Pixels: with this, polygons of all widths below one are as wide as they should be on average."""
 _FARTHEST = 2.0**24  # sixteenths of a pixel, well within OpenCV's whole numbers of 32 bits
 
 
@@ -223,9 +222,7 @@ class Projection:
     to_cut: list[int]  # per face, not 0 if it must be cut
     near_m: float  # depth of the near plane
     window: Window
-    views: list[
-        list[int]
-    ]  # per part left, top, right and bottom on the canvas, and how much finer it is painted
+    views: list[list[int]]  # per part left, top, right, bottom on the canvas, and how much finer
 
     def outline(self, face: MeshFace) -> Ints | None:
         """Corners of a seen face in sixteenths of a pixel, shape (k, 2); None if it is cut away."""

@@ -96,7 +96,7 @@ def build_scene(scenario: Scenario, light: Light | None = None) -> Scene:
         mats=_mats(arena, light),
         shadows=tuple(shadows),
         bodies=(
-            _base_body(base, light),
+            _base_body(base, scenario.base.mark_share, light),
             *(_gate_body(gate, light) for gate in gates),
             *(Body(prism, _upright_faces(prism, PRISM_BGR, light)) for prism in prisms),
         ),
@@ -153,9 +153,11 @@ def _face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: L
     )
 
 
-def _base_body(box: Solid, light: Light) -> Body:
+def _base_body(box: Solid, mark_share: float, light: Light) -> Body:
     half, _, top = box.half_extents_m
-    mark = 0.7 * half
+    if mark_share == 0.0:
+        return Body(box, _upright_faces(box, BASE_BGR, light))
+    mark = mark_share * half
     inset: list[Vec3] = [(-mark, -mark, top), (mark, -mark, top), (mark, mark, top), (-mark, mark, top)]
     mark_face = _face(box, inset, _UP, BASE_MARK_BGR, light)
     return Body(box, (*_upright_faces(box, BASE_BGR, light), mark_face))

@@ -15,9 +15,9 @@ from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.detector import detect
 from vision.gate_finder import GateFinder
-from vision.types import Detections, Image, Vision
+from vision.types import LEARNED, Detections, Image, Vision
 
-OWN_DETECTORS: tuple[Vision, ...] = get_args(Vision)
+OWN_DETECTORS: tuple[str, ...] = (*get_args(Vision), LEARNED)
 """Names that no other package can use."""
 Detector = Callable[[Image, int | None], Detections]
 """From an image (BGR, shape (height, width, 3), uint8) and its vehicle time (microseconds) to detections."""
@@ -35,6 +35,7 @@ def new_detector(
     focal_px: float | None = None,
     calibration: Calibration | None = None,
     shapes: GateShapes | None = None,
+    learned: bool = False,
 ) -> Detector:
     """Make a detector.
 
@@ -43,6 +44,7 @@ def new_detector(
         focal_px: focal length of the camera; "boxes" takes the paper's if it is None.
         calibration: of the camera; its focal length is used, and "frames" gives pixels of an ideal camera.
         shapes: of the gates of each colour; None: all have that of the frame challenge.
+        learned: to "frames", a network proposes gates, and denies others (`vision/learned`).
 
     Returns:
         A function of an image and its vehicle time. It raises `CalibrationError` if the image's shape is not
@@ -55,22 +57,25 @@ def new_detector(
         focal_px = calibration.fx_px
         if (matrix := calibration.colour_matrix) is not None:
             plain = calibration.model_copy(update={"colour_matrix": None})
-            detector = new_detector(kind, calibration=plain, shapes=shapes)
+            detector = new_detector(kind, calibration=plain, shapes=shapes, learned=learned)
             return lambda image, time_us: detector(correct_colours(image, matrix), time_us)
     if kind == "boxes":
         return partial(detect, focal_px=focal_px, shapes=shapes or GateShapes())
     if focal_px is None:
         raise ValueError("focal_px: the detector of frames needs the camera's focal length")
     lens = None if calibration is None or calibration.is_ideal else Lens(calibration)
-    return GateFinder(focal_px, lens, shapes).find
+    return GateFinder(focal_px, lens, shapes, learned=learned).find
 
 
-def others_detector(made_by: str | DetectorMaker, calibration: Calibration) -> Detector:
-    """Make a detector of others for a camera.
+def others_detector(
+    made_by: str | DetectorMaker, calibration: Calibration, shapes: GateShapes | None = None
+) -> Detector:
+    """Make a detector of others for a camera, or ours that has learned.
 
     Args:
-        made_by: name under which a package adds it, or a function that makes it.
+        made_by: name under which a package adds it, or a function that makes it; "learned": ours.
         calibration: of the camera.
+        shapes: of the gates of each colour, which only ours is told.
 
     Returns:
         A function of an image and its vehicle time, which the detections then have. It raises `DetectorError`
@@ -80,6 +85,8 @@ def others_detector(made_by: str | DetectorMaker, calibration: Calibration) -> D
         DetectorError: no package adds a detector of this name, or it cannot be made.
         ExtensionError: a package does, but it cannot be loaded.
     """
+    if made_by == LEARNED:
+        return new_detector("frames", calibration=calibration, shapes=shapes, learned=True)
     name = detector_name(made_by)
     make: DetectorMaker = _added(made_by) if isinstance(made_by, str) else made_by
     try:

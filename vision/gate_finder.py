@@ -14,10 +14,13 @@ from framerunner.geometry.gate_shape import GateShapes
 from vision.calibration.lens import Lens, straight_box
 from vision.colour_regions import OBSTACLE, PRIMARIES, SECONDARIES, ColourMask, find_colours
 from vision.detector import measure
-from vision.gate_fit import FittedGate, fit_gate
-from vision.gate_model import GateModel, Sides
-from vision.outer_sides import outer_sides, sides_by_opening
+from vision.fill_shares import find_filled
+from vision.gate_fit import FittedGate, fit_gate, gate_of_axes
+from vision.gate_model import GateModel, Point, Sides
+from vision.learned.proposals import GateProposals
+from vision.outer_sides import named_sides, outer_sides, sides_by_opening
 from vision.patch import ImagePatch, cut_patch
+from vision.thin_gates import Ring, find_rings
 from vision.types import (
     NOT_SEEN,
     Detection,
@@ -31,13 +34,18 @@ from vision.types import (
 _Plane = npt.NDArray[np.uint8]
 _Contour = npt.NDArray[np.int32]
 _Box = tuple[int, int, int, int]
+_Found = tuple[_Box, GateSighting]
 
 _OBSTACLE_STEP = 8
 _MIN_RUN_PX = 3
 _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are upright
 _MIN_FRAGMENT_PX = 3
 _MAX_FRAGMENTS = 12
-_SHEET_PX, _SHEET_SHARE = 5.0, 0.9
+_SHEET_PX, _SHEET_SHARE, _BARS_SHARE = 5.0, 0.9, 0.6
+_CLUTTER = 4  # regions of a colour; among more of them, small ones are not taken for gates by it alone
+_LARGE_PX = 40
+_THIN_BAR_PX = 2.5  # wider bars have pixels of their own colour, which tell how wide they are
+_LEAST_CHANCE, _LEAST_LIKELY = 0.2, 0.1  # of a network: of what it proposes, and of what is found without it
 _OPENING_PX = 12  # a region smaller than this is not looked at for an opening
 
 
@@ -51,7 +59,15 @@ class GateFinder:
         shapes: of the gates of each colour; None: all have that of the frame challenge.
     """
 
-    def __init__(self, focal_px: float, lens: Lens | None = None, shapes: GateShapes | None = None) -> None:
+    def __init__(
+        self,
+        focal_px: float,
+        lens: Lens | None = None,
+        shapes: GateShapes | None = None,
+        *,
+        learned: bool = False,
+    ) -> None:
+        self._learned = learned
         self._focal_px = focal_px
         known = shapes or GateShapes()
         self._models = {colour: GateModel(known.of(colour), focal_px) for colour in PRIMARIES + SECONDARIES}
@@ -75,10 +91,7 @@ class GateFinder:
         if self._lens is not None:
             self._lens.check_size(image.shape[1], image.shape[0])
         masks = find_colours(image)
-        if not masks:
-            return Detections(time_us=time_us)
-        sightings: list[GateSighting] = []
-        boxes: dict[str, Detection] = {}
+        found: dict[str, list[_Found]] = {}
         edges: tuple[ObstacleEdge, ...] = ()
         for mask in masks:
             others = [other for other in masks if other is not mask]
@@ -86,28 +99,39 @@ class GateFinder:
                 edges = _obstacle_edges(mask, others)
                 if self._lens is not None:
                     edges = _straight_edges(edges, self._lens)
-                continue
-            found, box = self._find_colour(mask, others)
-            sightings += found
-            if mask.colour in PRIMARIES:
-                boxes[mask.colour] = box
+            else:
+                found[mask.colour] = self._find_colour(mask, others)
+        known = [box for each in found.values() for box, _ in each]
+        filled = find_filled(image, known)
+        proposals = GateProposals(image, _LEAST_CHANCE) if self._learned else None
+        proposed = None if proposals is None else proposals.outside(known)
+        for ring in () if filled is None else find_rings(filled, proposed):
+            thin = self._thin_sighting(ring, image)
+            if thin is not None:
+                found.setdefault(ring.colour, []).append(thin)
+        height, width = image.shape[:2]
+        if proposals is not None:
+            for colour, sightings in found.items():
+                found[colour] = [one for one in sightings if _is_likely(one, proposals, width, height)]
+        numbers = {c: self._numbers(c, found[c], width, height) for c in PRIMARIES if found.get(c)}
         return Detections(
-            red=boxes.get("red", NOT_SEEN),
-            green=boxes.get("green", NOT_SEEN),
-            blue=boxes.get("blue", NOT_SEEN),
+            red=numbers.get("red", NOT_SEEN),
+            green=numbers.get("green", NOT_SEEN),
+            blue=numbers.get("blue", NOT_SEEN),
             time_us=time_us,
-            frames=tuple(sightings),
+            frames=tuple(sighting for each in found.values() for _, sighting in each),
             obstacle_edges=edges,
         )
 
-    def _find_colour(
-        self, mask: ColourMask, others: Sequence[ColourMask]
-    ) -> tuple[list[GateSighting], Detection]:
-        """The gates of one colour, and the paper's numbers of the largest one."""
-        found: list[tuple[_Box, GateSighting]] = []
-        for group in _groups(mask, others):
+    def _find_colour(self, mask: ColourMask, others: Sequence[ColourMask]) -> list[_Found]:
+        """The gates of one colour whose pixels are pure."""
+        found: list[_Found] = []
+        groups = _groups(mask, others)
+        if len(groups) > _CLUTTER:
+            groups = [group for group in groups if max(_bounding_box(np.concatenate(group))[2:]) >= _LARGE_PX]
+        for group in groups:
             sighting = self._sighting(mask, others, np.concatenate(group))
-            if (sighting is None or not sighting[1].whole) and len(group) > 1:
+            if (sighting is None or not sighting[1].whole) and 1 < len(group) <= _CLUTTER:
                 # What is joined may be two things: a gate, and mixed colours at an obstacle's edge.
                 each = [self._sighting(mask, others, fragment) for fragment in group]
                 alone = [one for one in each if one is not None and (sighting is None or one[1].whole)]
@@ -116,23 +140,46 @@ class GateFinder:
                     continue
             if sighting is not None:
                 found.append(sighting)
-        if not found:
-            return [], NOT_SEEN
-        height, width = mask.mask.shape
+        return found
+
+    def _thin_sighting(self, ring: Ring, image: Image) -> _Found | None:
+        """The gate that a ring of thin lines is, if it is one."""
+        height, width = image.shape[:2]
+        middle = np.array([(width - 1) / 2, (height - 1) / 2])
+        places = ring.corners - middle
+        if self._lens is not None:
+            places = self._lens.ideal(places)
+        corners: list[Point] = [(x, y) for x, y in places.tolist()]
+        segments = list(zip(corners, corners[1:] + corners[:1], strict=True))
+        model = self._models[ring.colour]
+        best: FittedGate | None = None
+        for sides in named_sides(segments):
+            axes = [side[0] for side in sides if side is not None]
+            fitted = gate_of_axes(axes, ring.std_px, model)
+            if fitted is not None and (best is None or fitted.cost < best.cost):
+                best = fitted
+        if best is None:
+            return None
+        distance_m = hypot(*best.poses[0].position_flu_m)
+        if self._focal_px * model.shape.bar_m > _THIN_BAR_PX * distance_m:
+            return None
+        box = _bounding_box(np.rint(ring.corners).astype(np.int32))
+        return box, GateSighting(ring.colour, best.corners, best.whole, best.poses)
+
+    def _numbers(self, colour: str, found: Sequence[_Found], width: int, height: int) -> Detection:
+        """The paper's numbers of the largest of some gates."""
         box, largest = max(found, key=lambda one: one[0][2] * one[0][3])
         numbers = measure(
             box[1] + 1, box[1] + box[3], box[0] + 1, box[0] + box[2],
-            width_px=width, height_px=height, focal_px=self._focal_px, shape=self._models[mask.colour].shape,
+            width_px=width, height_px=height, focal_px=self._focal_px, shape=self._models[colour].shape,
         )  # fmt: skip
         if self._lens is not None:
             numbers = straight_box(numbers, self._lens)
         if largest.poses:
             numbers = replace(numbers, signed_a=_signed_angle(largest.poses[0]))
-        return [sighting for _, sighting in found], numbers
+        return numbers
 
-    def _sighting(
-        self, mask: ColourMask, others: Sequence[ColourMask], points: _Contour
-    ) -> tuple[_Box, GateSighting] | None:
+    def _sighting(self, mask: ColourMask, others: Sequence[ColourMask], points: _Contour) -> _Found | None:
         """The gate that a group of fragments shows, if it is one."""
         height, width = mask.mask.shape
         box = _bounding_box(points)
@@ -165,6 +212,16 @@ class GateFinder:
         return best
 
 
+def _is_likely(found: _Found, proposals: GateProposals, width: int, height: int) -> bool:
+    """Whether the network does not deny a gate; of what is seen in part it is not asked."""
+    _, sighting = found
+    if not sighting.whole or not sighting.poses:
+        return True
+    corners = [(corner.right_px, corner.down_px) for corner in sighting.corners if corner is not None]
+    right, down = np.mean(corners, axis=0).tolist()
+    return proposals.chance_near(right + (width - 1) / 2, down + (height - 1) / 2) > _LEAST_LIKELY
+
+
 def _is_filled(mask: ColourMask, points: _Contour, box: _Box) -> bool:
     """Whether a region wholly inside the image is a sheet, so large that a gate's opening would show."""
     column, row, columns, rows = box
@@ -182,7 +239,8 @@ def _is_filled(mask: ColourMask, points: _Contour, box: _Box) -> bool:
     if area < _SHEET_PX * 0.5 * around:  # mean width of a long rectangle
         return False
     pixels = cv2.countNonZero(mask.mask[row : row + rows, column : column + columns])
-    return pixels > _SHEET_SHARE * (area + 0.5 * around + 1.0)  # Pick's theorem
+    # By Pick's theorem; or the bars of a gate, however it is turned, with a pixel beside them.
+    return pixels > min(_SHEET_SHARE * (area + 0.5 * around + 1.0), _BARS_SHARE * area + around)
 
 
 def _bounding_box(points: _Contour) -> _Box:

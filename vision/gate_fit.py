@@ -30,6 +30,9 @@ _MAX_OWN_UNSEEN = 0.4  # share of a bar that seems to be seen although it was no
 _WHOLE = 0.9  # share of a bar that is seen if nothing hides it; shaded and thin bars may have gaps
 _MAX_CORNER_STD_PX = 2.5
 _EDGE_ON, _OBLIQUE = 0.13, 0.23  # cosines: the bars of a gate that is seen edge-on hide one another
+_THINNEST_PX = 0.15  # a bar that fills less of a pixel has no colour
+_NOTHING, _SOMETHING = 0.35, 0.7  # shares of a side; for the second clearest side
+_NO_OPENING, _SPOT = 0.6, 0.4  # shares of a region in the middle of its outline
 _LEAST_ERROR_PX = 0.4  # may be between the corners of a pose and of the lines, besides two deviations
 _TILT_RAD = 0.2  # standard deviation of the camera's tilt, to tell which sides are upright
 _ROUGH = 2.5  # before the bars' edges are corrected by a pose, errors may be larger by this factor
@@ -66,12 +69,61 @@ def fit_gate(patch: ImagePatch, sides: Sides, model: GateModel) -> FittedGate | 
         sides: first estimates of its outer edges, pixels from the optical axis, from pixel centre to centre.
         model: of the gate.
     """
+    if not _may_be_gate(patch, sides, model.shape):
+        return None
     if patch.has_foreign and _least_length(sides) >= _CLEAR_PX:
         # It may be behind what is beside it, or in front of that: then four whole bars are seen.
         fitted = _fit_any(patch.in_front(), sides, model)
         if fitted is not None and fitted.whole:
             return fitted
     return _fit_any(patch, sides, model)
+
+
+def gate_of_axes(axes_corners: Sequence[Point], std_px: float, model: GateModel) -> FittedGate | None:
+    """A gate that is seen whole, by where the axes of its bars meet; None if no gate looks so.
+
+    Args:
+        axes_corners: upper left, upper right, lower right and lower left, pixels from the optical axis.
+        std_px: standard deviation of each of their coordinates.
+        model: of the gate.
+    """
+    meetings: _Meetings = [Meeting(x, y, std_px, std_px) for x, y in axes_corners]
+    poses = find_poses(axes_corners, model, _max_error_px(meetings))
+    corners = _outer_corners(meetings, poses[0], model, True) if poses else None
+    return None if corners is None else _fitted(corners, True, poses, meetings)
+
+
+def _may_be_gate(patch: ImagePatch, sides: Sides, shape: GateShape) -> bool:
+    """Whether there is something along two sides and more, and an opening if it is large enough to be seen.
+
+    Photographs have many regions that are refused by this in a tenth of the time of a fit. The limits let
+    through all gates of some thousand images, those of `crowded` and of photographs among them.
+    """
+    starts: list[Point] = []
+    ends: list[Point] = []
+    for side, (half_start, half_end) in zip(sides, expected_widths(sides, shape), strict=True):
+        if side is not None:
+            (x0, y0), (x1, y1) = side
+            length = max(hypot(x1 - x0, y1 - y0), 1e-9)
+            right, down = (y0 - y1) / length, (x1 - x0) / length  # towards the opening
+            from_start, from_end = max(half_start - 0.5, 0.0), max(half_end - 0.5, 0.0)
+            starts.append((x0 + from_start * right, y0 + from_start * down))
+            ends.append((x1 + from_end * right, y1 + from_end * down))
+    support = patch.support(starts, ends)
+    if sorted(support.empty)[-2] > _NOTHING or sorted(support.own)[-2] < _SOMETHING:
+        return False
+    corners = [side[0] for side in sides if side is not None]
+    if len(corners) < 4:
+        return True
+    (x0, y0), (x1, y1), (x2, y2), (x3, y3) = corners
+    area = 0.5 * abs((x2 - x0) * (y3 - y1) - (x3 - x1) * (y2 - y0))
+    longest = max(
+        hypot(end[0] - start[0], end[1] - start[1]) for start, end in zip(starts, ends, strict=True)
+    )
+    if area > _BARS_SEEN_PX * longest:
+        return patch.own_share(corners) < _NO_OPENING
+    # A spot may be a gate far away, but not one of many.
+    return not patch.among_others or patch.own_share(corners) < _SPOT
 
 
 def _least_length(sides: Sides) -> float:
@@ -100,8 +152,8 @@ def _fit_any(patch: ImagePatch, sides: Sides, model: GateModel) -> FittedGate | 
         lines, meetings, poses = _fit(patch, (a, b, c, d), model)
     corners = _outer_corners(meetings, poses[0], model, False) if poses else None
     if corners is None:
-        if not patch.may_be_cut:
-            return None  # nothing explains why no more is seen of it
+        if patch.among_others or not patch.may_be_cut:
+            return None  # it is one of many, or nothing explains why no more is seen of it
         corners = _corners_without_pose(patch, lines)
     return _fitted(corners, False, poses, meetings) if any(corners) else None
 
@@ -260,6 +312,8 @@ def _explains(patch: ImagePatch, pose: ModelPose, missing: int, model: GateModel
 
 def _outer_corners(meetings: _Meetings, pose: ModelPose, model: GateModel, whole: bool) -> Corners | None:
     """The corners of the outline in the gate's middle plane, from those of the bars' axes."""
+    if model.focal_px * model.shape.bar_m < _THINNEST_PX * hypot(*pose.shift_m.tolist()):
+        return None
     outer, axes = (
         pose.project(model.outer_corners, model.focal_px),
         pose.project(model.axes_corners, model.focal_px),

@@ -73,7 +73,12 @@ def outer_sides(
         corners = cv2.approxPolyN(hull.astype(np.float32), 4).reshape(-1, 2).tolist()
         segments = [(tuple(corners[i - 1]), tuple(corners[i])) for i in range(len(corners))]
     moved = [((x0 - column, y0 - row), (x1 - column, y1 - row)) for (x0, y0), (x1, y1) in segments]
-    answers = (_named(moved, upright) for upright in _upright(moved))
+    return named_sides(moved)
+
+
+def named_sides(segments: list[Segment]) -> list[Sides]:
+    """Say which segment, clockwise, is which side; several answers, the likelier one first, if not clear."""
+    answers = (_named(segments, upright) for upright in _upright(segments))
     return [sides for sides in answers if sides is not None]
 
 

@@ -20,6 +20,11 @@ BACKGROUND, OWN, FOREIGN, OUTSIDE = 0, 1, 2, 4
 """Values of pixels: none of the others, of the region, what may hide a part of it, and not in the image."""
 
 _PLACES = (np.arange(16.0)[:, None] + 0.5) / 16.0  # along a bar, as shares of its length, shape (16, 1)
+_ACROSS, _DOWN = (shares.ravel() for shares in np.meshgrid((0.25, 0.4, 0.6, 0.75), (0.3, 0.5, 0.7)))
+_INNER = np.stack(
+    [(1 - _ACROSS) * (1 - _DOWN), _ACROSS * (1 - _DOWN), _ACROSS * _DOWN, (1 - _ACROSS) * _DOWN], axis=1
+)  # weights of a quadrilateral's corners, shape (12, 4)
+_MUCH = 0.005  # share of an image
 _OPENING_PX = 6.0  # between the axes of opposite bars: an opening of this size is seen
 _AROUND = np.ones((5, 5), np.uint8)
 # A pixel and its four neighbours, shape (5, 1, 1).
@@ -37,6 +42,7 @@ class ImagePatch:
         origin: column and row of it where the optical axis is; whole numbers are pixel centres.
         reach_px: from the optical axis to the right and to the lower edge of the whole image.
         lens: of a camera that is not ideal: then `origin` and `reach_px` are from the image's middle.
+        among_others: the image has much else of the region's colour.
     """
 
     labels: Labels
@@ -44,6 +50,7 @@ class ImagePatch:
     origin: Point
     reach_px: Point
     lens: Lens | None = None
+    among_others: bool = False
 
     @property
     def has_foreign(self) -> bool:
@@ -76,6 +83,16 @@ class ImagePatch:
             if not (0 <= column < columns and 0 <= row < rows and self.labels[row, column] == OWN):
                 return False
         return True
+
+    def own_share(self, corners: Sequence[Point]) -> float:
+        """Share of the region's pixels in the inner part of a quadrilateral, pixels from the optical axis."""
+        places = _INNER @ np.array(corners)
+        if self.lens is not None:
+            places = self.lens.all_seen(places)
+        column, row = np.rint(places + self.origin).astype(np.intp).T
+        rows, columns = self.labels.shape
+        column, row = np.clip(column, 0, columns - 1), np.clip(row, 0, rows - 1)
+        return float(np.mean(self.labels[row, column] == OWN))
 
     def in_front(self) -> ImagePatch:
         """The same as if the region were in front of all else."""
@@ -130,4 +147,6 @@ def cut_patch(
         if left < x1 and top < y1 and left + wide > x0 and top + high > y0:
             inside |= other.mask[y0:y1, x0:x1] & FOREIGN
     origin = ((width - 1) / 2 - column + margin, (height - 1) / 2 - row + margin)
-    return ImagePatch(labels, excess, origin, (width / 2, height / 2), lens)
+    own = cv2.countNonZero(mask.mask[row : row + rows, column : column + columns])
+    among_others = cv2.countNonZero(mask.mask) - own > _MUCH * mask.mask.size
+    return ImagePatch(labels, excess, origin, (width / 2, height / 2), lens, among_others)

@@ -14,11 +14,13 @@ from pydantic import Field
 from pydantic.config import JsonDict
 
 from framerunner.errors import UserError
-from framerunner.geometry.vectors import Vec3
+from framerunner.geometry.vectors import Quaternion, Vec3
 
 Image = npt.NDArray[np.uint8]
 Vision = Literal["boxes", "frames"]
 """How gates are detected: the paper's box of each colour, or by contour and shape."""
+LEARNED = "learned"
+"""Name of the detector by shape to which a network proposes gates."""
 M: JsonDict = {"unit": "m"}
 PX: JsonDict = {"unit": "px"}
 DEG: JsonDict = {"unit": "deg"}
@@ -115,6 +117,38 @@ class ObstacleEdge:
 
 
 @dataclass(frozen=True, slots=True)
+class BaseExpectation:
+    """Where the camera is expected to be when an image is exposed, in the base's axes.
+
+    These are x and y along its edges, z up, with the origin on the floor under its centre.
+    """
+
+    eye_m: Vec3
+    attitude: Quaternion  # (w, x, y, z), from the camera's axes forward, left, up to the base's
+    eye_std_m: Vec3  # standard deviations along x, y, z
+    heading_std_rad: float  # of the turn about z
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BaseSighting:
+    """Corners of the base in one image. Compare by identity: its arrays have no order.
+
+    Attributes:
+        points_m: in the base's axes, shape (n, 3).
+        pixels: right of and below the optical axis of an ideal camera, shape (n, 2). A corner may be outside
+            the image, where the edges that lead to it meet.
+        covariance_px2: of all coordinates, in the order of `pixels.ravel()`, shape (2 n, 2 n). Where only one
+            edge that leads to a corner is seen, its variance along that edge is large.
+        score: the share of its outline that is seen, 0 to 1.
+    """
+
+    points_m: npt.NDArray[np.float64]
+    pixels: npt.NDArray[np.float64]
+    covariance_px2: npt.NDArray[np.float64]
+    score: float
+
+
+@dataclass(frozen=True, slots=True)
 class Detections:
     """What one image showed."""
 
@@ -127,6 +161,7 @@ class Detections:
     ] = None
     frames: tuple[GateSighting, ...] = ()  # by shape; only from the gate finder
     obstacle_edges: tuple[ObstacleEdge, ...] = ()  # from left to right; only from the gate finder
+    base: Annotated[BaseSighting | None, Field(description="the base, where it is expected and seen")] = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from framerunner.flying.plan import FlightPlan
 from scenarios.imaging.effects import CameraEffects
-from scenarios.models import Camera
+from scenarios.models import Base, Camera
+from vision.base.detector import DetectorWithBase
+from vision.base.finder import BaseFinder
+from vision.base.model import BaseShape
+from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.detectors import Detector, DetectorMaker, new_detector, others_detector
 
@@ -19,17 +23,32 @@ def plan_detector(plan: FlightPlan) -> Detector:
         DetectorError, ExtensionError: a detector of others cannot be made.
     """
     others = others_of(plan)
+    calibration = plan.calibration or true_calibration(plan.scenario.camera)
     if others is not None:
-        return others_detector(others, plan.calibration or true_calibration(plan.scenario.camera))
+        return _with_base(others_detector(others, calibration, plan.gate_shapes), plan, calibration)
     if plan.mission is None or plan.mission.vision == "boxes":
         return new_detector("boxes", shapes=plan.gate_shapes)  # with the paper's focal length
-    calibration = plan.calibration or true_calibration(plan.scenario.camera)
-    return new_detector(plan.mission.vision, calibration=calibration, shapes=plan.gate_shapes)
+    detector = new_detector(plan.mission.vision, calibration=calibration, shapes=plan.gate_shapes)
+    return _with_base(detector, plan, calibration)
+
+
+def _with_base(detector: Detector, plan: FlightPlan, calibration: Calibration) -> Detector:
+    """A detector that looks for the base, too; a drone that starts from the floor has none."""
+    if plan.mission is None or plan.mission.vision == "boxes" or plan.lift_m:
+        return detector
+    lens = None if calibration.is_ideal else Lens(calibration)
+    finder = BaseFinder(base_shape(plan.scenario.base), calibration.fx_px, lens)
+    return DetectorWithBase(detector, finder)
 
 
 def others_of(plan: FlightPlan) -> str | DetectorMaker | None:
     """The detector of others with which a plan's mission sees; None: it is one of ours."""
     return plan.detector or (None if plan.mission is None else plan.mission.detector or None)
+
+
+def base_shape(base: Base) -> BaseShape:
+    """The size of a scenario's base, as it is looked for in images."""
+    return BaseShape(base.edge_m, base.top_m, base.mark_share * base.edge_m)
 
 
 def true_calibration(camera: Camera) -> Calibration:

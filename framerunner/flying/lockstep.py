@@ -31,6 +31,7 @@ from scenarios.result import FaultFacts, RefereeReport
 from sitl.camera import CameraFeed, Exposure
 from sitl.faults.images import new_feed
 from sitl.simulation import Simulation
+from vision.base.detector import BaseExpectations, expect_base
 from vision.detectors import Detector, new_detector
 from vision.types import Detections, Image
 
@@ -224,6 +225,10 @@ class LockstepPerception:
     def space_images(self, period_s: float) -> None:
         """From now on process at most one image in this time, vehicle time; 0: all of them."""
         self._choice.period_s = period_s
+
+    def expect_base(self, expected: BaseExpectations) -> None:
+        """Say where in an image the base is to be looked for."""
+        expect_base(self._detector, expected)
 
     async def close(self) -> None:
         """Nothing to close."""

@@ -16,7 +16,11 @@ from rich.table import Table
 
 from framerunner.errors import SettingError
 from framerunner.terminal import table_console
-from framerunner.vision_evaluation.labelled_images import Disturbance, LabelledImage, labelled_images
+from framerunner.vision_evaluation.backgrounds import Backgrounds
+from framerunner.vision_evaluation.base_scores import BaseScores, rate_base
+from framerunner.vision_evaluation.camera_chain import CameraChain
+from framerunner.vision_evaluation.labelled_images import LabelledImage, labelled_images
+from framerunner.vision_evaluation.own_pictures import OwnPictures
 from framerunner.vision_evaluation.scores import (
     RATED_ANGLE_DEG,
     RATED_DISTANCE_M,
@@ -39,20 +43,21 @@ class VisionSettings:
     level: Level
     images: int
     seed: int
-    disturbance: Disturbance
+    chain: CameraChain
     out: Path
+    backgrounds: Backgrounds | None = None
     detector: str | DetectorMaker | None = None  # of others, to be rated beside ours
+    pictures: OwnPictures | None = None  # instead of painted images
 
     @property
     def title(self) -> str:
         """What the images are, for people."""
-        harder = {name: value for name, value in asdict(self.disturbance).items() if value != _CLEAN[name]}
-        return ", ".join(
-            [f"level {self.level.name}", *(f"{name} {value:g}" for name, value in harder.items())]
-        )
-
-
-_CLEAN = asdict(Disturbance())
+        if self.pictures is not None:
+            return f"pictures of {self.pictures.folder}"
+        parts = [f"level {self.level.name}"]
+        if self.backgrounds is not None:
+            parts.append(f"{len(self.backgrounds.photographs)} photographs")
+        return ", ".join(filter(None, [*parts, self.chain.shown()]))
 
 
 def evaluate_vision(settings: VisionSettings) -> None:
@@ -65,8 +70,12 @@ def evaluate_vision(settings: VisionSettings) -> None:
     _make_folder(settings.out)
     scores, examples = detect_all(_shown(settings), settings.detector)
     print_scores(scores, settings.title)
+    base = None
+    if settings.pictures is None:
+        base = rate_base(settings.level, settings.images, settings.seed, settings.chain)
+        print_base_scores(base)
     report = settings.out / REPORT
-    report.write_text(json.dumps(finite(_as_json(settings, scores), 5), indent=1), encoding="utf-8")
+    report.write_text(json.dumps(finite(_as_json(settings, scores, base), 5), indent=1), encoding="utf-8")
     from framerunner.vision_evaluation.picture import save_picture
 
     save_picture(scores, examples, settings.title, settings.out / PICTURE)
@@ -105,9 +114,13 @@ def write_dataset(settings: VisionSettings) -> None:
 
 def _shown(settings: VisionSettings) -> Iterator[LabelledImage]:
     """The images, while a bar on standard error shows how far it is."""
-    images: Iterable[LabelledImage] = labelled_images(
-        settings.level, settings.images, settings.seed, settings.disturbance
-    )
+    images: Iterable[LabelledImage]
+    if settings.pictures is None:
+        images = labelled_images(
+            settings.level, settings.images, settings.seed, settings.chain, settings.backgrounds
+        )
+    else:
+        images = settings.pictures.images()
     console = Console(stderr=True)
     yield from track(
         images,
@@ -126,17 +139,22 @@ def _make_folder(path: Path) -> None:
         raise SettingError(f"{path}: cannot be a folder ({error.strerror}); choose another") from error
 
 
-def _as_json(settings: VisionSettings, scores: Scores) -> dict[str, object]:
+def _as_json(settings: VisionSettings, scores: Scores, base: BaseScores | None) -> dict[str, object]:
+    painted = {"level": settings.level.name, "seed": settings.seed, "chain": asdict(settings.chain)}
+    of_base: dict[str, object] = {}
+    if base is not None:
+        of_base["base_by_distance_m"] = [asdict(row) for row in base.rows()]
+        of_base["base_false_alarms"] = {"of": base.others, "count": base.false_alarms}
     return {
-        "level": settings.level.name,
+        **(painted if settings.pictures is None else {"pictures": str(settings.pictures.folder)}),
         "images": scores.images,
-        "seed": settings.seed,
-        "disturbance": asdict(settings.disturbance),
         "detectors": [asdict(row) for row in scores.in_sum()],
         "by_distance_m": [asdict(row) for row in scores.by_distance()],
         "by_angle_deg": [asdict(row) for row in scores.by_angle()],
+        **of_base,
         "false_alarms": scores.false_alarms,
-        "median_ms": {kind: sorted(times)[len(times) // 2] for kind, times in scores.times_ms.items()},
+        "median_ms": {kind: float(np.median(times)) for kind, times in scores.times_ms.items()},
+        "p99_ms": {kind: float(np.percentile(times, 99)) for kind, times in scores.times_ms.items()},
     }
 
 
@@ -152,9 +170,36 @@ def print_scores(scores: Scores, title: str) -> None:
         named = [(f"{row.kind}  {row.low:g} to {row.high:g}{unit}", row) for row in rows]
         console.print(_table(f"by {what}", named))
     for kind in scores.kinds:
-        times_ms = np.percentile(scores.times_ms[kind], (50, 95))
+        times_ms = np.percentile(scores.times_ms[kind], (50, 99))
         console.print(
-            f"{kind}: {scores.false_alarms[kind]} false alarms, "
+            f"{kind}: {scores.false_alarms[kind] / max(scores.images, 1):.3f} false alarms an image, "
+            f"{times_ms[0]:.2f} ms an image (99 %: {times_ms[1]:.2f} ms)",
+            markup=False,
+        )
+
+
+def print_base_scores(scores: BaseScores) -> None:
+    """Print how well the base was found to standard output."""
+    console = table_console(130)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("base, by distance", no_wrap=True)
+    for column in ("images", "found", "corners", "95 %", "corners / std"):
+        table.add_column(column, justify="right")
+    for row in scores.rows():
+        if row.images:
+            table.add_row(
+                f"{row.low_m:g} to {row.high_m:g} m",
+                str(row.images),
+                _cell(row.found, 100.0, ".1f", " %"),
+                _cell(row.error_median_px, 1.0, ".2f", " px"),
+                _cell(row.error_p95_px, 1.0, ".2f", " px"),
+                _cell(row.deviation_rms, 1.0, ".2f", ""),
+            )
+    console.print(table)
+    if scores.times_ms:
+        times_ms = np.percentile(scores.times_ms, (50, 95))
+        console.print(
+            f"base: {scores.false_alarms} false alarms in {scores.others} images without it, "
             f"{times_ms[0]:.2f} ms an image (95 %: {times_ms[1]:.2f} ms)",
             markup=False,
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import atan2, cos, degrees, pi, radians, sin
 
 import cv2
@@ -12,13 +12,27 @@ import numpy.typing as npt
 
 from framerunner.flying.detector import true_calibration
 from framerunner.geometry.gate_shape import GateShapes
-from framerunner.geometry.rotations import mounting_flu, quaternion_from_euler, rotation, rotation_rows
+from framerunner.geometry.rotations import (
+    RotationRows,
+    mounting_flu,
+    multiply,
+    quaternion_from_euler,
+    rotated_by_rate,
+    rotation,
+    rotation_rows,
+)
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Quaternion, Vec3
+from framerunner.vision_evaluation.backgrounds import Backgrounds
+from framerunner.vision_evaluation.camera_chain import (
+    CLIP_IMAGES,
+    CLIP_RATE_HZ,
+    CameraChain,
+)
 from scenarios.models import Scenario, UprightGate
 from scenarios.random_scenarios import Level, random_scenario
 from sitl.camera import STILL, ExposureMotion, SimulatedCamera
-from sitl.video import encode_jpeg
+from sitl.optics.backdrop import Backdrop
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.types import Image
@@ -36,16 +50,6 @@ _DRAWS = 1000
 _LAST_S = 120.0  # of the flight
 _MAX_SPEED_M_S = 0.8
 _RATES_RAD_S = (0.2, 0.2, 0.4)  # standard deviations of roll, pitch and yaw
-
-
-@dataclass(frozen=True, slots=True)
-class Disturbance:
-    """What makes images harder than painted ones."""
-
-    noise: float = 0.0  # standard deviation of every channel, 0..255
-    blur_px: float = 0.0  # standard deviation of a Gaussian
-    light: float = 1.0  # factor of brightness
-    jpeg: int | None = None  # quality 1..100; None: not compressed
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,26 +85,53 @@ class LabelledImage:
         return self.calibration.fx_px
 
 
-def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbance) -> Iterator[LabelledImage]:
+def labelled_images(
+    level: Level, count: int, seed: int, chain: CameraChain, backgrounds: Backgrounds | None = None
+) -> Iterator[LabelledImage]:
     """Paint images from random poses in random scenarios of a level.
 
     Three of four are turned to one of the gates, from all distances and angles; the others anywhere. The
     same arguments give the same images. With a level's camera effects, the drone flies and turns.
+
+    Args:
+        level: of which scenarios are drawn.
+        count: of images.
+        seed: of the first scenario, and of all that is drawn.
+        chain: what the camera does, beside the level's effects.
+        backgrounds: photographs behind gates, base and obstacles; None: the level's floor, hall and sky.
     """
-    poses, noise, motions = (np.random.Generator(np.random.PCG64([seed, use])) for use in range(3))
+    streams = _Streams.of_seed(seed)
     scene: _LabelledScene | None = None
     for number in range(count):
         if scene is None or number % IMAGES_OF_A_SCENE == 0:
             drawn = seed + number // IMAGES_OF_A_SCENE
-            scene = _LabelledScene(random_scenario(level, drawn), drawn)
-        position, attitude = scene.draw_pose(poses)
-        motion = scene.draw_motion(motions)
-        painted = scene.camera.render(position, attitude, motion=motion)
-        image = _disturbed(painted, disturbance, noise)
+            scenario = chain.applied_to(random_scenario(level, drawn), streams.chain)
+            scene = _LabelledScene(scenario, drawn)
+        position, attitude = scene.draw_pose(streams.poses)
+        motion = scene.draw_motion(streams.motions, moves=chain.h264_mbit_s is not None)
+        backdrop = None
+        if backgrounds is not None:
+            rows = scene.camera_rows(attitude)
+            backdrop = backgrounds.draw(scene.scenario.camera, rows, streams.backgrounds)
+        image = scene.image(position, attitude, motion, chain, backdrop)
         labels = scene.labels(position, attitude)
         yield LabelledImage(
             image, scene.scenario.name, position, attitude, scene.calibration, labels, scene.shapes
         )
+
+
+@dataclass(frozen=True, slots=True)
+class _Streams:
+    """Random numbers by what they are for."""
+
+    poses: np.random.Generator
+    motions: np.random.Generator
+    chain: np.random.Generator
+    backgrounds: np.random.Generator
+
+    @classmethod
+    def of_seed(cls, seed: int) -> _Streams:
+        return cls(*(np.random.Generator(np.random.PCG64([seed, use])) for use in (0, 2, 3, 4)))
 
 
 class _LabelledScene:
@@ -126,21 +157,52 @@ class _LabelledScene:
         roll, pitch = (radians(stream.uniform(-_MAX_TILT_DEG, _MAX_TILT_DEG)) for _ in range(2))
         return position, quaternion_from_euler(roll, pitch, yaw)
 
-    def draw_motion(self, stream: np.random.Generator) -> ExposureMotion:
+    def draw_motion(self, stream: np.random.Generator, *, moves: bool) -> ExposureMotion:
         """When the image is taken, and how the drone moves then: as in a contest flight."""
-        if self.scenario.camera.effects is None:
+        if self.scenario.camera.effects is None and not moves:
             return STILL
         time_us = int(stream.uniform(0.0, _LAST_S) * 1e6)
         vx, vy, vz = (float(value) for value in stream.uniform(-_MAX_SPEED_M_S, _MAX_SPEED_M_S, 3))
         roll, pitch, yaw = (float(value) for value in stream.normal(0.0, 1.0, 3) * np.array(_RATES_RAD_S))
         return ExposureMotion(time_us, (vx, vy, vz), (roll, pitch, yaw))
 
+    def camera_rows(self, attitude: Quaternion) -> RotationRows:
+        """Rows of the matrix from the camera's forward, left, up to arena axes."""
+        mounting = mounting_flu(self.scenario.camera.mounting_frd_rad)
+        return rotation_rows(rotation(multiply(attitude, mounting)))
+
+    def image(
+        self,
+        position_arena_m: Vec3,
+        attitude: Quaternion,
+        motion: ExposureMotion,
+        chain: CameraChain,
+        backdrop: Backdrop | None,
+    ) -> Image:
+        """What a detector gets of a pose: the last image of a clip if it is of an H.264 stream."""
+        count = 1 if chain.h264_mbit_s is None else CLIP_IMAGES
+        clip = []
+        vx, vy, vz = motion.velocity_arena_m_s
+        roll, pitch, yaw = motion.rate_frd_rad_s
+        for before in range(1 - count, 1):
+            after_s = before / CLIP_RATE_HZ
+            x, y, z = position_arena_m
+            clip.append(
+                self.camera.render(
+                    (x + vx * after_s, y + vy * after_s, z + vz * after_s),
+                    rotated_by_rate(attitude, (roll, -pitch, -yaw), after_s),
+                    motion=replace(motion, time_us=motion.time_us + round(1e6 * after_s)),
+                    backdrop=backdrop,
+                )
+            )
+        return chain.compressed(clip)
+
     def labels(self, position_arena_m: Vec3, attitude: Quaternion) -> tuple[GateLabel, ...]:
         """What is true of every gate."""
         camera = self.scenario.camera
         body = np.array(rotation_rows(rotation(attitude)))
         eye = np.array(position_arena_m) + body @ np.array(camera.position_flu_m)
-        rows = body @ np.array(rotation_rows(rotation(mounting_flu(camera.mounting_frd_rad))))
+        rows = np.array(self.camera_rows(attitude))
         outlines = [self._outline(solid, eye, rows) for solid in self._solids]
         return tuple(
             self._label(gate, eye, rows, outlines, k) for k, gate in enumerate(self.scenario.all_gates)
@@ -245,15 +307,3 @@ def _covers(other: tuple[Floats | None, float, float], hull: Floats) -> bool:
 def _vector(values: Floats) -> Vec3:
     x, y, z = values.tolist()
     return (x, y, z)
-
-
-def _disturbed(image: Image, disturbance: Disturbance, stream: np.random.Generator) -> Image:
-    if disturbance.blur_px > 0.0:
-        image = np.asarray(cv2.GaussianBlur(image, (0, 0), disturbance.blur_px), np.uint8)
-    if disturbance.light != 1.0 or disturbance.noise > 0.0:
-        noise = stream.normal(0.0, disturbance.noise, image.shape) if disturbance.noise > 0.0 else 0.0
-        image = np.clip(np.rint(image * disturbance.light + noise), 0, 255).astype(np.uint8)
-    if disturbance.jpeg is not None:
-        data = np.frombuffer(encode_jpeg(image, disturbance.jpeg), np.uint8)
-        image = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.uint8)
-    return np.ascontiguousarray(image)

@@ -12,11 +12,10 @@ import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 
 from framerunner.runs.plots import save_figure
-from framerunner.vision_evaluation.labelled_images import LabelledImage
-from framerunner.vision_evaluation.scores import ErrorRow, Scores
-from vision.detectors import new_detector
+from framerunner.vision_evaluation.scores import ErrorRow, Example, Scores
 
 _STYLES = {"boxes": ("#ee7733", "--", "boxes (the paper's)"), "frames": ("#332288", "-", "frames")}
 _CURVES: tuple[tuple[str, Callable[[ErrorRow], float | None]], ...] = (
@@ -27,7 +26,7 @@ _CURVES: tuple[tuple[str, Callable[[ErrorRow], float | None]], ...] = (
 _EXAMPLES = 3
 
 
-def save_picture(scores: Scores, examples: Sequence[LabelledImage], title: str, path: Path) -> None:
+def save_picture(scores: Scores, examples: Sequence[Example], title: str, path: Path) -> None:
     """Draw it to a file.
 
     Raises:
@@ -69,26 +68,45 @@ def _percent(share: float | None) -> float | None:
     return None if share is None else 100.0 * share
 
 
-def _telling(examples: Sequence[LabelledImage]) -> list[LabelledImage]:
-    """The image with the most and largest gates of each of some scenes."""
-    best: dict[str, LabelledImage] = {}
-    for one in examples:
-        if one.scenario not in best or _content(one) > _content(best[one.scenario]):
-            best[one.scenario] = one
-    return sorted(best.values(), key=_content, reverse=True)[:_EXAMPLES]
+def _telling(examples: Sequence[Example]) -> list[Example]:
+    """Of some scenes: one with the most gates found, then one missed and one false alarm if there are."""
+    clean = [one for one in examples if not (one.missed or one.false)]
+    chosen: dict[str, Example] = {}
+    for ranked in (
+        sorted((one for one in examples if one.missed), key=_nearest_missed_m),
+        sorted((one for one in examples if one.false), key=lambda one: -len(one.false)),
+        sorted(clean, key=_content, reverse=True),
+    ):
+        wanted = _EXAMPLES if ranked and not (ranked[0].missed or ranked[0].false) else len(chosen) + 1
+        for one in ranked:
+            if len(chosen) < wanted:
+                chosen.setdefault(one.labelled.scenario, one)
+    return list(chosen.values())[::-1]
 
 
-def _content(labelled: LabelledImage) -> float:
-    return sum(1.0 + 1.0 / label.distance_m for label in labelled.gates if label.whole)
+def _nearest_missed_m(example: Example) -> float:
+    return min(label.distance_m for label in example.missed)
 
 
-def _draw_image(axes: Axes, labelled: LabelledImage) -> None:
-    """An image, the corners found with three standard deviations, and the poses' centres."""
-    image = labelled.image
-    height, width = image.shape[:2]
+def _content(example: Example) -> float:
+    return sum(1.0 + 1.0 / label.distance_m for label in example.labelled.gates if label.whole)
+
+
+def _draw_image(axes: Axes, example: Example) -> None:
+    """An image, the corners found with three standard deviations, and the poses' centres.
+
+    The outline of a gate that was missed is dashed, the corners of a false alarm are crosses.
+    """
+    labelled, found = example.labelled, example.found
+    height, width = labelled.image.shape[:2]
     reach = (-width / 2, width / 2, height / 2, -height / 2)
-    axes.imshow(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), extent=reach, interpolation="nearest")
-    found = new_detector("frames", calibration=labelled.calibration)(image, None)
+    axes.imshow(cv2.cvtColor(labelled.image, cv2.COLOR_BGR2RGB), extent=reach, interpolation="nearest")
+    for label in example.missed:
+        outline = Polygon(label.corners_px, fill=False, linestyle="--", edgecolor="white", linewidth=1.0)
+        axes.add_patch(outline)
+    for sighting in example.false:
+        places = [(corner.right_px, corner.down_px) for corner in sighting.corners if corner is not None]
+        axes.plot(*zip(*places, strict=True), "x", color="yellow", markersize=9, markeredgewidth=2.0)
     for sighting in found.frames:
         for corner in sighting.corners:
             if corner is not None:
@@ -110,4 +128,7 @@ def _draw_image(axes: Axes, labelled: LabelledImage) -> None:
     axes.set_ylim(reach[2:])
     axes.set_xticks([])
     axes.set_yticks([])
-    axes.set_title(labelled.scenario, fontsize=10)
+    words = [labelled.scenario]
+    words += [f"{len(example.missed)} missed"] if example.missed else []
+    words += [f"{len(example.false)} false"] if example.false else []
+    axes.set_title(", ".join(words), fontsize=10)

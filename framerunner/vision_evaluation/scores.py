@@ -43,6 +43,16 @@ class DetectionSample:
     deviations: tuple[float, ...] = ()  # errors of the corners by their standard deviations
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Example:
+    """An image, and what our detector by shape made of it."""
+
+    labelled: LabelledImage
+    found: Detections
+    missed: tuple[GateLabel, ...]  # wholly in view and rated
+    false: tuple[GateSighting, ...]
+
+
 @dataclass(slots=True)
 class Scores:
     """Everything that was counted, by kind: ours are `KINDS`; what others' gave is rated as both of them."""
@@ -117,14 +127,14 @@ class ErrorRow:
 
 def detect_all(
     labelled: Iterable[LabelledImage], others: str | DetectorMaker | None = None
-) -> tuple[Scores, list[LabelledImage]]:
-    """Run our detectors over images, and one of others if it is given; also give back the first images.
+) -> tuple[Scores, list[Example]]:
+    """Run our detectors over images, and one of others if it is given; also give back some images.
 
     Raises:
         DetectorError, ExtensionError: the others' detector cannot be made, or fails.
     """
     scores = Scores()
-    first: list[LabelledImage] = []
+    examples: list[Example] = []
     detectors: dict[str, Detector] = {}
     camera: tuple[Calibration, GateShapes] | None = None
     for one in labelled:
@@ -133,14 +143,27 @@ def detect_all(
             camera = (calibration, one.shapes)
             detectors = {k: new_detector(k, calibration=calibration, shapes=one.shapes) for k in KINDS}
             if others is not None:
-                detectors[detector_name(others)] = others_detector(others, calibration)
+                detectors[detector_name(others)] = others_detector(others, calibration, one.shapes)
             for detector in detectors.values():
                 detector(one.image, None)  # the first call loads code
-        scores.add(one, {kind: _timed(detector, one.image) for kind, detector in detectors.items()})
-        if len(first) < _KEPT:
-            first.append(one)
+        found = {kind: _timed(detector, one.image) for kind, detector in detectors.items()}
+        scores.add(one, found)
+        example = _example(one, found["frames"][0])
+        if len(examples) < _KEPT or (len(examples) < 2 * _KEPT and (example.missed or example.false)):
+            examples.append(example)
     scores.leave_out_unused()
-    return scores, first
+    return scores, examples
+
+
+def _example(labelled: LabelledImage, detections: Detections) -> Example:
+    missed = [
+        label
+        for label in labelled.gates
+        if label.whole
+        and is_rated(label.distance_m, label.angle_deg)
+        and _sighting_of(label, detections.frames) is None
+    ]
+    return Example(labelled, detections, tuple(missed), tuple(_false_alarms(labelled, detections)))
 
 
 def rows_by(
@@ -183,7 +206,12 @@ def row_of(kind: str, low: float, high: float, samples: Sequence[DetectionSample
 
 def rated(samples: Sequence[DetectionSample]) -> list[DetectionSample]:
     """Those that count for the detection rate."""
-    return [s for s in samples if s.distance_m <= RATED_DISTANCE_M and s.angle_deg < RATED_ANGLE_DEG]
+    return [s for s in samples if is_rated(s.distance_m, s.angle_deg)]
+
+
+def is_rated(distance_m: float, angle_deg: float) -> bool:
+    """Whether a gate wholly in view counts for the detection rate."""
+    return distance_m <= RATED_DISTANCE_M and angle_deg < RATED_ANGLE_DEG
 
 
 def _mean(numbers: Sequence[float]) -> float | None:
@@ -206,10 +234,15 @@ def _gates(labelled: LabelledImage, detections: Detections) -> tuple[list[Detect
     for label in labelled.gates:
         if label.whole:
             samples.append(_sample_of_sighting(label, _sighting_of(label, detections.frames)))
-    false_alarms = sum(
-        not any(_is_near(sighting, label) for label in labelled.gates) for sighting in detections.frames
-    )
-    return samples, false_alarms
+    return samples, len(_false_alarms(labelled, detections))
+
+
+def _false_alarms(labelled: LabelledImage, detections: Detections) -> list[GateSighting]:
+    return [
+        sighting
+        for sighting in detections.frames
+        if not any(_is_near(sighting, label) for label in labelled.gates)
+    ]
 
 
 def _is_near(sighting: GateSighting, label: GateLabel) -> bool:

@@ -30,7 +30,7 @@ from offboard.chart.spec import (
 )
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary
 from offboard.pilot import NAMES_ON_MAP, Pilot
-from vision.types import Vision
+from vision.types import LEARNED, Vision
 
 
 def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:
@@ -133,7 +133,7 @@ def _check_action(action: Action, vocabulary: Vocabulary, problems: ProblemList)
 def _check_detector(mission: MissionFile, problems: ProblemList) -> None:
     """A file that anybody may write names an installed detector only; nothing of it runs here."""
     name = mission.detector
-    if not name:
+    if not name or name == LEARNED:
         return
     known = [each for each in extension_names("detector") if each not in get_args(Vision)]
     if name not in known:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Awaitable
+from collections import deque
 from math import degrees
 from typing import Any
 
@@ -21,12 +21,17 @@ from framerunner.wire import px4_modes
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.px4_modes import Px4Mode
 from offboard.drone import VelocityFluCommand
+from offboard.link import inertial
 from offboard.link.dialect import AutopilotKind, Dialect, ModeNames
 from offboard.link.direct import synchronous
 from offboard.link.stepped import SteppedDialect
 
 _TAKEN_S = 0.3  # wall time in which PX4 takes a request that it cannot return a PING after
-_POSITIONS_HZ = 50.0
+STREAMS_HZ = {
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0,
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: inertial.RATE_HZ,
+    mavlink.MAVLINK_MSG_ID_ODOMETRY: inertial.ACCURACY_HZ,
+}
 
 
 def _parameters(mode: Px4Mode) -> tuple[float, ...]:
@@ -129,21 +134,26 @@ class SteppedPx4Dialect(SteppedDialect):
 
     kind = PX4
     has_resets = True
-    _interval_requested = False  # since the last tick
 
-    def request_streams(self) -> Awaitable[None]:
-        """Request positions as often as the app uses them.
+    def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
+        super().__init__(direct, system_id)
+        self._to_request: deque[tuple[int, float]] = deque()
+        self._requested = asyncio.Event()
 
-        PX4's thread that receives messages waits then, until time has gone on.
+    async def request_streams(self) -> None:
+        """Request what the app uses as often as it does, one of them a tick.
+
+        After each request PX4's thread that receives messages waits until time has gone on. What is refused
+        is missing later, in words.
         """
-        self._interval_requested = True
-        interval_us = 1e6 / _POSITIONS_HZ
-        number = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
-        return self._request(number, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, interval_us)
+        self._to_request.extend(STREAMS_HZ.items())
+        await self._requested.wait()
 
     async def _until_taken(self) -> None:
-        if self._interval_requested:
-            self._interval_requested = False
+        if self._to_request:
+            message_id, rate_hz = self._to_request.popleft()
+            self._messages.send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz)
             await asyncio.sleep(_TAKEN_S)
         else:
+            self._requested.set()
             await super()._until_taken()

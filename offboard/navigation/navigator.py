@@ -13,6 +13,7 @@ from math import dist, hypot
 from framerunner.geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityFluCommand
 from offboard.limits import CONTEST, CommandLimits
+from offboard.navigation.base_approach import SIGHTINGS_S, WayHome
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.crossing_attempt import CrossingAttempt
 from offboard.navigation.goals import Goal, Point, style_of
@@ -35,12 +36,17 @@ SEARCH_AFTER_M = 2.0  # from behind a gate to the drone, when it is chosen where
 
 
 class Navigator:
-    """The world model, the path, and the action that is flown. All positions are in arena axes."""
+    """The world model, the path, and the action that is flown. All positions are in arena axes.
+
+    Attributes:
+        expected_base: see `WorldModel.expected_base`.
+    """
 
     def __init__(self, surroundings: Surroundings, limits: CommandLimits = CONTEST) -> None:
         self._style = style_of(limits)
         self._camera = CameraModel.of(surroundings.camera)
         self._world = WorldModel(surroundings, self._style)
+        self.expected_base = self._world.expected_base
         self._flight = PathFlight(surroundings.arena, self._style, limits)
         self._places = LookingPlaces(surroundings.arena, self._style)
         self._start_m: Vec3 | None = None
@@ -48,6 +54,7 @@ class Navigator:
         self._action = ""
         self._acted_s = -GAP_S
         self._goal: Point | None = None
+        self._way_home = WayHome(surroundings.base, surroundings.arena)
         self._chosen_s = 0.0
         self._crossing: CrossingAttempt | None = None
         self._steps_back = 0
@@ -113,7 +120,7 @@ class Navigator:
     def arrived(self) -> bool:
         """`fly_to` or `step_back` has reached its goal, and the drone is (nearly) at rest."""
         goal, state = self._goal, self._state
-        if goal is None or state is None:
+        if goal is None or state is None or self._way_home.looks:
             return False
         near = dist(position_now(state), goal.position_m) < self._style.arrived_m
         return near and hypot(*state.velocity_arena_m_s) < self._style.arrived_m_s
@@ -145,12 +152,19 @@ class Navigator:
         return self._fly(self._goal)
 
     def fly_to(self, goal_m: Vec3) -> VelocityFluCommand:
-        """Fly to a point on a smooth path."""
-        self._begin("fly to goal")
-        if self._goal is None or self._goal.position_m != goal_m:
-            self._goal = Point(goal_m)
-            self._flight.change()
-        return self._compensated(self._fly(self._goal))
+        """Fly to a point on a smooth path; to one on the base, when that was looked at if need be."""
+        state, _ = self._begin("fly to goal")
+        flight = self._flight
+        known = self._world.base_known(state.time_us - round(SIGHTINGS_S * 1e6))
+        no_path = flight.path is None and flight.search is None and bool(flight.refusal)
+        searched = self._way_home.searches
+        goal = self._way_home.goal(goal_m, state, known, no_path=no_path)
+        if self._way_home.searches and not searched:
+            self._world.doubt_place()
+        if self._goal != goal:
+            self._goal = goal
+            flight.change()
+        return self._compensated(self._fly(goal))
 
     def step_back(self, colour: str) -> VelocityFluCommand:
         """Fly back from a gate, to one of its sides, facing it."""
@@ -228,6 +242,7 @@ class Navigator:
             self._flight.stop()
         if gap or action != self._action:
             self._action, self._goal = action, None
+            self._way_home.begin()
             self._flight.change()
         self._acted_s = now_s
         return state, now_s

@@ -20,9 +20,10 @@ from offboard.navigation.pose_history import DronePose, PoseCorrection, PoseHist
 from offboard.navigation.search.likelihood import Glimpses
 from offboard.navigation.seen_space import SeenSpace, ViewedSpace
 from offboard.navigation.view import GateEstimate, Surroundings
+from offboard.place.base_landmark import BaseLandmark
 from offboard.place.place import PlaceEstimator
 from scenarios.models import COLOURS
-from vision.types import Detections
+from vision.types import BaseExpectation, Detections
 
 START_SPARE_M = 0.02  # by which what is known to be free at the start exceeds what the drone needs
 IMAGES_WAITING = 32  # for the drone's pose when they were exposed
@@ -41,6 +42,7 @@ class WorldModel:
         self._surroundings = surroundings
         self._history = PoseHistory(camera)
         self._place = PlaceEstimator(camera, surroundings.shapes)
+        self._base = BaseLandmark(camera, surroundings.base)
         self._map = GateMap(camera, surroundings.arena, surroundings.shapes)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
         self.seen_space = SeenSpace(camera, surroundings.arena)
@@ -114,6 +116,7 @@ class WorldModel:
         if correction is not None:
             poses = [pose] * len(image.frames) if poses is None else poses
             self._place.see(image.frames, poses, correction, self._map)
+            self._see_base(image, pose, correction)
         self._obstacle_map.update(position_m, attitude, image.obstacle_edges)
         self.seen_space.update(position_m, attitude, image.obstacle_edges)
         self._explorer.coverage.update(position_m, attitude, image.obstacle_edges)
@@ -122,6 +125,33 @@ class WorldModel:
         others = any(gate.colour not in COLOURS for gate in self._map.gates)
         self.viewed_space.needed = others or len(known) < len(COLOURS)
         self._glimpses.update(position_m, attitude, image, known, self._map.is_lookalike)
+
+    def _see_base(self, image: Detections, pose: DronePose, correction: PoseCorrection) -> None:
+        sighting, base = image.base, self._base
+        if sighting is None:
+            return
+        at_us = pose.time_us + round(1e6 * self._camera.read_after_s(base.row_px(sighting)))
+        pose = self._history.at(at_us, self._place.correction(at_us)) or pose
+        if self._place.see_points(base.points_m(sighting), sighting, pose, correction):
+            base.seen_us.append(pose.time_us)
+
+    def expected_base(self, time_us: int) -> BaseExpectation | None:
+        """Where the base is to be looked for in an image; None if it need not be, or is out of view."""
+        std = self._place.std
+        pose = None if std is None else self._history.at(time_us, self._place.correction(time_us))
+        return None if std is None or pose is None else self._base.expected(pose, std)
+
+    def base_known(self, since_us: int) -> tuple[int, float] | None:
+        """How often the base was seen since a time, and how well the place is known in plan, metres.
+
+        None: the vehicle knows its place, so the base need not be looked at.
+        """
+        std = self._place.std
+        return None if std is None else (self._base.sightings(since_us), float(std[:2].max()))
+
+    def doubt_place(self) -> None:
+        """See `PlaceEstimator.doubt`."""
+        self._place.doubt()
 
     def _poses_of_rows(self, image: Detections, pose: DronePose) -> list[DronePose] | None:
         """With a rolling shutter, the drone's pose when each gate's middle row was read out."""

@@ -67,9 +67,7 @@ class InertialTrack:
                 [attitude],
             )
             return False
-        turn = self._attitudes[-1]
-        for sample in samples:
-            turn = self._add(sample, turn)
+        turn = self._integrate(samples, self._attitudes[-1])
         if samples:
             after_s = (self._times_us[-1] - time_us) * 1e-6
             reported = rotated_by_rate(attitude, samples[-1].angular_rate_flu_rad_s, after_s)
@@ -86,27 +84,28 @@ class InertialTrack:
         next_us = samples[0].time_us if samples else time_us
         return bool(self._times_us) and next_us - self._times_us[-1] > LONGEST_GAP_US
 
-    def _add(self, sample: ImuInterval, attitude: Quaternion) -> Quaternion:
-        """Add a sample that stands for the time since the last; the attitude at its end."""
-        step_s = (sample.time_us - self._times_us[-1]) * 1e-6
-        if step_s <= 0.0:
-            return attitude
-        rate = sample.angular_rate_flu_rad_s
-        middle = rotation(rotated_by_rate(attitude, rate, 0.5 * step_s))
-        ax, ay, az = to_world(middle, *sample.specific_force_flu_m_s2)
-        az -= GRAVITY_M_S2
-        (vx, vy, vz), (x, y, z), turn_rad = self._sums[-1]
-        half = 0.5 * step_s * step_s
-        self._times_us.append(sample.time_us)
-        self._sums.append(
-            (
-                (vx + ax * step_s, vy + ay * step_s, vz + az * step_s),
-                (x + vx * step_s + ax * half, y + vy * step_s + ay * half, z + vz * step_s + az * half),
-                turn_rad,
+    def _integrate(self, samples: tuple[ImuInterval, ...], attitude: Quaternion) -> Quaternion:
+        """Add samples, each of which stands for the time since the one before; the attitude at their end."""
+        times, sums, attitudes = self._times_us, self._sums, self._attitudes
+        (vx, vy, vz), (x, y, z), turn_rad = sums[-1]
+        for sample in samples:
+            step_s = (sample.time_us - times[-1]) * 1e-6
+            if step_s <= 0.0:
+                continue
+            rate, half_s = sample.angular_rate_flu_rad_s, 0.5 * step_s
+            middle = rotated_by_rate(attitude, rate, half_s)
+            ax, ay, az = to_world(rotation(middle), *sample.specific_force_flu_m_s2)
+            ux, uy, uz = ax * step_s, ay * step_s, (az - GRAVITY_M_S2) * step_s
+            x, y, z = (
+                x + vx * step_s + ux * half_s,
+                y + vy * step_s + uy * half_s,
+                z + vz * step_s + uz * half_s,
             )
-        )
-        attitude = rotated_by_rate(attitude, rate, step_s)
-        self._attitudes.append(attitude)
+            vx, vy, vz = vx + ux, vy + uy, vz + uz
+            attitude = rotated_by_rate(middle, rate, half_s)
+            times.append(sample.time_us)
+            sums.append(((vx, vy, vz), (x, y, z), turn_rad))
+            attitudes.append(attitude)
         return attitude
 
     def between(self, from_us: int, to_us: int) -> InertialMotion | None:

@@ -125,8 +125,7 @@ class GateLandmarks:
     def known(self, place: PlaceFilter, estimate: GateEstimate) -> GateEstimate:
         """A gate of the map, the best of its colour, as the filter has it: exact relative to the drone."""
         state = place.gate(estimate.colour)
-        if state is None:
-            return estimate
+        assert state is not None, "it is in the filter"
         covariance = place.gate_from_drone(estimate.colour)
         vx, vy, vz, v_yaw = covariance.diagonal().tolist()
         x, y, z, yaw = state.tolist()

@@ -1,4 +1,4 @@
-"""What the filter of the place measures: reported velocity and height, and corners of gates.
+"""What the filter of the place measures: what the vehicle reports, corners of gates, points known before.
 
 Each function gives the measurement's model: residual, Jacobian and noise at a state (`PlaceFilter`).
 """
@@ -6,44 +6,59 @@ Each function gives the measurement's model: residual, Jacobian and noise at a s
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, sin
+from math import cos, inf, sin
 
 import numpy as np
 
 from framerunner.geometry.vectors import Quaternion, Vec3
-from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.camera_model import NEAREST_M, CameraModel
 from offboard.navigation.gates.gate_measurement import GateView, predicted
 from offboard.navigation.pose_history import turned_by
-from offboard.place.place_filter import POSITION, TURN, VELOCITY, Floats, Measurement, Model
+from offboard.place.place_filter import OWN, POSITION, TURN, Floats, Measurement, Model
 
 PLACE_STD_M = 0.0005  # of the camera on the drone
 
 
-def velocity(reported_m_s: Vec3, level_std_m_s: float, climb_std_m_s: float) -> Model:
-    """A reported velocity, in the axes of the reported heading."""
-    x, y, z = reported_m_s
+def report(
+    velocity_m_s: Vec3,
+    level_std_m_s: float,
+    climb_std_m_s: float,
+    *,
+    position_m: Vec3 = (0.0, 0.0, 0.0),
+    height_std_m: float = inf,
+    position_std_m: float = inf,
+) -> Model:
+    """What a vehicle reports of its motion.
+
+    Args:
+        velocity_m_s: in the axes of the reported heading.
+        level_std_m_s: of its level components.
+        climb_std_m_s: of the vertical one.
+        position_m: above the arena's floor, and in plan.
+        height_std_m: infinite: the height is not used.
+        position_std_m: of each coordinate in plan; infinite: they are not used.
+    """
+    vx, vy, vz = velocity_m_s
+    stds = [level_std_m_s, level_std_m_s, climb_std_m_s]
+    used = []  # coordinates of the position
+    for axis, std_m in ((2, height_std_m), (0, position_std_m), (1, position_std_m)):
+        if std_m < inf:
+            used.append(axis)
+            stds.append(std_m)
+    measured = [position_m[axis] for axis in used]
+    noise = np.diag(np.square(stds))
+    shown = np.zeros((len(stds), OWN))
+    shown[np.arange(3), np.arange(4, 7)] = 1.0
+    shown[np.arange(3, len(stds)), used] = 1.0
 
     def at(state: Floats) -> Measurement:
         c, s = cos(state[TURN]), sin(state[TURN])
-        ax, ay = c * x - s * y, s * x + c * y
-        jacobian = np.zeros((3, len(state)))
-        jacobian[:, VELOCITY] = np.eye(3)
-        jacobian[:2, TURN] = (ay, -ax)
-        residual = np.array((ax, ay, z)) - state[VELOCITY]
-        return Measurement(
-            residual, jacobian, np.diag(np.square((level_std_m_s, level_std_m_s, climb_std_m_s)))
-        )
-
-    return at
-
-
-def height(reported_m: float, std_m: float) -> Model:
-    """A reported height above the arena's floor."""
-
-    def at(state: Floats) -> Measurement:
-        jacobian = np.zeros((1, len(state)))
-        jacobian[0, 2] = 1.0
-        return Measurement(np.array((reported_m - state[2],)), jacobian, np.array(((std_m**2,),)))
+        ax, ay = c * vx - s * vy, s * vx + c * vy
+        jacobian = np.zeros((len(stds), len(state)))
+        jacobian[:, :OWN] = shown
+        jacobian[0, TURN], jacobian[1, TURN] = ay, -ax
+        residual = np.array((ax, ay, vz, *measured)) - shown @ state[:OWN]
+        return Measurement(residual, jacobian, noise)
 
     return at
 
@@ -56,16 +71,6 @@ def stands(position_m: Vec3, turn_rad: float, std_m: float, turn_std_rad: float,
     def at(state: Floats) -> Measurement:
         jacobian = np.eye(len(known), len(state))
         return Measurement(known - state[: len(known)], jacobian, noise)
-
-    return at
-
-
-def position(reported_m: Vec3, std_m: float) -> Model:
-    """A reported place in plan."""
-
-    def at(state: Floats) -> Measurement:
-        residual = np.array(reported_m[:2]) - state[:2]
-        return Measurement(residual, np.eye(2, len(state)), std_m**2 * np.eye(2))
 
     return at
 
@@ -124,5 +129,52 @@ def corners(view: GateView, eye: Eye, first: int, yaw_var_rad2: float) -> Model:
             + PLACE_STD_M**2 * (moved @ moved.T)
         )
         return Measurement(view.corners_px - corners_px, jacobian, noise)
+
+    return at
+
+
+def points(
+    points_m: Floats, pixels: Floats, covariance_px2: Floats, eye: Eye, attitude_std_rad: float
+) -> Model:
+    """Known points in an image, such as corners of the base.
+
+    The attitude's error is common to all of them.
+
+    Args:
+        points_m: in the arena, shape (n, 3).
+        pixels: right of and below the optical axis, shape (n, 2).
+        covariance_px2: of all coordinates, shape (2 n, 2 n).
+        eye: that sees them.
+        attitude_std_rad: standard deviation of its attitude.
+    """
+
+    def at(state: Floats) -> Measurement | None:
+        place_m, attitude = eye.place(state)
+        camera = eye.model.pose(place_m, attitude)
+        focal_px = eye.model.focal_px
+        turn = np.array(camera.rotation).reshape(3, 3)
+        in_camera = (points_m - camera.position_m) @ turn
+        ahead = in_camera[:, 0]
+        if float(ahead.min()) < NEAREST_M:
+            return None
+        seen = -focal_px * in_camera[:, 1:] / ahead[:, None]
+        right, down = seen.T
+        by_body = np.zeros((len(seen), 2, 3))
+        by_body[:, 0, 0], by_body[:, 0, 1] = -right, -focal_px
+        by_body[:, 1, 0], by_body[:, 1, 2] = -down, -focal_px
+        by_point = (by_body / ahead[:, None, None]) @ turn.T
+        x, y, _ = (points_m - state[POSITION]).T
+        jacobian = np.zeros((len(seen), 2, len(state)))
+        jacobian[:, :, POSITION] = -by_point
+        jacobian[:, :, TURN] = by_point[:, :, 0] * y[:, None] - by_point[:, :, 1] * x[:, None]
+        turned = np.stack(
+            [
+                np.stack([down, -right * down / focal_px, focal_px + right * right / focal_px], axis=1),
+                np.stack([-right, -focal_px - down * down / focal_px, right * down / focal_px], axis=1),
+            ],
+            axis=1,
+        ).reshape(-1, 3)
+        noise = covariance_px2 + attitude_std_rad**2 * (turned @ turned.T)
+        return Measurement((pixels - seen).ravel(), jacobian.reshape(-1, len(state)), noise)
 
     return at

@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from math import hypot, pi, radians, remainder, sqrt
+from math import hypot, inf, pi, radians, remainder, sqrt
+
+import numpy as np
 
 from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3, turned
@@ -22,9 +24,9 @@ from offboard.navigation.pose_history import DronePose, PoseCorrection, turned_b
 from offboard.navigation.view import GateEstimate
 from offboard.place.inertial_track import InertialTrack
 from offboard.place.landmarks import GateLandmarks
-from offboard.place.measurements import Eye, height, position, stands, velocity
-from offboard.place.place_filter import POSITION, TURN, VELOCITY, PlaceFilter
-from vision.types import GateSighting
+from offboard.place.measurements import Eye, points, report, stands
+from offboard.place.place_filter import POSITION, TURN, VELOCITY, Floats, PlaceFilter
+from vision.types import BaseSighting, GateSighting
 
 # A place that is known no better than this, or this many times worse than at the start, is not known.
 SURE_M = 0.1
@@ -50,27 +52,34 @@ RESET_TURN_RAD = radians(3.0)
 BLIND_M = 0.1  # of the reported way in a gap of the IMU's samples, per root of a second
 BLIND_M_S = 0.3  # of the velocity after it
 
+POINTS_GATE = 30.0  # squared distance that fits; corners of a rigid cube have six degrees of freedom
+POINTS_STD_FACTOR = 2.0  # of corners: the errors of images from nearly the same place are not independent
+POINTS_MISFITS = 4  # in a row: known points tell that the estimate is wrong, and that is less well known then
+MISFIT_M, MISFIT_RAD = (0.2, 0.2, 0.05), radians(4.0)
+UNSEEN_M, UNSEEN_RAD = (0.5, 0.5, 0.05), radians(4.0)
 IMAGE_STD_M = 0.001
 
 
 class PlaceEstimator:
-    """Estimates the drone's place from its states, and from the gates that images show.
+    """Estimates the drone's place from its states, and from the gates and known points that images show.
 
     Args:
         camera: of the drone.
+        shapes: of the gates of each colour.
     """
 
     def __init__(self, camera: CameraModel, shapes: GateShapes) -> None:
         self._camera, self._shapes = camera, shapes
         self._track = InertialTrack()
         self._filter: PlaceFilter | None = None
-        self._reports: deque[tuple[int, DroneState]] = deque()
+        self._reports: deque[tuple[int, DroneState, ReportedAccuracy]] = deque()
         self._last: DroneState | None = None
         self._start: DroneState | None = None
         self._first_std_m: float | None = None
         self._left_us: int | None = None  # when the drone left the ground
         self._landmarks = GateLandmarks()
         self._fused_us = 0
+        self._misfits = 0  # of known points, in a row
 
     @property
     def estimates(self) -> bool:
@@ -100,13 +109,14 @@ class PlaceEstimator:
         if self._filter is None and continued and not self._is_sure(state):
             self._filter = PlaceFilter(position_us, (state.x, state.y, state.z), state.velocity_arena_m_s)
         place = self._filter
-        if place is not None:
+        accuracy = state.accuracy
+        if place is not None and accuracy is not None:
             if last is not None and _resets(last) != _resets(state):
                 place.p[TURN, TURN] += RESET_TURN_RAD**2
             for each in (*state.missed, state):
                 at_us = each.time_us - round(each.position_age_s * 1e6)
                 if not self._reports or at_us > self._reports[-1][0]:
-                    self._reports.append((at_us, each))
+                    self._reports.append((at_us, each, accuracy))
         self._last = state
 
     def _is_sure(self, state: DroneState) -> bool:
@@ -124,7 +134,7 @@ class PlaceEstimator:
         gap_s = max(0.0, (state.time_us - place.time_us) * 1e-6)
         x, y = turned(state.x - last.x, state.y - last.y, place.turn_rad)
         place.displace(state.time_us, (x, y, state.z - last.z), BLIND_M * sqrt(gap_s), BLIND_M_S)
-        place.update(velocity(state.velocity_arena_m_s, BLIND_M_S, BLIND_M_S))
+        place.update(report(state.velocity_arena_m_s, BLIND_M_S, BLIND_M_S))
         self._reports.clear()
 
     def advance(self, time_us: int | None = None) -> bool:
@@ -139,9 +149,9 @@ class PlaceEstimator:
         at_us = last.time_us - LATE_US if time_us is None else time_us
         reports = self._reports
         while reports and reports[0][0] <= at_us:
-            report_us, report = reports.popleft()
+            report_us, state, accuracy = reports.popleft()
             if report_us >= place.time_us and self._predict(place, report_us):
-                self._use(place, report, report_us)
+                self._use(place, state, accuracy, report_us)
         return self._predict(place, at_us)
 
     def _predict(self, place: PlaceFilter, time_us: int) -> bool:
@@ -154,16 +164,15 @@ class PlaceEstimator:
         place.time_us = time_us
         return True
 
-    def _use(self, place: PlaceFilter, report: DroneState, time_us: int) -> None:
+    def _use(self, place: PlaceFilter, state: DroneState, accuracy: ReportedAccuracy, time_us: int) -> None:
         """Fuse what a state reports of a time."""
-        accuracy, start = report.accuracy, self._start
-        assert accuracy is not None, "without it there is no filter"
+        start = self._start
         assert start is not None, "the filter begins with a state"
         step_s = min(max((time_us - self._fused_us) * 1e-6, 0.01), 0.2)
         self._fused_us = time_us
         stood = self._left_us is None or time_us < self._left_us - STOOD_US
-        if stood and hypot(*report.velocity_arena_m_s) < STANDS_M_S:
-            turn_rad = remainder(start.yaw - report.yaw, 2 * pi)
+        if stood and hypot(*state.velocity_arena_m_s) < STANDS_M_S:
+            turn_rad = remainder(start.yaw - state.yaw, 2 * pi)
             place.update(stands((start.x, start.y, start.z), turn_rad, *STANDS_STD))
             return
         slow = sqrt(2.0 * ERROR_S / step_s)
@@ -171,11 +180,17 @@ class PlaceEstimator:
             slow * max(std, LEAST_VELOCITY_STD_M_S)
             for std in (accuracy.velocity_std_m_s, accuracy.climb_std_m_s)
         )
-        place.update(velocity(report.velocity_arena_m_s, level, climb))
-        place.update(height(report.z, max(accuracy.height_std_m, LEAST_HEIGHT_STD_M)))
-        if self._knows_position(accuracy):
-            at_m = (report.x, report.y, report.z)
-            place.update(position(at_m, slow * max(accuracy.position_std_m, LEAST_POSITION_STD_M)))
+        knows = self._knows_position(accuracy)
+        place.update(
+            report(
+                state.velocity_arena_m_s,
+                level,
+                climb,
+                position_m=(state.x, state.y, state.z),
+                height_std_m=max(accuracy.height_std_m, LEAST_HEIGHT_STD_M),
+                position_std_m=slow * max(accuracy.position_std_m, LEAST_POSITION_STD_M) if knows else inf,
+            )
+        )
 
     def _is_settling(self, time_us: int) -> bool:
         """Whether the vehicle may correct its heading now."""
@@ -260,6 +275,41 @@ class PlaceEstimator:
                 by_colour.setdefault(sighting.colour, []).append((view, self._eye(pose, at)))
         self._landmarks.see(place, by_colour, gates)
 
+    def see_points(
+        self, points_m: Floats, sighting: BaseSighting, pose: DronePose, at: PoseCorrection
+    ) -> bool:
+        """Use known points in an image, to whose time the filter was brought; whether they fit.
+
+        Args:
+            points_m: in the arena, shape (n, 3).
+            sighting: of them.
+            pose: corrected, of the drone when they were read out.
+            at: the correction of the pose.
+        """
+        place = self._filter
+        if place is None:
+            return False
+        covariance = POINTS_STD_FACTOR**2 * sighting.covariance_px2
+        model = points(points_m, sighting.pixels, covariance, self._eye(pose, at), pose.attitude_std_rad)
+        if place.update(model, POINTS_GATE):
+            self._misfits = 0
+            return True
+        self._misfits += 1
+        if self._misfits >= POINTS_MISFITS:
+            self._misfits = 0
+            place.doubt(MISFIT_M, MISFIT_RAD)
+        return False
+
+    def doubt(self) -> None:
+        """What should be in view for long is not seen: the place is not known as well as it seems."""
+        if self._filter is not None:
+            self._filter.doubt(UNSEEN_M, UNSEEN_RAD)
+
+    @property
+    def std(self) -> Floats | None:
+        """Standard deviations of x, y, z (metres) and the heading (radians); None if nothing is estimated."""
+        return None if self._filter is None else np.sqrt(self._filter.p.diagonal()[:4])
+
     def _eye(self, pose: DronePose, at: PoseCorrection) -> Eye:
         """The carrier of a corrected pose, without the correction."""
         x, y, z = (a - b for a, b in zip(pose.position_m, at.position_m, strict=True))
@@ -270,8 +320,16 @@ class PlaceEstimator:
         )
 
     def known(self, estimate: GateEstimate) -> GateEstimate:
-        """A gate of the map, the best of its colour, as the filter has it: exact relative to the drone."""
-        return estimate if self._filter is None else self._landmarks.known(self._filter, estimate)
+        """A gate of the map, the best of its colour, as the filter has it: exact relative to the drone.
+
+        One that the filter could have and has not is not certain: the map does not know how the drone drifts.
+        """
+        place, last = self._filter, self._last
+        if place is None or last is None:
+            return estimate
+        if estimate.colour not in place.gates:
+            return replace(estimate, certain=False) if last.imu else estimate
+        return self._landmarks.known(place, estimate)
 
 
 def _resets(state: DroneState) -> int:

@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, radians, sin, sqrt
+from math import cos, inf, radians, sin, sqrt
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.rotations import to_world
 from framerunner.geometry.vectors import Vec3
 from offboard.place.inertial_track import InertialMotion
 
@@ -37,7 +38,13 @@ START_POSITION_M = 0.003
 START_VELOCITY_M_S = 0.02
 START_TURN_RAD = radians(1.0)
 START_BIAS_M_S2 = 0.05
-ITERATIONS = 3
+_EYE = np.eye(OWN)
+_MOVED = np.zeros((OWN, OWN))  # how velocity moves the position
+_MOVED[POSITION, VELOCITY] = np.eye(3)
+_BY_TIME = np.diag([0.0] * 4 + [ACCEL_M_S2**2] * 3 + [BIAS_M_S2**2] * 3)  # noise that grows with time,
+_BY_TIME_2 = ACCEL_M_S2**2 / 2.0 * (_MOVED + _MOVED.T)  # its square,
+_BY_TIME_3 = ACCEL_M_S2**2 / 3.0 * (_MOVED @ _MOVED.T)  # and its cube
+ITERATIONS = 5
 MOVED = 0.005  # metres or radians: where the state moves less, linearising anew changes nothing
 
 
@@ -109,27 +116,23 @@ class PlaceFilter:
 
     def moved(self, motion: InertialMotion) -> tuple[Vec3, Vec3]:
         """Position and velocity after a motion; the state stays."""
-        position, velocity, _ = self._after(motion)
-        return (
-            (float(position[0]), float(position[1]), float(position[2])),
-            (float(velocity[0]), float(velocity[1]), float(velocity[2])),
+        px, py, pz, turn_rad, vx, vy, vz, bx, by, bz = self.x[:OWN].tolist()
+        c, s, step_s = cos(turn_rad), sin(turn_rad), motion.duration_s
+        gx, gy, gz = to_world(motion.attitude, bx, by, bz)
+        gx, gy = c * gx - s * gy, s * gx + c * gy
+        (ux, uy, uz), (dx, dy, dz) = motion.velocity_m_s, motion.position_m
+        half = 0.5 * step_s**2
+        velocity = (
+            vx + c * ux - s * uy - step_s * gx,
+            vy + s * ux + c * uy - step_s * gy,
+            vz + uz - step_s * gz,
         )
-
-    def _after(self, motion: InertialMotion) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity, and the axes of the body in the arena."""
-        c, s = cos(self.x[TURN]), sin(self.x[TURN])
-        turn = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
-        body = turn @ np.array(motion.attitude).reshape(3, 3)
-        biased = body @ self.x[BIAS]
-        step_s = motion.duration_s
-        velocity = self.x[VELOCITY] + turn @ np.array(motion.velocity_m_s) - step_s * biased
         position = (
-            self.x[POSITION]
-            + step_s * self.x[VELOCITY]
-            + turn @ np.array(motion.position_m)
-            - 0.5 * step_s**2 * biased
+            px + step_s * vx + c * dx - s * dy - half * gx,
+            py + step_s * vy + s * dx + c * dy - half * gy,
+            pz + step_s * vz + dz - half * gz,
         )
-        return position, velocity, body
+        return position, velocity
 
     def predict(self, motion: InertialMotion, *, settling: bool = False) -> None:
         """Let the time of a motion pass.
@@ -141,12 +144,14 @@ class PlaceFilter:
             motion: since the state.
             settling: the vehicle may just be correcting its heading.
         """
-        position, velocity, body = self._after(motion)
+        position, velocity = self.moved(motion)
         step_s = motion.duration_s
+        c, s = cos(self.x[TURN]), sin(self.x[TURN])
+        turn = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+        body = turn @ np.array(motion.attitude).reshape(3, 3)
         by_force = position - self.x[POSITION] - step_s * self.x[VELOCITY]
         gained = velocity - self.x[VELOCITY]
-        f = np.eye(OWN)
-        f[POSITION, VELOCITY] = step_s * np.eye(3)
+        f = _EYE + step_s * _MOVED
         f[POSITION, TURN] = (-by_force[1], by_force[0], 0.0)
         f[POSITION, BIAS] = -0.5 * step_s**2 * body
         f[VELOCITY, TURN] = (-gained[1], gained[0], 0.0)
@@ -155,12 +160,7 @@ class PlaceFilter:
         p = self.p
         p[:OWN] = f @ p[:OWN]
         p[:, :OWN] = p[:, :OWN] @ f.T
-        each, q = np.arange(3), ACCEL_M_S2**2
-        p[each, each] += q * step_s**3 / 3.0
-        p[each + 4, each + 4] += q * step_s
-        p[each, each + 4] += q * step_s**2 / 2.0
-        p[each + 4, each] += q * step_s**2 / 2.0
-        p[each + 7, each + 7] += BIAS_M_S2**2 * step_s
+        p[:OWN, :OWN] += step_s * _BY_TIME + step_s**2 * _BY_TIME_2 + step_s**3 * _BY_TIME_3
         reported, gyro = (TURN_SETTLING_RAD if settling else TURN_RAD) ** 2, GYRO_RAD**2
         p[TURN, TURN] += step_s * reported * gyro / (reported + gyro)
         self.x[TURN] = self.turned_rad(motion, settling=settling)
@@ -181,6 +181,21 @@ class PlaceFilter:
         self.p[each, each] += std_m**2
         self.p[each + 4, each + 4] += velocity_std_m_s**2
 
+    def doubt(self, std_m: Vec3, heading_std_rad: float) -> None:
+        """Know less well where drone and gates are in the arena; relative to one another they stay known.
+
+        Args:
+            std_m: of x, y and z, in addition.
+            heading_std_rad: of the heading, in addition.
+        """
+        common = np.zeros((len(self.x), 4))
+        common[:4] = np.eye(4)
+        for at in self.gates.values():
+            x, y, _ = self.x[at : at + 3] - self.x[POSITION]
+            common[at : at + GATE] = np.eye(GATE)
+            common[at : at + 2, TURN] = (-y, x)
+        self.p += common * np.square((*std_m, heading_std_rad)) @ common.T
+
     def distance2(self, model: Model) -> float | None:
         """Square of a measurement's Mahalanobis distance; None if it cannot be made."""
         at = model(self.x)
@@ -189,8 +204,18 @@ class PlaceFilter:
         spread = at.jacobian @ self.p @ at.jacobian.T + at.noise
         return float(at.residual @ np.linalg.solve(spread, at.residual))
 
-    def update(self, model: Model) -> None:
-        """Use a measurement, linearised where it leads to (Bell & Cathey, IEEE TAC 38(2), 1993)."""
+    def update(self, model: Model, most2: float = inf) -> bool:
+        """Use a measurement, linearised where it leads to (Bell & Cathey, IEEE TAC 38(2), 1993).
+
+        Args:
+            model: of the measurement.
+            most2: it is used if the squares of the Mahalanobis distances of what is measured and of the state
+                from where it leads to are no more together. For a linear model this is `distance2`; it also
+                holds where little was known, and the model is far from linear.
+
+        Returns:
+            Whether it was used.
+        """
         before = at = self.x
         for _ in range(ITERATIONS):
             measurement = model(at)
@@ -198,14 +223,25 @@ class PlaceFilter:
                 break
             h, noise = measurement.jacobian, measurement.noise
             across = self.p @ h.T
+            innovation = measurement.residual - h @ (before - at)
             gain = np.linalg.solve(h @ across + noise, across.T).T
-            led = before + gain @ (measurement.residual - h @ (before - at))
+            led = before + gain @ innovation
             moved, at = float(np.abs(led - at).max()), led
             if moved < MOVED:
                 break
-        if at is not before:
-            kept = np.eye(len(before)) - gain @ h
-            self.x, self.p = at, kept @ self.p @ kept.T + gain @ noise @ gain.T
+        if at is before:
+            return False
+        if most2 < inf:
+            reached, of_state = model(at), np.linalg.solve(h @ across + noise, innovation)
+            if reached is None:
+                return False
+            distance2 = float(of_state @ h @ across @ of_state)
+            distance2 += float(reached.residual @ np.linalg.solve(reached.noise, reached.residual))
+            if distance2 > most2:
+                return False
+        kept = np.eye(len(before)) - gain @ h
+        self.x, self.p = at, kept @ self.p @ kept.T + gain @ noise @ gain.T
+        return True
 
     def add_gate(self, colour: str, state: Floats, covariance: Floats) -> None:
         """Begin to estimate a gate: x, y, z and yaw as seen from the drone where it is estimated to be.
@@ -239,11 +275,13 @@ class PlaceFilter:
 
     def gate_from_drone(self, colour: str) -> Floats:
         """Covariance of a gate's place and yaw relative to the drone, in the arena's axes, shape (4, 4)."""
-        at = self.gates[colour]
-        j = np.zeros((GATE, len(self.x)))
-        j[:, at : at + GATE] = np.eye(GATE)
-        j[:3, POSITION] = -np.eye(3)
-        x, y, _ = self.x[at : at + 3] - self.x[POSITION]
-        j[:, TURN] = (y, -x, 0.0, -1.0)
-        covariance: Floats = j @ self.p @ j.T
+        first = self.gates[colour]
+        gate = slice(first, first + GATE)
+        px, py = self.x[:2].tolist()
+        x, y = self.x[first : first + 2].tolist()
+        by_drone = np.array(
+            ((1.0, 0.0, 0.0, py - y), (0.0, 1.0, 0.0, x - px), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        )
+        relative = self.p[gate] - by_drone @ self.p[:GATE]  # its position and turn come first
+        covariance: Floats = relative[:, gate] - relative[:, :GATE] @ by_drone.T
         return covariance

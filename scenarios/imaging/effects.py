@@ -72,6 +72,9 @@ class CameraEffects(Part):
     readout_s: float = Field(
         0.0, ge=0, le=0.05, description="from the first to the last row; 0: all rows at once (global shutter)"
     )
+    blur_px: float = Field(
+        0.0, ge=0, le=10, description="standard deviation of the lens's blur, pixels of the image"
+    )
     vignetting: float = Field(0.0, ge=0, le=0.9, description="share of the light lost in the image's corners")
     illumination: float = Field(
         1.0, ge=0.02, le=1, description="light that reaches the sensor; the painted colours have 1"

@@ -20,6 +20,7 @@ from offboard.perception import IMAGES_KEPT, CameraLostError, CameraPerception
 from offboard.pilot import Pilot
 from scenarios.loader import load_scenario
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone, NoCamera
+from vision.base.detector import BaseExpectations
 from vision.types import CameraFrame, Detections
 
 MISSION = load_mission("frame_challenge")
@@ -131,6 +132,9 @@ class Blind(NoCamera):
         return ()
 
     def space_images(self, period_s: float) -> None:
+        pass
+
+    def expect_base(self, expected: BaseExpectations) -> None:
         pass
 
 

@@ -112,13 +112,16 @@ async def test_px4_that_never_answers_is_an_error(plugin, dialect, monkeypatch):
         await dialect.before_tick()
 
 
-async def test_after_a_request_for_a_stream_no_echo_is_awaited_before_time_goes_on(
+async def test_streams_are_requested_one_a_tick_without_an_echo_before_time_goes_on(
     plugin, dialect, monkeypatch
 ):
     monkeypatch.setattr(px4, "_TAKEN_S", 0.0)
-    await dialect.request_streams()
-    plugin.names()
-    await dialect.before_tick()
-    assert plugin.names() == []
+    requested = asyncio.create_task(dialect.request_streams())
+    await asyncio.sleep(0)
+    for _ in px4.STREAMS_HZ:
+        assert not requested.done()
+        await dialect.before_tick()
+        assert plugin.names() == ["COMMAND_LONG"]
     await dialect.before_tick()
     assert plugin.names() == ["PING"]
+    await asyncio.wait_for(requested, 1.0)

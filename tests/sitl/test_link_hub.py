@@ -240,6 +240,7 @@ async def test_a_serial_line_that_was_gone_is_opened_again(monkeypatch, tmp_path
     line = plug_in()
     async with drone_with(f"serial://{device}:57600") as drone:
         await heard(drone, lambda: read(line[0]), "HEARTBEAT")
+        device.unlink()  # as an adapter's; else it may soon name the terminal of another program
         os.close(line[0])
         os.close(line[1])
         await asyncio.sleep(0.1)

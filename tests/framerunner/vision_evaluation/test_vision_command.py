@@ -1,13 +1,23 @@
 """`framerunner vision`: the labelled images, the report and the data set."""
 
 import json
+from math import atan
+from pathlib import Path
 
 import cv2
+import matplotlib
+import numpy as np
 import pytest
 
 from framerunner.cli import run
-from framerunner.vision_evaluation.labelled_images import Disturbance, labelled_images
+from framerunner.geometry.rotations import quaternion_from_euler, rotation, rotation_rows
+from framerunner.vision_evaluation.backgrounds import Backgrounds
+from framerunner.vision_evaluation.camera_chain import PRESETS, CameraChain
+from framerunner.vision_evaluation.labelled_images import labelled_images
+from framerunner.vision_evaluation.own_pictures import OwnPictures
+from scenarios.models import Camera
 from scenarios.random_scenarios import load_level
+from sitl.camera_projection import Pinhole
 from vision.detectors import new_detector
 
 
@@ -43,14 +53,58 @@ def test_the_data_set_has_what_is_in_each_image(tmp_path):
     assert (tmp_path / "labels.json").read_bytes() == before
 
 
+def _write_own_pictures(folder, count):
+    """Painted pictures, and their labels as one would click them; the gates that are labelled."""
+    camera, images, gates = None, [], []
+    for number, one in enumerate(labelled_images(load_level("calm"), count, 70, CameraChain())):
+        camera = one.calibration
+        cv2.imwrite(str(folder / f"{number}.png"), one.image)
+        seen = [gate for gate in one.gates if gate.seen and gate.corners_px]
+        clicked = []
+        for gate in seen:
+            corners = [(x + camera.cx_px, y + camera.cy_px) for x, y in gate.corners_px]
+            clicked.append({"colour": gate.colour, "corners": corners, "whole": gate.whole})
+        images.append({"image": f"{number}.png", "frames": clicked})
+        gates += seen
+    labels = {"focal_px": camera.fx_px, "images": images}
+    (folder / "labels.json").write_text(json.dumps(labels))
+    return labels, gates
+
+
+def test_own_pictures_are_rated_by_the_corners_of_their_gates(tmp_path):
+    _, gates = _write_own_pictures(tmp_path, 15)
+    known = [gate for image in OwnPictures.of_folder(tmp_path).images() for gate in image.gates]
+    assert [gate.distance_m for gate in known] == pytest.approx([gate.distance_m for gate in gates], rel=1e-3)
+    out = tmp_path / "out"
+    assert run(["vision", "evaluate", "--labelled", str(tmp_path), "--out", str(out)]) == 0
+    report = json.loads((out / "vision.json").read_text())
+    assert report["images"] == 15
+    assert report["detectors"][1]["found"] == 1.0
+    assert report["false_alarms"]["frames"] == 0
+
+
 @pytest.mark.parametrize(
-    "disturbance", [Disturbance(), Disturbance(noise=3, blur_px=0.6, light=0.7, jpeg=98)]
+    ("change", "said"),
+    [
+        ({"focal_px": None}, "focal_px or calibration"),
+        ({"images": [{"image": "none.png"}]}, "none.png"),
+        ({"images": [{"image": "0.png", "frames": [{"colour": "pink", "corners": [[0, 0]] * 4}]}]}, "colour"),
+        ({"images": [{"image": "0.png", "frames": [{"colour": "red", "corners": [[5, 5]] * 4}]}]}, "corners"),
+    ],
 )
-def test_gates_of_crowded_scenes_are_found_where_they_are(disturbance):
+def test_labels_that_cannot_be_used_are_named(tmp_path, capsys, change, said):
+    labels, _ = _write_own_pictures(tmp_path, 1)
+    (tmp_path / "labels.json").write_text(json.dumps(labels | change))
+    assert run(["vision", "evaluate", "--labelled", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("chain", [CameraChain(), CameraChain(noise=3, blur_px=(0.6, 0.6), light=(0.7, 0.7))])
+def test_gates_of_crowded_scenes_are_found_where_they_are(chain):
     find = None
     found = whole = 0
-    for labelled in labelled_images(load_level("crowded"), 60, 40, disturbance):
-        find = find or new_detector("frames", focal_px=labelled.focal_px)
+    for labelled in labelled_images(load_level("crowded"), 60, 40, chain):
+        find = find or new_detector("frames", calibration=labelled.calibration)
         sightings = find(labelled.image, None).frames
         for label in labelled.gates:
             if label.whole and label.distance_m < 4 and label.angle_deg < 70:
@@ -66,11 +120,11 @@ def test_gates_of_crowded_scenes_are_found_where_they_are(disturbance):
                     for sighting in sightings
                 )
     assert whole >= 12
-    assert found >= whole - (disturbance != Disturbance())
+    assert found >= whole - (chain != CameraChain())
 
 
 def test_the_same_seed_gives_the_same_images():
-    one, two = (list(labelled_images(load_level("calm"), 3, 9, Disturbance(noise=2))) for _ in range(2))
+    one, two = (list(labelled_images(load_level("calm"), 3, 9, CameraChain(noise=2))) for _ in range(2))
     for a, b in zip(one, two, strict=True):
         assert (a.image == b.image).all()
         assert a.gates == b.gates
@@ -79,3 +133,72 @@ def test_the_same_seed_gives_the_same_images():
 def test_a_bad_option_is_named(capsys):
     assert run(["vision", "evaluate", "--jpeg", "0"]) == 2
     assert "--jpeg 0" in capsys.readouterr().err
+
+
+PHOTOGRAPH = Path(matplotlib.get_data_path()) / "sample_data" / "grace_hopper.jpg"  # public domain
+
+
+def with_photograph(preset, count, seed):
+    photograph = np.asarray(cv2.imread(str(PHOTOGRAPH)))
+    return list(labelled_images(load_level("calm"), count, seed, PRESETS[preset], Backgrounds((photograph,))))
+
+
+def test_a_photograph_is_behind_the_gates():
+    plain = list(labelled_images(load_level("calm"), 12, 3, PRESETS["plain"]))
+    compared = 0
+    for before, behind in zip(plain, with_photograph("plain", 12, 3), strict=True):
+        assert before.gates == behind.gates
+        same = (
+            np.abs(before.image.astype(int) - behind.image).max(axis=2) < 60
+        )  # edges mix with what is behind
+        assert same.mean() < 0.5  # of sky and floor nothing is left
+        for label in before.gates:
+            if label.whole and label.distance_m < 3.0:
+                for right, down in label.corners_px:
+                    row, column = round(down + 119.5), round(right + 159.5)
+                    assert same[row - 1 : row + 2, column - 1 : column + 2].any()
+                    compared += 1
+    assert compared >= 8
+
+
+def test_a_photograph_turns_with_the_camera():
+    photograph = np.asarray(cv2.imread(str(PHOTOGRAPH)))
+    camera = Camera()
+    level = rotation_rows(rotation((1.0, 0.0, 0.0, 0.0)))
+    backdrop = Backgrounds((photograph,)).draw(camera, level, np.random.default_rng(4))
+    pinhole = Pinhole(320, 240, camera.focal_px, camera.near_m, camera.far_m)
+    straight, turned = np.empty((2, 240, 320, 3), np.uint8)
+    backdrop.paint(straight, level, pinhole)
+    left = 10.0 / camera.focal_px  # tangent of the turn: 10 pixels in the middle
+    backdrop.paint(turned, rotation_rows(rotation(quaternion_from_euler(0.0, 0.0, atan(left)))), pinhole)
+    moved = np.abs(turned[115:125, 155:165].astype(int) - straight[115:125, 145:155]).mean()
+    unmoved = np.abs(turned[115:125, 155:165].astype(int) - straight[115:125, 155:165]).mean()
+    assert moved < 0.3 * unmoved
+
+
+@pytest.mark.parametrize("preset", ["jpeg", "h264"])
+def test_compression_halves_the_resolution_of_colour_and_keeps_the_scene(preset):
+    for clear, sent in zip(with_photograph("tint", 5, 8), with_photograph(preset, 5, 8), strict=True):
+        assert clear.gates == sent.gates
+        luma, chroma = (
+            np.abs(
+                cv2.cvtColor(clear.image, cv2.COLOR_BGR2YCrCb).astype(int)[..., channels]
+                - cv2.cvtColor(sent.image, cv2.COLOR_BGR2YCrCb)[..., channels]
+            ).mean()
+            for channels in (slice(0, 1), slice(1, 3))
+        )
+        assert 0.0 < luma < 12.0
+        assert 0.0 < chroma < 8.0
+
+
+def test_the_same_seed_gives_the_same_stream():
+    for a, b in zip(with_photograph("h264", 3, 9), with_photograph("h264", 3, 9), strict=True):
+        assert (a.image == b.image).all()
+
+
+def test_a_folder_without_photographs_is_named(tmp_path, capsys):
+    assert run(["vision", "evaluate", "--backgrounds", str(tmp_path)]) == 2
+    assert f"--backgrounds {tmp_path}: has no photographs" in capsys.readouterr().err
+    (tmp_path / "a.png").write_text("no image")
+    assert run(["vision", "evaluate", "--backgrounds", str(tmp_path)]) == 2
+    assert "a.png" in capsys.readouterr().err

@@ -11,13 +11,14 @@ from offboard.drone import ImuInterval
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.gates.gate_measurement import GateView
 from offboard.place.inertial_track import GRAVITY_M_S2, InertialTrack
-from offboard.place.measurements import Eye, corners, height, position, stands, velocity
+from offboard.place.measurements import Eye, corners, points, report, stands
 from offboard.place.place_filter import OWN, TURN, PlaceFilter
 from scenarios.models import Camera
 
 CAMERA = CameraModel.of(Camera())
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 EYE = Eye(CAMERA, quaternion_from_euler(0.1, -0.05, 0.4), (0.02, -0.01, 0.03))
+BASE_M = np.array(((2.1, 0.4, 0.5), (2.1, 0.9, 0.5), (1.8, 0.2, 0.0)))
 STATE = np.array((0.1, -0.3, 1.2, 0.05, 0.5, -0.2, 0.1, 0.02, -0.01, 0.03, 2.1, 0.9, 1.4, 0.7))
 
 
@@ -108,12 +109,15 @@ def view(seen=(True, True, True, True)):
 @pytest.mark.parametrize(
     "model",
     [
-        velocity((0.6, -0.1, 0.2), 0.1, 0.05),
-        height(1.3, 0.05),
-        position((0.2, 0.1, 1.0), 0.01),
+        report((0.6, -0.1, 0.2), 0.1, 0.05),
+        report((0.6, -0.1, 0.2), 0.1, 0.05, position_m=(0.2, 0.1, 1.3), height_std_m=0.05),
+        report(
+            (0.6, -0.1, 0.2), 0.1, 0.05, position_m=(0.2, 0.1, 1.3), height_std_m=0.05, position_std_m=0.01
+        ),
         stands((0.2, 0.1, 1.0), 0.1, 0.01, 0.01, 0.01),
         corners(view(), EYE, OWN, 0.0),
         corners(view((True, False, False, True)), EYE, OWN, 0.0),
+        points(BASE_M, np.array(((5.0, 60.0), (-40.0, 55.0), (20.0, 70.0))), np.eye(6), EYE, 0.003),
     ],
 )
 def test_the_derivatives_of_a_measurement_are_those_of_its_residual(model):
@@ -161,3 +165,41 @@ def test_a_gate_is_known_as_well_from_the_drone_as_it_was_seen_however_far_that_
     assert place.gate("red") is None
     assert place.gate("blue").tolist() == [-3.0, 1.0, 1.2, 1.3]
     assert place.gate_from_drone("blue") == pytest.approx(seen, abs=1e-9)
+
+
+CORNERS_M = np.array(
+    [(2.4 + x, 0.1 + y, z) for x in (-0.25, 0.25) for y in (-0.25, 0.25) for z in (0.0, 0.5)]
+)
+
+
+def corners_from(true_m):
+    """The corners of a base in an image that is taken at a place."""
+    eye = Eye(CAMERA, LEVEL, (0.0, 0.0, 0.0))
+    camera = CAMERA.pose(true_m, LEVEL)
+    pixels = np.array([CAMERA.project(camera, tuple(corner)) for corner in CORNERS_M])
+    return lambda spoilt_px: points(
+        CORNERS_M, pixels + spoilt_px, 0.25 * np.eye(2 * len(pixels)), eye, attitude_std_rad=0.003
+    )
+
+
+def test_a_place_that_is_far_off_is_found_by_known_corners_once_it_is_doubted():
+    true_m = (0.9, 0.3, 0.9)
+    measured = corners_from(true_m)
+    place = PlaceFilter(0, (0.2, -0.4, 0.93), (0.0, 0.0, 0.0), position_std_m=0.05)
+    assert not place.update(measured(0.0), 30.0)
+    assert place.x[:3] == pytest.approx((0.2, -0.4, 0.93))
+    place.doubt((0.5, 0.5, 0.05), 0.07)
+    other = np.random.default_rng(1).normal(0.0, 12.0, (len(CORNERS_M), 2))
+    assert not place.update(measured(other), 30.0)
+    assert place.update(measured(0.0), 30.0)
+    assert place.x[:3] == pytest.approx(true_m, abs=0.02)
+
+
+def test_a_doubted_place_is_known_as_well_as_before_relative_to_the_gates():
+    place = PlaceFilter(0, (0.2, -0.4, 0.9), (0.0, 0.0, 0.0))
+    place.add_gate("red", np.array((2.0, 0.5, 1.2, 0.3)), 1e-4 * np.eye(4))
+    before, gate_m = place.gate_from_drone("red"), place.p[OWN, OWN]
+    place.doubt((0.5, 0.5, 0.05), 0.07)
+    assert place.gate_from_drone("red") == pytest.approx(before, abs=1e-9)
+    assert place.p[0, 0] > 0.25
+    assert place.p[OWN, OWN] > gate_m + 0.25

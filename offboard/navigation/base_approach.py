@@ -1,0 +1,139 @@
+"""The way home of a drone that does not know its place: it looks at the base before it lands on it."""
+
+from __future__ import annotations
+
+from math import atan2, cos, dist, hypot, pi, sin
+
+from framerunner.geometry.vectors import Vec3
+from offboard.drone import DroneState
+from offboard.navigation.goals import Point
+from scenarios.models import Arena, Base, is_over_base
+
+BEFORE_M = 1.4  # from the base's centre: from there the drone looks at it
+ABOVE_M = 0.45  # its top: all of the top is in view
+SIDE_M = 0.5  # from the arena's sides, at least
+REACHED_M, REACHED_M_S = 0.25, 0.3
+SEARCH_S = 1.2  # if the base is not seen in so long, it is looked for farther around
+LOOK_S = 2.5  # likewise, from another side
+SIGHTINGS, SIGHTINGS_S = 4, 1.2  # so many in so long, and
+SURE_M = 0.03  # a place known so well are enough to land
+NEAR_M = 1.8  # from here on that is so in flight, too
+PLACES = 4  # from which it is looked for; then the drone lands where it believes the base to be
+ASIDE_RAD = pi / 4  # between two of them
+
+
+class WayHome:
+    """Where to fly to first, on the way to a point that may be on the base."""
+
+    def __init__(self, base: Base, arena: Arena) -> None:
+        self._base, self._arena = base, arena
+        self._approach: BaseApproach | None = None
+
+    def begin(self) -> None:
+        """Forget the way that was flown."""
+        self._approach = None
+
+    @property
+    def looks(self) -> bool:
+        """The drone is on its way to a place from which it looks at the base, or is there."""
+        return self._approach is not None and not self._approach.lands
+
+    @property
+    def searches(self) -> bool:
+        """See `BaseApproach`."""
+        return self._approach is not None and self._approach.searches
+
+    def goal(
+        self, goal_m: Vec3, state: DroneState, known: tuple[int, float] | None, *, no_path: bool
+    ) -> Point:
+        """Where to fly to now; a drone that knows its place flies to the point itself.
+
+        Args:
+            goal_m: the point.
+            state: of the drone, as estimated.
+            known: how often the base was seen in the last `SIGHTINGS_S`, and the standard deviation of the
+                place in plan, metres; None for a drone that knows its place.
+            no_path: there is none to where it was to fly.
+        """
+        if known is None or not is_over_base(self._base, goal_m[0], goal_m[1]):
+            return Point(goal_m)
+        here_m = (state.x, state.y, state.z)
+        if self._approach is None:
+            self._approach = BaseApproach(self._base, self._arena, goal_m, here_m)
+        elif no_path:
+            self._approach.refuse(here_m)
+        return self._approach.goal(state, *known)
+
+
+class BaseApproach:
+    """Where to fly to, in order to land on a base.
+
+    Args:
+        base: whose place is known.
+        arena: the drone stays inside it.
+        goal_m: where it lands.
+        here_m: where it is now.
+
+    Attributes:
+        lands: it is on its last way, to the goal.
+        searches: the base is not seen where it should be, so it may be farther away.
+    """
+
+    def __init__(self, base: Base, arena: Arena, goal_m: Vec3, here_m: Vec3) -> None:
+        self.lands = self.searches = False
+        self._base, self._arena, self._goal_m = base, arena, goal_m
+        self._side_rad = atan2(here_m[1] - base.y_m, here_m[0] - base.x_m)
+        self._tried = 0
+        self._place = self._next_place()
+        self._reached_us: int | None = None
+
+    def goal(self, state: DroneState, sightings: int, std_m: float) -> Point:
+        """Where to fly to now.
+
+        Args:
+            state: of the drone, as estimated.
+            sightings: how often the base was seen in the last `SIGHTINGS_S`.
+            std_m: standard deviation of the drone's place in plan.
+        """
+        base, here_m = self._base, (state.x, state.y, state.z)
+        if not self.lands:
+            sure = sightings >= SIGHTINGS and std_m <= SURE_M
+            if sure and hypot(state.x - base.x_m, state.y - base.y_m) < NEAR_M:
+                self._land(here_m)
+            elif self._reached_us is None:
+                slow = hypot(*state.velocity_arena_m_s) < REACHED_M_S
+                if slow and dist(here_m, self._place.position_m) < REACHED_M:
+                    self._reached_us = state.time_us
+            elif state.time_us - self._reached_us > LOOK_S * 1e6:
+                self.refuse(here_m)
+            elif state.time_us - self._reached_us > SEARCH_S * 1e6 and not (sightings or self.searches):
+                self.searches, self._reached_us = True, state.time_us
+        return self._place
+
+    def refuse(self, here_m: Vec3) -> None:
+        """Look from another side, or land: the base is not seen from this one, or no path leads there."""
+        if self.lands:
+            return
+        self._reached_us, self.searches = None, False
+        if self._tried >= PLACES:
+            self._land(here_m)
+        else:
+            self._place = self._next_place()
+
+    def _land(self, here_m: Vec3) -> None:
+        self.lands = True
+        towards_rad = atan2(self._base.y_m - here_m[1], self._base.x_m - here_m[0])
+        self._place = Point(self._goal_m, towards_rad)
+
+    def _next_place(self) -> Point:
+        """The next place from which to look: inside the arena, and as near to the drone's side as can be."""
+        base, arena = self._base, self._arena
+        x_m, y_m = arena.length_x_m / 2 - SIDE_M, arena.width_y_m / 2 - SIDE_M
+        for turn in range(self._tried, 8):
+            aside = (turn + 1) // 2 * (1 if turn % 2 else -1)
+            angle = self._side_rad + ASIDE_RAD * aside
+            x, y = base.x_m + BEFORE_M * cos(angle), base.y_m + BEFORE_M * sin(angle)
+            self._tried = turn + 1
+            if abs(x) <= x_m and abs(y) <= y_m:
+                break
+        return Point((x, y, base.top_m + ABOVE_M), atan2(base.y_m - y, base.x_m - x))

@@ -1,0 +1,101 @@
+"""The way home of a drone that does not know its place."""
+
+from dataclasses import replace
+from math import atan2, cos, hypot, pi, remainder, sin
+
+import pytest
+
+from offboard.drone import DroneState
+from offboard.navigation.base_approach import BEFORE_M, LOOK_S, PLACES, SEARCH_S, SIGHTINGS, WayHome
+from scenarios.models import Arena, Base
+
+BASE = Base(x_m=1.0, y_m=-2.0)
+GOAL_M = (1.02, -1.97, 0.6)
+NOT_SEEN, SEEN = (0, 0.2), (SIGHTINGS, 0.01)
+
+
+def state_at(x: float, y: float, z: float, time_s: float = 10.0) -> DroneState:
+    return DroneState(round(time_s * 1e6), x, y, z, 0.0, (0.0, 0.0, 0.0))
+
+
+def away_m(point: tuple[float, float, float]) -> float:
+    return hypot(point[0] - BASE.x_m, point[1] - BASE.y_m)
+
+
+def test_a_drone_that_knows_its_place_flies_to_the_goal() -> None:
+    way = WayHome(BASE, Arena())
+    assert way.goal(GOAL_M, state_at(-3.0, 0.0, 1.0), None, no_path=False).position_m == GOAL_M
+    assert not way.looks
+
+
+def test_a_goal_beside_the_base_is_flown_to_at_once() -> None:
+    beside_m = (BASE.x_m + 0.4, BASE.y_m, 0.6)
+    way = WayHome(BASE, Arena())
+    assert way.goal(beside_m, state_at(-3.0, 0.0, 1.0), NOT_SEEN, no_path=False).position_m == beside_m
+
+
+def test_the_base_is_looked_at_from_before_it_and_then_landed_on() -> None:
+    way = WayHome(BASE, Arena())
+    here = state_at(-3.0, 0.0, 1.0)
+    place = way.goal(GOAL_M, here, SEEN, no_path=False)
+    assert away_m(place.position_m) == pytest.approx(BEFORE_M)
+    x, y, _ = place.position_m
+    assert place.yaw_rad == pytest.approx(atan2(BASE.y_m - y, BASE.x_m - x))
+    assert hypot(x + 3.0, y) < hypot(BASE.x_m + 3.0, BASE.y_m)  # on the drone's side
+    assert way.looks
+    there = state_at(*place.position_m)
+    assert way.goal(GOAL_M, there, NOT_SEEN, no_path=False) == place
+    landing = way.goal(GOAL_M, there, SEEN, no_path=False)
+    assert landing.position_m == GOAL_M
+    assert not way.looks
+
+
+def test_one_that_is_not_seen_is_looked_for_from_other_sides_before_it_lands() -> None:
+    way, time_s, sides = WayHome(BASE, Arena()), 10.0, []
+    here = state_at(-3.0, 0.0, 1.0)
+    place = way.goal(GOAL_M, here, NOT_SEEN, no_path=False)
+    while way.looks:
+        x, y, _ = place.position_m
+        sides.append(atan2(y - BASE.y_m, x - BASE.x_m))
+        assert away_m(place.position_m) == pytest.approx(BEFORE_M)
+        for _ in range(2):
+            there = replace(state_at(*place.position_m), time_us=round(time_s * 1e6))
+            place = way.goal(GOAL_M, there, NOT_SEEN, no_path=False)
+            time_s += LOOK_S + 0.1
+    assert place.position_m == GOAL_M
+    assert len(sides) == PLACES
+    turns = [abs(remainder(one - other, 2 * pi)) for k, one in enumerate(sides) for other in sides[:k]]
+    assert min(turns) > 0.5
+
+
+def test_places_are_inside_the_arena() -> None:
+    corner = Base(x_m=-4.2, y_m=-4.2)
+    way, time_s = WayHome(corner, Arena()), 10.0
+    goal_m = (-4.2, -4.2, 0.6)
+    place = way.goal(goal_m, state_at(-4.5, -4.5, 1.0), NOT_SEEN, no_path=False)
+    while way.looks:
+        assert max(map(abs, place.position_m[:2])) < 5.0
+        time_s += 0.1
+        place = way.goal(goal_m, state_at(-4.5, -4.5, 1.0, time_s), NOT_SEEN, no_path=True)
+    assert place.position_m == goal_m
+
+
+def test_a_new_way_looks_again() -> None:
+    way = WayHome(BASE, Arena())
+    near = state_at(BASE.x_m + cos(2.0), BASE.y_m + sin(2.0), 1.0)
+    way.goal(GOAL_M, near, SEEN, no_path=False)
+    assert not way.looks
+    way.begin()
+    way.goal(GOAL_M, near, NOT_SEEN, no_path=False)
+    assert way.looks
+
+
+def test_one_that_is_not_seen_is_first_looked_for_farther_around() -> None:
+    way = WayHome(BASE, Arena())
+    place = way.goal(GOAL_M, state_at(-3.0, 0.0, 1.0), NOT_SEEN, no_path=False)
+    for time_s, searches in ((10.0, False), (10.1 + SEARCH_S, True), (10.0 + LOOK_S + SEARCH_S, True)):
+        assert way.goal(GOAL_M, state_at(*place.position_m, time_s), NOT_SEEN, no_path=False) == place
+        assert way.searches == searches
+    elsewhere = state_at(*place.position_m, 10.2 + LOOK_S + SEARCH_S)
+    assert way.goal(GOAL_M, elsewhere, NOT_SEEN, no_path=False) != place
+    assert not way.searches

@@ -1,0 +1,1 @@
+"""The network that proposes gates: its data, its training."""

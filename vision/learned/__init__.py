@@ -1,0 +1,1 @@
+"""What a small network that was trained on painted images proposes."""
