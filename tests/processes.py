@@ -51,24 +51,35 @@ def ports_are_free(instance: int) -> bool:
 
 
 def free_instance(count: int = 1) -> int:
-    """The first of some instances whose ports nobody has; parallel workers begin at different ones.
+    """The first of some instances in a row whose ports nobody has.
 
-    For some seconds, until their ports are open, no other process of tests gets them.
+    For some seconds, until their ports are open, no other process of tests gets them. Who needs several keeps
+    each that becomes free until all are; otherwise those who need one would always be first.
     """
     _RESERVATIONS.mkdir(exist_ok=True)
-    end_s = time.monotonic() + 60.0
-    while time.monotonic() < end_s:
-        with (_RESERVATIONS / "lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            for offset in range(9):
-                first = (4 * worker_number() + offset) % 9 + 1
-                instances = range(first, first + count)
-                if instances[-1] <= 9 and all(map(_is_available, instances)):
-                    for instance in instances:
-                        (_RESERVATIONS / str(instance)).write_text(str(os.getpid()), encoding="ascii")
-                    return first
-        time.sleep(0.5)
-    raise RuntimeError("no instance of 1 to 9 has all its ports free")
+    end_s = time.monotonic() + 120.0
+    with (_RESERVATIONS / "several").open("w") as turn:
+        if count > 1:  # two that gather would wait for each other
+            fcntl.flock(turn, fcntl.LOCK_EX)
+        first: int | None = None
+        while time.monotonic() < end_s:
+            with (_RESERVATIONS / "lock").open("w") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX)
+                first = first if first is not None and count > 1 else _best_first(count)
+                available = [i for i in range(first, first + count) if _is_available(i)]
+                for instance in available:
+                    (_RESERVATIONS / str(instance)).write_text(str(os.getpid()), encoding="ascii")
+            if len(available) == count:
+                return first
+            time.sleep(0.5)
+    raise RuntimeError(f"no {count} instances of 1 to 9 in a row have all their ports free")
+
+
+def _best_first(count: int) -> int:
+    """The first of those instances of which most are available; each worker prefers one of 1 to 5."""
+    single = [worker_number() % 5 + 1, *range(1, 10)]
+    firsts = single if count == 1 else range(10 - count, 0, -1)
+    return max(firsts, key=lambda first: sum(map(_is_available, range(first, first + count))))
 
 
 def _is_available(instance: int) -> bool:

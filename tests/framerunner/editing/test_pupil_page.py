@@ -51,6 +51,17 @@ async def test_a_gate_that_is_hit_is_named_and_marked(browser, program):
     await expect(user.page.locator('.t-frame[data-colour="red"]')).to_have_count(
         2
     )  # from above and its height
+    # As fast as possible, the flight may have ended by itself before Stop is pressed.
+    await expect(user.page.locator(".e-controls").get_by_role("button", name="Stop")).to_be_disabled()
+    await expect(user.page.locator(".t-hit")).to_have_count(1)
+    assert not user.complaints
+    await user.page.context.close()
+
+
+async def test_a_flight_that_is_stopped_says_so(browser, program):
+    user = await pupil(browser, program, "careless.yaml", LESSON_4.name)
+    await user.page.locator(".e-controls select").select_option("1")
+    await user.press("Fly", user.page.locator(".e-controls"))
     await user.press("Stop", user.page.locator(".e-controls"))
     await expect(user.page.locator(LINE)).to_have_text("You stopped the flight.")
     assert not user.complaints
