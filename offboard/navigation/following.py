@@ -65,7 +65,7 @@ class PathFollower:
         self.error_m = 0.0
         self._limits = limits
         self._path: Path | None = None
-        self._clock = PathClock(self.estimate.loop.dead_halves * HALF_S)
+        self._clock = PathClock(self.estimate.loop.dead_s + HALF_S)
         self._last_s: float | None = None
         self._observed_s: float | None = None  # vehicle time of the state last taken in
         self._sent: VelocityFluCommand | None = None
@@ -246,20 +246,20 @@ class PathFollower:
         slower_x, slower_y = off.velocity_m_s
         ex = gain * x + share * VELOCITY_GAIN_PER_S * slower_x
         ey = gain * y + share * VELOCITY_GAIN_PER_S * slower_y
-        motions = [self._motion(path, time_s + beside_s) for beside_s in (-STEP_S, 0.0, STEP_S)]
+        times_s = [time_s + beside_s for beside_s in (-STEP_S, 0.0, STEP_S)]
+        motions = [self._motion(path, at_s) for at_s in times_s]
         off_rad = coming.yaw_rad - motions[1].yaw_rad
         before, then, after = (
             estimate.motion.tilts_for(
                 (motion.acceleration_m_s2[0] + ex, motion.acceleration_m_s2[1] + ey),
-                motion.yaw_rad + off_rad if turn_rad_s is None else yaw_ahead(time_s + beside_s),
+                motion.yaw_rad + off_rad if turn_rad_s is None else yaw_ahead(at_s),
                 (motion.velocity_m_s[0] - slower_x, motion.velocity_m_s[1] - slower_y),
                 motion.acceleration_m_s2[2],
             )
-            for motion, beside_s in zip(motions, (-STEP_S, 0.0, STEP_S), strict=True)
+            for motion, at_s in zip(motions, times_s, strict=True)
         )
-        rates = ((after[0] - before[0]) / (2.0 * STEP_S), (after[1] - before[1]) / (2.0 * STEP_S))
         turn = motions[1].yaw_rate_rad_s if turn_rad_s is None else turn_rad_s
-        return estimate.command_for(then, rates, turn, coming, yaw_ahead)
+        return estimate.command_for((before, then, after), turn, coming, yaw_ahead)
 
     def _climb(self, path: Path, climbs: Coming, offset_m: float) -> float:
         """The command up."""

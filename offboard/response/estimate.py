@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, exp, hypot, pi, remainder, sin
+from math import ceil, cos, exp, hypot, pi, remainder, sin
 
 from framerunner.geometry.vectors import turned
 from offboard.drone import DroneState, VelocityFluCommand
+from offboard.limits import clamped
 from offboard.response.level_motion import LevelMotion
 from offboard.response.rate_response import RateResponse
 from offboard.response.tilt_loop import (
@@ -24,9 +24,10 @@ from offboard.response.tilt_loop import (
 )
 
 TAKE_OFF_STEPS = 12  # after which the thrust is that of flight
-KNOWN_STEPS = 25
+TILT_S = 0.1  # in which a wrong tilt is closed: a vehicle lags where its path needs more than it can turn,
+MAX_CLOSING_RAD_S = 1.5  # by at most this rate
 _SETTLE_STEPS = 3  # in which a first lag of commands is overcome
-_SETTLE_HALVES = 2 * (_SETTLE_STEPS - 1)
+_SETTLE_S = STEP_S * (_SETTLE_STEPS - 1)
 _MAX_STEPS = 8  # after a longer gap everything but the estimate begins again
 _SAME_LAG_S = 0.1  # lags that differ less are the same for planning
 _REGULAR_S = 0.012  # by which a step may be longer or shorter, to learn from it
@@ -61,6 +62,7 @@ class LevelComing:
         moved_m: until then, arena axes.
         velocity_m_s: then, arena axes.
         yaw_rad: then.
+        tilts_rad: then.
         held_m_s: velocity that the vehicle's loop will use, level axes.
         integrals_m: of the vehicle's loop, without the next command.
         along_m2_s2: square of the speed along the thrust, with its sign.
@@ -70,6 +72,7 @@ class LevelComing:
     moved_m: Plan
     velocity_m_s: Plan
     yaw_rad: float
+    tilts_rad: Plan
     held_m_s: Plan
     integrals_m: Plan
     along_m2_s2: float
@@ -149,9 +152,9 @@ class ResponseEstimate:
     def _summarise(self) -> None:
         """Note what planning needs, if it has changed."""
         loop, now = self._tilt_loop.loop, self.response
-        late_s = loop.dead_halves * HALF_S + loop.lag_s
+        late_s = loop.dead_s + HALF_S + loop.lag_s
         level_lag_s = loop.lag_s + 1.0 / (GRAVITY_M_S2 * max(loop.velocity, loop.command))
-        known = self._tilt_loop.updates >= KNOWN_STEPS
+        known = self._tilt_loop.known
         same = abs(level_lag_s - now.level_lag_s) < _SAME_LAG_S and self.climb.lag_s == now.climb_lag_s
         if not same or late_s != now.late_s or known != now.known:
             self.response = Response(late_s, level_lag_s, self.climb.lag_s, known)
@@ -161,61 +164,69 @@ class ResponseEstimate:
         tilt_loop, motion, up_m_s2 = self._tilt_loop, self.motion, self._up_m_s2
         loop, turn_rad_s, trims = tilt_loop.loop, tilt_loop.turn_rad_s, tilt_loop.trims_rad
         integrals, tilts, velocity = tilt_loop.integrals_m, self._tilts, motion.velocity_m_s
-        velocities = _halves(tilt_loop.velocities_m_s or [turned(*velocity, -state.yaw)])
-        now = len(velocities) - 1 - loop.inner_halves
-        age_s = state.position_age_s
+        rates = tilt_loop.rates_rad_s
+        past = _Velocities(tilt_loop.velocities_m_s or [turned(*velocity, -state.yaw)])
+        age_s, acts_s = state.position_age_s, loop.dead_s + (_SETTLE_S if loop.lag_s else 0.0)
         x = 0.5 * age_s * (velocity[0] + state.velocity_arena_m_s[0])
         y = 0.5 * age_s * (velocity[1] + state.velocity_arena_m_s[1])
-        halves = loop.dead_halves + (_SETTLE_HALVES if loop.lag_s else 0)
-        yaw = yaw_ahead(0.0)
-        for half in range(-1, halves):
-            command = tilt_loop.coming_m_s(max((loop.dead_halves - half) // 2, 1), yaw)
-            held = velocities[max(now + half + 1, 0)]
-            before = integrals
-            if half < halves - 1:
-                integrals = (
-                    before[0] + HALF_S * (command[0] - held[0]),
-                    before[1] + HALF_S * (command[1] - held[1]),
-                )
-            if half < 0:  # the integrals are known by then
-                continue
+        count, yaw = ceil(acts_s / HALF_S), yaw_ahead(0.0)
+        step_s, begin_s, before = acts_s / count, 0.0, integrals
+        for part in range(count + 1):
+            if part == count:  # until the middle of the next command's time
+                step_s, before = HALF_S, integrals
+            middle_s, end_s = begin_s + 0.5 * step_s, begin_s + step_s
+            command = tilt_loop.acting_m_s(begin_s, end_s, yaw)
+            held = past.at(middle_s - loop.inner_s)
             demands = (
-                loop.demand(0, command[0], held, before[0], turn_rad_s) + trims[0],
-                loop.demand(1, command[1], held, before[1], turn_rad_s) + trims[1],
+                loop.demand(0, command[0], held, integrals[0], 0.5 * step_s, turn_rad_s) + trims[0],
+                loop.demand(1, command[1], held, integrals[1], 0.5 * step_s, turn_rad_s) + trims[1],
             )
-            ahead = loop.followed(tilts, demands, turn_rad_s)
+            integrals = (
+                integrals[0] + step_s * (command[0] - held[0]),
+                integrals[1] + step_s * (command[1] - held[1]),
+            )
+            ahead, rates = loop.followed(tilts, rates, demands, turn_rad_s, step_s)
             middle = (0.5 * (tilts[0] + ahead[0]), 0.5 * (tilts[1] + ahead[1]))
-            yaw_before, yaw = yaw, yaw_ahead((half + 1) * HALF_S)
+            yaw_before, yaw = yaw, yaw_ahead(end_s)
             ax, ay = motion.acceleration(middle, 0.5 * (yaw_before + yaw), velocity, up_m_s2)
-            x += HALF_S * (velocity[0] + 0.5 * HALF_S * ax)
-            y += HALF_S * (velocity[1] + 0.5 * HALF_S * ay)
-            velocity, tilts = (velocity[0] + HALF_S * ax, velocity[1] + HALF_S * ay), ahead
-            velocities.append(turned(*velocity, -yaw))
-        along_m2_s2 = _along(tilts, velocities[-1], state.velocity_arena_m_s[2])
-        return LevelComing(halves * HALF_S, (x, y), velocity, yaw, held, integrals, along_m2_s2)
+            x += step_s * (velocity[0] + 0.5 * step_s * ax)
+            y += step_s * (velocity[1] + 0.5 * step_s * ay)
+            velocity, tilts, begin_s = (velocity[0] + step_s * ax, velocity[1] + step_s * ay), ahead, end_s
+            past.add(end_s, turned(*velocity, -yaw))
+        along_m2_s2 = _along(tilts, past.last, state.velocity_arena_m_s[2])
+        held = past.at(begin_s - loop.inner_s)
+        return LevelComing(begin_s, (x, y), velocity, yaw, tilts, held, before, along_m2_s2)
 
     def command_for(
-        self, tilts_rad: Plan, rates_rad_s: Plan, turn_rad_s: float, coming: LevelComing, yaw_ahead: YawAhead
+        self, tilts_rad: tuple[Plan, Plan, Plan], turn_rad_s: float, coming: LevelComing, yaw_ahead: YawAhead
     ) -> Plan:
         """The command in plan, forward and to the left, that makes the vehicle tilt when it has its effect.
 
         Args:
-            tilts_rad: to have then.
-            rates_rad_s: by which they change then.
+            tilts_rad: to have a step before then, then, and a step later.
             turn_rad_s: of the heading then.
             coming: of `predict`.
             yaw_ahead: the same.
         """
         tilt_loop = self._tilt_loop
         loop, trims = tilt_loop.loop, tilt_loop.trims_rad
-        rates = body_rates(tilts_rad, rates_rad_s, turn_rad_s)
-        demands = [tilt + loop.lead(rate) for tilt, rate in zip(tilts_rad, rates, strict=True)]
+        before, then, after = tilts_rad
+        changes = ((after[0] - before[0]) / (2.0 * STEP_S), (after[1] - before[1]) / (2.0 * STEP_S))
+        rates = body_rates(then, changes, turn_rad_s)
+        demands = []
+        for axis, (rate, has) in enumerate(zip(rates, coming.tilts_rad, strict=True)):
+            rate += clamped((then[axis] - has) / TILT_S, MAX_CLOSING_RAD_S, MAX_CLOSING_RAD_S)
+            change = (before[axis] - 2.0 * then[axis] + after[axis]) / (STEP_S * STEP_S)
+            demands.append(has + loop.lead(rate, change))
         size = hypot(*demands)
         scale = MAX_TILT_RAD / size if size > MAX_TILT_RAD else 1.0
+        held_s = coming.time_s - loop.inner_s
+        turned_rad = yaw_ahead(held_s + HALF_S) - yaw_ahead(held_s - HALF_S)
+        turn_rad_s = remainder(turned_rad, 2 * pi) / STEP_S
         asked = []
         for axis in (0, 1):
             demand = scale * demands[axis] - trims[axis]
-            rest = loop.demand(axis, 0.0, coming.held_m_s, coming.integrals_m[axis], turn_rad_s)
+            rest = loop.demand(axis, 0.0, coming.held_m_s, coming.integrals_m[axis], HALF_S, turn_rad_s)
             asked.append((demand - rest) / (loop.command + HALF_S * loop.integral))
         x, y = asked
         if not loop.lag_s:
@@ -228,12 +239,35 @@ class ResponseEstimate:
         return (x, y) if loop.turning else turned(x, y, -yaw_ahead(0.0))
 
 
-def _halves(velocities: list[Plan]) -> list[Plan]:
-    """Those between velocities, too."""
-    halves = velocities[:1]
-    for (x0, y0), (x1, y1) in itertools.pairwise(velocities):
-        halves += [(0.5 * (x0 + x1), 0.5 * (y0 + y1)), (x1, y1)]
-    return halves
+class _Velocities:
+    """Velocities in level axes, of the past and to come, by their times from the last state on.
+
+    Args:
+        past_m_s: one a step; the last is that of the last state.
+    """
+
+    def __init__(self, past_m_s: list[Plan]) -> None:
+        first = 1 - len(past_m_s)
+        self._all = [((first + number) * STEP_S, *each) for number, each in enumerate(past_m_s)]
+
+    @property
+    def last(self) -> Plan:
+        """The one farthest ahead."""
+        return self._all[-1][1:]
+
+    def add(self, time_s: float, velocity_m_s: Plan) -> None:
+        """Add one that is farther ahead than all others."""
+        self._all.append((time_s, *velocity_m_s))
+
+    def at(self, time_s: float) -> Plan:
+        """The one at a time between them."""
+        later_s, x, y = self._all[-1]
+        for before_s, bx, by in reversed(self._all):
+            if before_s <= time_s:
+                share = (time_s - before_s) / (later_s - before_s) if later_s > before_s else 0.0
+                return bx + min(share, 1.0) * (x - bx), by + min(share, 1.0) * (y - by)
+            later_s, x, y = before_s, bx, by
+        return x, y
 
 
 def _along(tilts_rad: Plan, level_m_s: Plan, up_m_s: float) -> float:

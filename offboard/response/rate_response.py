@@ -25,6 +25,7 @@ _KEPT = max(DEAD_STEPS) + _WINDOW + 1
 _MEMORY = 1.0 - STEP_S / 40.0
 _MIN_ENERGY = 0.2  # sum of squared changes (m/s, rad/s) that is evidence
 _BETTER = 0.7  # share of the present pair's error that another one must reach
+_UNEXPLAINED = 0.08  # root mean square of the changes (m/s, rad/s) that other things than lateness make
 _DISTURBANCE_S = 0.2  # time constant of the estimate of what commands do not explain
 _WASHED_S = 0.4  # time constant with which a vehicle's integral takes over what a cause makes
 _CAUSE_PRIOR = 0.3  # standard deviation of the rate by a unit of the cause
@@ -60,7 +61,7 @@ class RateResponse:
         self._chosen = (0, 0)
         self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])
         self._errors = np.zeros((len(DEAD_STEPS), len(LAGS_S)))
-        self._energy = 0.0
+        self._energy = self._time_s = 0.0
         self._by_cause, self._by_cause_variance = 0.0, _CAUSE_PRIOR**2
         self.restart()
 
@@ -95,6 +96,7 @@ class RateResponse:
             errors = np.array([self._changes[-1 - dead] for dead in DEAD_STEPS]) - change
             self._errors = _MEMORY * self._errors + STEP_S * errors * errors
             self._energy = _MEMORY * self._energy + STEP_S * change * change
+            self._time_s = _MEMORY * self._time_s + STEP_S
             if chooses:
                 self._choose()
         self._slow_cause += (1.0 - exp(-STEP_S / _WASHED_S)) * (cause - self._slow_cause)
@@ -104,8 +106,8 @@ class RateResponse:
     def _choose(self) -> None:
         """Take a pair that explains what was measured clearly better than the present one."""
         dead, lag = divmod(int(self._errors.argmin()), len(LAGS_S))
-        least = float(self._errors[dead, lag])
-        if self._energy > _MIN_ENERGY and least < _BETTER * float(self._errors[self._chosen]):
+        least, present = float(self._errors[dead, lag]), float(self._errors[self._chosen])
+        if self._energy > _MIN_ENERGY and least < _BETTER * (present - _UNEXPLAINED**2 * self._time_s):
             self._chosen = (dead, lag)
             self.dead_s, self.lag_s = DEAD_STEPS[dead] * STEP_S, LAGS_S[lag]
 
