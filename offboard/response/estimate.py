@@ -167,8 +167,8 @@ class ResponseEstimate:
         rates = tilt_loop.rates_rad_s
         past = _Velocities(tilt_loop.velocities_m_s or [turned(*velocity, -state.yaw)])
         age_s, acts_s = state.position_age_s, loop.dead_s + (_SETTLE_S if loop.lag_s else 0.0)
-        x = 0.5 * age_s * (velocity[0] + state.velocity_arena_m_s[0])
-        y = 0.5 * age_s * (velocity[1] + state.velocity_arena_m_s[1])
+        vx, vy, up_m_s = state.velocity_arena_m_s
+        moved = (0.5 * age_s * (velocity[0] + vx), 0.5 * age_s * (velocity[1] + vy))
         count, yaw = ceil(acts_s / HALF_S), yaw_ahead(0.0)
         step_s, begin_s, before = acts_s / count, 0.0, integrals
         for part in range(count + 1):
@@ -177,25 +177,20 @@ class ResponseEstimate:
             middle_s, end_s = begin_s + 0.5 * step_s, begin_s + step_s
             command = tilt_loop.acting_m_s(begin_s, end_s, yaw)
             held = past.at(middle_s - loop.inner_s)
-            demands = (
-                loop.demand(0, command[0], held, integrals[0], 0.5 * step_s, turn_rad_s) + trims[0],
-                loop.demand(1, command[1], held, integrals[1], 0.5 * step_s, turn_rad_s) + trims[1],
-            )
-            integrals = (
-                integrals[0] + step_s * (command[0] - held[0]),
-                integrals[1] + step_s * (command[1] - held[1]),
-            )
+            off = (command[0] - held[0], command[1] - held[1])
+            middles = _sum(integrals, 0.5 * step_s, off)
+            demands = _sum(loop.demands(command, held, middles, turn_rad_s), 1.0, trims)
+            integrals = _sum(integrals, step_s, off)
             ahead, rates = loop.followed(tilts, rates, demands, turn_rad_s, step_s)
             middle = (0.5 * (tilts[0] + ahead[0]), 0.5 * (tilts[1] + ahead[1]))
             yaw_before, yaw = yaw, yaw_ahead(end_s)
-            ax, ay = motion.acceleration(middle, 0.5 * (yaw_before + yaw), velocity, up_m_s2)
-            x += step_s * (velocity[0] + 0.5 * step_s * ax)
-            y += step_s * (velocity[1] + 0.5 * step_s * ay)
-            velocity, tilts, begin_s = (velocity[0] + step_s * ax, velocity[1] + step_s * ay), ahead, end_s
+            acceleration = motion.acceleration(middle, 0.5 * (yaw_before + yaw), velocity, up_m_s2)
+            moved = _sum(moved, step_s, _sum(velocity, 0.5 * step_s, acceleration))
+            velocity, tilts, begin_s = _sum(velocity, step_s, acceleration), ahead, end_s
             past.add(end_s, turned(*velocity, -yaw))
-        along_m2_s2 = _along(tilts, past.last, state.velocity_arena_m_s[2])
         held = past.at(begin_s - loop.inner_s)
-        return LevelComing(begin_s, (x, y), velocity, yaw, tilts, held, before, along_m2_s2)
+        along_m2_s2 = _along(tilts, past.last, up_m_s)
+        return LevelComing(begin_s, moved, velocity, yaw, tilts, held, before, along_m2_s2)
 
     def command_for(
         self, tilts_rad: tuple[Plan, Plan, Plan], turn_rad_s: float, coming: LevelComing, yaw_ahead: YawAhead
@@ -215,20 +210,19 @@ class ResponseEstimate:
         rates = body_rates(then, changes, turn_rad_s)
         demands = []
         for axis, (rate, has) in enumerate(zip(rates, coming.tilts_rad, strict=True)):
-            rate += clamped((then[axis] - has) / TILT_S, MAX_CLOSING_RAD_S, MAX_CLOSING_RAD_S)
+            close = clamped((then[axis] - has) / TILT_S, MAX_CLOSING_RAD_S, MAX_CLOSING_RAD_S)
             change = (before[axis] - 2.0 * then[axis] + after[axis]) / (STEP_S * STEP_S)
-            demands.append(has + loop.lead(rate, change))
+            demands.append(has + loop.lead(rate + close, change))
         size = hypot(*demands)
         scale = MAX_TILT_RAD / size if size > MAX_TILT_RAD else 1.0
-        held_s = coming.time_s - loop.inner_s
+        held, held_s = coming.held_m_s, coming.time_s - loop.inner_s
         turned_rad = yaw_ahead(held_s + HALF_S) - yaw_ahead(held_s - HALF_S)
-        turn_rad_s = remainder(turned_rad, 2 * pi) / STEP_S
-        asked = []
-        for axis in (0, 1):
-            demand = scale * demands[axis] - trims[axis]
-            rest = loop.demand(axis, 0.0, coming.held_m_s, coming.integrals_m[axis], HALF_S, turn_rad_s)
-            asked.append((demand - rest) / (loop.command + HALF_S * loop.integral))
-        x, y = asked
+        integrals = _sum(coming.integrals_m, -HALF_S, held)
+        rests = loop.demands((0.0, 0.0), held, integrals, remainder(turned_rad, 2 * pi) / STEP_S)
+        x, y = (
+            (scale * demand - trim - rest) / (loop.command + HALF_S * loop.integral)
+            for demand, trim, rest in zip(demands, trims, rests, strict=True)
+        )
         if not loop.lag_s:
             return x, y
         if not loop.turning:
@@ -268,6 +262,11 @@ class _Velocities:
                 return bx + min(share, 1.0) * (x - bx), by + min(share, 1.0) * (y - by)
             later_s, x, y = before_s, bx, by
         return x, y
+
+
+def _sum(a: Plan, share: float, b: Plan) -> Plan:
+    """The first, and a share of the second."""
+    return a[0] + share * b[0], a[1] + share * b[1]
 
 
 def _along(tilts_rad: Plan, level_m_s: Plan, up_m_s: float) -> float:

@@ -5,13 +5,14 @@ tilt p (rad) along each level axis follows a demand that is linear in what is kn
 
     p + T w + D w |w| + J a = B r - K v + I (integral of r - v) + H v |v| / g + C (centripetal) + trim
 
-with the body's rate w about that axis and its change w', the command r after a dead time, maybe with a first lag before the
-loop, and the velocity v: a proportional part with set-point weighting and an integral part (Astrom &
-Hagglund, "Advanced PID Control", 2006, section 3.4), compensation of drag and of level axes that turn, and
-the lag and the drag of tilting. All are means over the step between two states: the tilt is the mean of both,
-the rate their difference, and commands hold in between. The coefficients are the states of a Kalman filter, one for each of many candidates of dead time and first
-lag; their likelihoods choose one (multiple-model estimation: Bar-Shalom, Li & Kirubarajan, "Estimation with
-Applications to Tracking and Navigation", 2001, section 11.6), and those that are far worse are dropped.
+with the body's rate w about that axis and its change a, the command r after a dead time, maybe with a first
+lag before the loop, and the velocity v: a proportional part with set-point weighting and an integral part
+(Astrom & Hagglund, "Advanced PID Control", 2006, section 3.4), compensation of drag and of level axes that
+turn, and the lags and the drag of tilting. Commands hold over a step, so all are means over one: a tilt is
+the mean of two states, and a rate their difference. The coefficients are the states of a Kalman filter, one
+for each of many candidates of dead time and first lag; their likelihoods choose one (multiple-model
+estimation: Bar-Shalom, Li & Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001,
+section 11.6), and those that are far worse are dropped.
 """
 
 from __future__ import annotations
@@ -105,24 +106,20 @@ class TiltLoop:
     lag_s: float
     turning: bool
 
-    def demand(
-        self,
-        axis: int,
-        command_m_s: float,
-        velocity_m_s: Plan,
-        integral_m: float,
-        since_s: float,
-        turn_rad_s: float,
-    ) -> float:
-        """The demand of an axis, 0 for forward (rad); the integral is that of a time ago."""
-        v = velocity_m_s[axis]
-        centripetal = (turn_rad_s if axis else -turn_rad_s) * velocity_m_s[1 - axis]
-        return (
-            self.command * command_m_s
-            - self.velocity * v
-            + self.integral * (integral_m + since_s * (command_m_s - v))
-            + (self.drag * v * abs(v) + self.turn * centripetal) / GRAVITY_M_S2
+    def demands(
+        self, command_m_s: Plan, velocity_m_s: Plan, integrals_m: Plan, turn_rad_s: float
+    ) -> tuple[float, float]:
+        """The demands forward and to the left, rad."""
+        forward, left = (
+            self.command * command - self.velocity * v + self.integral * integral + self.drag_tilt(v)
+            for command, v, integral in zip(command_m_s, velocity_m_s, integrals_m, strict=True)
         )
+        turn = self.turn * turn_rad_s / GRAVITY_M_S2
+        return forward - turn * velocity_m_s[1], left + turn * velocity_m_s[0]
+
+    def drag_tilt(self, velocity_m_s: float) -> float:
+        """The part of a demand that compensates drag, rad."""
+        return self.drag * velocity_m_s * abs(velocity_m_s) / GRAVITY_M_S2
 
     def followed(
         self, tilts_rad: Plan, rates_rad_s: Plan, demands_rad: Plan, turn_rad_s: float, step_s: float
@@ -167,7 +164,7 @@ def body_rates(tilts_rad: Plan, changes_rad_s: Plan, turn_rad_s: float) -> Plan:
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
+class _StepMeans:
     """What is known of the motion over a step, by means.
 
     Attributes:
@@ -259,7 +256,7 @@ class TiltLoopEstimate:
         self._velocities: deque[Plan] = deque(maxlen=_LONGEST_INNER // 4 + 3)
         self._turns: deque[float] = deque(maxlen=_LONGEST_INNER // 4 + 2)
         self._tilts: deque[Plan] = deque(maxlen=2)
-        self._steps: tuple[_Step, ...] = ()
+        self._steps: tuple[_StepMeans, ...] = ()
         self._rest_rad = [0.0, 0.0]
         self._integrals = np.zeros((len(self._all), 2))
         self._x[:, _COEFFICIENTS:] = 0.0
@@ -366,7 +363,7 @@ class TiltLoopEstimate:
         (f0, l0), (f1, l1) = self._tilts
         tilts = (0.5 * (f0 + f1), 0.5 * (l0 + l1))
         rates = body_rates(tilts, ((f1 - f0) / STEP_S, (l1 - l0) / STEP_S), turn_rad_s)
-        step = _Step(self._rows(rates, yaw_rad + 0.5 * turn_rad_s * STEP_S), tilts, rates)
+        step = _StepMeans(self._rows(rates, yaw_rad + 0.5 * turn_rad_s * STEP_S), tilts, rates)
         before, self._steps = self._steps, (*self._steps[-1:], step)
         if len(before) < 2:
             return
@@ -398,7 +395,7 @@ class TiltLoopEstimate:
         """Those of the body over the last step."""
         return self._steps[-1].rates_rad_s if self._steps else (0.0, 0.0)
 
-    def _is_limited(self, step: _Step) -> bool:
+    def _is_limited(self, step: _StepMeans) -> bool:
         """Whether a vehicle's limits may have acted: then its tilts show less of the loop."""
         loop, x = self.loop, self._x[self._chosen]
         asked, made = [], []
@@ -451,7 +448,7 @@ class TiltLoopEstimate:
         self._integrals += off
         return rows
 
-    def _learn(self, step: _Step) -> None:
+    def _learn(self, step: _StepMeans) -> None:
         """Update all filters, and the candidates' log likelihoods."""
         x, p = self._x, self._p
         p[:, range(_STATES), range(_STATES)] += _WANDER
