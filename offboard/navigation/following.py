@@ -251,10 +251,14 @@ class PathFollower:
         off_rad = coming.yaw_rad - motions[1].yaw_rad
         before, then, after = (
             estimate.motion.tilts_for(
-                (motion.acceleration_m_s2[0] + ex, motion.acceleration_m_s2[1] + ey),
+                (
+                    motion.acceleration_m_s2[0] + ex,
+                    motion.acceleration_m_s2[1] + ey,
+                    motion.acceleration_m_s2[2],
+                ),
                 motion.yaw_rad + off_rad if turn_rad_s is None else yaw_ahead(at_s),
                 (motion.velocity_m_s[0] - slower_x, motion.velocity_m_s[1] - slower_y),
-                motion.acceleration_m_s2[2],
+                coming.tilts_rad,
             )
             for motion, at_s in zip(motions, times_s, strict=True)
         )

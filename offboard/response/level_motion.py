@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from math import atan2, hypot, tan
+from math import atan2, cos, hypot, sin, tan
 
-from framerunner.geometry.vectors import turned
+from framerunner.geometry.vectors import Vec3, turned
 from offboard.drone import DroneState
 from offboard.response.tilt_loop import GRAVITY_M_S2, STEP_S, Plan
 
@@ -20,7 +20,7 @@ _LONGEST_S = 0.15  # between two velocities that are compared
 class LevelMotion:
     """What changes of velocity show beside tilts: drag and a disturbance; call `update` at ticks.
 
-    Estimated by a Kalman filter. Drag is quadratic along each level axis.
+    Estimated by a Kalman filter. Drag is quadratic along the body's axes forward and to the left.
 
     Attributes:
         velocity_m_s: at the time of the last state, arena axes.
@@ -38,6 +38,7 @@ class LevelMotion:
         self._measured: Plan = (0.0, 0.0)
         self._measured_s: float | None = None
         self._tilts: Plan = (0.0, 0.0)
+        self._up_m_s = 0.0
 
     @property
     def disturbance_m_s2(self) -> Plan:
@@ -47,14 +48,15 @@ class LevelMotion:
 
     def update(self, state: DroneState, tilts_rad: Plan, up_m_s2: float) -> None:
         """Take in a state; upwards the drone accelerates as given."""
-        x, y, _ = state.velocity_arena_m_s
+        x, y, self._up_m_s = state.velocity_arena_m_s
         measured_s, last_s = state.time_us * 1e-6 - state.position_age_s, self._measured_s
         if last_s is not None and 0.0 < (step_s := measured_s - last_s) < _LONGEST_S and not state.landed:
             before_x, before_y = self._measured
             tilts = (0.5 * (tilts_rad[0] + self._tilts[0]), 0.5 * (tilts_rad[1] + self._tilts[1]))
             by_x, by_y = _by_tilt(tilts, state.yaw, up_m_s2)
             rest = ((x - before_x) / step_s - by_x, (y - before_y) / step_s - by_y)
-            self._learn(rest, _squares((0.5 * (x + before_x), 0.5 * (y + before_y)), state.yaw), step_s)
+            middle = (0.5 * (x + before_x), 0.5 * (y + before_y))
+            self._learn(rest, _squares(middle, self._up_m_s, tilts, state.yaw), step_s)
         self._measured, self._measured_s, self._tilts = (x, y), measured_s, tilts_rad
         ax, ay = self.acceleration(tilts_rad, state.yaw, (x, y), up_m_s2)
         self.velocity_m_s = (x + state.position_age_s * ax, y + state.position_age_s * ay)
@@ -81,17 +83,24 @@ class LevelMotion:
     def acceleration(self, tilts_rad: Plan, yaw_rad: float, velocity_m_s: Plan, up_m_s2: float) -> Plan:
         """In plan, arena axes, m/s^2; upwards it is as given."""
         x, y = _by_tilt(tilts_rad, yaw_rad, up_m_s2)
-        (along_x, along_y), drag = _squares(velocity_m_s, yaw_rad), self.drag_per_m
+        (along_x, along_y), drag = _squares(velocity_m_s, self._up_m_s, tilts_rad, yaw_rad), self.drag_per_m
         dx, dy = self.disturbance_m_s2
         return x - drag * along_x + dx, y - drag * along_y + dy
 
-    def tilts_for(self, acceleration_m_s2: Plan, yaw_rad: float, velocity_m_s: Plan, up_m_s2: float) -> Plan:
-        """The tilts for an acceleration in plan, arena axes, whatever the disturbance; rad."""
-        (along_x, along_y), drag = _squares(velocity_m_s, yaw_rad), self.drag_per_m
+    def tilts_for(self, acceleration_m_s2: Vec3, yaw_rad: float, velocity_m_s: Plan, tilts_rad: Plan) -> Plan:
+        """The tilts for an acceleration, arena axes, whatever the disturbance; rad.
+
+        Args:
+            acceleration_m_s2: that the drone should have.
+            yaw_rad: its heading then.
+            velocity_m_s: in plan, then.
+            tilts_rad: about then, for the drag.
+        """
+        (along_x, along_y), drag = _squares(velocity_m_s, self._up_m_s, tilts_rad, yaw_rad), self.drag_per_m
         dx, dy = self.disturbance_m_s2
         x, y = acceleration_m_s2[0] + drag * along_x - dx, acceleration_m_s2[1] + drag * along_y - dy
         forward, left = turned(x, y, -yaw_rad)
-        over = GRAVITY_M_S2 + up_m_s2
+        over = GRAVITY_M_S2 + acceleration_m_s2[2]
         return atan2(forward, over), atan2(left, hypot(forward, over))
 
 
@@ -102,7 +111,15 @@ def _by_tilt(tilts_rad: Plan, yaw_rad: float, up_m_s2: float) -> Plan:
     return turned(forward, hypot(forward, over) * tan(tilts_rad[1]), yaw_rad)
 
 
-def _squares(velocity_m_s: Plan, yaw_rad: float) -> Plan:
-    """Of the velocities along both level axes, each with its sign; arena axes."""
-    forward, left = turned(*velocity_m_s, -yaw_rad)
-    return turned(forward * abs(forward), left * abs(left), yaw_rad)
+def _squares(velocity_m_s: Plan, up_m_s: float, tilts_rad: Plan, yaw_rad: float) -> Plan:
+    """What drag by mass decelerates with in plan, m^2/s^2, arena axes.
+
+    It is the square of the velocity along a body axis, with its sign, by the cosine of its tilt: the thrust,
+    which holds the height, makes up for the part upwards.
+    """
+    forward, left = (
+        along * abs(along) / cos(tilt)
+        for tilt, v in zip(tilts_rad, turned(*velocity_m_s, -yaw_rad), strict=True)
+        for along in (v * cos(tilt) - up_m_s * sin(tilt),)
+    )
+    return turned(forward, left, yaw_rad)

@@ -85,10 +85,13 @@ class Vehicle:
             self.tilts[axis] += (demand - self.tilts[axis]) * step_s / self.tilt_lag_s
         forward = GRAVITY_M_S2 * tan(self.tilts[0])
         left = hypot(forward, GRAVITY_M_S2) * tan(self.tilts[1])
-        ax, ay = turned(forward, left, self.yaw)
-        share = self.drag_per_m * hypot(*self.plan)
-        self.plan[0] += (ax - share * self.plan[0] + self.wind_m_s2) * step_s
-        self.plan[1] += (ay - share * self.plan[1]) * step_s
+        drags = []
+        for tilt, v in zip(self.tilts, level, strict=True):  # along the body's axes
+            along = v * cos(tilt) - self.up * sin(tilt)
+            drags.append(self.drag_per_m * along * abs(along) / cos(tilt))
+        ax, ay = turned(forward - drags[0], left - drags[1], self.yaw)
+        self.plan[0] += (ax + self.wind_m_s2) * step_s
+        self.plan[1] += ay * step_s
         self.up += (given.up_m_s - self.up) * step_s / 0.1
         self.turn += (given.yaw_rate_rad_s - self.turn) * step_s / 0.05
         self.yaw = remainder(self.yaw + self.turn * step_s, 2 * pi)
