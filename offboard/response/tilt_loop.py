@@ -246,6 +246,7 @@ class TiltLoopEstimate:
         self._dead = _between([each.dead for each in self._all])
         self._inner = _between([each.inner for each in self._all])
         self._source = np.array([each.source for each in self._all])
+        self._has_lags = any(each.lag is not None for each in self._all)
         self._in_arena = np.array([not each.turning for each in self._all])
         self._loop: TiltLoop | None = None
 
@@ -413,6 +414,9 @@ class TiltLoopEstimate:
     def _filter(self, sent: VelocityFluCommand, yaw_rad: float) -> None:
         """Let the first lags follow a command given at a heading; their means over the step act."""
         level = (sent.forward_m_s, sent.left_m_s)
+        if not self._has_lags:
+            self._commands.append(np.array((level,)))
+            return
         given = np.empty((2, 1, 2))
         given[0], given[1] = level, turned(*level, yaw_rad)
         before = self._lagged
@@ -421,12 +425,13 @@ class TiltLoopEstimate:
         self._commands.append(np.concatenate((given[0], 0.5 * (before + self._lagged))))
 
     def _rows(self, rates: Plan, yaw_rad: float) -> Array:
-        """What the coefficients are multiplied with over the last step, for both axes: (2, candidates, 9)."""
+        """What the coefficients are multiplied with over the last step: (2, candidates, states)."""
         commands = np.array(self._commands)
         last, share = self._dead
         acting = (1.0 - share) * commands[last, self._source] + share * commands[last - 1, self._source]
-        c, s = cos(yaw_rad), sin(yaw_rad)
-        acting = np.where(self._in_arena[:, None], acting @ np.array(((c, -s), (s, c))), acting)
+        if self._has_lags:
+            c, s = cos(yaw_rad), sin(yaw_rad)
+            acting = np.where(self._in_arena[:, None], acting @ np.array(((c, -s), (s, c))), acting)
         past = np.array(self._velocities)
         means = 0.5 * (past[1:] + past[:-1])
         last, share = self._inner
@@ -435,16 +440,13 @@ class TiltLoopEstimate:
         turn = ((1.0 - share[:, 0]) * turns[last] + share[:, 0] * turns[last - 1]) / GRAVITY_M_S2
         off = STEP_S * (acting - velocity)
         rows = np.zeros((2, len(self._all), _STATES))
-        for axis, sign in ((0, -turn), (1, turn)):
-            row, v = rows[axis], velocity[:, axis]
-            row[:, 0] = -rates[axis]
-            row[:, 1] = -rates[axis] * abs(rates[axis])
-            row[:, 3] = acting[:, axis]
-            row[:, 4] = -v
-            row[:, 5] = self._integrals[:, axis] + 0.5 * off[:, axis]
-            row[:, 6] = v * np.abs(v) / GRAVITY_M_S2
-            row[:, 7] = sign * velocity[:, 1 - axis]
-            row[:, _COEFFICIENTS + axis] = 1.0
+        rows[:, :, :2] = [[(-rate, -rate * abs(rate))] for rate in rates]
+        rows[:, :, 3] = acting.T
+        rows[:, :, 4] = -velocity.T
+        rows[:, :, 5] = (self._integrals + 0.5 * off).T
+        rows[:, :, 6] = (velocity * np.abs(velocity)).T / GRAVITY_M_S2
+        rows[0, :, 7], rows[1, :, 7] = -turn * velocity[:, 1], turn * velocity[:, 0]
+        rows[0, :, _COEFFICIENTS] = rows[1, :, _COEFFICIENTS + 1] = 1.0
         self._integrals += off
         return rows
 
@@ -484,5 +486,7 @@ class TiltLoopEstimate:
             self._all = [self._all[number] for number in numbers]
             self._x, self._p, self._scores = self._x[stay], self._p[stay], self._scores[stay]
             self._integrals = self._integrals[stay]
+            if all(each.lag is None for each in self._all):
+                self._commands = deque((each[:1] for each in self._commands), maxlen=_LONGEST)
             self._steps = tuple(replace(step, rows=step.rows[:, stay]) for step in self._steps)
         self._index()
