@@ -453,8 +453,9 @@ class TiltLoopEstimate:
     def _learn(self, step: _StepMeans) -> None:
         """Update all filters, and the candidates' log likelihoods."""
         x, p = self._x, self._p
-        p[:, range(_STATES), range(_STATES)] += _WANDER
-        p[:, _TRIMS, _TRIMS] += np.square(_WANDER_OF_REST * np.array(self._rest_rad))
+        diagonal = p.reshape(len(p), -1)[:, :: _STATES + 1]
+        diagonal += _WANDER
+        diagonal[:, _COEFFICIENTS:] += np.square(_WANDER_OF_REST * np.array(self._rest_rad))
         self._scores *= _MEMORY
         for axis, (row, tilt, rate) in enumerate(
             zip(step.rows, step.tilts_rad, step.rates_rad_s, strict=True)
